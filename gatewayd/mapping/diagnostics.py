@@ -1,0 +1,142 @@
+"""What a check finds: rules with stable ids, and findings with their exact place in the mapping file."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import Enum
+
+__all__ = [
+    "FAMILIES",
+    "Diagnostic",
+    "Position",
+    "Related",
+    "Rule",
+    "Severity",
+    "all_rules",
+    "declare",
+    "rule_of",
+]
+
+FAMILIES = {
+    1: "syntax and numbers",
+    2: "Modbus",
+    3: "robot",
+    4: "CANopen",
+    5: "ownership",
+    6: "fail-safe",
+    7: "lossy conversion",
+}
+"""Rule families by the hundreds digit of their ids."""
+
+_ID = re.compile(r"GW[1-7]\d\d")
+_SLUG = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+
+
+class Severity(Enum):
+    """Whether a finding keeps the gateway from starting."""
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Position:
+    """A place in a mapping file; `line` and `column` are counted from 1."""
+
+    file: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        """`file:line:column`, as editors and terminals follow it."""
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Related:
+    """A second place that a finding is about, for example "first used here"."""
+
+    position: Position
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One thing that can be wrong with a mapping. Id and slug are stable: people search by them."""
+
+    id: str
+    """`GW` and three digits; the first digit is the family."""
+    slug: str
+    severity: Severity
+    summary: str
+    """One line without a full stop."""
+    why: str
+    """What goes wrong in the plant and how to put it right: Markdown, shown by `gatewayd check --explain`."""
+
+    @property
+    def family(self) -> str:
+        """Name of the family the id belongs to."""
+        return FAMILIES[int(self.id[2])]
+
+    def at(
+        self,
+        position: Position,
+        message: str,
+        *,
+        hint: str | None = None,
+        related: tuple[Related, ...] = (),
+    ) -> Diagnostic:
+        """Make a finding of this rule."""
+        return Diagnostic(self, message, position, related, hint)
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One finding: the rule, what was found (with the value), where, and the remedy."""
+
+    rule: Rule
+    message: str
+    position: Position
+    related: tuple[Related, ...] = ()
+    hint: str | None = None
+
+    @property
+    def severity(self) -> Severity:
+        """Severity of the rule."""
+        return self.rule.severity
+
+
+_rules: dict[str, Rule] = {}
+
+
+def declare(
+    rule_id: str,
+    slug: str,
+    summary: str,
+    why: str,
+    severity: Severity = Severity.ERROR,
+) -> Rule:
+    """Enter a rule into the catalogue. Raises ValueError for a malformed or a used id or slug."""
+    if not _ID.fullmatch(rule_id) or not _SLUG.fullmatch(slug):
+        raise ValueError(f"malformed rule {rule_id} {slug}")
+    for known in _rules.values():
+        if rule_id == known.id or slug == known.slug:
+            raise ValueError(f"rule {rule_id} {slug} clashes with {known.id} {known.slug}")
+    rule = Rule(rule_id, slug, severity, summary, why.strip())
+    _rules[rule_id] = rule
+    return rule
+
+
+def all_rules() -> tuple[Rule, ...]:
+    """Return the rules declared so far by id; import `gatewayd.mapping.rules.run` to have them all."""
+    return tuple(_rules[key] for key in sorted(_rules))
+
+
+def rule_of(name: str) -> Rule | None:
+    """Return the declared rule with this id or slug (any case), or None."""
+    wanted = name.strip().casefold()
+    for rule in _rules.values():
+        if wanted in (rule.id.casefold(), rule.slug):
+            return rule
+    return None
