@@ -1,0 +1,79 @@
+# What people type. Needs python3 >= 3.11 with venv, make and a package index; everything lands in $(VENV).
+# Paths are relative on purpose: the tree may lie in a directory with a space in its name.
+
+PYTHON ?= python3
+VENV   ?= .venv
+JOBS   ?= auto
+UV     ?= uv
+
+PY      = $(VENV)/bin/python
+INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --no-input
+COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url
+SOURCES = gatewayd tests
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test install dev lint format types check docs-check ci bench lock install-hook clean
+
+help: ## Show this list
+	@echo "make TARGET, where TARGET is one of:"
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1|\2/p' Makefile | awk -F'|' '{ printf "%-14s %s\n", $$1, $$2 }'
+
+demo: $(VENV)/.runtime ## Set up, then run simulator, gateway and a small PLC program together (ARGS="--seconds 20")
+	$(PY) -m gatewayd demo $(ARGS)
+
+test: $(VENV)/.dev ## Set up, then pass the tests (ARGS="tests/core -x")
+	$(PY) -m pytest -n $(JOBS) $(ARGS)
+
+install: $(VENV)/.runtime ## Set up what the daemon needs
+dev: $(VENV)/.dev ## Set up what developers need
+
+lint: $(VENV)/.dev ## Lint and check the format
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+
+format: $(VENV)/.dev ## Format the code and mend what ruff can mend
+	$(PY) -m ruff check --fix-only .
+	$(PY) -m ruff format .
+
+types: $(VENV)/.dev ## Check the types (mypy, strict)
+	$(PY) -m mypy
+
+check: $(VENV)/.runtime ## Check the shipped mappings
+	$(PY) -m gatewayd check --strict mappings/*.yaml
+
+docs-check: $(VENV)/.dev ## Check that generated pages and links of docs/ are right
+	$(PY) -m pytest tests/test_docs.py $(ARGS)
+
+ci: ## Everything the project asks of a commit, in a clean clone of HEAD
+	.ci/run
+
+bench: $(VENV)/.dev ## Measure, and print the figures as ratios (ARGS="modbus latency")
+	$(PY) -m tests.benchmarks $(ARGS)
+
+lock: ## Pin and hash the newest packages that pyproject.toml allows (needs uv)
+	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --group build -o requirements.lock
+	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
+
+install-hook: ## Let git run lint and types before each commit
+	printf '#!/bin/sh\nexec make --no-print-directory lint types\n' > "$$(git rev-parse --git-path hooks)/pre-commit"
+	chmod +x "$$(git rev-parse --git-path hooks)/pre-commit"
+
+clean: ## Remove everything that make made
+	rm -rf -- "$(VENV)" build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+# The stamps make a second run start at once. requirements-dev.lock contains requirements.lock, version by version.
+
+$(VENV)/.made:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "gatewayd needs Python 3.11 or newer; this is " + sys.version.split()[0] + ". Name another one: make PYTHON=python3.12 ...")'
+	$(PYTHON) -m venv "$(VENV)"
+	@touch "$@"
+
+$(VENV)/.runtime: $(VENV)/.made requirements.lock pyproject.toml
+	$(INSTALL) --require-hashes -r requirements.lock
+	$(INSTALL) --no-deps --no-build-isolation --editable .
+	@touch "$@"
+
+$(VENV)/.dev: $(VENV)/.made requirements-dev.lock pyproject.toml
+	$(INSTALL) --require-hashes -r requirements-dev.lock
+	$(INSTALL) --no-deps --no-build-isolation --editable .
+	@touch "$(VENV)/.runtime" "$@"

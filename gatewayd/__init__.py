@@ -1,0 +1,7 @@
+"""gatewayd: the fieldbus registers of a Universal Robots controller on Modbus TCP, from one mapping file."""
+
+from __future__ import annotations
+
+__all__ = ["__version__"]
+
+__version__ = "0.1.0"

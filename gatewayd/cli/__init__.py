@@ -1,0 +1,82 @@
+"""The command line: one module per command, imported when the command is used, so that `--help` answers at once."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import click
+from click.shell_completion import CompletionItem
+
+from gatewayd import __version__
+
+__all__ = ["COMMANDS", "command"]
+
+COMMANDS = {
+    "demo": "Simulator, gateway and a small PLC program in one terminal.",
+    "check": "Find every mistake of mapping files, without a robot.",
+    "show": "Print the register table of a mapping file.",
+    "simulate": "Be a robot controller to connect to.",
+    "run": "Serve the cells of mapping files: the daemon.",
+    "completion": "Print the completion script of a shell.",
+}
+"""Name -> what the list of commands says. Module `gatewayd.cli.NAME` has the click command as `command`."""
+
+HELP = """\
+gatewayd puts the fieldbus registers of a Universal Robots controller, and any other RTDE field, on Modbus TCP, in both
+directions, with one owner per variable. What lies where is declared in one mapping file per robot cell.
+
+\b
+Five commands from nothing to a running cell:
+  gatewayd demo                           see it work, no robot needed
+  gatewayd check mappings/*.yaml          try the shipped mappings
+  gatewayd show mappings/small-cell.yaml  the register list for the PLC
+  gatewayd simulate                       a controller on your desk
+  gatewayd run my-cell.yaml               the daemon itself
+"""
+
+EPILOG = """\
+\b
+Exit codes:
+  0    all is well
+  1    the command found something, or what it had to do failed
+  2    wrong usage, or a file that cannot be read
+  70   a defect of gatewayd itself; GATEWAYD_TRACEBACK=1 shows where
+  130  interrupted by Ctrl-C
+"""
+
+
+class LazyGroup(click.Group):
+    """A group that knows its commands' names and one-line helps, and imports a command only to use it."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The names in the order in which people meet them."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of that name; None when there is none."""
+        if cmd_name not in COMMANDS:
+            return None
+        found = import_module(f"gatewayd.cli.{cmd_name}").command
+        assert isinstance(found, click.Command)  # noqa: S101 - a defect of ours, not of any input
+        return found
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Command names and options that begin with `incomplete`."""
+        names = [CompletionItem(name, help=text) for name, text in COMMANDS.items() if name.startswith(incomplete)]
+        return names + click.Command.shell_complete(self, ctx, incomplete)
+
+
+@click.group(
+    cls=LazyGroup,
+    help=HELP,
+    epilog=EPILOG,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+@click.version_option(__version__, "-V", "--version", prog_name="gatewayd", message="%(prog)s %(version)s")
+def command() -> None:
+    """The root of all commands; does nothing itself."""
