@@ -1,0 +1,155 @@
+"""What a cell consists of, as declared by its mapping: variables, locks, writers.
+
+Everything here is immutable and holds no state. Indices (`Variable.lock`, `Lock.members`, `Lock.owners`)
+are positions in the tuples of `CellDefinition`; people see them counted from 1 (`number`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+__all__ = [
+    "CellDefinition",
+    "Direction",
+    "Fallback",
+    "FallbackKind",
+    "Limits",
+    "Lock",
+    "Value",
+    "ValueKind",
+    "Variable",
+    "Writer",
+]
+
+Value = bool | int | float
+"""A value in the robot's own unit: bool for a bit, int for integers, float for doubles."""
+
+
+class Direction(Enum):
+    """Which way a variable flows, seen from the robot as RTDE names it."""
+
+    INPUT = "input"
+    """fieldbus -> robot; written by its owner."""
+    OUTPUT = "output"
+    """robot -> fieldbus; nobody but the robot writes it."""
+
+
+class ValueKind(IntEnum):
+    """The Python type of a variable's values."""
+
+    BOOL = 0
+    INT = 1
+    FLOAT = 2
+
+    @property
+    def zero(self) -> Value:
+        """What `clear` means for this kind."""
+        return _ZEROS[self]
+
+
+_ZEROS: tuple[Value, ...] = (False, 0, 0.0)
+
+
+class FallbackKind(Enum):
+    """What is seen when a value's source or owner is lost."""
+
+    CLEAR = "clear"
+    HOLD = "hold"
+    VALUE = "value"
+    EXCEPTION = "exception"
+    """Outputs only: reading answers Modbus exception 0B, a TPDO stops."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fallback:
+    """A fail-safe policy; `value` is meant for `FallbackKind.VALUE` alone."""
+
+    kind: FallbackKind = FallbackKind.CLEAR
+    value: Value | None = None
+
+    def apply(self, present: Value, kind: ValueKind) -> Value:
+        """The value that replaces `present` for a variable of `kind`."""
+        if self.kind is FallbackKind.VALUE and self.value is not None:
+            return self.value
+        return kind.zero if self.kind is FallbackKind.CLEAR else present
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Closed range in the robot's unit; outside it a write is refused, or clamped where the mapping says so."""
+
+    low: float
+    high: float
+    clamp: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One named thing of the mapping: a bit, a register, a field, or an element of a vector."""
+
+    number: int
+    """Position in the cell counted from 1; what the status block and the tables show."""
+    name: str
+    direction: Direction
+    kind: ValueKind
+    field: str
+    """RTDE field that carries it, for example `input_bit_registers0_to_31`."""
+    bit: int | None = None
+    """Bit of the field, for fields that are words of bits."""
+    element: int | None = None
+    """Element of the field, for vectors."""
+    low: float | None = None
+    """Least value the robot's type can hold; None for bits and reals."""
+    high: float | None = None
+    """Greatest value the robot's type can hold; None for bits and reals."""
+    limits: Limits | None = None
+    on_stale: Fallback = Fallback()
+    """What the fieldbus sees when the robot stops telling (outputs)."""
+    on_release: Fallback = Fallback()
+    """What the robot is given when the owner is lost (inputs)."""
+    lock: int | None = None
+    """Index of the lock that guards it (inputs; None for outputs)."""
+    deadband: float = 0.0
+    """Least change of a real that makes an event-driven PDO send."""
+    unit: str = ""
+    comment: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Lock:
+    """What is owned: one input variable, or a group whose variables are only ever owned together."""
+
+    name: str
+    members: tuple[int, ...]
+    owners: tuple[int, ...]
+    """Writers that may own it; with `takeover` the first has the highest priority."""
+    takeover: bool = False
+    """A writer named earlier takes the lock from one named later."""
+    lease: float | None = None
+    """Seconds for which the owner holds it without renewing; None: until release, disconnect or time-out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """A party that may write inputs. How a link recognises it is the link's plan."""
+
+    name: str
+    timeout: float | None = None
+    """Seconds without any request after which the writer counts as lost; None: the connection alone decides."""
+
+
+@dataclass(frozen=True, slots=True)
+class CellDefinition:
+    """All that the core needs to know of one robot cell."""
+
+    name: str
+    fingerprint: int
+    """32 bits that change with every change of meaning of the mapping."""
+    variables: tuple[Variable, ...]
+    locks: tuple[Lock, ...]
+    writers: tuple[Writer, ...]
+    stale_after: float
+    """Seconds without a fresh package after which outputs are stale."""
+    clear_on_connect: bool = False
+    """After adopting the controller's inputs, give ownerless inputs their release fallback at once."""

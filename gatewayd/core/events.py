@@ -1,0 +1,82 @@
+"""What happened, kept in a ring and told to whoever listens."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+from gatewayd.core.definition import Value
+from gatewayd.core.refusal import Reason
+
+__all__ = ["CAPACITY", "Event", "EventKind", "EventRing"]
+
+CAPACITY = 1000
+"""Events kept; older ones are forgotten."""
+
+
+class EventKind(Enum):
+    """The value is the text shown in logs."""
+
+    ROBOT_CONNECTED = "robot connected"
+    ROBOT_LOST = "robot lost"
+    INPUTS_ADOPTED = "inputs adopted"
+    STALE = "robot values stale"
+    FRESH = "robot values fresh"
+    UNAVAILABLE = "register unavailable"
+    AVAILABLE = "register available"
+    READ_BACK_DIFFERS = "read-back differs"
+    WRITER_CONNECTED = "writer connected"
+    WRITER_LOST = "writer lost"
+    ACQUIRED = "lock acquired"
+    TAKEN_OVER = "lock taken over"
+    RELEASED = "lock released"
+    FALLBACK = "fallback applied"
+    REFUSED = "write refused"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One happening. Indices are those of the cell's definition; fields that do not apply are None."""
+
+    time: float
+    """Monotonic seconds."""
+    kind: EventKind
+    variable: int | None = None
+    lock: int | None = None
+    writer: int | None = None
+    """Who did it, or whom it befell."""
+    other: int | None = None
+    """The former owner of a lock taken over, or the holder in a refusal."""
+    reason: Reason | None = None
+    old: Value | None = None
+    new: Value | None = None
+    repeats: int = 0
+    """Refusals like this one that were counted but not told since the last."""
+    detail: str = ""
+
+
+class EventRing:
+    """The last `CAPACITY` events, oldest first when iterated."""
+
+    __slots__ = ("_events", "count", "listeners")
+
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        self._events: deque[Event] = deque(maxlen=capacity)
+        self.count = 0
+        """Events since the start, the forgotten ones included."""
+        self.listeners: list[Callable[[Event], None]] = []
+
+    def append(self, event: Event) -> None:
+        """Keep the event and tell the listeners."""
+        self._events.append(event)
+        self.count += 1
+        for listener in self.listeners:
+            listener(event)
+
+    def __iter__(self) -> Iterator[Event]:
+        return iter(self._events)
+
+    def __len__(self) -> int:
+        return len(self._events)

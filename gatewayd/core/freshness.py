@@ -1,0 +1,96 @@
+"""Whether the robot still tells: a state machine over packages, silence and a timestamp that stands still."""
+
+from __future__ import annotations
+
+import math
+from enum import Enum, IntEnum
+
+__all__ = ["Freshness", "Happening", "Source"]
+
+
+class Source(IntEnum):
+    """State of the robot as a source of values. The numbers stand in the status block: never renumber."""
+
+    LOST = 0
+    """No connection."""
+    WAITING = 1
+    """Connected, no package yet."""
+    FRESH = 2
+    SILENT = 3
+    """Connected, but no package came for longer than `stale_after`."""
+    FROZEN = 4
+    """Packages come, but the controller's timestamp stands still."""
+
+
+class Happening(Enum):
+    """What moves the state."""
+
+    CONNECTED = "connected"
+    PROGRESS = "package with a new timestamp"
+    NO_PACKAGE = "no package for too long"
+    NO_PROGRESS = "timestamp unchanged for too long"
+    LOST = "connection lost"
+
+
+TRANSITIONS: dict[tuple[Source, Happening], Source] = {
+    (Source.LOST, Happening.CONNECTED): Source.WAITING,
+    (Source.WAITING, Happening.PROGRESS): Source.FRESH,
+    (Source.WAITING, Happening.LOST): Source.LOST,
+    (Source.FRESH, Happening.NO_PACKAGE): Source.SILENT,
+    (Source.FRESH, Happening.NO_PROGRESS): Source.FROZEN,
+    (Source.FRESH, Happening.LOST): Source.LOST,
+    (Source.SILENT, Happening.PROGRESS): Source.FRESH,
+    (Source.SILENT, Happening.NO_PROGRESS): Source.FROZEN,
+    (Source.SILENT, Happening.LOST): Source.LOST,
+    (Source.FROZEN, Happening.PROGRESS): Source.FRESH,
+    (Source.FROZEN, Happening.NO_PACKAGE): Source.SILENT,
+    (Source.FROZEN, Happening.LOST): Source.LOST,
+}
+"""A pair that is not listed leaves the state as it is."""
+
+
+class Freshness:
+    """Follows one source. `stale_after` is in seconds; times are of the monotonic clock."""
+
+    __slots__ = ("last_package", "last_progress", "stale_after", "state", "timestamp")
+
+    def __init__(self, stale_after: float) -> None:
+        self.stale_after = stale_after
+        self.state = Source.LOST
+        self.timestamp: float | None = None
+        """The controller's own time in the last package."""
+        self.last_package = -math.inf
+        self.last_progress = -math.inf
+
+    def connected(self) -> None:
+        """A session with the controller has begun."""
+        self.timestamp = None
+        self._move(Happening.CONNECTED)
+
+    def lost(self) -> None:
+        """The session has ended."""
+        self._move(Happening.LOST)
+
+    def package(self, timestamp: float | None, now: float) -> bool:
+        """A package came. Returns whether it tells anything new: its timestamp differs from the last one's.
+
+        A controller whose recipe has no timestamp (None) is believed.
+        """
+        self.last_package = now
+        if timestamp is not None and timestamp == self.timestamp:
+            return False
+        self.timestamp = timestamp
+        self.last_progress = now
+        if self.state is not Source.FRESH:
+            self._move(Happening.PROGRESS)
+        return True
+
+    def tick(self, now: float) -> None:
+        """Notice silence and a frozen timestamp."""
+        if self.state in (Source.LOST, Source.WAITING) or now - self.last_progress <= self.stale_after:
+            return
+        silent = now - self.last_package > self.stale_after
+        self._move(Happening.NO_PACKAGE if silent else Happening.NO_PROGRESS)
+
+    def _move(self, happening: Happening) -> None:
+        self.state = TRANSITIONS.get((self.state, happening), self.state)

@@ -1,0 +1,30 @@
+"""Counters and measurements of one cell, filled in by the core and by the links, shown by the status block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["Health"]
+
+
+@dataclass(slots=True)
+class Health:
+    """All counts are since the start of the gateway."""
+
+    started: float = 0.0
+    """Monotonic time of the first tick."""
+    heartbeat: int = 0
+    """Counts up every `gatewayd.core.cell.HEARTBEAT_PERIOD` while the core turns."""
+    packages: int = 0
+    skipped: int = 0
+    """Packages the controller left out, seen from its timestamps."""
+    late: int = 0
+    frequency: float = 0.0
+    """Packages per second, measured."""
+    sessions: int = 0
+    """Sessions with the controller; the first one is no reconnect."""
+    read_back_mismatches: int = 0
+    watchdog_fed: bool = False
+    writes_accepted: int = 0
+    writes_refused: int = 0
+    modbus_connections: int = 0

@@ -1,0 +1,131 @@
+"""Who owns what: one table of locks, one state machine.
+
+A lock is free or has exactly one owner. What a writer's act does follows from how the writer stands to the lock,
+by the table `MOVES`; time and disconnects release, nothing else does. A request over several locks first decides
+on all of them (`decide` changes nothing) and is then carried out whole (`apply`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import Enum, IntEnum
+
+from gatewayd.core.definition import Lock
+
+__all__ = ["MOVES", "Act", "LockTable", "Move", "Standing"]
+
+
+class Standing(Enum):
+    """How a writer stands to a lock at this moment."""
+
+    STRANGER = "not among its owners"
+    FREE = "free, and may be taken"
+    OWNER = "owns it"
+    HIGHER = "ranks above the present owner"
+    LOWER = "ranks below the present owner, or the lock knows no takeover"
+
+
+class Act(Enum):
+    """What a writer does."""
+
+    WRITE = "write"
+    REQUEST = "request"
+    RELEASE = "release"
+
+
+class Move(IntEnum):
+    """What becomes of the lock."""
+
+    ACQUIRE = 0
+    RENEW = 1
+    TAKE_OVER = 2
+    RELEASE = 3
+    NOTHING = 4
+    REFUSE_HELD = 5
+    REFUSE_NEVER = 6
+
+
+MOVES: dict[tuple[Standing, Act], Move] = {
+    (Standing.STRANGER, Act.WRITE): Move.REFUSE_NEVER,
+    (Standing.STRANGER, Act.REQUEST): Move.REFUSE_NEVER,
+    (Standing.STRANGER, Act.RELEASE): Move.REFUSE_NEVER,
+    (Standing.FREE, Act.WRITE): Move.ACQUIRE,
+    (Standing.FREE, Act.REQUEST): Move.ACQUIRE,
+    (Standing.FREE, Act.RELEASE): Move.NOTHING,
+    (Standing.OWNER, Act.WRITE): Move.RENEW,
+    (Standing.OWNER, Act.REQUEST): Move.RENEW,
+    (Standing.OWNER, Act.RELEASE): Move.RELEASE,
+    (Standing.HIGHER, Act.WRITE): Move.TAKE_OVER,
+    (Standing.HIGHER, Act.REQUEST): Move.TAKE_OVER,
+    (Standing.HIGHER, Act.RELEASE): Move.REFUSE_HELD,
+    (Standing.LOWER, Act.WRITE): Move.REFUSE_HELD,
+    (Standing.LOWER, Act.REQUEST): Move.REFUSE_HELD,
+    (Standing.LOWER, Act.RELEASE): Move.REFUSE_HELD,
+}
+
+
+class LockTable:
+    """The owners of a cell's locks. Locks and writers are indices; times are monotonic seconds."""
+
+    __slots__ = ("_next_expiry", "_ranks", "expires", "locks", "owners")
+
+    def __init__(self, locks: Sequence[Lock]) -> None:
+        self.locks = tuple(locks)
+        self.owners: list[int | None] = [None] * len(locks)
+        self.expires: list[float] = [math.inf] * len(locks)
+        """When the lease ends; infinity without a lease or owner."""
+        self._ranks = [{writer: rank for rank, writer in enumerate(lock.owners)} for lock in locks]
+        self._next_expiry = math.inf
+
+    def standing(self, lock: int, writer: int) -> Standing:
+        """How `writer` stands to `lock` now."""
+        ranks = self._ranks[lock]
+        rank = ranks.get(writer)
+        if rank is None:
+            return Standing.STRANGER
+        owner = self.owners[lock]
+        if owner is None:
+            return Standing.FREE
+        if owner == writer:
+            return Standing.OWNER
+        return Standing.HIGHER if self.locks[lock].takeover and rank < ranks[owner] else Standing.LOWER
+
+    def decide(self, lock: int, writer: int, act: Act) -> Move:
+        """What `act` would do; changes nothing."""
+        return MOVES[self.standing(lock, writer), act]
+
+    def apply(self, lock: int, writer: int, move: Move, now: float) -> None:
+        """Carry out a move that `decide` returned; refusals and NOTHING change nothing."""
+        if move is Move.RELEASE:
+            self.free(lock)
+        elif move <= Move.TAKE_OVER:
+            self.owners[lock] = writer
+            lease = self.locks[lock].lease
+            if lease is not None:
+                self.expires[lock] = now + lease
+                self._next_expiry = min(self._next_expiry, now + lease)
+
+    def free(self, lock: int) -> int | None:
+        """Release unconditionally; returns the former owner."""
+        owner, self.owners[lock] = self.owners[lock], None
+        self.expires[lock] = math.inf
+        return owner
+
+    def expired(self, now: float) -> list[int]:
+        """The owned locks whose lease has ended. Cheap while nothing can have expired."""
+        if now < self._next_expiry:
+            return []
+        ended = [lock for lock, expiry in enumerate(self.expires) if expiry <= now]
+        self._next_expiry = min((expiry for expiry in self.expires if expiry > now), default=math.inf)
+        return ended
+
+    def held_by(self, writer: int) -> list[int]:
+        """The locks that `writer` owns."""
+        return [lock for lock, owner in enumerate(self.owners) if owner == writer]
+
+    def remaining(self, lock: int, now: float) -> float:
+        """Seconds of lease left; 0 if free, infinity if owned without a lease."""
+        if self.owners[lock] is None:
+            return 0.0
+        return max(0.0, self.expires[lock] - now)

@@ -1,0 +1,70 @@
+"""Why a request was refused. Links translate a reason into their protocol's own code; none is ever silent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+__all__ = ["Reason", "Refusal"]
+
+
+class Reason(IntEnum):
+    """The numbers stand in the status block: never renumber, only append."""
+
+    NO_SUCH_ADDRESS = 1
+    """Nothing is mapped there."""
+    NOT_WRITABLE = 2
+    """This writer may never write it."""
+    HELD = 3
+    """Another writer owns it now."""
+    OUT_OF_LIMITS = 4
+    """The value is outside the declared limits or the robot's type."""
+    PARTIAL_VALUE = 5
+    """The request covers a part of a value."""
+    ROBOT_LOST = 6
+    """The robot is not connected, or its inputs were not yet adopted."""
+    CLAIMED_ELSEWHERE = 7
+    """The controller gave the register to another client, or does not have it."""
+
+    @property
+    def text(self) -> str:
+        """The reason in words, for logs and tables."""
+        return _TEXTS[self]
+
+    @property
+    def of_the_robot(self) -> bool:
+        """Whether the robot is the cause, not the writer: such a refusal still counts as a sign of life."""
+        return self in (Reason.ROBOT_LOST, Reason.CLAIMED_ELSEWHERE)
+
+
+_TEXTS = {
+    Reason.NO_SUCH_ADDRESS: "no variable at this address",
+    Reason.NOT_WRITABLE: "never writable by this writer",
+    Reason.HELD: "held by another owner",
+    Reason.OUT_OF_LIMITS: "value out of limits",
+    Reason.PARTIAL_VALUE: "only a part of a value was written",
+    Reason.ROBOT_LOST: "robot not connected",
+    Reason.CLAIMED_ELSEWHERE: "register claimed elsewhere",
+}
+
+PRECEDENCE = {
+    Reason.NO_SUCH_ADDRESS: 0,
+    Reason.NOT_WRITABLE: 1,
+    Reason.PARTIAL_VALUE: 2,
+    Reason.OUT_OF_LIMITS: 3,
+    Reason.ROBOT_LOST: 4,
+    Reason.CLAIMED_ELSEWHERE: 5,
+    Reason.HELD: 6,
+}
+"""Which reason is told when several apply: what can never work first, what may pass soon last."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A request that was refused whole."""
+
+    reason: Reason
+    variable: int | None = None
+    """Index of the first variable that stood in the way."""
+    holder: int | None = None
+    """Index of the writer that owns it, for `Reason.HELD`."""

@@ -1,0 +1,257 @@
+"""The status block: what a PLC reads to know whether to believe the rest, and writes to take and release locks.
+
+The block lies at fixed addresses, never derived from the map. All numbers are unsigned and big-endian; what takes
+two words has the high word first. Variables and writers are counted from 1, 0 means none. Times saturate at the
+greatest number of their width, which also stands for "never" (ages) and "no end" (leases).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from gatewayd.core.cell import Cell
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
+from gatewayd.core.refusal import Reason, Refusal
+
+__all__ = [
+    "BASE",
+    "FIELDS",
+    "LAYOUT_VERSION",
+    "LENGTH",
+    "MAX_VARIABLES",
+    "MAX_WRITERS",
+    "RELEASE",
+    "RELEASE_ALL",
+    "REQUEST",
+    "TABLES",
+    "StatusBlock",
+    "StatusField",
+    "StatusTable",
+]
+
+LAYOUT_VERSION = 1
+BASE = 60000
+"""Protocol address of the first word, in holding and in input registers."""
+MAX_VARIABLES = 1024
+MAX_WRITERS = 32
+REQUEST = 40
+"""Offset of the word into which a writer puts the number of a variable whose lock it wants."""
+RELEASE = 41
+"""Offset of the word into which a writer puts the number of a variable whose lock it gives back."""
+RELEASE_ALL = 0xFFFF
+"""Written to `RELEASE`: give back every lock I own."""
+
+_U16 = 0xFFFF
+_U32 = 0xFFFF_FFFF
+
+
+@dataclass(frozen=True, slots=True)
+class StatusField:
+    """One number of the header, `offset` words after `BASE`, `words` long."""
+
+    offset: int
+    words: int
+    name: str
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True)
+class StatusTable:
+    """A table with one entry for each variable or writer, `offset` words after `BASE`."""
+
+    offset: int
+    words: int
+    name: str
+    meaning: str
+
+
+FIELDS = (
+    StatusField(0, 1, "layout", "version of this layout, 1"),
+    StatusField(
+        1,
+        1,
+        "flags",
+        "bit 0 robot values fresh, 1 robot connected and writable, 2 every variable good, 3 some lock is owned, "
+        "4 something was refused since the start, 5 read-back differed since the start, 6 robot watchdog is fed",
+    ),
+    StatusField(2, 2, "fingerprint", "32 bits that change with the meaning of the mapping"),
+    StatusField(4, 1, "heartbeat", "counts up every 100 ms while the gateway lives, wraps"),
+    StatusField(5, 1, "variables", "number of variables"),
+    StatusField(6, 1, "writers", "number of declared writers"),
+    StatusField(7, 1, "robot_state", "0 lost, 1 waiting, 2 fresh, 3 silent, 4 frozen"),
+    StatusField(8, 2, "uptime", "seconds since the gateway started"),
+    StatusField(10, 2, "robot_age", "milliseconds since the last package that told anything new"),
+    StatusField(12, 1, "frequency", "packages per second, measured, in 0.1 Hz"),
+    StatusField(13, 1, "sessions", "sessions with the controller since the start, wraps"),
+    StatusField(14, 2, "packages", "packages received"),
+    StatusField(16, 2, "skipped", "packages that the controller left out"),
+    StatusField(18, 2, "late", "packages that came late"),
+    StatusField(20, 2, "accepted", "write requests applied"),
+    StatusField(22, 2, "refused", "requests refused"),
+    StatusField(24, 2, "mismatches", "inputs whose read-back differed from what was written"),
+    StatusField(26, 1, "modbus_connections", "open Modbus connections to this unit's listener"),
+    StatusField(30, 1, "refusal_reason", "last refusal: " + ", ".join(f"{r.value} {r.text}" for r in Reason)),
+    StatusField(31, 1, "refusal_variable", "number of the variable in the last refusal"),
+    StatusField(32, 1, "refusal_writer", "number of the writer that was refused; 0 if it is not declared"),
+    StatusField(33, 1, "refusal_holder", "number of the writer that held it"),
+    StatusField(34, 2, "refusal_age", "milliseconds since the last refusal"),
+    StatusField(REQUEST, 1, "request", "write a variable's number to take its lock; reads 0"),
+    StatusField(
+        RELEASE, 1, "release", "write a variable's number to give its lock back, 65535 for all; reads 0"
+    ),
+)
+HEADER_WORDS = 64
+TABLES = (
+    StatusTable(
+        64, 64, "good", "one bit for each variable, 1 = good; variable n is bit (n-1)%16 of word (n-1)/16"
+    ),
+    StatusTable(128, 64, "writers_alive", "one word for each writer: 1 = connected and heard in time"),
+    StatusTable(192, MAX_VARIABLES, "owner", "one word for each variable: number of the writer that owns it"),
+    StatusTable(
+        1216, MAX_VARIABLES, "lease", "one word for each variable: milliseconds of its owner's lease left"
+    ),
+    StatusTable(2240, MAX_VARIABLES, "age", "one word for each variable: age of its value in milliseconds"),
+    StatusTable(
+        3264, MAX_VARIABLES, "quality", "one word for each variable: 0 good, 1 stale, 2 unavailable, 3 never"
+    ),
+)
+LENGTH = 4288
+"""Words of the whole block."""
+
+_HEADER = struct.Struct(">HHIHHHHIIHHIIIIIIH6xHHHHI")
+
+
+class StatusBlock:
+    """The status block of one cell."""
+
+    def __init__(self, cell: Cell) -> None:
+        self._cell = cell
+        self._tables = (
+            (TABLES[0], self._good),
+            (TABLES[1], self._writers_alive),
+            (TABLES[2], self._owner),
+            (TABLES[3], self._lease),
+            (TABLES[4], self._age),
+            (TABLES[5], self._quality),
+        )
+
+    def read(self, first: int, count: int, now: float) -> bytes:
+        """`count` words from offset `first` (0 = address `BASE`), big-endian, all of one moment.
+
+        The caller has checked that the range lies within `LENGTH`.
+        """
+        block = bytearray(2 * LENGTH)
+        end = first + count
+        if first < HEADER_WORDS:
+            header = self._header(now)
+            block[: len(header)] = header
+        for table, words in self._tables:
+            if first < table.offset + table.words and end > table.offset:
+                encoded = b"".join(word.to_bytes(2, "big") for word in words(now))
+                block[2 * table.offset : 2 * table.offset + len(encoded)] = encoded
+        return bytes(block[2 * first : 2 * end])
+
+    def write(self, writer: int | None, first: int, words: Sequence[int], now: float) -> Refusal | None:
+        """A writer takes or gives back a lock; any other word of the block is never writable.
+
+        A request that fills both words is refused, because it could succeed by half.
+        """
+        cell = self._cell
+        if writer is None or first < REQUEST or first + len(words) > RELEASE + 1:
+            return self._refuse(writer, Reason.NOT_WRITABLE, now)
+        wanted = [(offset, number) for offset, number in enumerate(words, first) if number]
+        if not wanted:
+            return None
+        offset, number = wanted[0]
+        if offset == RELEASE and number == RELEASE_ALL:
+            cell.release_all(writer, now)
+            return None
+        if len(wanted) > 1 or number > len(cell.definition.variables):
+            return self._refuse(writer, Reason.OUT_OF_LIMITS, now)
+        act = cell.request if offset == REQUEST else cell.release
+        return act(writer, number - 1, now)
+
+    def _refuse(self, writer: int | None, reason: Reason, now: float) -> Refusal:
+        refusal = Refusal(reason)
+        self._cell.refuse(writer, refusal, now)
+        return refusal
+
+    def _header(self, now: float) -> bytes:
+        cell, health = self._cell, self._cell.health
+        last = cell.last_refusal
+        refusal = last.refusal if last is not None else None
+        return _HEADER.pack(
+            LAYOUT_VERSION,
+            self._flags(),
+            cell.definition.fingerprint,
+            health.heartbeat & _U16,
+            len(cell.definition.variables),
+            len(cell.definition.writers),
+            cell.freshness.state,
+            int(max(0.0, now - health.started)) & _U32,
+            _milliseconds(now - cell.freshness.last_progress, _U32),
+            min(_U16, round(health.frequency * 10)),
+            health.sessions & _U16,
+            health.packages & _U32,
+            health.skipped & _U32,
+            health.late & _U32,
+            health.writes_accepted & _U32,
+            health.writes_refused & _U32,
+            health.read_back_mismatches & _U32,
+            min(_U16, health.modbus_connections),
+            refusal.reason if refusal is not None else 0,
+            _number(refusal.variable) if refusal is not None else 0,
+            _number(last.writer) if last is not None else 0,
+            _number(refusal.holder) if refusal is not None else 0,
+            _milliseconds(now - last.time, _U32) if last is not None else _U32,
+        )
+
+    def _flags(self) -> int:
+        cell, health = self._cell, self._cell.health
+        flags = (
+            cell.freshness.state is Source.FRESH,
+            cell.accepts_writes,
+            all(quality is Quality.GOOD for quality in cell.image.quality),
+            any(owner is not None for owner in cell.ownership.owners),
+            health.writes_refused > 0,
+            health.read_back_mismatches > 0,
+            health.watchdog_fed,
+        )
+        return sum(1 << bit for bit, flag in enumerate(flags) if flag)
+
+    def _good(self, _now: float) -> Iterable[int]:
+        quality = self._cell.image.quality
+        for start in range(0, len(quality), 16):
+            word = quality[start : start + 16]
+            yield sum(1 << bit for bit, one in enumerate(word) if one is Quality.GOOD)
+
+    def _writers_alive(self, _now: float) -> Iterable[int]:
+        return map(int, self._cell.writers.alive)
+
+    def _owner(self, _now: float) -> Iterable[int]:
+        owners = self._cell.ownership.owners
+        for variable in self._cell.definition.variables:
+            yield _number(owners[variable.lock]) if variable.lock is not None else 0
+
+    def _lease(self, now: float) -> Iterable[int]:
+        remaining = self._cell.ownership.remaining
+        for variable in self._cell.definition.variables:
+            yield _milliseconds(remaining(variable.lock, now), _U16) if variable.lock is not None else 0
+
+    def _age(self, now: float) -> Iterable[int]:
+        image = self._cell.image
+        return (_milliseconds(image.age(index, now), _U16) for index in range(len(image.values)))
+
+    def _quality(self, _now: float) -> Iterable[int]:
+        return map(int, self._cell.image.quality)
+
+
+def _milliseconds(seconds: float, greatest: int) -> int:
+    return int(min(max(0.0, seconds * 1000), greatest))
+
+
+def _number(index: int | None) -> int:
+    return 0 if index is None else index + 1

@@ -1,0 +1,1 @@
+"""From the text of a mapping file to diagnostics and one immutable compiled plan."""
