@@ -43,7 +43,7 @@ class Outcome:
 
 
 def as_text(outcome: Outcome, *, colour: bool = False) -> str:
-    """One line `file:line:col: severity GWnnn slug: message` per finding, details indented; then a summary."""
+    """One line `file:line:col: severity GWnnn slug: message` per finding, details indented; a summary line."""
     lines: list[str] = []
     for finding in outcome.findings:
         lines.extend(_finding_lines(finding, colour=colour))
