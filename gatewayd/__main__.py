@@ -17,8 +17,8 @@ INTERNAL_ERROR = 70
 """Exit code of a defect of gatewayd itself (EX_SOFTWARE of sysexits.h)."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells count it: 128 + SIGINT."""
-READER_GONE = 141
-"""Exit code when the reader of a pipe went away, as shells count it: 128 + SIGPIPE."""
+READER_GONE = 1
+"""Exit code when the reader of a pipe went away; click's own, wherever in the output that is noticed."""
 
 
 def main() -> None:

@@ -24,6 +24,6 @@ def command(ctx: click.Context, shell: str) -> None:
     To try it in the present shell: eval "$(gatewayd completion bash)". The script's last line says how to keep it.
     """
     script = get_completion_class(shell)
-    assert script is not None  # noqa: S101 - INSTRUCTIONS names only shells that click knows
+    assert script is not None
     click.echo(script(ctx.find_root().command, {}, "gatewayd", "_GATEWAYD_COMPLETE").source().strip())
     click.echo(f"# To keep it, once:  {INSTRUCTIONS[shell]}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -54,9 +55,11 @@ def test_help_imports_no_library_but_click() -> None:
         "try: main()\n"
         "except SystemExit: pass\n"
         "heavy = {'pydantic', 'pymodbus', 'rich', 'ruamel', 'asyncio'} & set(sys.modules)\n"
-        "sys.exit(' '.join(sorted(heavy)))"
+        "sys.exit(' '.join(sorted(heavy)) or 0)"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=30)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=30
+    )
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -89,8 +92,9 @@ def test_every_listed_command_can_be_imported_and_has_help(name: str) -> None:
 def test_every_command_module_is_listed() -> None:
     """A module of gatewayd/cli with a `command` is in COMMANDS."""
     folder = Path(gatewayd.__file__).parent / "cli"
-    modules = {path.stem for path in folder.glob("*.py") if "\ncommand = " in (text := path.read_text()) or "\ndef command(" in text}
-    assert modules - {"__init__"} == set(COMMANDS)
+    commands = re.compile(r"^(command = |def command\()", re.MULTILINE)
+    found = {path.stem for path in folder.glob("*.py") if commands.search(path.read_text())}
+    assert found - {"__init__"} == set(COMMANDS)
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
@@ -123,24 +127,37 @@ main()
 """
 
 
+DEFECT = "gatewayd: internal error: {} (<string>:9); please report with the log\n"
+
+
 @pytest.mark.parametrize(
     "what, code, message",
     [
-        ("1 / 0", 70, "gatewayd: internal error: ZeroDivisionError: division by zero (<string>:9); please report with the log\n"),
-        ("raise ValueError('two\\nlines')", 70, "gatewayd: internal error: ValueError: two lines (<string>:9); please report with the log\n"),
+        ("1 / 0", 70, DEFECT.format("ZeroDivisionError: division by zero")),
+        ("raise ValueError('two\\nlines')", 70, DEFECT.format("ValueError: two lines")),
         ("raise KeyboardInterrupt", 130, "\n"),
         ("raise click.ClickException('no')", 1, "Error: no\n"),
-        ("raise click.UsageError('no')", 2, "Usage: gatewayd broken [OPTIONS]\nTry 'gatewayd broken --help' for help.\n\nError: no\n"),
-        ("raise BrokenPipeError", 141, ""),
+        (
+            "raise click.UsageError('no')",
+            2,
+            "Usage: gatewayd broken [OPTIONS]\nTry 'gatewayd broken --help' for help.\n\nError: no\n",
+        ),
+        ("raise BrokenPipeError", 1, ""),
         ("click.get_current_context().exit(1)", 1, ""),
         ("sys.exit(3)", 3, ""),
         ("return 1", 1, ""),
         ("return None", 0, ""),
     ],
 )
-def test_whatever_a_command_does_ends_in_one_message_and_an_exit_code(what: str, code: int, message: str) -> None:
+def test_whatever_a_command_does_ends_in_one_message_and_an_exit_code(
+    what: str, code: int, message: str
+) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", BROKEN.format(what=what)], capture_output=True, text=True, check=False, timeout=30
+        [sys.executable, "-c", BROKEN.format(what=what)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=30,
     )
     assert (done.returncode, done.stderr) == (code, message)
 
@@ -160,13 +177,16 @@ def test_internal_error_shows_its_traceback_on_request() -> None:
 def test_a_reader_that_goes_away_is_no_error() -> None:
     """`gatewayd --help | true` says nothing on stderr, whether or not the output was written in time."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "gatewayd", "--help"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-m", "gatewayd", "--help"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     assert process.stdout is not None
     process.stdout.close()
     assert process.stderr is not None
     errors = process.stderr.read()
-    assert process.wait(30) in (0, 141)
+    assert process.wait(30) in (0, 1)
     assert errors == ""
 
 
