@@ -1,0 +1,195 @@
+"""RTDE packages to messages and back, for both sides, without any IO (guide, section "Header").
+
+A package is `uint16 size, uint8 type, payload`, size including these three bytes, everything big-endian. A connection
+speaks protocol version 1 until the controller has accepted another one.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from typing import TYPE_CHECKING, Generic, NoReturn, TypeVar
+
+from gatewayd.rtde import payloads
+from gatewayd.rtde.messages import (
+    ControllerMessage,
+    DataPackage,
+    ExecutableMessage,
+    PackageType,
+    ProtocolVersionReply,
+    RequestProtocolVersion,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+__all__ = ["MAX_PACKAGE", "ClientProtocol", "ControllerProtocol", "ProtocolError"]
+
+MAX_PACKAGE = 0xFFFF
+"""Largest package, header included: what its size field can say."""
+
+_HEADER = struct.Struct(">HB")
+_DATA_HEADER = struct.Struct(">HBB")
+_DATA = int(PackageType.DATA_PACKAGE)
+_SHOWN = 16
+_MOST_REQUESTS = 16
+
+
+class ProtocolError(Exception):
+    """Bytes that are not RTDE: what was wrong, and where."""
+
+    def __init__(self, reason: str, offset: int, data: bytes = b"", *, within: str = "stream") -> None:
+        shown = data[:_SHOWN].hex(" ") + (" ..." if len(data) > _SHOWN else "")
+        super().__init__(f"{reason}, at byte {offset} of the {within}" + (f": {shown}" if shown else ""))
+        self.reason = reason
+        """What was wrong, without the place."""
+        self.offset = offset
+        """First byte of the offending package in the stream received; of the offending value in a payload."""
+        self.data = data
+        """The offending bytes, as far as they had arrived."""
+
+
+_Received = TypeVar("_Received", ControllerMessage, ExecutableMessage)
+
+
+class _Receiver(Generic[_Received]):
+    """Cuts a stream into packages and decodes them by the table of the version spoken."""
+
+    version: int
+    """Protocol version spoken: 1 until another one is accepted."""
+
+    def __init__(self, decoders: Mapping[int, Callable[[bytes], _Received]], *, data_id: bool) -> None:
+        self.version = 1
+        self._decoders: Mapping[int, Callable[[bytes], _Received]] = decoders
+        self._data_id = data_id
+        self._rest = bytearray()
+        self._needed = _HEADER.size
+        self._consumed = 0
+        self._error: ProtocolError | None = None
+        self._requested: deque[int] = deque(maxlen=_MOST_REQUESTS)
+
+    @property
+    def buffered(self) -> int:
+        """Bytes kept for an unfinished package: always less than MAX_PACKAGE once an iterator is exhausted."""
+        return len(self._rest)
+
+    def receive(self, data: bytes) -> Iterator[_Received]:
+        """The messages that `data` completes, in order.
+
+        Exhaust the iterator before the next call. A message is decoded when it is asked for, so that an answer sent
+        while iterating (an accepted protocol version) already governs the next one. Raises ProtocolError at the first
+        package that is none; from then on every call raises it again and takes nothing in.
+        """
+        if self._error is not None:
+            raise self._error
+        rest = self._rest
+        if rest:
+            rest += data
+            if len(rest) < self._needed:
+                return iter(())
+            data = bytes(rest)
+            rest.clear()
+        return self._messages(data)
+
+    def _messages(self, data: bytes) -> Iterator[_Received]:
+        position = 0
+        end = len(data)
+        self._needed = _HEADER.size
+        try:
+            while end - position >= _HEADER.size:
+                size, kind = _HEADER.unpack_from(data, position)
+                decoder = self._decoders.get(kind)
+                if decoder is None or size < _HEADER.size:
+                    self._reject_header(size, kind, data, position)
+                if end - position < size:
+                    self._needed = size
+                    break
+                start = position
+                position += size
+                if kind == _DATA and self._data_id and size > _HEADER.size:
+                    yield DataPackage(data[start + 3], data[start + 4 : position])
+                    continue
+                try:
+                    message = decoder(data[start + _HEADER.size : position])
+                except payloads.MalformedPayloadError as error:
+                    self._reject(f"{PackageType(kind).name} with {error}", start, data[start:position])
+                self._observe(message)
+                yield message
+        finally:
+            if self._error is None:
+                self._consumed += position
+                self._rest += data[position:]
+
+    def _observe(self, message: _Received) -> None:
+        """Take note of a message of the version negotiation before it is handed out."""
+
+    def _reject_header(self, size: int, kind: int, data: bytes, position: int) -> NoReturn:
+        if size < _HEADER.size:
+            reason = f"package size {size} is less than its own header of {_HEADER.size} bytes"
+        else:
+            reason = f"unknown package type {kind}"
+        self._reject(reason, position, data[position : position + max(size, _HEADER.size)])
+
+    def _reject(self, reason: str, position: int, package: bytes) -> NoReturn:
+        self._error = ProtocolError(reason, self._consumed + position, package)
+        raise self._error from None
+
+
+def _package(kind: PackageType, payload: bytes) -> bytes:
+    size = _HEADER.size + len(payload)
+    if size > MAX_PACKAGE:
+        msg = f"{kind.name} of {size} bytes is larger than a package can be ({MAX_PACKAGE})"
+        raise ValueError(msg)
+    return _HEADER.pack(size, kind) + payload
+
+
+class ClientProtocol(_Receiver[ControllerMessage]):
+    """The client's side of one connection (EE). Switches version when an accepted request is answered."""
+
+    def __init__(self) -> None:
+        super().__init__(payloads.FROM_CONTROLLER_V1, data_id=False)
+
+    def send(self, message: ExecutableMessage) -> bytes:
+        """The package of `message` in the version spoken. ValueError for what does not fit into one."""
+        data = _package(*payloads.encode_executable(message, self.version))
+        if isinstance(message, RequestProtocolVersion):
+            self._requested.append(message.version)
+        return data
+
+    def _observe(self, message: ControllerMessage) -> None:
+        if isinstance(message, ProtocolVersionReply) and self._requested:
+            requested = self._requested.popleft()
+            if message.accepted:
+                self._speak(requested)
+
+    def _speak(self, version: int) -> None:
+        self.version = version
+        self._data_id = version > 1
+        self._decoders = payloads.FROM_CONTROLLER if version > 1 else payloads.FROM_CONTROLLER_V1
+
+
+class ControllerProtocol(_Receiver[ExecutableMessage]):
+    """The controller's side of one connection (CON). Switches version when it sends the acceptance of a request.
+
+    Answer a RequestProtocolVersion while iterating over `receive`, before the next message is taken.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(payloads.FROM_EXECUTABLE_V1, data_id=True)
+
+    def send(self, message: ControllerMessage) -> bytes:
+        """The package of `message` in the version spoken. ValueError for what does not fit into one."""
+        data = _package(*payloads.encode_controller(message, self.version))
+        if isinstance(message, ProtocolVersionReply) and self._requested:
+            requested = self._requested.popleft()
+            if message.accepted:
+                self._speak(requested)
+        return data
+
+    def _observe(self, message: ExecutableMessage) -> None:
+        if isinstance(message, RequestProtocolVersion):
+            self._requested.append(message.version)
+
+    def _speak(self, version: int) -> None:
+        self.version = version
+        self._decoders = payloads.FROM_EXECUTABLE if version > 1 else payloads.FROM_EXECUTABLE_V1

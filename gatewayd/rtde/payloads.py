@@ -1,0 +1,289 @@
+"""The payload of each package type, both directions, protocol versions 1 and 2 (guide, section "Protocol").
+
+Tables of decoders and encoders by package and by message type. The type of a package does not tell its direction, and
+its layout depends on the version spoken, so there is a table for each. Where guide and controllers differ the
+controllers are followed, as UR's own client libraries do: version 1 outputs carry no recipe id, a version 1 text
+from the controller has neither lengths nor source.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING
+
+from gatewayd.rtde.messages import (
+    ControllerMessage,
+    ControllerVersion,
+    DataPackage,
+    ExecutableMessage,
+    GetControllerVersion,
+    InputsSetup,
+    OutputsSetup,
+    PackageType,
+    Pause,
+    PauseReply,
+    ProtocolVersionReply,
+    RequestProtocolVersion,
+    SetupInputs,
+    SetupOutputs,
+    Start,
+    StartReply,
+    TextMessage,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    ControllerDecoders = Mapping[int, Callable[[bytes], ControllerMessage]]
+    ExecutableDecoders = Mapping[int, Callable[[bytes], ExecutableMessage]]
+
+__all__ = [
+    "FROM_CONTROLLER",
+    "FROM_CONTROLLER_V1",
+    "FROM_EXECUTABLE",
+    "FROM_EXECUTABLE_V1",
+    "MalformedPayloadError",
+    "encode_controller",
+    "encode_executable",
+]
+
+_UINT16 = struct.Struct(">H")
+_VERSION = struct.Struct(">4I")
+_DOUBLE = struct.Struct(">d")
+_MAX_TEXT = 0xFF
+_LEAST_TEXT = 3
+
+
+class MalformedPayloadError(Exception):
+    """A payload that does not fit its layout; the codec adds where it stood."""
+
+
+def _expect(payload: bytes, size: int) -> None:
+    if len(payload) != size:
+        msg = f"payload of {len(payload)} bytes where {size} belong"
+        raise MalformedPayloadError(msg)
+
+
+def _at_least(payload: bytes, size: int) -> None:
+    if len(payload) < size:
+        msg = f"payload of {len(payload)} bytes where at least {size} belong"
+        raise MalformedPayloadError(msg)
+
+
+def _text(data: bytes) -> str:
+    return data.decode("utf-8", "replace")
+
+
+def _names(data: bytes) -> tuple[str, ...]:
+    """Split a comma separated list; ur_rtde sends one comma more at its end."""
+    names = data.decode("ascii", "replace").split(",")
+    if not names[-1]:
+        names.pop()
+    return tuple(names)
+
+
+def _joined(names: tuple[str, ...]) -> bytes:
+    return ",".join(names).encode("ascii", "replace")
+
+
+def _decode_text(payload: bytes) -> TextMessage:
+    _at_least(payload, _LEAST_TEXT)
+    end = 1 + payload[0]
+    if end >= len(payload):
+        msg = f"message length {payload[0]} reaches beyond the package"
+        raise MalformedPayloadError(msg)
+    level = end + 1 + payload[end]
+    if level + 1 != len(payload):
+        msg = f"source length {payload[end]} does not fit the package"
+        raise MalformedPayloadError(msg)
+    return TextMessage(_text(payload[1:end]), _text(payload[end + 1 : level]), payload[level])
+
+
+def _decode_text_v1(payload: bytes) -> TextMessage:
+    _at_least(payload, 1)
+    return TextMessage(_text(payload[1:]), "", payload[0])
+
+
+def _decode_version_reply(payload: bytes) -> ProtocolVersionReply:
+    _expect(payload, 1)
+    return ProtocolVersionReply(payload[0] != 0)
+
+
+def _decode_controller_version(payload: bytes) -> ControllerVersion:
+    _expect(payload, _VERSION.size)
+    return ControllerVersion(*_VERSION.unpack(payload))
+
+
+def _decode_data(payload: bytes) -> DataPackage:
+    _at_least(payload, 1)
+    return DataPackage(payload[0], payload[1:])
+
+
+def _decode_data_v1(payload: bytes) -> DataPackage:
+    return DataPackage(None, payload)
+
+
+def _decode_outputs_setup(payload: bytes) -> OutputsSetup:
+    _at_least(payload, 1)
+    return OutputsSetup(payload[0], _names(payload[1:]))
+
+
+def _decode_outputs_setup_v1(payload: bytes) -> OutputsSetup:
+    return OutputsSetup(None, _names(payload))
+
+
+def _decode_inputs_setup(payload: bytes) -> InputsSetup:
+    _at_least(payload, 1)
+    return InputsSetup(payload[0], _names(payload[1:]))
+
+
+def _decode_start_reply(payload: bytes) -> StartReply:
+    _expect(payload, 1)
+    return StartReply(payload[0] != 0)
+
+
+def _decode_pause_reply(payload: bytes) -> PauseReply:
+    _expect(payload, 1)
+    return PauseReply(payload[0] != 0)
+
+
+def _decode_request_version(payload: bytes) -> RequestProtocolVersion:
+    _expect(payload, _UINT16.size)
+    return RequestProtocolVersion(_UINT16.unpack(payload)[0])
+
+
+def _decode_get_version(payload: bytes) -> GetControllerVersion:
+    _expect(payload, 0)
+    return GetControllerVersion()
+
+
+def _decode_setup_outputs(payload: bytes) -> SetupOutputs:
+    _at_least(payload, _DOUBLE.size)
+    return SetupOutputs(_names(payload[_DOUBLE.size :]), _DOUBLE.unpack_from(payload)[0])
+
+
+def _decode_setup_outputs_v1(payload: bytes) -> SetupOutputs:
+    return SetupOutputs(_names(payload))
+
+
+def _decode_setup_inputs(payload: bytes) -> SetupInputs:
+    return SetupInputs(_names(payload))
+
+
+def _decode_start(payload: bytes) -> Start:
+    _expect(payload, 0)
+    return Start()
+
+
+def _decode_pause(payload: bytes) -> Pause:
+    _expect(payload, 0)
+    return Pause()
+
+
+FROM_CONTROLLER: ControllerDecoders = {
+    PackageType.REQUEST_PROTOCOL_VERSION: _decode_version_reply,
+    PackageType.GET_URCONTROL_VERSION: _decode_controller_version,
+    PackageType.TEXT_MESSAGE: _decode_text,
+    PackageType.DATA_PACKAGE: _decode_data,
+    PackageType.SETUP_OUTPUTS: _decode_outputs_setup,
+    PackageType.SETUP_INPUTS: _decode_inputs_setup,
+    PackageType.START: _decode_start_reply,
+    PackageType.PAUSE: _decode_pause_reply,
+}
+"""Package type -> decoder of what a controller sends in protocol version 2."""
+FROM_CONTROLLER_V1: ControllerDecoders = {
+    **FROM_CONTROLLER,
+    PackageType.TEXT_MESSAGE: _decode_text_v1,
+    PackageType.DATA_PACKAGE: _decode_data_v1,
+    PackageType.SETUP_OUTPUTS: _decode_outputs_setup_v1,
+}
+"""The same in protocol version 1."""
+FROM_EXECUTABLE: ExecutableDecoders = {
+    PackageType.REQUEST_PROTOCOL_VERSION: _decode_request_version,
+    PackageType.GET_URCONTROL_VERSION: _decode_get_version,
+    PackageType.TEXT_MESSAGE: _decode_text,
+    PackageType.DATA_PACKAGE: _decode_data,
+    PackageType.SETUP_OUTPUTS: _decode_setup_outputs,
+    PackageType.SETUP_INPUTS: _decode_setup_inputs,
+    PackageType.START: _decode_start,
+    PackageType.PAUSE: _decode_pause,
+}
+"""Package type -> decoder of what a client sends in protocol version 2."""
+FROM_EXECUTABLE_V1: ExecutableDecoders = {
+    **FROM_EXECUTABLE,
+    PackageType.SETUP_OUTPUTS: _decode_setup_outputs_v1,
+}
+"""The same in protocol version 1."""
+
+
+def _encode_text(message: TextMessage) -> bytes:
+    text = message.message.encode("utf-8", "replace")[:_MAX_TEXT]
+    source = message.source.encode("utf-8", "replace")[:_MAX_TEXT]
+    return bytes((len(text),)) + text + bytes((len(source),)) + source + bytes((message.level,))
+
+
+def _recipe(recipe: int | None) -> bytes:
+    if recipe is None:
+        msg = "a recipe id belongs into this package"
+        raise ValueError(msg)
+    return bytes((recipe,))
+
+
+def encode_executable(message: ExecutableMessage, version: int) -> tuple[PackageType, bytes]:
+    """Package type and payload of what a client sends.
+
+    Texts are cut to 255 bytes. ValueError for what the version cannot say: no recipe id, no frequency.
+    """
+    match message:
+        case DataPackage(recipe, payload):
+            return PackageType.DATA_PACKAGE, _recipe(recipe) + payload
+        case RequestProtocolVersion(requested):
+            return PackageType.REQUEST_PROTOCOL_VERSION, _UINT16.pack(requested)
+        case GetControllerVersion():
+            return PackageType.GET_URCONTROL_VERSION, b""
+        case TextMessage():
+            return PackageType.TEXT_MESSAGE, _encode_text(message)
+        case SetupOutputs(names, frequency):
+            return PackageType.SETUP_OUTPUTS, _frequency(frequency, version) + _joined(names)
+        case SetupInputs(names):
+            return PackageType.SETUP_INPUTS, _joined(names)
+        case Start():
+            return PackageType.START, b""
+        case Pause():
+            return PackageType.PAUSE, b""
+
+
+def _frequency(frequency: float | None, version: int) -> bytes:
+    if version == 1:
+        return b""
+    if frequency is None:
+        msg = "protocol version 2 wants an output frequency"
+        raise ValueError(msg)
+    return _DOUBLE.pack(frequency)
+
+
+def encode_controller(message: ControllerMessage, version: int) -> tuple[PackageType, bytes]:
+    """Package type and payload of what a controller sends.
+
+    Version 1 has no place for recipe ids of outputs and for the source of a text: they are left out. Texts are cut
+    to what fits. ValueError for a missing recipe id in version 2.
+    """
+    match message:
+        case DataPackage(recipe, payload):
+            return PackageType.DATA_PACKAGE, payload if version == 1 else _recipe(recipe) + payload
+        case ProtocolVersionReply(accepted):
+            return PackageType.REQUEST_PROTOCOL_VERSION, bytes((accepted,))
+        case ControllerVersion(major, minor, bugfix, build):
+            return PackageType.GET_URCONTROL_VERSION, _VERSION.pack(major, minor, bugfix, build)
+        case TextMessage(text, _, level):
+            if version == 1:
+                return PackageType.TEXT_MESSAGE, bytes((level,)) + text.encode("utf-8", "replace")
+            return PackageType.TEXT_MESSAGE, _encode_text(message)
+        case OutputsSetup(recipe, types):
+            return PackageType.SETUP_OUTPUTS, (b"" if version == 1 else _recipe(recipe)) + _joined(types)
+        case InputsSetup(recipe, types):
+            return PackageType.SETUP_INPUTS, _recipe(recipe) + _joined(types)
+        case StartReply(accepted):
+            return PackageType.START, bytes((accepted,))
+        case PauseReply(accepted):
+            return PackageType.PAUSE, bytes((accepted,))

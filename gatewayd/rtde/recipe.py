@@ -1,0 +1,74 @@
+"""The layout of a data package: an ordered list of fields with their types, compiled once (guide, "Data types")."""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING
+
+from gatewayd.rtde.codec import ProtocolError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from gatewayd.rtde.types import DataType
+
+__all__ = ["Recipe", "Scalar"]
+
+Scalar = bool | int | float
+"""One element of a value: bool for BOOL, int for the integer types, float for DOUBLE and its vectors."""
+
+
+class Recipe:
+    """Field names and types of one recipe, and the struct they make.
+
+    Values travel as one flat tuple in which a vector takes as many places as it has elements.
+    """
+
+    __slots__ = ("_struct", "names", "size", "slots", "types")
+
+    def __init__(self, names: Sequence[str], types: Sequence[DataType]) -> None:
+        if len(names) != len(types):
+            msg = f"{len(names)} names but {len(types)} types"
+            raise ValueError(msg)
+        self.names = tuple(names)
+        self.types = tuple(types)
+        self._struct = struct.Struct(">" + "".join(data_type.format for data_type in types))
+        self.size = self._struct.size
+        """Bytes of a payload, without the recipe id."""
+        self.slots: dict[str, slice] = {}
+        """Where the elements of each field lie in the flat tuple."""
+        place = 0
+        for name, data_type in zip(self.names, self.types, strict=True):
+            self.slots[name] = slice(place, place + data_type.count)
+            place += data_type.count
+
+    def __repr__(self) -> str:
+        fields = ", ".join(f"{name}: {kind.word}" for name, kind in zip(self.names, self.types, strict=True))
+        return f"Recipe({fields})"
+
+    def unpack(self, payload: bytes) -> tuple[Scalar, ...]:
+        """The flat values of a payload; ProtocolError if it has not the recipe's length."""
+        try:
+            return self._struct.unpack(payload)
+        except struct.error:
+            reason = f"data package with {len(payload)} bytes of values where the recipe has {self.size}"
+            raise ProtocolError(reason, min(len(payload), self.size), payload, within="payload") from None
+
+    def pack(self, values: Sequence[Scalar]) -> bytes:
+        """The payload of flat values; ValueError names the first value that its type cannot hold."""
+        try:
+            return self._struct.pack(*values)
+        except (struct.error, OverflowError) as error:
+            raise ValueError(self._complaint(values)) from error
+
+    def _complaint(self, values: Sequence[Scalar]) -> str:
+        places = sum(kind.count for kind in self.types)
+        if len(values) != places:
+            return f"{len(values)} values for a recipe of {places}"
+        for name, kind in zip(self.names, self.types, strict=True):
+            for value in values[self.slots[name]]:
+                try:
+                    struct.pack(">" + kind.code, value)
+                except (struct.error, OverflowError):
+                    return f"{name} is {kind.word} and cannot hold {value!r}"
+        return "values that do not fit the recipe"
