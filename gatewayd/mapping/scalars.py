@@ -1,0 +1,444 @@
+"""The small languages inside a mapping: durations, addresses, robot references, networks, versions, policies.
+
+Each reader takes what YAML made of a value and gives a typed one. What cannot be read raises
+`PydanticCustomError` whose type is the slug of the rule that it breaks and whose context holds the remedy.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from ipaddress import IPv4Address, IPv6Address, ip_address, ip_network
+from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
+
+from pydantic import BeforeValidator, Field, InstanceOf
+from pydantic_core import PydanticCustomError
+
+from gatewayd.core.definition import Fallback, FallbackKind
+from gatewayd.mapping.plan import Network
+from gatewayd.mapping.rules import syntax
+from gatewayd.mapping.source import RealNumber, WholeNumber
+
+if TYPE_CHECKING:
+    from gatewayd.mapping.diagnostics import Rule
+
+__all__ = [
+    "Address",
+    "CellName",
+    "Duration",
+    "Endpoint",
+    "Listen",
+    "Name",
+    "Names",
+    "Networks",
+    "OptionalDuration",
+    "OutputPolicy",
+    "Real",
+    "Reference",
+    "ReleasePolicy",
+    "RobotReference",
+    "Version",
+    "Whole",
+    "refuse",
+]
+
+_DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?")
+_NUMBER_LIKE = re.compile(r"[-+]?[0-9.][0-9a-fA-FxXoO_.,:+-]*")
+_DURATION = re.compile(r"([0-9]+(?:\.[0-9]+)?)[ ]?(ms|s|min|h)")
+_SECONDS: Final = {"ms": 0.001, "s": 1.0, "min": 60.0, "h": 3600.0}
+_LONGEST: Final = 24 * 3600.0
+_ADDRESS = re.compile(r"(0|[1-9][0-9]*)(?:\.(0|[1-9][0-9]*))?")
+_GREATEST_ADDRESS: Final = 0xFFFF
+_GREATEST_BIT: Final = 15
+_REFERENCE = re.compile(
+    r"(?P<field>[A-Za-z][A-Za-z0-9_]*?)"
+    r"(?:(?P<first>[0-9]{1,4})\.\.(?P<last>[0-9]{1,4})"
+    r"|(?P<element>\[(?P<element_first>[0-9]{1,4})(?:\.\.(?P<element_last>[0-9]{1,4}))?\])?"
+    r"(?:\.(?P<bit_first>[0-9]{1,4})(?:\.\.(?P<bit_last>[0-9]{1,4}))?)?)"
+)
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_CELL_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
+_LONGEST_NAME: Final = 64
+_VERSION = re.compile(r"([0-9]{1,4})(?:\.([0-9]{1,4}))?(?:\.([0-9]{1,9}))?(?:\.[0-9]{1,9})?")
+_LISTEN = re.compile(r"(?:\[(?P<six>[0-9A-Fa-f:.%a-z]+)\]|(?P<four>[^:\[\]\s]+)):(?P<port>[0-9]{1,5})")
+_GREATEST_PORT: Final = 65535
+
+
+def refuse(rule: Rule, message: str, hint: str) -> NoReturn:
+    """Stop the validation of a value: it breaks `rule`."""
+    raise PydanticCustomError(rule.slug, "{message}", {"message": message, "hint": hint})
+
+
+def _text(value: object) -> str:
+    """Return a scalar as it was written."""
+    if isinstance(value, (WholeNumber, RealNumber)):
+        return value.text
+    if value is None:
+        return "nothing"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _scalar(value: object, what: str, hint: str) -> str:
+    if value is None or isinstance(value, (dict, list, tuple, bool)):
+        kinds = {
+            dict: "a table",
+            list: "a list",
+            tuple: "a list",
+            bool: "true or false",
+            type(None): "nothing",
+        }
+        refuse(syntax.WRONG_TYPE, f"{kinds[type(value)]} stands where {what} is expected", hint)
+    return _text(value)
+
+
+def _decimal(value: object) -> object:
+    """Let only plain decimal numbers pass; other shapes are read differently by different tools."""
+    if isinstance(value, (WholeNumber, RealNumber)):
+        if not _DECIMAL.fullmatch(value.text):
+            hint = "write a plain decimal number such as 10 or 0.5"
+            refuse(syntax.BAD_NUMBER, f"`{value.text}` is not a plain decimal number", hint)
+        return float(value) if isinstance(value, float) else int(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        refuse(syntax.BAD_NUMBER, f"`{value}` is not a number of this world", "write a plain decimal number")
+    if isinstance(value, str):
+        if _NUMBER_LIKE.fullmatch(value):
+            hint = "write a plain decimal number such as 10 or 0.5, without quotes"
+            refuse(syntax.BAD_NUMBER, f"`{value}` is not a plain decimal number", hint)
+        refuse(syntax.WRONG_TYPE, f"`{value}` stands where a number is expected", "write a number")
+    return value
+
+
+Whole = Annotated[int, BeforeValidator(_decimal, json_schema_input_type=int)]
+"""An integer in plain decimal digits."""
+Real = Annotated[float, BeforeValidator(_decimal, json_schema_input_type=float), Field(allow_inf_nan=False)]
+"""A number in plain decimal digits."""
+
+
+def _duration(value: object) -> float:
+    hint = "name the unit: 500ms, 2s, 1.5s or 5min"
+    text = _scalar(value, "a duration", hint)
+    match = _DURATION.fullmatch(text)
+    if match is None:
+        if isinstance(value, (int, float)):
+            refuse(
+                syntax.BAD_DURATION,
+                f"the duration `{text}` has no unit",
+                f"write {text}ms, {text}s or {text}min",
+            )
+        refuse(syntax.BAD_DURATION, f"`{text}` is not a duration", hint)
+    seconds = float(match[1]) * _SECONDS[match[2]]
+    if not 0 < seconds <= _LONGEST:
+        refuse(syntax.OUT_OF_RANGE, f"the duration `{text}` is not between 1ms and 24h", hint)
+    return seconds
+
+
+def _optional_duration(value: object) -> float | None:
+    return None if value == "none" else _duration(value)
+
+
+_DURATION_SCHEMA = Annotated[
+    str, Field(pattern=r"^[0-9]+(\.[0-9]+)? ?(ms|s|min|h)$", examples=["500ms", "2s"])
+]
+_OPTIONAL_DURATION_SCHEMA = Annotated[
+    str, Field(pattern=r"^(none|[0-9]+(\.[0-9]+)? ?(ms|s|min|h))$", examples=["none", "60s"])
+]
+Duration = Annotated[float, BeforeValidator(_duration, json_schema_input_type=_DURATION_SCHEMA)]
+"""Seconds, written with a unit."""
+OptionalDuration = Annotated[
+    float | None, BeforeValidator(_optional_duration, json_schema_input_type=_OPTIONAL_DURATION_SCHEMA)
+]
+"""Seconds, written with a unit, or `none`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """Where a listener listens."""
+
+    host: str
+    """A literal IP address."""
+    port: int
+
+    def __str__(self) -> str:
+        """`host:port`, with brackets around IPv6."""
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+
+def _listen(value: object) -> Endpoint:
+    if isinstance(value, Endpoint):
+        return value
+    hint = "write host:port, for example 127.0.0.1:1502, 0.0.0.0:502 or [::1]:502"
+    text = _scalar(value, "a listen address", hint)
+    match = _LISTEN.fullmatch(text)
+    if match is None:
+        refuse(syntax.BAD_NETWORK, f"`{text}` is not a listen address", hint)
+    host = match["six"] or match["four"]
+    try:
+        address = ip_address(host)
+    except ValueError:
+        refuse(syntax.BAD_NETWORK, f"`{host}` is not an IP address", "names are not resolved here; " + hint)
+    if (match["six"] is not None) != isinstance(address, IPv6Address):
+        refuse(syntax.BAD_NETWORK, f"`{text}` is not a listen address", hint)
+    port = int(match["port"])
+    if not 0 < port <= _GREATEST_PORT:
+        refuse(syntax.OUT_OF_RANGE, f"port {port} is not between 1 and 65535", hint)
+    return Endpoint(str(address), port)
+
+
+Listen = Annotated[
+    InstanceOf[Endpoint],
+    BeforeValidator(
+        _listen,
+        json_schema_input_type=Annotated[
+            str, Field(pattern=r"^(\[[0-9A-Fa-f:.]+\]|[0-9.]+):[0-9]{1,5}$", examples=["127.0.0.1:1502"])
+        ],
+    ),
+]
+"""A literal IP address and a port."""
+
+
+def _network(value: object) -> Network:
+    if isinstance(value, (IPv4Address, IPv6Address, Network)):
+        return ip_network(value)
+    hint = "write an address (192.168.1.20) or a network (192.168.1.0/28)"
+    text = _scalar(value, "an IP address or network", hint)
+    try:
+        return ip_network(text)
+    except ValueError:
+        pass
+    try:
+        network = ip_network(text, strict=False)
+    except ValueError:
+        refuse(syntax.BAD_NETWORK, f"`{text}` is neither an IP address nor a network", hint)
+    host = text.partition("/")[0]
+    hint = f"write {network} for the whole network, or {host} for the one address"
+    refuse(syntax.BAD_NETWORK, f"`{text}` has host bits set", hint)
+
+
+def _many(value: object) -> object:
+    """One thing may stand for a list of one."""
+    return list(value) if isinstance(value, (list, tuple)) else [value]
+
+
+_OneNetwork = Annotated[
+    InstanceOf[Network],
+    BeforeValidator(_network, json_schema_input_type=Annotated[str, Field(examples=["192.168.1.20"])]),
+]
+Networks = Annotated[
+    tuple[_OneNetwork, ...],
+    BeforeValidator(_many, json_schema_input_type=str | list[str]),
+    Field(strict=False),
+]
+"""An address, a network, or a list of them."""
+
+
+def _name(value: object) -> str:
+    hint = "begin with a letter and go on with letters, digits and `_`"
+    text = _scalar(value, "a name", hint)
+    if not _NAME.fullmatch(text):
+        refuse(syntax.BAD_NAME, f"`{text}` is not a name", hint)
+    if len(text) > _LONGEST_NAME:
+        refuse(
+            syntax.BAD_NAME, f"the name `{text}` has {len(text)} characters", f"use at most {_LONGEST_NAME}"
+        )
+    return text
+
+
+def _cell_name(value: object) -> str:
+    hint = "use small letters, digits and `-`, for example press-3"
+    text = _scalar(value, "a name", hint)
+    if not _CELL_NAME.fullmatch(text) or len(text) > _LONGEST_NAME:
+        refuse(syntax.BAD_NAME, f"`{text}` is not a name of a cell", hint)
+    return text
+
+
+Name = Annotated[
+    str,
+    BeforeValidator(
+        _name, json_schema_input_type=Annotated[str, Field(pattern="^[A-Za-z][A-Za-z0-9_]{0,63}$")]
+    ),
+]
+"""Name of a writer, group or variable."""
+CellName = Annotated[
+    str,
+    BeforeValidator(
+        _cell_name, json_schema_input_type=Annotated[str, Field(pattern="^[a-z0-9][a-z0-9-]{0,63}$")]
+    ),
+]
+"""Name of a cell."""
+Names = Annotated[
+    tuple[Name, ...],
+    BeforeValidator(_many, json_schema_input_type=str | list[str]),
+    Field(strict=False, min_length=1),
+]
+"""A name or a list of names."""
+
+
+def _version(value: object) -> tuple[int, int, int]:
+    hint = "write the controller software as PolyScope shows it, for example 5.12 or 10.7.0"
+    if isinstance(value, tuple):
+        return value
+    text = _scalar(value, "a version", hint)
+    match = _VERSION.fullmatch(text)
+    if match is None:
+        refuse(syntax.BAD_NUMBER, f"`{text}` is not a version", hint)
+    return int(match[1]), int(match[2] or 0), int(match[3] or 0)
+
+
+Version = Annotated[
+    tuple[int, int, int],
+    BeforeValidator(
+        _version,
+        json_schema_input_type=float
+        | Annotated[str, Field(pattern=r"^[0-9]+(\.[0-9]+){0,3}$", examples=["5.12.0"])],
+    ),
+]
+"""Version of the controller software: major, minor, bugfix."""
+
+
+def _address(value: object) -> tuple[int, int | None]:
+    if isinstance(value, tuple):
+        return value
+    hint = "write a register (100) or a bit of a register (100.3), counted from 0"
+    text = _scalar(value, "an address", hint)
+    match = _ADDRESS.fullmatch(text)
+    if match is None:
+        refuse(syntax.BAD_ADDRESS, f"`{text}` is not an address", hint)
+    address = int(match[1])
+    if address > _GREATEST_ADDRESS:
+        refuse(
+            syntax.OUT_OF_RANGE,
+            f"the address {address} is greater than 65535",
+            _notation_hint(match[1]) or hint,
+        )
+    bit = int(match[2]) if match[2] is not None else None
+    if bit is not None and bit > _GREATEST_BIT:
+        hint = "bit 0 is the least significant of the register, bit 15 the most"
+        refuse(syntax.OUT_OF_RANGE, f"the register has no bit {bit}", hint)
+    return address, bit
+
+
+def _notation_hint(digits: str) -> str | None:
+    """Explain 400101 and the like, without guessing."""
+    areas = {"0": "coil", "1": "discrete", "3": "input", "4": "holding"}
+    if len(digits) != 6 or digits[0] not in areas or int(digits[1:]) == 0:
+        return None
+    return f"addresses count from 0: where a manual says {digits}, write {{{areas[digits[0]]}: {int(digits[1:]) - 1}}}"
+
+
+Address = Annotated[
+    tuple[int, int | None],
+    BeforeValidator(
+        _address,
+        json_schema_input_type=float | Annotated[str, Field(pattern=r"^[0-9]{1,5}(\.[0-9]{1,2})?$")],
+    ),
+    Field(strict=False),
+]
+"""Protocol address from 0 and, after a dot, the bit of the register."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """What a `robot:` key names: a field, elements of a vector, bits of an integer, or numbered registers."""
+
+    text: str
+    field: str
+    """Name of the field; for numbered registers without the number (`output_int_register_`)."""
+    registers: range | None = None
+    """Numbers of the registers; None when the field is named in full."""
+    elements: range | None = None
+    """Elements of a vector field."""
+    bits: range | None = None
+    """Bits of an integer field."""
+    many: bool = False
+    """Written as a range, so that it makes a numbered family of variables even where it holds one."""
+
+    def __str__(self) -> str:
+        """As written."""
+        return self.text
+
+
+def _reference(value: object) -> Reference:
+    if isinstance(value, Reference):
+        return value
+    hint = (
+        "write a field (actual_TCP_pose), 'field[0]', field.3, or a range such as output_int_register_0..23"
+    )
+    text = _scalar(value, "the name of an RTDE field", hint)
+    match = _REFERENCE.fullmatch(text)
+    if match is None:
+        refuse(syntax.BAD_REFERENCE, f"`{text}` does not name an RTDE field", hint)
+    registers = _span(text, match, "first", "last")
+    elements = _span(text, match, "element_first", "element_last")
+    bits = _span(text, match, "bit_first", "bit_last")
+    ranges = sum(match[key] is not None for key in ("last", "element_last", "bit_last"))
+    if ranges > 1:
+        refuse(syntax.BAD_REFERENCE, f"`{text}` holds more than one range", hint)
+    return Reference(text, match["field"], registers, elements, bits, many=ranges > 0)
+
+
+def _span(text: str, match: re.Match[str], first: str, last: str) -> range | None:
+    if match[first] is None:
+        return None
+    low = int(match[first])
+    high = int(match[last]) if match[last] is not None else low
+    if high < low:
+        hint = f"write {text.replace(f'{match[first]}..{match[last]}', f'{high}..{low}')}"
+        refuse(syntax.BAD_RANGE, f"the range of `{text}` runs backwards", hint)
+    return range(low, high + 1)
+
+
+RobotReference = Annotated[
+    InstanceOf[Reference],
+    BeforeValidator(
+        _reference,
+        json_schema_input_type=Annotated[
+            str,
+            Field(
+                pattern=r"^[A-Za-z][A-Za-z0-9_]*([0-9]\.\.[0-9]+)?(\[[0-9]+(\.\.[0-9]+)?\])?(\.[0-9]+(\.\.[0-9]+)?)?$",
+                examples=["input_bit_register_0", "output_double_register_0..23", "actual_TCP_pose[0]"],
+            ),
+        ],
+    ),
+]
+"""What a variable is in the robot."""
+
+
+def _policy(value: Any, words: tuple[str, ...]) -> Fallback:
+    if isinstance(value, Fallback):
+        return value
+    choices = ", ".join(words) + " or a value"
+    if isinstance(value, bool):
+        return Fallback(FallbackKind.VALUE, value)
+    if isinstance(value, (int, float)):
+        number = _decimal(value)
+        return Fallback(FallbackKind.VALUE, number)  # type: ignore[arg-type]
+    text = _scalar(value, "a policy", f"write {choices}")
+    if text not in words:
+        refuse(syntax.BAD_CHOICE, f"`{text}` is not a policy", f"write {choices}")
+    return Fallback(FallbackKind(text))
+
+
+def _release_policy(value: object) -> Fallback:
+    return _policy(value, ("clear", "hold"))
+
+
+def _output_policy(value: object) -> Fallback:
+    return _policy(value, ("clear", "hold", "exception"))
+
+
+ReleasePolicy = Annotated[
+    InstanceOf[Fallback],
+    BeforeValidator(
+        _release_policy, json_schema_input_type=bool | float | Annotated[str, Field(pattern="^(clear|hold)$")]
+    ),
+]
+"""What an input is given when its owner is lost."""
+OutputPolicy = Annotated[
+    InstanceOf[Fallback],
+    BeforeValidator(
+        _output_policy,
+        json_schema_input_type=bool | float | Annotated[str, Field(pattern="^(clear|hold|exception)$")],
+    ),
+]
+"""What the fieldbus sees of an output when the robot stops telling."""
