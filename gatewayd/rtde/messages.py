@@ -1,0 +1,195 @@
+"""The messages of RTDE as values, one class for each direction of each package type (guide, section "Protocol").
+
+EE is the external executable (the client), CON the controller. A message knows nothing of bytes: `gatewayd.rtde.codec`
+turns it into a package and back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+__all__ = [
+    "ERROR_WORDS",
+    "IN_USE",
+    "NOT_FOUND",
+    "ControllerMessage",
+    "ControllerVersion",
+    "DataPackage",
+    "ExecutableMessage",
+    "GetControllerVersion",
+    "InputsSetup",
+    "OutputsSetup",
+    "PackageType",
+    "Pause",
+    "PauseReply",
+    "ProtocolVersionReply",
+    "RequestProtocolVersion",
+    "SetupInputs",
+    "SetupOutputs",
+    "Start",
+    "StartReply",
+    "TextLevel",
+    "TextMessage",
+]
+
+NOT_FOUND = "NOT_FOUND"
+"""In place of a type: the controller does not have the field."""
+IN_USE = "IN_USE"
+"""In place of an input's type: another client controls it."""
+ERROR_WORDS = frozenset({NOT_FOUND, IN_USE})
+
+
+class PackageType(IntEnum):
+    """Third byte of every package."""
+
+    REQUEST_PROTOCOL_VERSION = 86
+    GET_URCONTROL_VERSION = 118
+    TEXT_MESSAGE = 77
+    DATA_PACKAGE = 85
+    SETUP_OUTPUTS = 79
+    SETUP_INPUTS = 73
+    START = 83
+    PAUSE = 80
+
+
+class TextLevel(IntEnum):
+    """Severity of a text message."""
+
+    EXCEPTION = 0
+    ERROR = 1
+    WARNING = 2
+    INFO = 3
+
+
+@dataclass(frozen=True, slots=True)
+class RequestProtocolVersion:
+    """EE -> CON: speak this version from the reply on."""
+
+    version: int
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolVersionReply:
+    """CON -> EE."""
+
+    accepted: bool
+
+
+@dataclass(frozen=True, slots=True)
+class GetControllerVersion:
+    """EE -> CON."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class ControllerVersion:
+    """CON -> EE: the software of the controller. Ordered, so that versions compare."""
+
+    major: int
+    minor: int
+    bugfix: int
+    build: int
+
+    def __str__(self) -> str:
+        return f"{self.major}.{self.minor}.{self.bugfix}.{self.build}"
+
+
+@dataclass(frozen=True, slots=True)
+class TextMessage:
+    """Both directions. Protocol v1 controllers send neither source nor a v2 level, only a message type."""
+
+    message: str
+    source: str
+    level: int
+    """A `TextLevel`, or whatever else the peer sent."""
+
+
+@dataclass(frozen=True, slots=True)
+class DataPackage:
+    """Both directions: values of a recipe, still packed.
+
+    `recipe` is None where the package carries no id (protocol v1, CON -> EE).
+    """
+
+    recipe: int | None
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class SetupOutputs:
+    """EE -> CON. `frequency` is None in protocol v1, which cannot choose one."""
+
+    names: tuple[str, ...]
+    frequency: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class OutputsSetup:
+    """CON -> EE: a type word or error word for each name. `recipe` is 0 if refused, None in protocol v1."""
+
+    recipe: int | None
+    types: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SetupInputs:
+    """EE -> CON."""
+
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class InputsSetup:
+    """CON -> EE: a type word or error word for each name; `recipe` counts from 1, 0 if refused."""
+
+    recipe: int
+    types: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """EE -> CON."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartReply:
+    """CON -> EE."""
+
+    accepted: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """EE -> CON."""
+
+
+@dataclass(frozen=True, slots=True)
+class PauseReply:
+    """CON -> EE."""
+
+    accepted: bool
+
+
+ExecutableMessage = (
+    RequestProtocolVersion
+    | GetControllerVersion
+    | TextMessage
+    | DataPackage
+    | SetupOutputs
+    | SetupInputs
+    | Start
+    | Pause
+)
+"""What a client sends and a controller receives."""
+
+ControllerMessage = (
+    ProtocolVersionReply
+    | ControllerVersion
+    | TextMessage
+    | DataPackage
+    | OutputsSetup
+    | InputsSetup
+    | StartReply
+    | PauseReply
+)
+"""What a controller sends and a client receives."""
