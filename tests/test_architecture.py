@@ -1,0 +1,244 @@
+"""The shape of the package: who may import whom, and what every module has to have.
+
+The tables below are the rules; docs/explanation/architecture.md explains them. An exception is a line in a table.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "gatewayd"
+
+LAYERS: dict[str, set[str]] = {
+    "gatewayd": set(),
+    "core": {"core"},
+    "rtde": {"rtde"},
+    "rtde.link": {"core", "logs", "mapping.plan", "rtde"},
+    "rtde.transfer": {"core", "mapping.plan", "rtde"},
+    "simulator": {"rtde", "simulator"},
+    "mapping": {"core.definition", "core.status", "mapping", "rtde.catalogue", "rtde.types"},
+    "modbus": {"core", "logs", "mapping.codec", "mapping.plan", "modbus"},
+    "logs": set(),
+    "eventlog": {"core", "logs"},
+    "daemon": {"core", "eventlog", "logs", "mapping", "modbus", "rtde"},
+    "demo": {"core", "daemon", "demo", "eventlog", "logs", "mapping", "modbus", "rtde", "simulator"},
+    "cli": {"cli", "core", "daemon", "demo", "eventlog", "logs", "mapping", "rtde", "simulator"},
+    "__main__": {"cli"},
+}
+"""Module or package -> what it and everything in it may import; the longest name that fits decides."""
+
+ROBOT_LINK = {"rtde.link", "rtde.transfer"}
+"""Where RTDE meets the core. The rest of rtde stands on its own, so it may not import these."""
+
+LIBRARIES: dict[str, set[str]] = {
+    "click": {"__main__", "cli"},
+    "pydantic": {"mapping"},
+    "pydantic_core": {"mapping"},
+    "pymodbus": {"demo", "modbus.server"},
+    "rich": {"cli", "demo", "mapping.table"},
+    "ruamel": {"mapping.source"},
+}
+"""Third-party package -> the only modules or packages that may know its types."""
+
+PURE = (
+    "core",
+    "mapping",
+    "modbus.frames",
+    "modbus.functions",
+    "modbus.registers",
+    "rtde.codec",
+    "rtde.recipe",
+)
+"""What has no socket, no event loop and no clock."""
+
+IMPURE_IMPORTS = {"asyncio", "select", "selectors", "signal", "socket", "subprocess", "threading", "time"}
+
+GREATEST_LENGTH = 600
+"""Lines of a module."""
+
+WITHOUT_TEST_FILE: dict[str, str] = {
+    "gatewayd": "the version",
+    "__main__": "tests/cli/test_main.py tests it as a process",
+    "cli": "tests/cli/test_main.py",
+    "cli.completion": "tests/cli/test_main.py",
+    "core": "a docstring",
+    "core.definition": "records; every other test of the core builds on them",
+    "core.refusal": "records; every other test of the core builds on them",
+    "mapping": "a docstring",
+    "mapping.plan": "records; tests/mapping/test_compile.py pins their content",
+    "modbus": "a docstring",
+    "rtde": "a docstring",
+    "rtde.messages": "records; tests/rtde/test_codec.py pins them byte by byte",
+    "rtde.types": "records; tests/rtde/test_recipe.py pins their formats",
+    "simulator": "a docstring",
+}
+"""Module -> why it has no test file of its own."""
+
+WITHOUT_ALL = {"core", "mapping", "modbus", "rtde", "simulator", "demo", "mapping.rules"}
+"""Packages that export nothing themselves."""
+
+
+def _modules() -> dict[str, Path]:
+    found = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE).with_suffix("").parts
+        found[".".join(part for part in parts if part != "__init__") or "gatewayd"] = path
+    return found
+
+
+MODULES = _modules()
+every_module = pytest.mark.parametrize("module", MODULES)
+
+
+@cache
+def tree(module: str) -> ast.Module:
+    """The parsed source."""
+    return ast.parse(MODULES[module].read_text())
+
+
+def imports(module: str) -> Iterator[str]:
+    """Full names of everything that is imported anywhere in the module, under TYPE_CHECKING and in functions too."""
+    for node in ast.walk(tree(module)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module}: relative import, line {node.lineno}"
+            assert node.module is not None
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                yield inner if inner.removeprefix("gatewayd.") in MODULES else node.module
+
+
+def within(name: str, prefixes: set[str] | tuple[str, ...]) -> bool:
+    """Whether `name` is one of the modules or packages, or lies in one."""
+    return any(name == prefix or name.startswith(prefix + ".") for prefix in prefixes)
+
+
+def own_imports(module: str) -> Iterator[str]:
+    """Modules of ours that the module imports, without the package itself, which has only the version."""
+    for name in imports(module):
+        if name.startswith("gatewayd."):
+            yield name.removeprefix("gatewayd.")
+
+
+@every_module
+def test_imports_follow_the_layers(module: str) -> None:
+    layer = max((name for name in LAYERS if within(module, {name})), key=len, default=None)
+    assert layer is not None, f"{module} belongs to no layer: give it one in LAYERS"
+    foreign = [name for name in own_imports(module) if not within(name, LAYERS[layer])]
+    assert not foreign, f"{module} (layer {layer}) may not import {foreign}"
+
+
+@every_module
+def test_rtde_stands_on_its_own(module: str) -> None:
+    if within(module, {"rtde"}) and module not in ROBOT_LINK:
+        assert not ROBOT_LINK & set(own_imports(module))
+
+
+@every_module
+def test_library_types_stay_in_their_adapter(module: str) -> None:
+    for name in imports(module):
+        library = name.partition(".")[0]
+        if library in LIBRARIES:
+            assert within(module, LIBRARIES[library]), f"{module} may not import {library}"
+
+
+@every_module
+def test_pure_modules_have_no_socket_no_loop_and_no_clock(module: str) -> None:
+    if within(module, PURE):
+        assert not IMPURE_IMPORTS & {name.partition(".")[0] for name in imports(module)}
+
+
+@every_module
+def test_nobody_imports_in_a_circle(module: str) -> None:
+    seen: set[str] = set()
+    waiting = set(own_imports(module))
+    while waiting:
+        name = waiting.pop()
+        assert name != module, f"{module} imports itself by way of others"
+        if name in MODULES and name not in seen:
+            seen.add(name)
+            waiting |= set(own_imports(name))
+
+
+@every_module
+def test_module_says_what_it_is(module: str) -> None:
+    assert ast.get_docstring(tree(module)), f"{module} has no docstring"
+
+
+@every_module
+def test_module_says_what_it_exports(module: str) -> None:
+    """`__all__` stands in every module that has something, and names only what is there."""
+    if module in WITHOUT_ALL:
+        return
+    namespace = [
+        ast.literal_eval(node.value)
+        for node in tree(module).body
+        if isinstance(node, ast.Assign)
+        and isinstance(node.targets[0], ast.Name)
+        and node.targets[0].id == "__all__"
+    ]
+    assert namespace, f"{module} has no __all__"
+    assert len(namespace[0]) == len(set(namespace[0]))
+
+
+@every_module
+def test_module_is_short_enough_to_be_read(module: str) -> None:
+    lines = len(MODULES[module].read_text().splitlines())
+    assert lines <= GREATEST_LENGTH, f"{module} has {lines} lines"
+
+
+def file_of_tests(module: str) -> Path:
+    """Where the module's tests belong."""
+    *folders, name = module.split(".")
+    return ROOT.joinpath("tests", *folders, f"test_{name}.py")
+
+
+@every_module
+def test_module_has_its_test_file(module: str) -> None:
+    if module in WITHOUT_TEST_FILE:
+        assert not file_of_tests(module).exists(), (
+            f"{module} has a test file now: strike it from WITHOUT_TEST_FILE"
+        )
+    else:
+        assert file_of_tests(module).exists(), f"{file_of_tests(module).relative_to(ROOT)} is missing"
+
+
+def test_tables_name_only_what_exists() -> None:
+    """No rule outlives the module that it is about."""
+    named = set(LAYERS) | ROBOT_LINK | set(PURE) | set(WITHOUT_TEST_FILE) | set.union(*LIBRARIES.values())
+    assert named - set(MODULES) == set()
+
+
+FORBIDDEN = {
+    "a path of somebody's machine": re.compile(r"(?<![\w.\-/])/(?:root|home/\w+|work|tmp/\w+)/"),
+    "the host of a package index": re.compile(
+        r"\b(?:[\w-]+\.)+[a-z]{2,}/(?:simple|pypi)\b|--(?:extra-)?index-url[ =]http"
+    ),
+    "a key or password": re.compile(r"-----BEGIN [A-Z ]*PRIVATE KEY|\bAKIA[0-9A-Z]{16}\b"),
+}
+"""What no committed file may contain."""
+
+
+def test_no_file_names_a_machine_or_an_index() -> None:
+    listed = subprocess.run(
+        ["git", "-C", ROOT, "ls-files", "-z"], capture_output=True, text=True, check=False
+    )
+    if listed.returncode != 0:
+        pytest.skip("this tree is not a git checkout")
+    for name in filter(None, listed.stdout.split("\0")):
+        path = ROOT / name
+        if name == "tests/test_architecture.py" or not path.is_file():
+            continue
+        text = path.read_text(errors="replace")
+        for what, pattern in FORBIDDEN.items():
+            match = pattern.search(text)
+            assert match is None, f"{name} names {what}: {match.group()!r}"
