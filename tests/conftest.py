@@ -1,7 +1,7 @@
 """What all tests share: how hypothesis behaves.
 
-The ordinary profile makes the same examples every time, so a red run can be repeated. `--hypothesis-profile=thorough` looks for new
-ones, and for longer.
+The ordinary profile makes the same examples every time, so a red run can be repeated; `--hypothesis-profile=thorough`
+looks for new ones, and for longer.
 """
 
 from __future__ import annotations
