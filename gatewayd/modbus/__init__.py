@@ -1,0 +1,1 @@
+"""Modbus TCP: the mapped variables as coils, discrete inputs, input registers and holding registers."""

@@ -1,0 +1,103 @@
+"""The MBAP frame around a Modbus PDU (Messaging on TCP/IP Guide V1.0b, 3.1.3), without any input or output.
+
+A frame is transaction id, protocol id (0), length (unit id and PDU, 2..254), unit id, PDU; all numbers big-endian.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+__all__ = [
+    "BUFFER_SIZE",
+    "GREATEST_FRAME",
+    "HEADER_SIZE",
+    "Frame",
+    "FrameBuffer",
+    "FramingError",
+    "encode",
+    "split",
+]
+
+HEADER_SIZE = 7
+"""Bytes before the PDU."""
+GREATEST_PDU = 253
+"""Bytes (Application Protocol V1.1b3, 4.1)."""
+GREATEST_FRAME = HEADER_SIZE + GREATEST_PDU
+BUFFER_SIZE = 4096
+"""Bytes taken from a connection at a time; bounds what one peer can make us do before the next has its turn."""
+
+_LEAST_LENGTH = 2
+_GREATEST_LENGTH = GREATEST_PDU + 1
+_PREFIX = 6
+"""Bytes up to and with the length, which does not count them."""
+_HEADER = struct.Struct(">HHHB")
+
+
+class FramingError(ValueError):
+    """Bytes that are no Modbus frame. Where the next one begins cannot be known: the connection must be closed."""
+
+
+class Frame(NamedTuple):
+    """One request as it came in."""
+
+    transaction: int
+    unit: int
+    pdu: bytes
+    end: int
+    """Position behind the frame."""
+
+
+def encode(transaction: int, unit: int, pdu: bytes) -> bytes:
+    """The frame of an answer; transaction and unit are the request's own."""
+    return _HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu
+
+
+def split(data: bytearray, start: int, end: int) -> Frame | None:
+    """The frame that begins at `start`, or None if it is not complete at `end`.
+
+    Raises FramingError as soon as the protocol id or the length is known to be wrong.
+    """
+    if end - start < _PREFIX:
+        return None
+    protocol = data[start + 2] << 8 | data[start + 3]
+    length = data[start + 4] << 8 | data[start + 5]
+    if protocol:
+        message = f"protocol id {protocol} instead of 0"
+        raise FramingError(message)
+    if not _LEAST_LENGTH <= length <= _GREATEST_LENGTH:
+        message = f"length {length} is not within {_LEAST_LENGTH}..{_GREATEST_LENGTH}"
+        raise FramingError(message)
+    behind = start + _PREFIX + length
+    if behind > end:
+        return None
+    return Frame(
+        data[start] << 8 | data[start + 1], data[start + 6], bytes(data[start + HEADER_SIZE : behind]), behind
+    )
+
+
+class FrameBuffer:
+    """What has come in on one connection and is not answered yet. Its size never changes."""
+
+    __slots__ = ("_view", "data", "end")
+
+    def __init__(self, size: int = BUFFER_SIZE) -> None:
+        self.data = bytearray(max(size, 2 * GREATEST_FRAME))
+        self.end = 0
+        """Position behind the last byte that came in."""
+        self._view = memoryview(self.data)
+
+    def space(self) -> memoryview:
+        """Where the next bytes are to be written; never empty between two calls of `discard`."""
+        return self._view[self.end :]
+
+    def advance(self, count: int) -> None:
+        """`count` bytes were written to `space`."""
+        self.end += count
+
+    def discard(self, start: int) -> None:
+        """Forget what lies before `start`; what is left is less than a frame and moves to the front."""
+        rest = self.end - start
+        if rest and start:
+            self.data[:rest] = self.data[start : self.end]
+        self.end = rest

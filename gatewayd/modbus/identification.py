@@ -1,0 +1,99 @@
+"""What a unit says of itself: Read Device Identification, function 43 with MEI type 14 (V1.1b3, 6.21)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import IntEnum
+
+from gatewayd import __version__
+
+__all__ = ["FUNCTION", "MEI_TYPE", "Identification", "ObjectId", "ReadCode"]
+
+FUNCTION = 43
+MEI_TYPE = 14
+
+_HEAD_SIZE = 7
+_OBJECT_HEAD_SIZE = 2
+_GREATEST_PDU = 253
+_GREATEST_OBJECT = _GREATEST_PDU - _HEAD_SIZE - _OBJECT_HEAD_SIZE
+_REQUEST_SIZE = 4
+_MORE_FOLLOWS = 0xFF
+_CONFORMITY = 0x83
+"""Extended identification, as a stream and object by object."""
+
+
+class ReadCode(IntEnum):
+    """How much is asked for."""
+
+    BASIC = 1
+    REGULAR = 2
+    EXTENDED = 3
+    INDIVIDUAL = 4
+
+
+class ObjectId(IntEnum):
+    """Objects we have; from 0x80 on they are our own."""
+
+    VENDOR_NAME = 0x00
+    PRODUCT_CODE = 0x01
+    REVISION = 0x02
+    VENDOR_URL = 0x03
+    PRODUCT_NAME = 0x04
+    MODEL_NAME = 0x05
+    APPLICATION_NAME = 0x06
+    FINGERPRINT = 0x80
+
+
+_LAST_OF = {ReadCode.BASIC: 0x02, ReadCode.REGULAR: 0x7F, ReadCode.EXTENDED: 0xFF}
+
+
+class Identification:
+    """The identification objects of one unit."""
+
+    def __init__(self, cell: str, fingerprint: int, application: str = "") -> None:
+        """`cell` is told as model name; `fingerprint`, in hexadecimal, tells which mapping is loaded."""
+        texts = {
+            ObjectId.VENDOR_NAME: "gatewayd",
+            ObjectId.PRODUCT_CODE: "gatewayd",
+            ObjectId.REVISION: __version__,
+            ObjectId.VENDOR_URL: "urn:gatewayd",
+            ObjectId.PRODUCT_NAME: "gatewayd: robot registers on Modbus TCP",
+            ObjectId.MODEL_NAME: cell,
+            ObjectId.APPLICATION_NAME: application or cell,
+            ObjectId.FINGERPRINT: f"{fingerprint:08x}",
+        }
+        self._objects = _encoded(texts)
+
+    def answer(self, pdu: bytes) -> bytes | int:
+        """The answer to a request that begins with 43, 14; or the exception code."""
+        if len(pdu) != _REQUEST_SIZE:
+            return 0x03
+        code, first = pdu[2], pdu[3]
+        if code == ReadCode.INDIVIDUAL:
+            content = self._objects.get(first)
+            return 0x02 if content is None else self._stream(code, [(first, content)])
+        last = _LAST_OF.get(ReadCode(code)) if code in _LAST_OF else None
+        if last is None:
+            return 0x03
+        if first > last or first not in self._objects:
+            first = 0
+        return self._stream(
+            code, [(key, text) for key, text in self._objects.items() if first <= key <= last]
+        )
+
+    def _stream(self, code: int, objects: list[tuple[int, bytes]]) -> bytes:
+        body = bytearray()
+        count = more = following = 0
+        for key, content in objects:
+            if _HEAD_SIZE + len(body) + _OBJECT_HEAD_SIZE + len(content) > _GREATEST_PDU:
+                more, following = _MORE_FOLLOWS, key
+                break
+            body += bytes((key, len(content))) + content
+            count += 1
+        return bytes((FUNCTION, MEI_TYPE, code, _CONFORMITY, more, following, count)) + body
+
+
+def _encoded(texts: Mapping[ObjectId, str]) -> dict[int, bytes]:
+    return {
+        int(key): text.encode("ascii", "replace")[:_GREATEST_OBJECT] for key, text in sorted(texts.items())
+    }

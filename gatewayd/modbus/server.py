@@ -1,0 +1,388 @@
+"""The listener: pymodbus's TCP server with its connection handler replaced by ours.
+
+pymodbus brings listening, connection objects and their life cycle; what a connection receives goes to `Session` as
+it comes. All that is known of pymodbus, and all sockets, are in this module.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import logging
+import os
+import socket
+import time
+from collections.abc import Callable, Iterable
+from typing import Any, cast
+
+from pymodbus.server import ModbusTcpServer
+from pymodbus.server.requesthandler import ServerRequestHandler
+from pymodbus.simulator import SimData, SimDevice
+
+from gatewayd.core.cell import Cell
+from gatewayd.mapping.plan import ModbusPlan
+from gatewayd.modbus.functions import Unit
+from gatewayd.modbus.peers import (
+    Address,
+    DenialLog,
+    PeerEvent,
+    PeerEventKind,
+    address_of,
+    may_connect,
+    writer_of,
+)
+from gatewayd.modbus.session import Access, Session
+
+__all__ = ["ListenError", "ModbusListener"]
+
+UNUSED_AFTER = 10.0
+"""Seconds without a request after which a connection without locks may have to make room for a new one."""
+STALLED_AFTER = 5.0
+"""Seconds for which a peer may leave its answers unread."""
+_GREATEST_UNSENT = 65536
+"""Bytes of answers waiting for a peer above which none of its requests is read."""
+_SWEEP = 1.0
+"""Seconds between two looks for connections that are idle or stalled."""
+_BACKLOG_DENIED = "too many connections"
+
+# A pulled cable is noticed after KEEPIDLE + KEEPCNT * KEEPINTVL seconds, or TCP_USER_TIMEOUT with answers under way.
+_KEEPALIVE = (
+    (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
+    (socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 2),
+    (socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 1),
+    (socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 3),
+    (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 5000),
+    (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),
+)
+_REMEDIES = {
+    errno.EADDRINUSE: "another program listens there; stop it or choose another port under modbus: listen:",
+    errno.EACCES: "ports below 1024 need the capability CAP_NET_BIND_SERVICE; grant it or choose a port from 1024 on",
+    errno.EADDRNOTAVAIL: "this machine has no such address; use one of its own or 0.0.0.0 under modbus: listen:",
+}
+
+logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
+
+
+class ListenError(OSError):
+    """The address cannot be listened on; `errno` tells why, the text also what to do."""
+
+
+class _Connection(ServerRequestHandler, asyncio.BufferedProtocol):
+    """One connection, from its acceptance on."""
+
+    def __init__(self, server: _Server) -> None:
+        super().__init__(server, None, None, None)  # type: ignore[no-untyped-call]
+        self.owner = server.owner
+        self.session = Session()
+        self.peer = ""
+        self.address: Address | None = None
+        self.accesses: dict[int, Access] = {}
+        self.last_request = 0.0
+        self.stalled_since: float | None = None
+        self.reason = "closed by the peer"
+        self._write: Callable[[bytes], None] | None = None
+
+    @property
+    def wire(self) -> asyncio.Transport:
+        """The transport under its right type."""
+        return cast("asyncio.Transport", self.transport)
+
+    def callback_connected(self) -> None:
+        """Called once, after the connection was accepted."""
+        self.wire.set_write_buffer_limits(high=_GREATEST_UNSENT)
+        self._write = self.wire.write
+        peer = self.wire.get_extra_info("peername")
+        if not peer:
+            self.wire.abort()
+            return
+        self.peer = f"[{peer[0]}]:{peer[1]}" if ":" in peer[0] else f"{peer[0]}:{peer[1]}"
+        self.address = address_of(peer[0])
+        _set_options(self.wire.get_extra_info("socket"))
+        self.last_request = time.monotonic()
+        self.owner.connected(self)
+
+    def get_buffer(self, sizehint: int) -> memoryview:
+        """Where asyncio puts what it receives."""
+        return self.session.buffer.space()
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """Called when `nbytes` were received: the hot path."""
+        session = self.session
+        self.last_request = now = time.monotonic()
+        answers = session.received(nbytes, now)
+        if answers and self._write is not None:
+            self._write(answers)
+        if session.broken:
+            self.drop(f"no Modbus TCP: {session.broken}")
+
+    def pause_writing(self) -> None:
+        """The peer does not read its answers: take no more requests."""
+        self.stalled_since = time.monotonic()
+        self.wire.pause_reading()
+
+    def resume_writing(self) -> None:
+        """The peer has caught up."""
+        self.stalled_since = None
+        if not self.wire.is_closing():
+            self.wire.resume_reading()
+
+    def drop(self, reason: str) -> None:
+        """Close the connection after what was answered already."""
+        self.reason = reason
+        if self.transport is not None:
+            self.wire.close()
+
+    def abort(self, reason: str) -> None:
+        """Close the connection at once."""
+        self.reason = reason
+        if self.transport is not None:
+            self.wire.abort()
+
+    def callback_disconnected(self, exc: Exception | None) -> None:
+        """Called after the connection has ended, whoever ended it."""
+        if exc is not None:
+            self.reason = str(exc)
+        self._write = None
+        self.owner.disconnected(self)
+
+
+class _Server(ModbusTcpServer):
+    """pymodbus's server with our connections. Its own data store is never asked."""
+
+    def __init__(self, owner: ModbusListener, host: str, port: int) -> None:
+        super().__init__(SimDevice(1, [SimData(0)]), address=(host, port))
+        self.owner = owner
+
+    def callback_new_connection(self) -> _Connection:
+        """Called for every accepted connection."""
+        return _Connection(self)
+
+    async def listen(self) -> bool:
+        """Start listening; unlike pymodbus's own, let the reason out if that fails."""
+        self.is_listener = True
+        self.transport = await self.call_create()
+        return True
+
+
+class ModbusListener:
+    """One listening address and the units behind it.
+
+    `observe` is told of connections; it must not raise. Of the units' plans the most generous number of connections
+    and idle time-out count, since a connection is not bound to a unit.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        *,
+        observe: Callable[[PeerEvent], None] = lambda _event: None,
+    ) -> None:
+        self._host = host
+        self._port = port
+        self._observe = observe
+        self._units: dict[int, Unit] = {}
+        self._connections: dict[_Connection, None] = {}
+        self._denials = DenialLog()
+        self._server: _Server | None = None
+        self._sweeper: asyncio.TimerHandle | None = None
+
+    @property
+    def port(self) -> int:
+        """The port that is listened on, also if 0 was asked for."""
+        sockets = self._sockets()
+        return int(sockets[0].getsockname()[1]) if sockets else self._port
+
+    @property
+    def connections(self) -> int:
+        """Connections that are open now."""
+        return len(self._connections)
+
+    @property
+    def name(self) -> str:
+        """Host and port, for messages."""
+        return f"[{self._host}]:{self._port}" if ":" in self._host else f"{self._host}:{self._port}"
+
+    async def start(self) -> None:
+        """Listen. Raises ListenError."""
+        server = _Server(self, self._host, self._port)
+        try:
+            await server.listen()
+        except OSError as error:
+            remedy = _REMEDIES.get(error.errno or 0, "check modbus: listen:")
+            cause = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+            message = f"cannot listen on {self.name}: {cause}; {remedy}"
+            raise ListenError(error.errno, message) from error
+        self._server = server
+        self._sweep()
+
+    async def close(self, reason: str = "gateway stopped") -> None:
+        """Stop listening and end all connections at once; the units follow their cells no longer."""
+        if self._sweeper is not None:
+            self._sweeper.cancel()
+            self._sweeper = None
+        for connection in list(self._connections):
+            connection.abort(reason)
+        server, self._server = self._server, None
+        if server is not None:
+            server.close()
+        for connection in list(self._connections):
+            self.disconnected(connection)
+        for unit in self._units.values():
+            unit.close()
+        self._units = {}
+        # The transports close their sockets in the next turn of the loop.
+        await asyncio.sleep(0)
+
+    def serve(self, units: Iterable[tuple[ModbusPlan, Cell]]) -> None:
+        """Answer for these units, and for no others, from the next request on; connections stay.
+
+        A unit whose plan and cell are the very objects served already goes on untouched. Raises ValueError for two
+        units of one number.
+        """
+        wanted: dict[int, tuple[ModbusPlan, Cell]] = {}
+        for plan, cell in units:
+            if plan.unit in wanted:
+                message = (
+                    f"unit {plan.unit} is served twice on {self.name}: give every cell a unit of its own"
+                )
+                raise ValueError(message)
+            wanted[plan.unit] = (plan, cell)
+        former, self._units = self._units, {}
+        for number, (plan, cell) in wanted.items():
+            kept = former.get(number)
+            if kept is not None and kept.plan is plan and kept.cell is cell:
+                self._units[number] = former.pop(number)
+            else:
+                self._units[number] = Unit(plan, cell)
+        now = time.monotonic()
+        for connection in list(self._connections):
+            if not self._admit(connection, now, "unit no longer served"):
+                connection.abort("not on the access list any more")
+        for unit in former.values():
+            unit.cell.health.modbus_connections = 0
+            unit.close()
+        self._count()
+
+    # -- called by connections ------------------------------------------------------------------------------------
+
+    def connected(self, connection: _Connection) -> None:
+        """A peer has connected: take it, or refuse it."""
+        now = time.monotonic()
+        address = connection.address
+        if address is None or not any(may_connect(address, unit.plan) for unit in self._units.values()):
+            self._refuse(connection, PeerEventKind.DENIED, now)
+            return
+        if len(self._connections) >= self._most_connections() and not self._make_room(now):
+            self._refuse(connection, PeerEventKind.FULL, now)
+            return
+        self._connections[connection] = None
+        self._admit(connection, now, "")
+        self._count()
+        self._observe(PeerEvent(PeerEventKind.CONNECTED, connection.peer, _names(connection)))
+
+    def disconnected(self, connection: _Connection) -> None:
+        """A connection has ended; called once or more for each."""
+        if connection not in self._connections:
+            return
+        del self._connections[connection]
+        names = _names(connection)
+        now = time.monotonic()
+        accesses, connection.accesses = connection.accesses, {}
+        connection.session.serve({})
+        for cell, writer in _writers(accesses):
+            cell.writer_disconnected(writer, now, connection.reason)
+        self._count()
+        self._observe(PeerEvent(PeerEventKind.DISCONNECTED, connection.peer, names, connection.reason))
+
+    # -- inside ---------------------------------------------------------------------------------------------------
+
+    def _admit(self, connection: _Connection, now: float, reason: str) -> bool:
+        """Give the connection the units its address may reach; returns whether there is any.
+
+        Writers that it is both before and after stay connected throughout.
+        """
+        address = connection.address
+        accesses = {
+            number: Access(unit, writer_of(address, unit.plan.writers))
+            for number, unit in self._units.items()
+            if address is not None and may_connect(address, unit.plan)
+        }
+        before, after = _writers(connection.accesses), _writers(accesses)
+        connection.accesses = accesses
+        connection.session.serve(accesses)
+        for cell, writer in after:
+            if (cell, writer) not in before:
+                cell.writer_connected(writer, now, connection.peer)
+        for cell, writer in before:
+            if (cell, writer) not in after:
+                cell.writer_disconnected(writer, now, reason)
+        return bool(accesses)
+
+    def _refuse(self, connection: _Connection, kind: PeerEventKind, now: float) -> None:
+        connection.abort(kind.value)
+        repeats = self._denials.repeats(f"{kind.name} {connection.address}", now)
+        if repeats is not None:
+            self._observe(PeerEvent(kind, connection.peer, reason=kind.value, repeats=repeats))
+
+    def _make_room(self, now: float) -> bool:
+        """Close the connection that was unused longest, if any is unused and owns nothing (TCP guide, 4.2.2)."""
+        unused = [
+            connection
+            for connection in self._connections
+            if now - connection.last_request >= UNUSED_AFTER and not _owns_anything(connection)
+        ]
+        if not unused:
+            return False
+        oldest = min(unused, key=lambda connection: connection.last_request)
+        oldest.abort("made room for a new connection")
+        self.disconnected(oldest)
+        return True
+
+    def _most_connections(self) -> int:
+        return max((unit.plan.connections for unit in self._units.values()), default=0)
+
+    def _idle_timeout(self) -> float | None:
+        timeouts = [unit.plan.idle_timeout for unit in self._units.values()]
+        limited = [timeout for timeout in timeouts if timeout is not None]
+        return max(limited) if limited and len(limited) == len(timeouts) else None
+
+    def _sweep(self) -> None:
+        now = time.monotonic()
+        idle = self._idle_timeout()
+        for connection in list(self._connections):
+            if connection.stalled_since is not None and now - connection.stalled_since > STALLED_AFTER:
+                connection.abort(f"did not read its answers for {STALLED_AFTER:g} s")
+            elif idle is not None and now - connection.last_request > idle:
+                connection.abort(f"no request for {idle:g} s")
+        delay = _SWEEP if idle is None else min(_SWEEP, idle / 4)
+        self._sweeper = asyncio.get_running_loop().call_later(delay, self._sweep)
+
+    def _count(self) -> None:
+        for unit in self._units.values():
+            unit.cell.health.modbus_connections = len(self._connections)
+
+    def _sockets(self) -> tuple[Any, ...]:
+        transport = self._server.transport if self._server is not None else None
+        return tuple(cast("asyncio.Server", transport).sockets) if transport is not None else ()
+
+
+def _set_options(sock: Any) -> None:
+    """Set what the platform knows; a connection that is gone already is none of our business."""
+    try:
+        for level, option, value in _KEEPALIVE:
+            sock.setsockopt(level, option, value)
+    except OSError:
+        return
+
+
+def _writers(accesses: dict[int, Access]) -> list[tuple[Cell, int]]:
+    return [(access.unit.cell, access.writer) for access in accesses.values() if access.writer is not None]
+
+
+def _names(connection: _Connection) -> tuple[str, ...]:
+    return tuple(cell.definition.writers[writer].name for cell, writer in _writers(connection.accesses))
+
+
+def _owns_anything(connection: _Connection) -> bool:
+    return any(cell.ownership.held_by(writer) for cell, writer in _writers(connection.accesses))

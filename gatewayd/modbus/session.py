@@ -1,0 +1,118 @@
+"""One connection's requests: bytes in, answers out, in order, whatever the depth of pipelining. No input or output.
+
+Plain register reads, nearly all of the traffic, are answered here without leaving the loop; everything else goes to
+`gatewayd.modbus.functions`.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from gatewayd.modbus.frames import FrameBuffer, FramingError, encode, split
+from gatewayd.modbus.functions import ExceptionCode, Unit, exception, execute
+from gatewayd.modbus.registers import GREATEST_REGISTERS
+
+__all__ = ["Access", "Session"]
+
+_READ_HOLDING = 3
+_READ_INPUT = 4
+_READ_FRAME = 12
+_READ_LENGTH = 6
+_READ = struct.Struct(">2sHHHHH")
+"""Transaction id, protocol id, length, unit id and function, address, quantity."""
+_HEAD = struct.Struct(">HHBBB")
+_THIS_DEVICE = (0, 255)
+"""Unit ids by which a client on TCP means the device itself (Messaging on TCP/IP Guide V1.0b, 4.4.2.3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """What a peer may do with one unit."""
+
+    unit: Unit
+    writer: int | None
+    """The writer of the unit's cell that the peer is, if any."""
+
+    def seen(self, now: float) -> None:
+        """The peer has sent a request."""
+        if self.writer is not None:
+            self.unit.cell.writer_seen(self.writer, now)
+
+
+class Session:
+    """The requests of one connection."""
+
+    def __init__(self) -> None:
+        self.buffer = FrameBuffer()
+        self.broken = ""
+        """Why the connection must be closed, once something came in that is no Modbus frame."""
+        self._accesses: dict[int, Access] = {}
+        self._reads: dict[int, tuple[Any, bytearray, tuple[bytes, ...], Access]] = {}
+
+    def serve(self, accesses: Mapping[int, Access]) -> None:
+        """Answer for these units from now on. The only one also answers to 0 and 255."""
+        self._accesses = dict(accesses)
+        if len(accesses) == 1:
+            self._accesses.update(dict.fromkeys(_THIS_DEVICE, *accesses.values()))
+        self._reads = {}
+        for unit, access in self._accesses.items():
+            image = access.unit.image
+            for function, table in ((_READ_HOLDING, image.holding), (_READ_INPUT, image.input)):
+                key = unit << 8 | function
+                self._reads[key] = (table.readable.reach, table.image, _heads(key), access)
+
+    def received(self, count: int, now: float) -> bytes:
+        """`count` bytes were written to `buffer.space()`; returns the answers to all requests that are complete."""
+        buffer, reads = self.buffer, self._reads
+        buffer.advance(count)
+        data, end = buffer.data, buffer.end
+        answers = []
+        start = 0
+        seen: Access | None = None
+        while start < end:
+            if end - start >= _READ_FRAME:
+                transaction, protocol, length, key, address, quantity = _READ.unpack_from(data, start)
+                read = reads.get(key)
+                if read is not None and length == _READ_LENGTH and not protocol:
+                    reach, image, heads, access = read
+                    if 0 < quantity <= reach[address]:
+                        answers.append(
+                            transaction + heads[quantity] + image[2 * address : 2 * (address + quantity)]
+                        )
+                        start += _READ_FRAME
+                        if access is not seen:
+                            seen = access
+                            access.seen(now)
+                        continue
+            try:
+                frame = split(data, start, end)
+            except FramingError as error:
+                self.broken = str(error)
+                break
+            if frame is None:
+                break
+            start = frame.end
+            answers.append(encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now)))
+        buffer.discard(start)
+        return b"".join(answers)
+
+    def _answer(self, unit: int, pdu: bytes, now: float) -> bytes:
+        access = self._accesses.get(unit)
+        if access is None:
+            return exception(pdu[0], ExceptionCode.TARGET_FAILED)
+        access.seen(now)
+        return execute(access.unit, access.writer, pdu, now)
+
+
+@cache
+def _heads(key: int) -> tuple[bytes, ...]:
+    """For every quantity, what stands between transaction id and registers in the answer to a read."""
+    unit, function = key >> 8, key & 0xFF
+    return tuple(
+        _HEAD.pack(0, 3 + 2 * quantity, unit, function, 2 * quantity)
+        for quantity in range(GREATEST_REGISTERS + 1)
+    )
