@@ -265,7 +265,6 @@ class _Builder:
         self.variables: list[ConcreteVariable] = []
         self.placements: list[ConcretePlacement] = []
         self.unresolved: list[Unresolved] = []
-        self._locks: list[ConcreteLock | str] = []
         self._members: list[list[int]] = []
         self._group_locks: dict[str, int] = {}
 
@@ -297,7 +296,7 @@ class _Builder:
         name = part.name if member is None else f"{part.name}[{member}]"
         direction = Direction.INPUT if target.field.name in INPUTS else Direction.OUTPUT
         index = len(self.variables)
-        lock = self._lock_index(part, name, index) if direction is Direction.INPUT else None
+        lock = self._lock_index(part, index) if direction is Direction.INPUT else None
         variable = ConcreteVariable(
             index,
             name,
@@ -315,17 +314,15 @@ class _Builder:
         self.variables.append(variable)
         return variable
 
-    def _lock_index(self, part: Part[VariableSpec], name: str, index: int) -> int | None:
+    def _lock_index(self, part: Part[VariableSpec], index: int) -> int | None:
         group = part.spec.group
         if group is None:
-            self._locks.append(name)
             self._members.append([index])
             return len(self._members) - 1
         if group not in self.document.groups:
             return None
         if group not in self._group_locks:
             self._group_locks[group] = len(self._members)
-            self._locks.append(group)
             self._members.append([])
         lock = self._group_locks[group]
         self._members[lock].append(index)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from ipaddress import IPv4Address, IPv6Address, ip_address, ip_network
+from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 
 from pydantic import BeforeValidator, Field, InstanceOf
@@ -100,7 +100,7 @@ def _decimal(value: object) -> object:
             refuse(syntax.BAD_NUMBER, f"`{value.text}` is not a plain decimal number", hint)
         return float(value) if isinstance(value, float) else int(value)
     if isinstance(value, float) and not math.isfinite(value):
-        refuse(syntax.BAD_NUMBER, f"`{value}` is not a number of this world", "write a plain decimal number")
+        refuse(syntax.BAD_NUMBER, f"`{value}` is not a finite number", "write a plain decimal number")
     if isinstance(value, str):
         if _NUMBER_LIKE.fullmatch(value):
             hint = "write a plain decimal number such as 10 or 0.5, without quotes"
@@ -198,8 +198,6 @@ Listen = Annotated[
 
 
 def _network(value: object) -> Network:
-    if isinstance(value, (IPv4Address, IPv6Address, Network)):
-        return ip_network(value)
     hint = "write an address (192.168.1.20) or a network (192.168.1.0/28)"
     text = _scalar(value, "an IP address or network", hint)
     try:
@@ -217,16 +215,20 @@ def _network(value: object) -> Network:
 
 def _many(value: object) -> object:
     """One thing may stand for a list of one."""
-    return list(value) if isinstance(value, (list, tuple)) else [value]
+    if isinstance(value, (list, tuple)):
+        return list(value) or refuse(
+            syntax.WRONG_TYPE, "the list is empty", "name at least one, or remove the key"
+        )
+    return [value]
 
 
 _OneNetwork = Annotated[
-    InstanceOf[Network],
+    IPv4Network | IPv6Network,
     BeforeValidator(_network, json_schema_input_type=Annotated[str, Field(examples=["192.168.1.20"])]),
 ]
 Networks = Annotated[
     tuple[_OneNetwork, ...],
-    BeforeValidator(_many, json_schema_input_type=str | list[str]),
+    BeforeValidator(_many, json_schema_input_type=_OneNetwork | list[_OneNetwork]),
     Field(strict=False),
 ]
 """An address, a network, or a list of them."""

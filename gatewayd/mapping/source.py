@@ -152,7 +152,7 @@ def parse(data: bytes, name: str) -> Source:
     findings.
     """
     if len(data) > MAXIMUM_BYTES:
-        message = f"the file has {len(data)} bytes, the limit is {MAXIMUM_BYTES}"
+        message = f"the file has more than {MAXIMUM_BYTES} bytes"
         hint = "one file describes one robot cell"
         return Source(name, None, (syntax.TOO_LARGE.at(Position(name, 1, 1), message, hint=hint),))
     try:

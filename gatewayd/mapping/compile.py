@@ -1,0 +1,214 @@
+"""From an expanded cell without errors to the one immutable plan that core and links work from.
+
+Deterministic: the same mapping gives an equal plan, whatever its comments and formatting.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from enum import Enum
+from ipaddress import IPv4Network, IPv6Network
+from typing import TYPE_CHECKING, Any, Final
+
+from gatewayd.core.definition import (
+    CellDefinition,
+    Direction,
+    Fallback,
+    FallbackKind,
+    Limits,
+    Lock,
+    Value,
+    ValueKind,
+    Variable,
+    Writer,
+)
+from gatewayd.mapping.codec import Codec
+from gatewayd.mapping.plan import ModbusPlan, Network, Placement, Plan, RobotPlan, WatchdogPlan
+from gatewayd.rtde.catalogue import Series
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
+    from gatewayd.mapping.model import Modbus, Robot
+
+__all__ = ["compile_plan", "fingerprint", "package_period"]
+
+_STALE_PERIODS: Final = 5
+_LEAST_STALE_AFTER: Final = 0.05
+_CASTS: Final[dict[ValueKind, Callable[[Value], Value]]] = {
+    ValueKind.BOOL: bool,
+    ValueKind.INT: round,
+    ValueKind.FLOAT: float,
+}
+_TIMESTAMP: Final = "timestamp"
+
+
+def compile_plan(cell: ExpandedCell) -> Plan:
+    """Compile a cell that passed all rules; ValueError for one with parts that could not be read or expanded."""
+    document = cell.document
+    if document.robot is None or not document.cell or not cell.is_complete:
+        raise ValueError(f"{document.source.name} has errors and cannot be compiled")
+    robot = document.robot.spec
+    writers = {name: index for index, name in enumerate(document.writers)}
+    definition = CellDefinition(
+        name=document.cell,
+        fingerprint=0,
+        variables=tuple(_variable(variable) for variable in cell.variables),
+        locks=tuple(
+            Lock(
+                lock.name,
+                lock.members,
+                tuple(writers[name] for name in lock.owners),
+                lock.takeover,
+                lock.lease,
+            )
+            for lock in cell.locks
+        ),
+        writers=tuple(Writer(name, part.spec.timeout) for name, part in document.writers.items()),
+        stale_after=robot.stale_after or max(_STALE_PERIODS * package_period(robot), _LEAST_STALE_AFTER),
+        clear_on_connect=robot.on_connect == "fallback",
+    )
+    modbus = _modbus(cell, document.modbus.spec) if document.modbus is not None else None
+    plan = Plan(document.source.name, definition, _robot(cell, robot, writers), modbus)
+    return dataclasses.replace(plan, cell=dataclasses.replace(definition, fingerprint=fingerprint(plan)))
+
+
+def package_period(robot: Robot) -> float:
+    """Seconds between output packages: the controller divides its base rate by a whole number.
+
+    Where the series is not known the slowest that may answer counts: CB3 with 125 Hz for its own rate.
+    """
+    if robot.frequency == 0:
+        return 1 / (Series.from_word(robot.series) if robot.series is not None else Series.CB3).base_rate
+    if robot.series is None:
+        return 1 / robot.frequency
+    base = Series.from_word(robot.series).base_rate
+    return max(int(base / robot.frequency), 1) / base
+
+
+def _variable(variable: ConcreteVariable) -> Variable:
+    spec, kind = variable.spec, variable.kind
+    is_input = variable.direction is Direction.INPUT
+    return Variable(
+        number=variable.index + 1,
+        name=variable.name,
+        direction=variable.direction,
+        kind=kind,
+        field=variable.field.name,
+        bit=variable.bit,
+        element=variable.element,
+        low=variable.low,
+        high=variable.high,
+        limits=Limits(*spec.limits, spec.clamp) if spec.limits is not None else None,
+        on_stale=Fallback() if is_input else _fallback(spec.on_stale, kind),
+        on_release=_fallback(spec.on_release, kind) if is_input else Fallback(),
+        lock=variable.lock,
+        deadband=spec.deadband,
+        unit=spec.unit,
+        comment=spec.comment,
+    )
+
+
+def _fallback(fallback: Fallback, kind: ValueKind) -> Fallback:
+    if fallback.value is None:
+        return fallback
+    value: Value = _CASTS[kind](fallback.value)
+    return Fallback(FallbackKind.VALUE, value)
+
+
+def _robot(cell: ExpandedCell, robot: Robot, writers: dict[str, int]) -> RobotPlan:
+    watchdog = robot.watchdog
+    return RobotPlan(
+        host=robot.host,
+        port=robot.port,
+        frequency=robot.frequency,
+        outputs=tuple(name for name in _fields(cell, Direction.OUTPUT) if name != _TIMESTAMP),
+        inputs=_fields(cell, Direction.INPUT),
+        verify=robot.verify,
+        watchdog=None
+        if watchdog is None
+        else WatchdogPlan(
+            watchdog.field,
+            watchdog.frequency,
+            tuple(writers[name] for name in dict.fromkeys(watchdog.requires or ())),
+        ),
+    )
+
+
+def _fields(cell: ExpandedCell, direction: Direction) -> tuple[str, ...]:
+    names = (variable.field.name for variable in cell.variables if variable.direction is direction)
+    return tuple(dict.fromkeys(names))
+
+
+def _modbus(cell: ExpandedCell, modbus: Modbus) -> ModbusPlan:
+    peers = [
+        (network, index)
+        for index, writer in enumerate(cell.document.writers.values())
+        for network in writer.spec.modbus
+    ]
+    return ModbusPlan(
+        host=modbus.listen.host,
+        port=modbus.listen.port,
+        unit=modbus.unit,
+        allow=modbus.allow,
+        connections=modbus.connections,
+        idle_timeout=modbus.idle_timeout,
+        fill_gaps=modbus.gaps == "zero",
+        placements=tuple(
+            Placement(placed.variable.index, placed.area, placed.address, placed.bit, placed.codec)
+            for placed in cell.placements
+        ),
+        writers=tuple(sorted(peers, key=lambda peer: (_host_bits(peer[0]), peer[0].version, str(peer[0])))),
+    )
+
+
+def _host_bits(network: Network) -> int:
+    return network.max_prefixlen - network.prefixlen
+
+
+_FOR_PEOPLE: Final = frozenset({"comment", "source", "fingerprint"})
+_CODEC_MEANING: Final = ("type", "order", "scale", "offset")
+
+
+def fingerprint(plan: Plan) -> int:
+    """32 bits of what the plan means: everything but the comments and the path of the file.
+
+    Keys that stand at their default do not count, so that later versions of gatewayd can add some without
+    changing the fingerprint of the mappings that do not use them.
+    """
+    text = json.dumps(_meaning(plan), sort_keys=True, separators=(",", ":"))
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "big")
+
+
+def _meaning(thing: Any) -> Any:
+    match thing:
+        case Codec():
+            return [getattr(thing, name) for name in _CODEC_MEANING]
+        case Enum():
+            return thing.name
+        case IPv4Network() | IPv6Network():
+            return str(thing)
+        case tuple():
+            return [_meaning(item) for item in thing]
+    if not dataclasses.is_dataclass(thing):
+        return thing
+    return {
+        name: _meaning(value)
+        for name, default in _fields_of(type(thing))
+        if (value := getattr(thing, name)) is not default and value != default
+    }
+
+
+_known_fields: dict[type, tuple[tuple[str, Any], ...]] = {}
+
+
+def _fields_of(kind: type[Any]) -> tuple[tuple[str, Any], ...]:
+    """Names and defaults of the fields that carry meaning."""
+    if kind not in _known_fields:
+        _known_fields[kind] = tuple(
+            (field.name, field.default) for field in dataclasses.fields(kind) if field.name not in _FOR_PEOPLE
+        )
+    return _known_fields[kind]
