@@ -1,0 +1,76 @@
+"""The one way from mapping files to findings and plans: `check`, `show` and `run` all load through here.
+
+Text -> tree -> typed parts -> expanded cell -> rules -> plan. A plan exists only where no error was found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from gatewayd.mapping.compile import compile_plan
+from gatewayd.mapping.diagnostics import Diagnostic, Severity
+from gatewayd.mapping.document import read_document
+from gatewayd.mapping.expand import ExpandedCell, expand
+from gatewayd.mapping.rules.run import check_cell, check_plant
+from gatewayd.mapping.source import MAXIMUM_BYTES, parse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    from gatewayd.mapping.plan import Plan
+
+__all__ = ["Loaded", "load", "load_together", "read_bytes"]
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """One mapping file, looked at in full."""
+
+    name: str
+    """Path as given."""
+    cell: ExpandedCell
+    """What could be read of it; empty where nothing could."""
+    diagnostics: tuple[Diagnostic, ...]
+    """All findings, from top to bottom."""
+    plan: Plan | None
+    """None when a finding is an error."""
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The text of the file, for excerpts."""
+        return self.cell.document.source.lines
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a mapping file; what exceeds the size limit is left out, so that `load` refuses it. Raises OSError."""
+    with path.open("rb") as file:
+        return file.read(MAXIMUM_BYTES + 1)
+
+
+def load(data: bytes, name: str) -> Loaded:
+    """Load one file by itself. Never raises, whatever the bytes."""
+    return load_together([(name, data)])[0]
+
+
+def load_together(files: Sequence[tuple[str, bytes]]) -> tuple[Loaded, ...]:
+    """Load files (name, bytes) that are to run in one process: what they share is checked too. Never raises."""
+    cells: list[ExpandedCell] = []
+    findings: dict[str, list[Diagnostic]] = {}
+    for name, data in files:
+        document, found = read_document(parse(data, name))
+        cell = expand(document)
+        cells.append(cell)
+        findings.setdefault(name, []).extend((*found, *check_cell(cell)))
+    for finding in check_plant(cells):
+        findings.setdefault(finding.position.file, []).append(finding)
+    return tuple(
+        _finished(name, cell, findings[name]) for (name, _), cell in zip(files, cells, strict=True)
+    )
+
+
+def _finished(name: str, cell: ExpandedCell, findings: Iterable[Diagnostic]) -> Loaded:
+    diagnostics = tuple(sorted(findings, key=lambda finding: (finding.position, finding.rule.id)))
+    failed = any(finding.severity is Severity.ERROR for finding in diagnostics)
+    return Loaded(name, cell, diagnostics, None if failed else compile_plan(cell))
