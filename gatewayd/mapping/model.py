@@ -110,7 +110,11 @@ class Robot(Section):
 class Modbus(Section):
     """One unit of a Modbus TCP listener."""
 
-    listen: Listen = Field(default=Endpoint("127.0.0.1", 502), description="address and port to listen on")
+    listen: Listen = Field(
+        default=Endpoint("127.0.0.1", 502),
+        description="address and port to listen on",
+        json_schema_extra={"default": "127.0.0.1:502"},
+    )
     unit: Whole = Field(default=1, ge=1, le=247, description="unit identifier of this cell")
     allow: Networks = Field(
         default=(),
@@ -155,6 +159,12 @@ class Group(Section):
 
 class PlacementSpec(Section):
     """Where a variable lies in Modbus and how its number is written there."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [{"required": [area]} for area in ("holding", "input", "coil", "discrete")]
+        }
+    )
 
     holding: Address | None = Field(default=None, description="holding register (4xxxxx)")
     input: Address | None = Field(default=None, description="input register (3xxxxx), read only")
@@ -267,10 +277,12 @@ class VariableSpec(Section):
     on_release: ReleasePolicy = Field(
         default=Fallback(),
         description="inputs: clear (default), hold, or a value given when the owner is lost",
+        json_schema_extra={"default": "clear"},
     )
     on_stale: OutputPolicy = Field(
         default=Fallback(),
         description="outputs: clear (default), hold, exception, or a value seen when the robot is lost",
+        json_schema_extra={"default": "clear"},
     )
     deadband: Real = Field(default=0.0, ge=0, description="least change that makes an event-driven PDO send")
     unit: str = Field(default="", max_length=32, description="unit of the robot's value, for people")

@@ -10,7 +10,7 @@ import math
 import re
 from dataclasses import dataclass
 from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
-from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn
 
 from pydantic import BeforeValidator, Field, InstanceOf
 from pydantic_core import PydanticCustomError
@@ -109,9 +109,9 @@ def _decimal(value: object) -> object:
     return value
 
 
-Whole = Annotated[int, BeforeValidator(_decimal, json_schema_input_type=int)]
+Whole = Annotated[int, BeforeValidator(_decimal)]
 """An integer in plain decimal digits."""
-Real = Annotated[float, BeforeValidator(_decimal, json_schema_input_type=float), Field(allow_inf_nan=False)]
+Real = Annotated[float, BeforeValidator(_decimal), Field(allow_inf_nan=False)]
 """A number in plain decimal digits."""
 
 
@@ -222,13 +222,13 @@ def _many(value: object) -> object:
     return [value]
 
 
+_NETWORK_SCHEMA = Annotated[str, Field(examples=["192.168.1.20", "192.168.1.0/28"])]
 _OneNetwork = Annotated[
-    IPv4Network | IPv6Network,
-    BeforeValidator(_network, json_schema_input_type=Annotated[str, Field(examples=["192.168.1.20"])]),
+    IPv4Network | IPv6Network, BeforeValidator(_network, json_schema_input_type=_NETWORK_SCHEMA)
 ]
 Networks = Annotated[
     tuple[_OneNetwork, ...],
-    BeforeValidator(_many, json_schema_input_type=_OneNetwork | list[_OneNetwork]),
+    BeforeValidator(_many, json_schema_input_type=_NETWORK_SCHEMA | list[_NETWORK_SCHEMA]),
     Field(strict=False),
 ]
 """An address, a network, or a list of them."""
@@ -254,12 +254,8 @@ def _cell_name(value: object) -> str:
     return text
 
 
-Name = Annotated[
-    str,
-    BeforeValidator(
-        _name, json_schema_input_type=Annotated[str, Field(pattern="^[A-Za-z][A-Za-z0-9_]{0,63}$")]
-    ),
-]
+_NAME_SCHEMA = Annotated[str, Field(pattern="^[A-Za-z][A-Za-z0-9_]{0,63}$")]
+Name = Annotated[str, BeforeValidator(_name, json_schema_input_type=_NAME_SCHEMA)]
 """Name of a writer, group or variable."""
 CellName = Annotated[
     str,
@@ -270,8 +266,8 @@ CellName = Annotated[
 """Name of a cell."""
 Names = Annotated[
     tuple[Name, ...],
-    BeforeValidator(_many, json_schema_input_type=str | list[str]),
-    Field(strict=False, min_length=1),
+    BeforeValidator(_many, json_schema_input_type=_NAME_SCHEMA | list[_NAME_SCHEMA]),
+    Field(strict=False),
 ]
 """A name or a list of names."""
 
@@ -431,16 +427,14 @@ def _output_policy(value: object) -> Fallback:
 
 ReleasePolicy = Annotated[
     InstanceOf[Fallback],
-    BeforeValidator(
-        _release_policy, json_schema_input_type=bool | float | Annotated[str, Field(pattern="^(clear|hold)$")]
-    ),
+    BeforeValidator(_release_policy, json_schema_input_type=bool | float | Literal["clear", "hold"]),
 ]
 """What an input is given when its owner is lost."""
 OutputPolicy = Annotated[
     InstanceOf[Fallback],
     BeforeValidator(
         _output_policy,
-        json_schema_input_type=bool | float | Annotated[str, Field(pattern="^(clear|hold|exception)$")],
+        json_schema_input_type=bool | float | Literal["clear", "hold", "exception"],
     ),
 ]
 """What the fieldbus sees of an output when the robot stops telling."""
