@@ -1,0 +1,48 @@
+"""`make bench`: measure, and print every figure beside its aim. `make bench ARGS="latency cost"`: some of them."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+from collections.abc import Callable
+from importlib import import_module
+
+from tests.benchmarks.report import Table
+
+__all__: list[str] = []
+
+SUBJECTS = {
+    "throughput": "Modbus requests per second and round trips, beside libmodbus and the stock pymodbus server",
+    "latency": "robot to PLC and PLC to robot, as histograms",
+    "cost": "CPU time, memory and start of the daemon with the full image at 500 Hz",
+    "check": "time of `gatewayd check`",
+    "script": "the script that a user would write instead: ur_rtde feeding a pymodbus server",
+}
+"""Module -> what it measures. Each has `run(seconds) -> list[Table]`."""
+
+
+def _main() -> None:
+    subjects = "\n".join(f"  {name:<11} {text}" for name, text in SUBJECTS.items())
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks",
+        description=f"Measure gatewayd on this machine.\n\nsubjects (default: all):\n{subjects}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("subjects", nargs="*", metavar="SUBJECT", default=list(SUBJECTS))
+    parser.add_argument("--seconds", type=float, default=3.0, help="length of each measurement (default 3)")
+    options = parser.parse_args()
+    unknown = set(options.subjects) - set(SUBJECTS)
+    if unknown:
+        parser.error(f"no subject is called {', '.join(sorted(unknown))}")
+    print(
+        f"{platform.python_implementation()} {platform.python_version()}, {os.cpu_count()} cores, {platform.machine()}"
+    )
+    for subject in options.subjects:
+        run: Callable[[float], list[Table]] = import_module(f"tests.benchmarks.{subject}").run
+        for table in run(options.seconds):
+            print(f"\n{table}\n", flush=True)
+
+
+if __name__ == "__main__":
+    _main()

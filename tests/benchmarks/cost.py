@@ -1,0 +1,91 @@
+"""What the daemon costs with the full image at 500 Hz: CPU time, memory, the time to start."""
+
+from __future__ import annotations
+
+import struct
+import time
+from statistics import median
+
+from tests.benchmarks.image import DOUBLES_OUT, INTEGERS_IN
+from tests.benchmarks.plc import Plc
+from tests.benchmarks.processes import cpu_seconds, free_port, resident_megabytes, wait_until
+from tests.benchmarks.report import Table, at_most
+from tests.benchmarks.servers import Served, gateway, mapped_gateway, simulator
+
+__all__ = ["run"]
+
+STARTS = 5
+SETTLE = 2.0
+"""Seconds between the first fresh value and the measurement."""
+PLC_PERIOD = 0.01
+COUNTERS = 60014
+"""Packages, skipped, late: 32 bits each (status block)."""
+ROBOT_STATE = 60007
+FRESH = b"\x00\x02"
+CPU_AIM = 8.0
+START_AIM = 0.5
+MEMORY_AIM = 60.0
+
+DEFINITION = """\
+`gatewayd run` with all reserved registers both ways, read-back of the inputs and 20 state fields, its robot
+being `gatewayd simulate` at 500 Hz. CPU: user and system time from /proc, as a share of one core. PLC:
+every 10 ms FC3 of 125 registers and FC16 of 10. Start: from fork to the accepted connection, and to fresh
+values with a robot that is there; median of five."""
+
+
+def run(seconds: float) -> list[Table]:
+    """One table."""
+    table = Table("Cost of the daemon, full image at 500 Hz", DEFINITION, ("what", "figure"))
+    seconds = max(seconds, 3.0)
+    with gateway() as served:
+        time.sleep(SETTLE)
+        before = _counters(served)
+        table.add("CPU, no PLC", at_most(_share(served, seconds, busy=False), CPU_AIM, " %"))
+        table.add("CPU, one PLC", f"{_share(served, seconds, busy=True):.3g} %")
+        packages, skipped, late = (now - then for now, then in zip(_counters(served), before, strict=True))
+        table.add("packages skipped", at_most(skipped, 0))
+        table.add("packages late", f"{late} of {packages}")
+        table.add("memory (RSS)", at_most(resident_megabytes(served.pid), MEMORY_AIM, " MB"))
+    table.add("start to serving", at_most(median(_start() for _ in range(STARTS)), START_AIM, " s"))
+    with simulator() as robot:
+        table.add("start to fresh values", f"{median(_start(robot.port) for _ in range(STARTS)):.3g} s")
+    return [table]
+
+
+def _share(served: Served, seconds: float, *, busy: bool) -> float:
+    """CPU time in percent of one core, while nobody asks or while a PLC does."""
+    begin, used = time.monotonic(), cpu_seconds(served.pid)
+    if busy:
+        _poll(served.port, begin + seconds)
+    else:
+        time.sleep(seconds)
+    return 100 * (cpu_seconds(served.pid) - used) / (time.monotonic() - begin)
+
+
+def _poll(port: int, end: float) -> None:
+    plc = Plc(port)
+    number = 0
+    while time.monotonic() < end:
+        number += 1
+        plc.read(DOUBLES_OUT, 125)
+        plc.write(INTEGERS_IN, struct.pack(">5i", *[number] * 5))
+        time.sleep(PLC_PERIOD)
+    plc.close()
+
+
+def _counters(served: Served) -> tuple[int, ...]:
+    plc = Plc(served.port)
+    counters = struct.unpack(">3I", plc.read(COUNTERS, 6))
+    plc.close()
+    return counters
+
+
+def _start(robot: int | None = None) -> float:
+    """Seconds until the daemon serves; with a robot's port: until its values are fresh."""
+    begin = time.monotonic()
+    with mapped_gateway(robot or free_port()) as served:
+        if robot is not None:
+            plc = Plc(served.port)
+            wait_until(lambda: plc.read(ROBOT_STATE, 1) == FRESH, "fresh values")
+            plc.close()
+        return time.monotonic() - begin

@@ -1,0 +1,152 @@
+"""How long a value is under way, seen from outside: controller and PLC in one process, gatewayd in another."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from statistics import median
+
+from tests.benchmarks.controller import Controller
+from tests.benchmarks.image import DOUBLES_OUT, INTEGERS_IN
+from tests.benchmarks.plc import Plc
+from tests.benchmarks.processes import free_port
+from tests.benchmarks.report import Table, at_most, histogram, percentile
+from tests.benchmarks.servers import mapped_gateway
+
+__all__ = ["PERIOD", "Stream", "pace", "run", "stream"]
+
+PERIOD = 0.002
+"""Seconds between packages: 500 Hz."""
+DOUBLES = tuple(f"output_double_register_{number}" for number in range(24))
+WORDS = 4
+"""Registers of one double."""
+BOUNDS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0)
+OUT_AIM = 0.3
+IN_AIM = 0.5
+
+OUT = """\
+The full image's package is handed to the kernel; the PLC, in the same process, then reads one double until
+the new value is there. Own time: less the median round trip of the same read while nothing else happens."""
+IN = """\
+The PLC's FC16 request for an integer is handed to the kernel, in the middle of a cycle; the controller, in
+the same process, receives the RTDE package with the new value. Loopback both ways is part of it."""
+
+
+@dataclass
+class Stream:
+    """What a PLC saw of a controller's packages."""
+
+    times: list[float] = field(default_factory=list)
+    """Seconds from handing over each package to the answer that shows it, or a later one."""
+    reads: int = 0
+    mixed: int = 0
+    """Reads in which the doubles were not all of one package."""
+
+
+def stream(controller: Controller, plc: Plc, seconds: float, count: int = 1) -> Stream:
+    """Send numbered packages at 500 Hz; after each read `count` doubles from DOUBLES_OUT until it is seen."""
+    seen = Stream()
+    unseen: deque[tuple[float, float]] = deque()
+    layout = struct.Struct(f">{count}d")
+    clock = time.perf_counter
+    number = controller.values.get(DOUBLES[0], (0.0,))[0]
+    due = clock()
+    end = due + seconds
+    while due < end or unseen:
+        if due < end and clock() >= due:
+            number += 1.0
+            _send(controller, number)
+            unseen.append((number, clock()))
+            due += PERIOD
+        if unseen:
+            values = layout.unpack(plc.read(DOUBLES_OUT, WORDS * count))
+            now = clock()
+            seen.reads += 1
+            seen.mixed += len(set(values)) > 1
+            while unseen and unseen[0][0] <= values[0]:
+                seen.times.append(now - unseen.popleft()[1])
+        else:
+            time.sleep(max(0.0, due - clock()))
+    return seen
+
+
+def pace(controller: Controller, seconds: float) -> None:
+    """Send numbered packages at 500 Hz and do nothing else."""
+    number = controller.values.get(DOUBLES[0], (0.0,))[0]
+    due = time.perf_counter()
+    for _ in range(int(seconds / PERIOD)):
+        number += 1.0
+        _send(controller, number)
+        due += PERIOD
+        time.sleep(max(0.0, due - time.perf_counter()))
+
+
+def _send(controller: Controller, number: float) -> None:
+    controller.pump(0)
+    controller.values.update(dict.fromkeys(DOUBLES, (number,)))
+    controller.send()
+
+
+def run(seconds: float) -> list[Table]:
+    """A table for each direction."""
+    robot = free_port()
+    controller = Controller(robot)
+    with mapped_gateway(robot) as served:
+        controller.wait_for_start()
+        plc = Plc(served.port)
+        pace(controller, 0.5)
+        idle = _round_trip(controller, plc)
+        outward = stream(controller, plc, seconds).times
+        inward = _inward(controller, plc, seconds)
+        plc.close()
+    controller.close()
+    own = [max(0.0, value - idle) for value in outward]
+    out = Table("Robot to PLC: package in -> value in the PLC's hands", OUT, ("time", "share", ""))
+    out.rows = histogram(outward, BOUNDS)
+    out.add(
+        "p50, p99",
+        f"{_ms(outward, 0.5)}, {_ms(outward, 0.99)} ms",
+        f"of {len(outward)}; round trip {idle * 1000:.3f} ms",
+    )
+    out.add("own time p99", at_most(percentile(own, 0.99) * 1000, OUT_AIM, " ms"))
+    into = Table("PLC to robot: write in -> package out", IN, ("time", "share", ""))
+    into.rows = histogram(inward, BOUNDS)
+    into.add("p50", f"{_ms(inward, 0.5)} ms", f"of {len(inward)}")
+    into.add("p99", at_most(percentile(inward, 0.99) * 1000, IN_AIM, " ms"))
+    return [out, into]
+
+
+def _ms(times: list[float], share: float) -> str:
+    return f"{percentile(times, share) * 1000:.3f}"
+
+
+def _round_trip(controller: Controller, plc: Plc) -> float:
+    """Median of the read that `stream` does, each in the middle of a quiet cycle."""
+    times = []
+    for _ in range(250):
+        pace(controller, PERIOD)
+        time.sleep(PERIOD / 2)
+        begin = time.perf_counter()
+        plc.read(DOUBLES_OUT, WORDS)
+        times.append(time.perf_counter() - begin)
+    return median(times)
+
+
+def _inward(controller: Controller, plc: Plc, seconds: float) -> list[float]:
+    """Times from each write to the package with its value."""
+    times = []
+    for number in range(1, int(seconds / PERIOD / 2) + 1):
+        pace(controller, PERIOD)
+        time.sleep(PERIOD / 2)
+        controller.pump(0)
+        begin = time.perf_counter()
+        plc.post(INTEGERS_IN, struct.pack(">i", number))
+        while controller.values.get("input_int_register_0") != (number,):
+            controller.pump(1.0)
+            if time.perf_counter() - begin > 1.0:
+                raise TimeoutError("a written value did not reach the controller within a second")
+        times.append(time.perf_counter() - begin)
+        plc.answer()
+    return times
