@@ -5,22 +5,20 @@
 `DCBA` both; 64-bit numbers alike over four words, 16-bit numbers know only the byte swap.
 
 Encoding saturates: a value beyond the register type becomes the nearest number that the type holds, NaN
-becomes 0 in an integer. A float32 beyond its range becomes the greatest finite one; infinities stay what they are.
-Halves round to even.
+becomes 0 in an integer. A float32 beyond its range becomes the greatest finite one; infinities stay what they
+are in reals. Halves round to even. A `bool` register is written 0 or 1, and every number but 0 reads as true.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import lru_cache
 from struct import Struct
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import Final, TypeAlias
 
 from gatewayd.core.definition import Value, ValueKind
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 __all__ = ["ORDERS", "TYPES", "Codec", "NumberFormat", "make_codec"]
 
@@ -96,7 +94,7 @@ class Codec:
     """
 
 
-@cache
+@lru_cache(maxsize=4096)
 def make_codec(
     type_name: str,
     order: str = "ABCD",
@@ -214,6 +212,9 @@ def _real_packer(number: NumberFormat, pack: Pack) -> Pack:
 def _plain_decoder(number: NumberFormat, unpack: Unpack, kind: ValueKind) -> Callable[[Buffer], Value | None]:
     if kind is ValueKind.BOOL:
         return lambda data: bool(unpack(data)[0])
+    if number.name == "bool":
+        truth: tuple[Value, Value] = (0, 1) if kind is ValueKind.INT else (0.0, 1.0)
+        return lambda data: truth[unpack(data)[0] != 0]
     if kind is ValueKind.FLOAT:
         return lambda data: float(unpack(data)[0])
     if number.is_real:

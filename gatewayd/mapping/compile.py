@@ -8,9 +8,10 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from collections.abc import Callable
 from enum import Enum
 from ipaddress import IPv4Network, IPv6Network
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from gatewayd.core.definition import (
     CellDefinition,
@@ -25,14 +26,10 @@ from gatewayd.core.definition import (
     Writer,
 )
 from gatewayd.mapping.codec import Codec
+from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
+from gatewayd.mapping.model import Modbus, Robot
 from gatewayd.mapping.plan import ModbusPlan, Network, Placement, Plan, RobotPlan, WatchdogPlan
 from gatewayd.rtde.catalogue import Series
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
-    from gatewayd.mapping.model import Modbus, Robot
 
 __all__ = ["compile_plan", "fingerprint", "package_period"]
 

@@ -7,11 +7,14 @@ that is wrong with it is reported at its exact place.
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
 
+from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule
 from gatewayd.mapping.model import (
     ANY,
     FORMAT_VERSION,
@@ -28,13 +31,6 @@ from gatewayd.mapping.model import (
 from gatewayd.mapping.rules import syntax
 from gatewayd.mapping.scalars import CellName, Name
 from gatewayd.mapping.source import Entry, Items, Node, Scalar, Source, Table
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pydantic_core import ErrorDetails
-
-    from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule
 
 __all__ = ["Document", "Part", "read_document"]
 

@@ -7,23 +7,20 @@ expanded is kept as `Unresolved` or as a placement with a `PlacementProblem`: ru
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from gatewayd.core.definition import Direction, ValueKind
 from gatewayd.mapping.codec import TYPES, Codec, make_codec
+from gatewayd.mapping.diagnostics import Position
+from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.model import ANY, Group, PlacementSpec, VariableSpec
 from gatewayd.mapping.plan import Area
+from gatewayd.mapping.scalars import Reference
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, REGISTERS, Field, bit_word
 from gatewayd.rtde.types import DataType
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from gatewayd.mapping.diagnostics import Position
-    from gatewayd.mapping.document import Document, Part
-    from gatewayd.mapping.scalars import Reference
 
 __all__ = [
     "SHARED_LEASE",
@@ -64,6 +61,7 @@ _ELEMENTS: Final = {
 _FAMILIES: Final = {family.prefix: family for family in REGISTERS}
 _BIT_REGISTERS: Final = {"input_bit_register_": "input", "output_bit_register_": "output"}
 _WORD_BITS: Final = range(64)
+_MANY: Final = 2048
 
 
 class ReferenceProblem(Enum):
@@ -235,9 +233,14 @@ class ExpandedCell:
 
 
 def expand(document: Document) -> ExpandedCell:
-    """Expand all variables of a document. Never raises, whatever valid parts it holds."""
+    """Expand the variables of a document. Never raises, whatever valid parts it holds.
+
+    Stops some way beyond the limit of variables, so that no file can fill the memory with them.
+    """
     builder = _Builder(document)
     for part in document.variables.values():
+        if len(builder.variables) > _MANY:
+            break
         builder.add(part)
     return builder.finished()
 

@@ -5,21 +5,17 @@ Text -> tree -> typed parts -> expanded cell -> rules -> plan. A plan exists onl
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from gatewayd.mapping.compile import compile_plan
 from gatewayd.mapping.diagnostics import Diagnostic, Severity
 from gatewayd.mapping.document import read_document
 from gatewayd.mapping.expand import ExpandedCell, expand
+from gatewayd.mapping.plan import Plan
 from gatewayd.mapping.rules.run import check_cell, check_plant
 from gatewayd.mapping.source import MAXIMUM_BYTES, parse
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from pathlib import Path
-
-    from gatewayd.mapping.plan import Plan
 
 __all__ = ["Loaded", "load", "load_together", "read_bytes"]
 
@@ -65,9 +61,7 @@ def load_together(files: Sequence[tuple[str, bytes]]) -> tuple[Loaded, ...]:
         findings.setdefault(name, []).extend((*found, *check_cell(cell)))
     for finding in check_plant(cells):
         findings.setdefault(finding.position.file, []).append(finding)
-    return tuple(
-        _finished(name, cell, findings[name]) for (name, _), cell in zip(files, cells, strict=True)
-    )
+    return tuple(_finished(name, cell, findings[name]) for (name, _), cell in zip(files, cells, strict=True))
 
 
 def _finished(name: str, cell: ExpandedCell, findings: Iterable[Diagnostic]) -> Loaded:

@@ -10,18 +10,16 @@ import math
 import re
 from dataclasses import dataclass
 from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NoReturn
+from typing import Annotated, Any, Final, Literal, NoReturn
 
 from pydantic import BeforeValidator, Field, InstanceOf
 from pydantic_core import PydanticCustomError
 
 from gatewayd.core.definition import Fallback, FallbackKind
+from gatewayd.mapping.diagnostics import Rule
 from gatewayd.mapping.plan import Network
 from gatewayd.mapping.rules import syntax
 from gatewayd.mapping.source import RealNumber, WholeNumber
-
-if TYPE_CHECKING:
-    from gatewayd.mapping.diagnostics import Rule
 
 __all__ = [
     "Address",
@@ -94,19 +92,18 @@ def _scalar(value: object, what: str, hint: str) -> str:
 
 def _decimal(value: object) -> object:
     """Let only plain decimal numbers pass; other shapes are read differently by different tools."""
-    if isinstance(value, (WholeNumber, RealNumber)):
-        if not _DECIMAL.fullmatch(value.text):
-            hint = "write a plain decimal number such as 10 or 0.5"
-            refuse(syntax.BAD_NUMBER, f"`{value.text}` is not a plain decimal number", hint)
-        return float(value) if isinstance(value, float) else int(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        refuse(syntax.BAD_NUMBER, f"`{value}` is not a finite number", "write a plain decimal number")
+    hint = "write a plain decimal number such as 10 or 0.5"
     if isinstance(value, str):
         if _NUMBER_LIKE.fullmatch(value):
-            hint = "write a plain decimal number such as 10 or 0.5, without quotes"
-            refuse(syntax.BAD_NUMBER, f"`{value}` is not a plain decimal number", hint)
-        refuse(syntax.WRONG_TYPE, f"`{value}` stands where a number is expected", "write a number")
-    return value
+            refuse(syntax.BAD_NUMBER, f"`{value}` is not a plain decimal number", f"{hint}, without quotes")
+        refuse(syntax.WRONG_TYPE, f"`{value}` stands where a number is expected", hint)
+    if isinstance(value, (WholeNumber, RealNumber)) and not _DECIMAL.fullmatch(value.text):
+        refuse(syntax.BAD_NUMBER, f"`{value.text}` is not a plain decimal number", hint)
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            refuse(syntax.BAD_NUMBER, f"`{_text(value)}` is not a finite number", hint)
+        return float(value)
+    return int(value) if isinstance(value, WholeNumber) else value
 
 
 Whole = Annotated[int, BeforeValidator(_decimal)]

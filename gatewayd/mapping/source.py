@@ -7,8 +7,9 @@ stays bit 10 of register 0. `parse` never raises, whatever the bytes: what is wr
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
@@ -22,12 +23,10 @@ from ruamel.yaml.events import (
     SequenceStartEvent,
     StreamEndEvent,
 )
+from ruamel.yaml.reader import ReaderError
 
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule
 from gatewayd.mapping.rules import syntax
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 __all__ = [
     "MAXIMUM_BYTES",
@@ -51,7 +50,7 @@ MAXIMUM_DEPTH: Final = 16
 
 _BEGIN: Final = "begin with `gatewayd: 1`"
 _SHOWN_LENGTH: Final = 60
-_WHOLE = re.compile(r"[-+]?[0-9]{1,400}|0x[0-9a-fA-F]{1,400}|0o[0-7]{1,400}")
+_WHOLE = re.compile(r"[-+]?[0-9]{1,300}|0x[0-9a-fA-F]{1,240}|0o[0-7]{1,300}")
 _REAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NAMED: Final[dict[str, Any]] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
@@ -209,6 +208,9 @@ class _Reader:
         except MarkedYAMLError as error:
             self._syntax(error)
             return None
+        except ReaderError as error:
+            self._unprintable(text, error.position)
+            return None
         except YAMLError as error:
             self._find(syntax.YAML_SYNTAX, _one_line(str(error)), Position(self.name, 1, 1), "")
             return None
@@ -310,6 +312,14 @@ class _Reader:
             related = (Related(place, _one_line(error.context)),)
         problem = _one_line(error.problem or error.context or "not YAML")
         self._find(syntax.YAML_SYNTAX, problem, position, _syntax_hint(problem), related)
+
+    def _unprintable(self, text: str, offset: int) -> None:
+        lines = text[:offset].splitlines() or [""]
+        position = Position(self.name, len(lines), len(lines[-1]) + 1)
+        message = f"the character U+{ord(text[offset]):04X} does not belong into a text file"
+        self._find(
+            syntax.NOT_UTF8, message, position, "delete it; the file may have been saved in a wrong encoding"
+        )
 
     def _find(
         self, rule: Rule, message: str, position: Position, hint: str, related: tuple[Related, ...] = ()
