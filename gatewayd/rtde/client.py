@@ -1,0 +1,220 @@
+"""An RTDE client that keeps itself connected: one asyncio task, synchronous callbacks, no logging of its own.
+
+It negotiates, subscribes, claims, and starts over with the full set-up whenever the connection ends, be it the boot
+restart of a controller or a pulled cable. Packages are handed on from within the read of the socket; of several that
+are waiting only the newest. The decisions are in `gatewayd.rtde.negotiation`, one connection in
+`gatewayd.rtde.connection`; here connections follow one another.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from time import monotonic
+
+from gatewayd.rtde.connection import ClientHandler, Connection, Tolerances
+from gatewayd.rtde.loss import Loss, LossReason, connect_failure
+from gatewayd.rtde.negotiation import Session, State, Unavailable, Wishes
+from gatewayd.rtde.pace import Statistics
+from gatewayd.rtde.recipe import Scalar
+from gatewayd.rtde.types import DEFAULT_PORT
+
+__all__ = [
+    "ClientHandler",
+    "ClientSettings",
+    "Loss",
+    "LossReason",
+    "RtdeClient",
+    "Session",
+    "Statistics",
+    "Unavailable",
+]
+
+_OLD_LIST_LIMIT = 2048
+"""Bytes of a list of names that every controller takes (older guide, "Introduction"); newer ones take far more."""
+_KEEPALIVE = (("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCNT", 3))
+
+
+@dataclass(frozen=True, slots=True)
+class ClientSettings:
+    """Where the controller is, what is wanted of it, and how long to wait. Times in seconds."""
+
+    host: str
+    """Name or address."""
+    port: int = DEFAULT_PORT
+    outputs: tuple[str, ...] = ()
+    """Fields to subscribe; `timestamp` is subscribed by itself."""
+    inputs: tuple[str, ...] = ()
+    """Fields to claim."""
+    watchdog: str | None = None
+    """Input field that gets a recipe of its own, so that nothing else feeds it."""
+    frequency: float = 0.0
+    """Packages per second; 0: the controller's own rate. The controller divides its rate by a whole number."""
+    read_back: bool = True
+    """Subscribe the claimed `input_*` fields too."""
+    connect_timeout: float = 2.0
+    handshake_timeout: float = 2.0
+    """For each answer of the set-up."""
+    data_timeout: float = 1.0
+    """Without a package while the output runs: the connection is taken for dead."""
+    first_data_timeout: float = 30.0
+    """The same before the first package: a controller whose safety set-up is unconfirmed sends none for a while."""
+    claim_retry: float = 1.0
+    """Between attempts to claim inputs that are in use."""
+    backoff: float = 0.05
+    """Before the first new connection; doubles with each failure."""
+    backoff_limit: float = 2.0
+    """Longest wait before a new connection."""
+    write_buffer: int = 65536
+    """Unsent bytes at which a controller that does not read is given up."""
+
+
+class RtdeClient:
+    """One robot controller, for as long as `run` runs."""
+
+    def __init__(self, settings: ClientSettings, handler: ClientHandler) -> None:
+        self.statistics = Statistics()
+        """Counters over all sessions."""
+        self._settings = settings
+        self._handler = handler
+        self._address = f"{settings.host}:{settings.port}"
+        self._tolerances = Tolerances(
+            settings.handshake_timeout,
+            settings.data_timeout,
+            settings.first_data_timeout,
+            settings.claim_retry,
+            settings.write_buffer,
+        )
+        self._connection: Connection | None = None
+        self._short_list = False
+        self._paused = False
+
+    @property
+    def session(self) -> Session | None:
+        """What is agreed with the controller now; None without a session."""
+        return self._connection.session if self._connection is not None else None
+
+    def send(self, key: str, values: Sequence[Scalar]) -> bool:
+        """Send values of a claimed recipe, flat in the order of `session.inputs[key].recipe`, in one package.
+
+        Never waits. False if there is no session, the recipe is not claimed, or the controller has stopped reading.
+        ValueError if a value does not fit its type.
+        """
+        return self._connection is not None and self._connection.send(key, values)
+
+    async def pause(self) -> None:
+        """Have the controller pause its output, in this session and in those to come."""
+        self._paused = True
+        if self._connection is not None:
+            await self._connection.pause()
+
+    async def resume(self) -> None:
+        """Have it send again."""
+        self._paused = False
+        if self._connection is not None:
+            await self._connection.resume()
+
+    async def run(self) -> None:
+        """Stay connected until cancelled; what was sent before is still delivered. Raises what a handler raises."""
+        delay = self._settings.backoff
+        attempts = 0
+        while True:
+            loss, lasted = await self._session()
+            attempts = 0 if loss.started else attempts + 1
+            if lasted > self._settings.backoff_limit:
+                delay = self._settings.backoff
+            self._handler.session_lost(replace(loss, attempts=attempts, retry_in=delay))
+            await asyncio.sleep(delay)
+            delay = min(2 * delay, self._settings.backoff_limit)
+
+    async def _session(self) -> tuple[Loss, float]:
+        """One connection: how it ended, and for how long a session was up."""
+        wishes = self._wishes()
+        try:
+            connection = await self._connect(wishes)
+        except OSError as error:
+            return connect_failure(error, self._address), 0.0
+        self._connection = connection
+        try:
+            loss = await connection.done
+        finally:
+            self._connection = None
+            await connection.close()
+        self._consider_list_length(wishes, connection)
+        if connection.started_at is None:
+            return loss, 0.0
+        return replace(loss, started=True), monotonic() - connection.started_at
+
+    async def _connect(self, wishes: Wishes) -> Connection:
+        loop = asyncio.get_running_loop()
+        async with asyncio.timeout(self._settings.connect_timeout):
+            connected = await self._open_socket(loop)
+            try:
+                _, connection = await loop.create_connection(
+                    lambda: Connection(
+                        self._address, wishes, self._tolerances, self._handler, self.statistics
+                    ),
+                    sock=connected,
+                )
+            except BaseException:
+                connected.close()
+                raise
+        return connection
+
+    async def _open_socket(self, loop: asyncio.AbstractEventLoop) -> socket.socket:
+        """Try the host's addresses in turn; the error of the last if none answers."""
+        host = self._settings.host
+        try:
+            found = await loop.getaddrinfo(host, self._settings.port, type=socket.SOCK_STREAM)
+        except UnicodeError as error:
+            raise socket.gaierror(socket.EAI_NONAME, "not a host name") from error
+        failure: OSError = socket.gaierror(socket.EAI_NONAME, "no address")
+        for family, kind, protocol, _, address in found:
+            candidate = socket.socket(family, kind, protocol)
+            try:
+                candidate.setblocking(False)
+                self._tune(candidate)
+                await loop.sock_connect(candidate, address)
+            except OSError as error:
+                candidate.close()
+                failure = error
+            except BaseException:
+                candidate.close()
+                raise
+            else:
+                return candidate
+        raise failure
+
+    def _tune(self, candidate: socket.socket) -> None:
+        """No delay of small writes; a dead peer is noticed even while nothing is due from it."""
+        candidate.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        candidate.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        unacknowledged = max(1000, int(self._settings.data_timeout * 1000))
+        for name, value in (*_KEEPALIVE, ("TCP_USER_TIMEOUT", unacknowledged)):
+            option = getattr(socket, name, None)
+            if option is not None:
+                with contextlib.suppress(OSError):
+                    candidate.setsockopt(socket.IPPROTO_TCP, option, value)
+
+    def _wishes(self) -> Wishes:
+        settings = self._settings
+        return Wishes(
+            settings.outputs,
+            settings.inputs,
+            settings.watchdog,
+            settings.frequency,
+            settings.read_back,
+            self._short_list,
+            not self._paused,
+        )
+
+    def _consider_list_length(self, wishes: Wishes, connection: Connection) -> None:
+        """Old controllers take 2048 bytes of names: if a longer list came to nothing, try without read-backs."""
+        if connection.started_at is not None:
+            self._short_list = False
+        elif connection.state is State.OUTPUTS and self._settings.read_back:
+            length = len(",".join(wishes.subscription()))
+            self._short_list = not self._short_list and length > _OLD_LIST_LIMIT

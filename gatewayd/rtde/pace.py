@@ -1,0 +1,71 @@
+"""How regularly packages come: measured frequency, packages skipped by the controller, packages late on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["Pace", "Statistics"]
+
+
+@dataclass(slots=True)
+class Statistics:
+    """Counters of a client, over all its sessions."""
+
+    sessions: int = 0
+    """Set-ups completed."""
+    packages: int = 0
+    """Data packages received."""
+    skipped: int = 0
+    """Packages that the controller did not send, by the gaps between timestamps."""
+    late: int = 0
+    """Packages that came more than a period later after their predecessor than their timestamps say."""
+    overtaken: int = 0
+    """Packages not handed on because a newer one had already arrived."""
+    writes: int = 0
+    """Input packages sent."""
+    frequency: float = 0.0
+    """Packages per second, measured lately."""
+
+
+class Pace:
+    """The rhythm of one session. `statistics` is counted on."""
+
+    def __init__(self, period: float, statistics: Statistics, now: float) -> None:
+        self._period = period
+        self._statistics = statistics
+        self._timestamp: float | None = None
+        self._arrival = now
+        self._window_start = now
+        self._window_packages = 0
+        statistics.frequency = 0.0
+
+    @property
+    def timestamp(self) -> float | None:
+        """Controller time of the newest package."""
+        return self._timestamp
+
+    def package(self, timestamp: float, now: float) -> bool:
+        """Count a package; False if the controller's time went back, that is, if it has restarted."""
+        self._window_packages += 1
+        statistics = self._statistics
+        statistics.packages += 1
+        last, self._timestamp = self._timestamp, timestamp
+        arrival, self._arrival = self._arrival, now
+        if last is None:
+            return True
+        elapsed = timestamp - last
+        if not elapsed >= 0.0:
+            return False
+        if elapsed > 1.5 * self._period:
+            statistics.skipped += round(elapsed / self._period) - 1
+        if now - arrival - elapsed > self._period:
+            statistics.late += 1
+        return True
+
+    def measure(self, now: float) -> None:
+        """Close the present window of the frequency measurement; call every second or so."""
+        span = now - self._window_start
+        if span > 0.0:
+            self._statistics.frequency = self._window_packages / span
+        self._window_start = now
+        self._window_packages = 0
