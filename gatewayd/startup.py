@@ -1,0 +1,80 @@
+"""From the files named on the command line to the plans that can be served; what cannot be is said, one line each."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from gatewayd.logs import fields
+from gatewayd.mapping.diagnostics import Severity
+from gatewayd.mapping.loader import Loaded, load_together, read_bytes
+from gatewayd.mapping.plan import Plan
+
+__all__ = ["Startup", "load_plans", "mapping_files"]
+
+PATTERN = "*.yaml"
+"""The files of a configuration directory."""
+
+log = logging.getLogger("gatewayd.startup")
+
+
+@dataclass(frozen=True, slots=True)
+class Startup:
+    """What there is to serve."""
+
+    plans: tuple[Plan, ...]
+    unreadable: int
+    """Files that could not be read."""
+    broken: int
+    """Files with errors."""
+
+
+def mapping_files(paths: Iterable[Path]) -> list[Path]:
+    """The files meant: a directory stands for its *.yaml files, by name."""
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(path.glob(PATTERN))
+            if not inside:
+                log.error(
+                    "no mapping file in the directory", extra=fields(directory=str(path), pattern=PATTERN)
+                )
+            found.extend(inside)
+        else:
+            found.append(path)
+    return found
+
+
+def load_plans(paths: Sequence[Path]) -> Startup:
+    """Read and check everything; log what cannot be served and why."""
+    files: list[tuple[str, bytes]] = []
+    unreadable = 0
+    for path in mapping_files(paths):
+        try:
+            files.append((str(path), read_bytes(path)))
+        except OSError as error:
+            unreadable += 1
+            log.error("cannot read the mapping file", extra=fields(file=str(path), reason=error.strerror))  # noqa: TRY400 - the reason says it all
+    loaded = load_together(files)
+    for one in loaded:
+        _tell(one)
+    plans = tuple(one.plan for one in loaded if one.plan is not None)
+    return Startup(plans, unreadable, len(loaded) - len(plans))
+
+
+def _tell(loaded: Loaded) -> None:
+    for finding in loaded.diagnostics:
+        level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
+        log.log(
+            level,
+            finding.message,
+            extra=fields(
+                at=str(finding.position), rule=f"{finding.rule.id} {finding.rule.slug}", hint=finding.hint
+            ),
+        )
+    if loaded.plan is None:
+        log.error(
+            "the cell is not served", extra=fields(file=loaded.name, remedy=f"gatewayd check {loaded.name}")
+        )
