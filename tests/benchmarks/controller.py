@@ -107,7 +107,10 @@ class Controller:
                 continue
             connection = key.fileobj
             assert isinstance(connection, socket.socket)
-            data = connection.recv(65536)
+            try:
+                data = connection.recv(65536)
+            except ConnectionResetError:
+                data = b""
             if data:
                 arrived += self._sessions[connection].take(data)
             else:

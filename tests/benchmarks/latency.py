@@ -45,8 +45,10 @@ class Stream:
     """Reads in which the doubles were not all of one package."""
 
 
-def stream(controller: Controller, plc: Plc, seconds: float, count: int = 1) -> Stream:
-    """Send numbered packages at 500 Hz; after each read `count` doubles from DOUBLES_OUT until it is seen."""
+def stream(
+    controller: Controller, plc: Plc, seconds: float, first: int = DOUBLES_OUT, count: int = 1
+) -> Stream:
+    """Send numbered packages at 500 Hz; after each read `count` doubles from register `first` on until it is seen."""
     seen = Stream()
     unseen: deque[tuple[float, float]] = deque()
     layout = struct.Struct(f">{count}d")
@@ -61,7 +63,7 @@ def stream(controller: Controller, plc: Plc, seconds: float, count: int = 1) -> 
             unseen.append((number, clock()))
             due += PERIOD
         if unseen:
-            values = layout.unpack(plc.read(DOUBLES_OUT, WORDS * count))
+            values = layout.unpack(plc.read(first, WORDS * count))
             now = clock()
             seen.reads += 1
             seen.mixed += len(set(values)) > 1

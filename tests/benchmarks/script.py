@@ -21,15 +21,17 @@ __all__ = ["run"]
 ROBOT_PORT = 30004
 """ur_rtde knows no other, so the controller gets a loopback address of its own."""
 ROBOT_HOST = "127.0.0.3"
-DOUBLES = 24
+FIRST = DOUBLES_OUT + 4 * 12
+"""Address of `output_double_register_12`, the first that ur_rtde gives."""
+DOUBLES = 8
 SILENCE = 3.0
 """Seconds for which the controller says nothing while its connection stays open."""
 
 DEFINITION = """\
-24 doubles, all the same number in each package; the PLC reads them in one request after each package. The
-script maps 48 registers outward and nothing else; gatewayd serves the full image, inward and read-back too.
-Mixed: a block with doubles of two packages. Silence: the controller stops sending but keeps its connection,
-as behind a dead switch; how long until the registers tell."""
+Every double is the same number in each package; the PLC reads eight of them in one request after each package. The
+script maps 16 registers outward and nothing else; gatewayd serves the full image, inward and read-back too. Mixed:
+a block with doubles of two packages. Silence: the controller stops sending but keeps its connection, as behind a
+dead switch; how long until the registers tell."""
 
 
 def run(seconds: float) -> list[Table]:
@@ -63,7 +65,7 @@ def _script(controller: Controller) -> Iterator[Served]:
     port = free_port()
     with running(python(Path(__file__).with_name("user_script.py"), ROBOT_HOST, str(port))) as process:
         controller.wait_for_start()
-        while not listens(port):
+        while process.poll() is None and not listens(port):
             pace(controller, 0.02)
         yield Served(process.pid, port)
 
@@ -74,7 +76,7 @@ def _column(controller: Controller, served: Served, seconds: float) -> dict[str,
     before = cpu_seconds(served.pid)
     pace(controller, seconds)
     cpu = 100 * (cpu_seconds(served.pid) - before) / seconds
-    seen = stream(controller, plc, seconds, DOUBLES)
+    seen = stream(controller, plc, seconds, FIRST, DOUBLES)
     silence = _silence(controller, plc)
     plc.close()
     controller.close()
@@ -90,11 +92,11 @@ def _column(controller: Controller, served: Served, seconds: float) -> dict[str,
 def _silence(controller: Controller, plc: Plc) -> float | None:
     """Seconds of silence until the PLC reads something else than the last value; None: it never does."""
     pace(controller, 0.1)
-    last = plc.read(DOUBLES_OUT, 4)
+    last = plc.read(FIRST, 4)
     begin = time.monotonic()
     while time.monotonic() - begin < SILENCE:
         controller.pump(0)
-        if plc.read(DOUBLES_OUT, 4) != last:
+        if plc.read(FIRST, 4) != last:
             return time.monotonic() - begin
         time.sleep(0.001)
     return None
