@@ -319,12 +319,8 @@ OUTPUTS: Mapping[str, Field] = _table(
             "actual_configurable_digital_output_bits", _UINT64, "configurable digital outputs", since=_NOT_CB3
         ),
         Field("runtime_state", _UINT32, "state of the robot program, see ProgramState"),
-        Field(
-            "elbow_position", _V3, "position of the elbow in base coordinates", since=_since("3.5.0", "5.0.0")
-        ),
-        Field(
-            "elbow_velocity", _V3, "velocity of the elbow in base coordinates", since=_since("3.5.0", "5.0.0")
-        ),
+        Field("elbow_position", _V3, "position of the elbow in base coordinates", since=_since("3.5.0")),
+        Field("elbow_velocity", _V3, "velocity of the elbow in base coordinates", since=_since("3.5.0")),
         Field("robot_status_bits", _UINT32, "bits 0-3, see ROBOT_STATUS_BITS"),
         Field(
             "safety_status_bits", _UINT32, "bits 0-11, see SAFETY_STATUS_BITS; bit 11 from 5.25.0 and 10.12.0"

@@ -220,7 +220,7 @@ class Notebook:
 
 async def _until(condition: Callable[[], object], seconds: float = 5.0) -> None:
     async with asyncio.timeout(seconds):
-        while not condition():
+        while not condition():  # noqa: ASYNC110  what is waited for is somebody else's state
             await asyncio.sleep(0.002)
 
 

@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import pytest
+
+from gatewayd.rtde import messages, payloads
+from gatewayd.rtde.messages import PackageType
+
+
+def test_every_package_type_is_decoded_in_both_directions_and_versions() -> None:
+    tables: list[object] = [
+        set(payloads.FROM_CONTROLLER),
+        set(payloads.FROM_CONTROLLER_V1),
+        set(payloads.FROM_EXECUTABLE),
+        set(payloads.FROM_EXECUTABLE_V1),
+    ]
+    assert tables == [set(PackageType)] * 4
+
+
+@pytest.mark.parametrize(
+    "kind, payload, words",
+    [
+        (PackageType.REQUEST_PROTOCOL_VERSION, "", "0 bytes where 1 belong"),
+        (PackageType.REQUEST_PROTOCOL_VERSION, "0102", "2 bytes where 1 belong"),
+        (PackageType.GET_URCONTROL_VERSION, "000000050000", "6 bytes where 16 belong"),
+        (PackageType.TEXT_MESSAGE, "0000", "2 bytes where at least 3 belong"),
+        (PackageType.TEXT_MESSAGE, "036162", "reaches beyond"),
+        (PackageType.TEXT_MESSAGE, "01610262", "source length 2 does not fit"),
+        (PackageType.TEXT_MESSAGE, "0161016202ff", "source length 1 does not fit"),
+        (PackageType.DATA_PACKAGE, "", "at least 1"),
+        (PackageType.SETUP_OUTPUTS, "", "at least 1"),
+        (PackageType.SETUP_INPUTS, "", "at least 1"),
+        (PackageType.START, "", "0 bytes where 1 belong"),
+        (PackageType.PAUSE, "0101", "2 bytes where 1 belong"),
+    ],
+)
+def test_what_a_controller_cannot_send_is_refused(kind: PackageType, payload: str, words: str) -> None:
+    with pytest.raises(payloads.MalformedPayloadError, match=words):
+        payloads.FROM_CONTROLLER[kind](bytes.fromhex(payload))
+
+
+@pytest.mark.parametrize(
+    "kind, payload",
+    [
+        (PackageType.REQUEST_PROTOCOL_VERSION, "02"),
+        (PackageType.GET_URCONTROL_VERSION, "00"),
+        (PackageType.TEXT_MESSAGE, "ff"),
+        (PackageType.DATA_PACKAGE, ""),
+        (PackageType.SETUP_OUTPUTS, "405f400000"),
+        (PackageType.START, "01"),
+        (PackageType.PAUSE, "01"),
+    ],
+)
+def test_what_a_client_cannot_send_is_refused(kind: PackageType, payload: str) -> None:
+    with pytest.raises(payloads.MalformedPayloadError):
+        payloads.FROM_EXECUTABLE[kind](bytes.fromhex(payload))
+
+
+def test_only_one_trailing_comma_is_ignored() -> None:
+    decode = payloads.FROM_EXECUTABLE[PackageType.SETUP_INPUTS]
+    assert decode(b"a,b,") == messages.SetupInputs(("a", "b"))
+    assert decode(b"a,,b,,") == messages.SetupInputs(("a", "", "b", ""))
+    assert decode(b"") == messages.SetupInputs(())
+
+
+def test_other_characters_than_ascii_do_no_harm() -> None:
+    decode = payloads.FROM_CONTROLLER[PackageType.TEXT_MESSAGE]
+    assert decode(b"\x03\xff\xfe!\x01\xe4\x02") == messages.TextMessage("\ufffd\ufffd!", "\ufffd", 2)
+    names = payloads.FROM_EXECUTABLE[PackageType.SETUP_INPUTS](b"caf\xc3\xa9")
+    assert names == messages.SetupInputs(("caf\ufffd\ufffd",))
+
+
+def test_texts_are_cut_to_their_length_byte() -> None:
+    long = messages.TextMessage("m" * 300, "s" * 300, 3)
+    for encode in (payloads.encode_controller, payloads.encode_executable):
+        kind, payload = encode(long, 2)
+        assert payloads.FROM_CONTROLLER[kind](payload) == messages.TextMessage("m" * 255, "s" * 255, 3)
+
+
+@pytest.mark.parametrize(
+    "message", [messages.DataPackage(None, b""), messages.SetupOutputs(("a",), None)], ids=["data", "outputs"]
+)
+def test_a_client_cannot_leave_out_what_version_2_wants(message: messages.ExecutableMessage) -> None:
+    with pytest.raises(ValueError, match=r"recipe id|frequency"):
+        payloads.encode_executable(message, 2)
+
+
+@pytest.mark.parametrize("message", [messages.DataPackage(None, b""), messages.OutputsSetup(None, ("BOOL",))])
+def test_a_controller_cannot_leave_out_recipe_ids_in_version_2(message: messages.ControllerMessage) -> None:
+    with pytest.raises(ValueError, match="recipe id"):
+        payloads.encode_controller(message, 2)
