@@ -213,10 +213,10 @@ def _network(value: object) -> Network:
 def _many(value: object) -> object:
     """One thing may stand for a list of one."""
     if isinstance(value, (list, tuple)):
-        return list(value) or refuse(
+        return tuple(value) or refuse(
             syntax.WRONG_TYPE, "the list is empty", "name at least one, or remove the key"
         )
-    return [value]
+    return (value,)
 
 
 _NETWORK_SCHEMA = Annotated[str, Field(examples=["192.168.1.20", "192.168.1.0/28"])]

@@ -309,13 +309,14 @@ class _Reader:
         related: tuple[Related, ...] = ()
         if error.context and error.context_mark and mark is not error.context_mark:
             place = Position(self.name, error.context_mark.line + 1, error.context_mark.column + 1)
-            related = (Related(place, _one_line(error.context)),)
+            related = (Related(place, _CONTEXTS.get(_one_line(error.context), _one_line(error.context))),)
         problem = _one_line(error.problem or error.context or "not YAML")
+        problem = problem.replace("'<stream end>'", "the end of the file")
         self._find(syntax.YAML_SYNTAX, problem, position, _syntax_hint(problem), related)
 
     def _unprintable(self, text: str, offset: int) -> None:
-        lines = text[:offset].splitlines() or [""]
-        position = Position(self.name, len(lines), len(lines[-1]) + 1)
+        lines = text[: offset + 1].splitlines()
+        position = Position(self.name, len(lines), len(lines[-1]) or 1)
         message = f"the character U+{ord(text[offset]):04X} does not belong into a text file"
         self._find(
             syntax.NOT_UTF8, message, position, "delete it; the file may have been saved in a wrong encoding"
@@ -328,6 +329,15 @@ class _Reader:
 
     def _at(self, event: Any) -> Position:
         return Position(self.name, event.start_mark.line + 1, event.start_mark.column + 1)
+
+
+_CONTEXTS: Final = {
+    "while parsing a flow sequence": "the list `[` begins here",
+    "while parsing a flow mapping": "the table `{` begins here",
+    "while parsing a block mapping": "the table begins here",
+    "while parsing a block collection": "the list begins here",
+    "while scanning a quoted scalar": "the quoted text begins here",
+}
 
 
 class _TooDeepError(Exception):
