@@ -15,7 +15,6 @@ __all__ = [
     "BAD_RANGE",
     "BAD_REFERENCE",
     "DUPLICATE_KEY",
-    "DUPLICATE_NAME",
     "EMPTY",
     "FORMAT_VERSION",
     "MISSING_KEY",
@@ -24,7 +23,6 @@ __all__ = [
     "SEVERAL_DOCUMENTS",
     "TAG",
     "TOO_LARGE",
-    "TOO_MANY",
     "UNKNOWN_KEY",
     "WRONG_TYPE",
     "YAML_SYNTAX",
@@ -197,15 +195,6 @@ host and port (`127.0.0.1:1502`, `[::1]:502`). Names are not resolved here: a wr
 hang on a name server.
 """,
 )
-TOO_MANY = declare(
-    "GW119",
-    "too-many",
-    "more variables or writers than one cell can hold",
-    """
-A cell holds at most 1024 variables and 32 writers: the status block has a fixed place for each. Split the
-cell's variables over two mapping files with two units.
-""",
-)
 NOT_UTF8 = declare(
     "GW120",
     "not-utf8",
@@ -213,15 +202,6 @@ NOT_UTF8 = declare(
     """
 The file holds bytes that are not UTF-8, or control characters. Editors on Windows may have saved it as
 UTF-16 or in a national code page: save it as UTF-8.
-""",
-)
-DUPLICATE_NAME = declare(
-    "GW121",
-    "duplicate-name",
-    "two variables have the same name after expansion",
-    """
-A range or a vector makes several variables, `recipe[0]`, `recipe[1]` and so on; one of these names is
-used by another line too. Rename one of them.
 """,
 )
 BAD_RANGE = declare(

@@ -1,0 +1,336 @@
+"""Rules GW6xx: what happens when a side is lost, and what values are let through."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from gatewayd.core.definition import Direction, FallbackKind, ValueKind
+from gatewayd.mapping.compile import package_period
+from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
+from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
+from gatewayd.mapping.rules.registry import cell_rule
+from gatewayd.mapping.rules.wording import number, seconds
+
+__all__: list[str] = []
+
+_MOTION_FIELDS = ("speed_slider_fraction",)
+_MOTION_WORDS = frozenset(
+    {
+        "drive",
+        "enable",
+        "execute",
+        "go",
+        "home",
+        "jog",
+        "motion",
+        "move",
+        "play",
+        "resume",
+        "run",
+        "speed",
+        "start",
+        "step",
+        "velocity",
+    }
+)
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
+
+
+@cell_rule(
+    "GW601",
+    "fallback-outside-limits",
+    "a fallback value outside the limits",
+    """
+`on_release` is given to the robot when the owner is lost. A value outside `limits` would be refused from
+any writer, and must not come from the gateway itself.
+""",
+)
+def fallback_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`on_release` values beyond `limits`."""
+    for variable in _lines(cell):
+        limits, value = variable.spec.limits, variable.spec.on_release.value
+        if limits is None or value is None or isinstance(value, bool) or limits[0] > limits[1]:
+            continue
+        if not limits[0] <= value <= limits[1]:
+            low, high = map(number, limits)
+            message = (
+                f"`{variable.part.name}` falls back to {number(value)}, outside its limits {low} to {high}"
+            )
+            related = (Related(variable.at("limits"), "the limits are here"),)
+            hint = f"use a value from {low} to {high}"
+            yield rule.at(variable.at("on_release"), message, hint=hint, related=related)
+
+
+@cell_rule(
+    "GW602",
+    "fallback-type",
+    "a fallback value that the variable cannot have",
+    """
+A fallback is a value of the robot's own type: true or false for a bit, a whole number within its range
+for an integer, a number for a double.
+""",
+)
+def fallback_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Fallback values of another type or beyond the type's range."""
+    for variable in _lines(cell):
+        for key, fallback in (
+            ("on_release", variable.spec.on_release),
+            ("on_stale", variable.spec.on_stale),
+        ):
+            expected = None if fallback.value is None else _mismatch(variable, fallback.value)
+            if expected is not None and fallback.value is not None:
+                shown = (
+                    str(fallback.value).lower()
+                    if isinstance(fallback.value, bool)
+                    else number(fallback.value)
+                )
+                message = (
+                    f"`{variable.part.name}` ({variable.target}, {variable.type.word}) cannot be {shown}"
+                )
+                yield rule.at(variable.at(key), message, hint=f"write {expected}")
+
+
+def _mismatch(variable: ConcreteVariable, value: float) -> str | None:
+    """What should stand in the place of `value`; None where it fits."""
+    if variable.kind is ValueKind.BOOL:
+        return None if value in (0, 1) else "true or false"
+    if isinstance(value, bool):
+        return "a number"
+    if variable.kind is ValueKind.FLOAT or variable.low is None or variable.high is None:
+        return None
+    fits = value == int(value) and variable.low <= value <= variable.high
+    return None if fits else f"a whole number from {variable.low} to {variable.high}"
+
+
+@cell_rule(
+    "GW603",
+    "held-motion",
+    "a motion command that stays on when its owner is lost",
+    """
+The variable looks like a command to move (by its name, or because it is the speed slider), it keeps its
+value when its owner is lost, and nothing supervises the owner: neither a lease nor a `timeout`. A PLC
+that dies with the command set leaves the robot moving. Use `on_release: clear`, or supervise the owner if
+holding is meant.
+""",
+    Severity.WARNING,
+)
+def held_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`hold` at motion commands without supervision."""
+    for variable, silent in _unsupervised_motion(cell):
+        if variable.spec.on_release.kind is FallbackKind.HOLD:
+            message = (
+                f"`{variable.part.name}` is held when its owner is lost, and `{silent}` is not supervised"
+            )
+            hint = f"use `on_release: clear`, or add `timeout: 1s` to `{silent}`"
+            yield rule.at(variable.at("on_release"), message, hint=hint)
+
+
+@cell_rule(
+    "GW604",
+    "unsupervised-motion",
+    "a motion command whose owner nobody supervises",
+    """
+The variable looks like a command to move, and its owner has neither a lease nor a `timeout`: the owner
+counts as lost only when its connection closes. A PLC whose program hangs keeps the connection, and the
+command stays set. Give the writer a `timeout`, or the variable a `lease`.
+""",
+    Severity.WARNING,
+)
+def unsupervised_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Motion commands without supervision whose fallback would stop the motion."""
+    for variable, silent in _unsupervised_motion(cell):
+        if variable.spec.on_release.kind is not FallbackKind.HOLD:
+            writer = cell.document.writers[silent]
+            message = f"`{variable.part.name}` looks like a motion command, and `{silent}` is not supervised"
+            related = (Related(writer.key, f"`{silent}` has no timeout"),)
+            hint = f"add `timeout: 1s` to `{silent}`, or `lease: 2s` to the variable"
+            yield rule.at(variable.position, message, hint=hint, related=related)
+
+
+def _unsupervised_motion(cell: ExpandedCell) -> Iterator[tuple[ConcreteVariable, str]]:
+    """Motion commands and the first owner that could be lost unnoticed."""
+    for variable in _lines(cell):
+        if variable.lock is None or not _is_motion(variable):
+            continue
+        lock = cell.locks[variable.lock]
+        silent = [name for name in lock.owners if cell.document.writers[name].spec.timeout is None]
+        if lock.lease is None and silent:
+            yield variable, silent[0]
+
+
+def _is_motion(variable: ConcreteVariable) -> bool:
+    words = {word.lower() for word in _WORD.findall(variable.part.name)}
+    return variable.field.name in _MOTION_FIELDS or not words.isdisjoint(_MOTION_WORDS)
+
+
+@cell_rule(
+    "GW605",
+    "policy-of-other-side",
+    "on_stale at an input, or on_release at an output",
+    """
+`on_stale` is what the fieldbus sees of an output when the robot stops telling; `on_release` is what the
+robot is given of an input when the owner is lost. At the other side they never act, and the policy that
+does act is the default.
+""",
+)
+def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Policies that belong to the other direction."""
+    for variable in _lines(cell):
+        is_input = variable.direction is Direction.INPUT
+        key, other = ("on_stale", "on_release") if is_input else ("on_release", "on_stale")
+        if key in variable.spec.model_fields_set:
+            message = (
+                f"`{variable.part.name}` is an {variable.direction.value} ({variable.target}); "
+                f"`{key}` never acts on it"
+            )
+            yield rule.at(variable.part.key_at(key), message, hint=f"write `{other}`, or remove `{key}`")
+
+
+@cell_rule(
+    "GW607",
+    "stale-too-soon",
+    "stale_after shorter than the time between two packages",
+    """
+Between two packages nothing can be known. With `stale_after` shorter than that, every value would be
+stale before its successor can come, and all fallbacks would act all the time. Leave it out (five periods,
+at least 50ms), or give it several periods.
+""",
+)
+def stale_too_soon(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`stale_after` below the package period."""
+    robot = cell.document.robot
+    if robot is None or robot.spec.stale_after is None:
+        return
+    period = package_period(robot.spec)
+    if robot.spec.stale_after < period:
+        message = (
+            f"stale_after {seconds(robot.spec.stale_after)} is shorter than the {seconds(period)} "
+            f"between two packages"
+        )
+        hint = f"leave it out, or write at least {seconds(2 * period)}"
+        yield rule.at(robot.at("stale_after"), message, hint=hint)
+
+
+@cell_rule(
+    "GW608",
+    "limits-inverted",
+    "limits that no value can satisfy",
+    """
+Limits are written `[least, greatest]`. With the greater first no value lies between them, and every write
+would be refused.
+""",
+)
+def limits_inverted(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Limits with the least not below the greatest."""
+    for variable in _lines(cell):
+        limits = variable.spec.limits
+        if limits is not None and limits[0] >= limits[1]:
+            low, high = map(number, limits)
+            message = f"the limits of `{variable.part.name}` begin at {low} and end at {high}"
+            hint = f"write [{high}, {low}]" if limits[0] > limits[1] else "write two different numbers"
+            yield rule.at(variable.at("limits"), message, hint=hint)
+
+
+@cell_rule(
+    "GW609",
+    "limits-outside-type",
+    "limits beyond what the robot's register can hold",
+    """
+The robot's register has a range of its own (INT32: -2147483648 to 2147483647). A limit beyond it can
+never act; most likely a digit is too many, or another register was meant.
+""",
+)
+def limits_outside_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Limits of integers beyond their type."""
+    for variable in _lines(cell):
+        limits = variable.spec.limits
+        if limits is None or variable.low is None or variable.high is None:
+            continue
+        if limits[0] < variable.low or limits[1] > variable.high:
+            low, high = map(number, limits)
+            message = (
+                f"`{variable.part.name}` is limited to {low} to {high}, but {variable.target} holds "
+                f"{variable.low} to {variable.high}"
+            )
+            yield rule.at(
+                variable.at("limits"), message, hint=f"stay within {variable.low} to {variable.high}"
+            )
+
+
+@cell_rule(
+    "GW610",
+    "limits-without-effect",
+    "limits where nothing can be limited",
+    """
+Limits guard what a writer sends. A bit has only two values, so limits say nothing about it. What comes
+from the robot is shown as it is and never clamped; `limits` at an output only state the range that it
+keeps, for the conversion rules (GW703).
+""",
+)
+def limits_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Limits of bits, and clamping of outputs."""
+    for variable in _lines(cell):
+        if variable.kind is ValueKind.BOOL and variable.spec.limits is not None:
+            message = f"`{variable.part.name}` is a bit ({variable.target}) and has limits"
+            yield rule.at(variable.part.key_at("limits"), message, hint="remove `limits`")
+        elif variable.direction is Direction.OUTPUT and variable.spec.clamp:
+            message = f"`{variable.part.name}` comes from the robot and is never clamped"
+            yield rule.at(variable.part.key_at("clamp"), message, hint="remove `clamp`")
+
+
+@cell_rule(
+    "GW611",
+    "clear-outside-limits",
+    "a fallback of zero that the limits exclude",
+    """
+When the owner is lost, an input is cleared to 0 unless `on_release` says otherwise. Here the limits
+exclude 0, so the robot would be given a value that no writer may send. Say `on_release: hold` or name a
+value.
+""",
+    Severity.WARNING,
+)
+def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`clear` at inputs whose limits exclude 0."""
+    for variable in _lines(cell):
+        limits = variable.spec.limits
+        if variable.direction is Direction.OUTPUT or variable.kind is ValueKind.BOOL or limits is None:
+            continue
+        if (
+            variable.spec.on_release.kind is FallbackKind.CLEAR
+            and limits[0] < limits[1]
+            and not limits[0] <= 0 <= limits[1]
+        ):
+            low, high = map(number, limits)
+            message = (
+                f"`{variable.part.name}` is cleared to 0 when its owner is lost, outside {low} to {high}"
+            )
+            nearest = low if limits[0] > 0 else high
+            hint = f"write `on_release: {nearest}`, or `on_release: hold`"
+            written = "on_release" in variable.spec.model_fields_set
+            yield rule.at(variable.at("on_release" if written else "limits"), message, hint=hint)
+
+
+@cell_rule(
+    "GW612",
+    "clamp-without-limits",
+    "clamping without limits",
+    """
+`clamp: true` brings a value outside the limits to the nearer limit instead of refusing it. Without
+`limits` there is nothing to bring it to.
+""",
+)
+def clamp_without_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`clamp` at inputs without `limits`."""
+    for variable in _lines(cell):
+        if variable.spec.clamp and variable.spec.limits is None and variable.direction is Direction.INPUT:
+            message = f"`{variable.part.name}` is to be clamped, but has no limits"
+            hint = "add `limits: [least, greatest]`, or remove `clamp`"
+            yield rule.at(variable.part.key_at("clamp"), message, hint=hint)
+
+
+def _lines(cell: ExpandedCell) -> Iterator[ConcreteVariable]:
+    """The first variable of each line: those of a family are alike in all that these rules judge."""
+    for variable in cell.variables:
+        if not variable.member:
+            yield variable

@@ -1,0 +1,45 @@
+"""How a rule enters the catalogue together with its check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final, TypeAlias
+
+from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity, declare
+from gatewayd.mapping.expand import ExpandedCell
+
+__all__ = ["CELL_CHECKS", "PLANT_CHECKS", "CellCheck", "PlantCheck", "cell_rule", "plant_rule"]
+
+CellCheck: TypeAlias = Callable[[Rule, ExpandedCell], Iterator[Diagnostic]]
+"""Looks at one cell. Must not raise, whatever the cell holds: a finding is its only way to complain."""
+PlantCheck: TypeAlias = Callable[[Rule, Sequence[ExpandedCell]], Iterator[Diagnostic]]
+"""Looks at all cells that are checked together. Must not raise."""
+
+CELL_CHECKS: Final[list[tuple[Rule, CellCheck]]] = []
+PLANT_CHECKS: Final[list[tuple[Rule, PlantCheck]]] = []
+
+
+def cell_rule(
+    rule_id: str, slug: str, summary: str, why: str, severity: Severity = Severity.ERROR
+) -> Callable[[CellCheck], CellCheck]:
+    """Declare a rule; the decorated generator finds its breaches in one cell."""
+    rule = declare(rule_id, slug, summary, why, severity)
+
+    def enter(check: CellCheck) -> CellCheck:
+        CELL_CHECKS.append((rule, check))
+        return check
+
+    return enter
+
+
+def plant_rule(
+    rule_id: str, slug: str, summary: str, why: str, severity: Severity = Severity.ERROR
+) -> Callable[[PlantCheck], PlantCheck]:
+    """Declare a rule; the decorated generator finds its breaches among several cells."""
+    rule = declare(rule_id, slug, summary, why, severity)
+
+    def enter(check: PlantCheck) -> PlantCheck:
+        PLANT_CHECKS.append((rule, check))
+        return check
+
+    return enter
