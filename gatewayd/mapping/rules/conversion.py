@@ -179,7 +179,10 @@ def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             continue
         low, high = _reach(placement)
         slack = abs(placement.scale) / 2
-        if limits[0] < low - slack or limits[1] > high + slack:
+        # What the robot's own type excludes is GW609.
+        least = limits[0] if variable.low is None else max(limits[0], variable.low)
+        most = limits[1] if variable.high is None else min(limits[1], variable.high)
+        if least < low - slack or most > high + slack:
             message = (
                 f"`{variable.name}` may be {number(limits[0])} to {number(limits[1])}, "
                 f"{placement.type} with scale {number(placement.scale)} reaches {number(low)} to {number(high)}"

@@ -245,6 +245,11 @@ def idle_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     if not _is_whole(cell):
         return
     named = {name for name, _, _ in _named_writers(cell.document)}
+    if named - {ANY} - cell.document.declared("writers") or any(
+        len(part.spec.owner or ()) > 1 and ANY in (part.spec.owner or ()) for part in _owned(cell.document)
+    ):
+        # A wrong name has its own finding, and may be what this writer was meant by.
+        return
     used = named | {name for lock in cell.locks for name in lock.owners}
     for writer in cell.document.writers.values():
         if writer.name not in used:
