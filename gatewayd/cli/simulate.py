@@ -1,0 +1,263 @@
+"""`gatewayd simulate`: a robot controller to connect to."""
+
+from __future__ import annotations
+
+import logging
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from gatewayd.rtde.catalogue import Series, SoftwareVersion
+    from gatewayd.simulator.controller import Controller
+    from gatewayd.simulator.program import Rule
+
+__all__ = ["command"]
+
+CANNOT_SERVE = 1
+SAFETY_TEXT = "SafetySetup has not been confirmed yet, therefore no data will be send yet"
+_PROBABILITY = click.FloatRange(0, 1)
+
+
+def _seconds(_ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
+    """A number of seconds; infinity for `never`, which only --overflow-close takes."""
+    if value is None:
+        return None
+    if value == "never" and param.name == "overflow_close":
+        return math.inf
+    try:
+        seconds = float(value)
+    except ValueError:
+        seconds = math.nan
+    if not 0 <= seconds < math.inf:
+        message = f"{value!r} is not a number of seconds"
+        raise click.BadParameter(message)
+    return seconds
+
+
+@click.command(
+    name="simulate",
+    epilog="""\b
+The robot program, one rule a line or separated by `;`, run in order in every control cycle:
+  TARGET = SOURCE [* NUMBER] [+ NUMBER] [after DURATION] [for DURATION]
+  TARGET = not SOURCE [after DURATION] [for DURATION]
+  TARGET = count SOURCE | count every DURATION
+  TARGET = toggle SOURCE | toggle every DURATION
+  TARGET = NUMBER
+TARGET and SOURCE are RTDE fields (output_int_register_0), elements (actual_TCP_pose[2]), bits of
+integers (actual_digital_input_bits.0) or reserved bits (output_bit_register_0 to _63); NAME_0..23 on both
+sides makes a rule for each number. `after` delays every change, `for` makes a pulse of every change from 0,
+`count` and `toggle` act on every change of SOURCE from 0. DURATION has its unit: 200ms, 1.5s. # starts a
+comment.
+
+\b
+Commands on standard input (--control stdin), each answered with `ok`, `ok RESULT` or `error REASON`:
+  get FIELD            set FIELD VALUE[,VALUE...]    hold FIELD[,FIELD...]    free FIELD[,FIELD...]
+  freeze on|off        silence on|off                drop-clients             text MESSAGE
+  restart              clients                       quit (as does the end of input)
+
+\b
+Examples:
+  gatewayd simulate --program demo
+  gatewayd simulate --program 'output_int_register_0 = input_int_register_0 * 2 + 1'
+  gatewayd simulate --program 'output_bit_register_0 = input_bit_register_0 for 300ms' --control stdin
+  gatewayd simulate --series cb3 --protocol-v1 --hold input_int_register_3
+
+\b
+Exit codes:
+  0    stopped by SIGTERM, SIGINT or `quit`
+  1    the address cannot be listened on
+  2    wrong usage, a mistake in the robot program
+""",
+)
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=30004,
+    show_default=True,
+    help="TCP port; 0 takes a free one and prints it.",
+)
+@click.option(
+    "--series", type=click.Choice(["cb3", "e", "x"]), help="Generation; default: that of --version, else e."
+)
+@click.option(
+    "--version", help="Controller software, as 5.12.0: later fields are NOT_FOUND. Default: by series."
+)
+@click.option(
+    "--frequency",
+    type=click.FloatRange(1, 1000),
+    metavar="HZ",
+    help="Control cycles per second, in place of the series' 125 or 500.",
+)
+@click.option(
+    "--uptime",
+    callback=_seconds,
+    help="First timestamp. [default: 100; 0 with --boot-restart]",
+    metavar="SECONDS",
+)
+@click.option(
+    "--program",
+    "programs",
+    multiple=True,
+    metavar="RULE",
+    help="Rule of the robot program (below), or `demo`: echo all reserved registers and bits. Repeatable.",
+)
+@click.option(
+    "--program-file",
+    "program_files",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="File of such rules. Repeatable.",
+)
+@click.option(
+    "--connections",
+    type=click.IntRange(1, 1000),
+    default=16,
+    show_default=True,
+    help="Most clients at a time.",
+)
+@click.option("--protocol-v1", "v1_only", is_flag=True, help="Fault: refuse protocol version 2.")
+@click.option(
+    "--text-on-connect",
+    is_flag=False,
+    flag_value=SAFETY_TEXT,
+    metavar="[TEXT]",
+    help="Fault: a text message before anything was asked, as an unpowered PolyScope X sends it.",
+)
+@click.option(
+    "--boot-restart",
+    callback=_seconds,
+    metavar="SECONDS",
+    help="Fault: restart once, this long after the start, timestamp from 0 again.",
+)
+@click.option(
+    "--adapter",
+    type=click.Choice(["profinet", "ethernet-ip"]),
+    help="Fault: a fieldbus adapter owns registers 0-23, bits 0-63 and the IO.",
+)
+@click.option("--hold", metavar="FIELD,...", help="Fault: inputs that the controller itself has claimed.")
+@click.option("--strict-lists", is_flag=True, help="Fault: ignore lists of names of more than 2048 bytes.")
+@click.option(
+    "--linger",
+    type=click.IntRange(0, 3_600_000),
+    default=0,
+    metavar="MS",
+    help="Fault: release claims this long after a connection has closed.",
+)
+@click.option(
+    "--overflow-close",
+    callback=_seconds,
+    default="1",
+    show_default=True,
+    metavar="SECONDS",
+    help="Close a client that has not read for this long, or never.",
+)
+@click.option("--drop", type=_PROBABILITY, default=0.0, help="Fault: probability of losing a data package.")
+@click.option("--duplicate", type=_PROBABILITY, default=0.0, help="Fault: probability of sending one twice.")
+@click.option(
+    "--split", type=_PROBABILITY, default=0.0, help="Fault: probability of sending one in two segments."
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the three probabilities.")
+@click.option("--freeze", is_flag=True, help="Fault: the timestamp stands still, packages go on.")
+@click.option("--silence", is_flag=True, help="Fault: no data packages.")
+@click.option("--control", type=click.Choice(["stdin"]), help="Take commands (below) from standard input.")
+@click.option("-q", "--quiet", is_flag=True, help="Log warnings only.")
+def command(
+    host: str, port: int, control: str | None, connections: int, *, quiet: bool, **options: Any
+) -> int:
+    """Be a Universal Robots controller: its RTDE interface with moving values, claims and a small robot program.
+
+    Serves any number of RTDE clients as a real controller does and prints one line when it listens. What it is told
+    to do wrong can be declared here and, in part, switched while it runs.
+    """
+    import asyncio
+
+    from gatewayd.simulator.process import serve
+    from gatewayd.simulator.server import SimulatedController
+
+    level = logging.WARNING if quiet else logging.INFO
+    logging.basicConfig(level=level, format="%(asctime)s %(levelname)-7s %(message)s")
+    controller = _controller(**options)
+    simulator = SimulatedController(controller, host=host, port=port, connections=connections)
+    try:
+        asyncio.run(serve(simulator, control=control is not None))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        click.echo(f"gatewayd: cannot listen on {host}:{port}: {reason}", err=True)
+        return CANNOT_SERVE
+    return 0
+
+
+def _controller(
+    *,
+    series: str | None,
+    version: str | None,
+    frequency: float | None,
+    uptime: float | None,
+    programs: tuple[str, ...],
+    program_files: tuple[Path, ...],
+    hold: str | None,
+    linger: int,
+    overflow_close: float,
+    **switches: Any,
+) -> Controller:
+    from gatewayd.simulator.controller import Controller
+    from gatewayd.simulator.faults import Faults
+    from gatewayd.simulator.program import ProgramError
+
+    faults = Faults(
+        hold=tuple(name.strip() for name in (hold or "").split(",") if name.strip()),
+        linger=linger / 1000,
+        overflow_close=None if overflow_close == math.inf else overflow_close,
+        **switches,
+    )
+    generation, software = _generation(series, version)
+    try:
+        rules = _rules(programs, program_files)
+        return Controller(
+            generation, software, frequency=frequency, uptime=uptime, program=rules, faults=faults
+        )
+    except ProgramError as error:
+        raise click.UsageError(str(error)) from error
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="--hold") from error
+
+
+def _generation(series: str | None, version: str | None) -> tuple[Series, SoftwareVersion | None]:
+    from gatewayd.rtde.catalogue import Series, SoftwareVersion
+
+    if version is None:
+        return Series.from_word(series or "e"), None
+    try:
+        software = SoftwareVersion.parse(version)
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="--version") from error
+    own = Series.from_major(software.major)
+    if own is None:
+        message = f"{version}: software versions begin with 3 (cb3), 5 (e) or 10 (x)"
+        raise click.BadParameter(message, param_hint="--version")
+    if series is not None and own.word != series:
+        message = f"{version} is software of series {own.word}, not of {series}"
+        raise click.BadParameter(message, param_hint="--version")
+    return own, software
+
+
+def _rules(programs: tuple[str, ...], files: tuple[Path, ...]) -> list[Rule]:
+    """The rules of the options, then those of the files."""
+    from gatewayd.simulator.program import DEMO, parse
+
+    rules: list[Rule] = []
+    for number, text in enumerate(programs, 1):
+        source = "--program" if len(programs) == 1 else f"--program {number}"
+        rules += parse(DEMO if text == "demo" else text, source)
+    for path in files:
+        try:
+            text = path.read_text("utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "is not UTF-8 text"
+            raise click.BadParameter(f"{path}: {reason}", param_hint="--program-file") from error
+        rules += parse(text, str(path))
+    return rules

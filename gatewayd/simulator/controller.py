@@ -1,0 +1,178 @@
+"""The controller behind the protocol: cycle counter, variables, claims, robot program. No sockets, no clock.
+
+Whoever runs it calls `advance` for every control cycle; everything it shows follows from the number of cycles, from
+what was written and from the switches in `faults`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Sequence
+
+from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series, SoftwareVersion
+from gatewayd.rtde.types import DataType
+from gatewayd.simulator.arm import Moment
+from gatewayd.simulator.claims import Claims
+from gatewayd.simulator.faults import ADAPTER_FIELDS, ADAPTERS, Faults
+from gatewayd.simulator.interpreter import Interpreter
+from gatewayd.simulator.program import Rule
+from gatewayd.simulator.signals import CYCLE_FIELDS, INITIAL, SIGNALS
+from gatewayd.simulator.store import Scalar, Store
+
+__all__ = ["DEFAULT_UPTIME", "DEFAULT_VERSIONS", "INTERNAL", "Controller"]
+
+DEFAULT_VERSIONS = {
+    Series.CB3: SoftwareVersion(3, 15, 8),
+    Series.E: SoftwareVersion(5, 12, 0),
+    Series.X: SoftwareVersion(10, 12, 0),
+}
+"""Software that each series runs unless told otherwise."""
+
+DEFAULT_UPTIME = 100.0
+"""Seconds since power-up at the start: beyond the boot window that clients wait out."""
+
+INTERNAL = "the controller itself"
+"""Owner of the inputs that were claimed with `hold`."""
+
+_RUNNING = 2  # runtime_state
+_PROGRAM_RUNNING = 0b10  # robot_status_bits
+
+
+class Controller:
+    """One simulated controller.
+
+    `frequency` is the rate of its control cycle in Hz (default: that of the series), `uptime` its first timestamp in
+    seconds. Raises ProgramError if `program` names what the controller does not have, ValueError for inputs to be
+    held that do not exist.
+    """
+
+    def __init__(
+        self,
+        series: Series = Series.E,
+        version: SoftwareVersion | None = None,
+        *,
+        frequency: float | None = None,
+        uptime: float | None = None,
+        program: Iterable[Rule] = (),
+        faults: Faults | None = None,
+    ) -> None:
+        self.series = series
+        self.version = version or DEFAULT_VERSIONS[series]
+        """Software version: fields that came later are NOT_FOUND."""
+        self.faults = faults or Faults()
+        """The fault switches; they may be thrown at any time."""
+        self.rate = float(frequency or series.base_rate)
+        """Control cycles per second."""
+        self.cycle = 0
+        """Cycles run. Unlike the step counter it goes on while the controller is frozen."""
+        self.claims = Claims()
+        self.store = Store(
+            {name: field.type for name, field in {**INPUTS, **OUTPUTS}.items()}, SIGNALS, INITIAL
+        )
+        self._rules = tuple(program)
+        self._interpreter = self._load()
+        if uptime is None:
+            uptime = DEFAULT_UPTIME if self.faults.boot_restart is None else 0.0
+        self._set_step(round(uptime * self.rate), 0.0, 1.0)
+        if self.faults.adapter is not None:
+            fields = [name for name in ADAPTER_FIELDS if self.input_type(name)]
+            self.claims.claim(ADAPTERS[self.faults.adapter], fields)
+        self.hold(self.faults.hold)
+
+    @property
+    def step(self) -> int:
+        """The step counter: timestamp times rate."""
+        return self.store.moment.step
+
+    def output_type(self, name: str) -> DataType | None:
+        """The type of an output, None if this series and version does not have it."""
+        return self._type(OUTPUTS.get(name))
+
+    def input_type(self, name: str) -> DataType | None:
+        """The type of an input, None if this series and version does not have it."""
+        return self._type(INPUTS.get(name))
+
+    def period(self, frequency: float | None) -> int:
+        """Cycles from one package to the next: floor(rate / frequency), never more often than each cycle.
+
+        None is a request in protocol version 1, which gets 125 Hz; 0 and nonsense get the full rate, less than 1 Hz
+        gets 1 Hz.
+        """
+        if frequency is None:
+            frequency = Series.CB3.base_rate
+        if not 0 < frequency < self.rate:
+            return 1
+        return int(self.rate / max(frequency, 1.0))
+
+    def advance(self, cycles: int = 1) -> None:
+        """Run one control cycle, `cycles` after the last: more than 1 where some could not be run in time."""
+        self.cycle += cycles
+        if self.faults.freeze:
+            return
+        running = self._running()
+        fraction = float(self.store.cells[self._speed]) if running else 0.0
+        path = self.store.moment.path + fraction * cycles / self.rate
+        self._set_step(self.step + cycles, path, fraction)
+        if running:
+            self._interpreter.run(cycles)
+
+    def restart(self) -> None:
+        """Boot again: timestamp and registers from the beginning, no claims but internal ones."""
+        self.store.reset()
+        self._interpreter = self._load()
+        self._set_step(0, 0.0, 1.0)
+
+    def hold(self, fields: Iterable[str]) -> None:
+        """Claim inputs for the controller itself; ValueError names those that do not exist or are a client's."""
+        wanted = tuple(fields)
+        unknown = [name for name in wanted if self.input_type(name) is None]
+        if unknown:
+            message = f"no such input: {', '.join(unknown)}"
+            raise ValueError(message)
+        taken = self.claims.claim(INTERNAL, wanted)
+        if taken:
+            name = min(taken)
+            message = f"{name} is in use by {self.claims.owner(name)}"
+            raise ValueError(message)
+
+    def free(self, fields: Iterable[str]) -> None:
+        """Give up inputs held by the controller or an adapter; ValueError for what neither holds."""
+        internal: set[Hashable] = {INTERNAL, *ADAPTERS.values()}
+        for name in tuple(fields):
+            owner = self.claims.owner(name)
+            if owner not in internal:
+                message = f"{name} is not held" if owner is None else f"{name} is in use by {owner}"
+                raise ValueError(message)
+            self.claims.release(owner, (name,))
+
+    def get(self, field: str) -> tuple[Scalar, ...]:
+        """The elements of any input or output now; KeyError if there is no such field."""
+        return self.store.read(field)
+
+    def set(self, field: str, values: Sequence[Scalar]) -> None:
+        """Write any field, as the robot would; one that moves by itself stays there from now on.
+
+        KeyError if there is no such field, ValueError for the wrong number of values or the cycle counter.
+        """
+        if field in CYCLE_FIELDS:
+            message = f"{field} follows the controller's cycles; use freeze to stop it"
+            raise ValueError(message)
+        self.store.pin(field, values)
+
+    def _type(self, field: Field | None) -> DataType | None:
+        return field.type if field is not None and field.available(self.series, self.version) else None
+
+    def _load(self) -> Interpreter:
+        self._speed = self.store.place("target_speed_fraction").start
+        self._state = self.store.place("runtime_state").start
+        return Interpreter(self._rules, self.store, self.rate, INPUTS)
+
+    def _running(self) -> bool:
+        """Whether the robot program runs; keeps the bit that says so in step."""
+        running = int(self.store.cells[self._state]) == _RUNNING
+        bits = int(self.store.read("robot_status_bits")[0])
+        if bool(bits & _PROGRAM_RUNNING) != running:
+            self.store.write("robot_status_bits", (bits ^ _PROGRAM_RUNNING,))
+        return running
+
+    def _set_step(self, step: int, path: float, rate: float) -> None:
+        self.store.moment = Moment(step, step / self.rate, path, rate)

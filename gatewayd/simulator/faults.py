@@ -1,0 +1,102 @@
+"""What can be made to go wrong, and with which probability: switches of the simulated controller.
+
+Everything here is off by default. `freeze` and `silence` may be thrown while the simulator runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from random import Random
+
+__all__ = ["ADAPTERS", "ADAPTER_FIELDS", "STRICT_LIST_BYTES", "Faults", "Mangler"]
+
+STRICT_LIST_BYTES = 2048
+"""Longest list of names an old controller takes (guide of 2022, SETUP_OUTPUTS)."""
+
+ADAPTERS = {"profinet": "PROFINET adapter", "ethernet-ip": "EtherNet/IP adapter"}
+"""Fieldbus adapters of the controller that act as an RTDE client inside it, and how the log names them."""
+
+ADAPTER_FIELDS: tuple[str, ...] = (
+    "speed_slider_mask",
+    "speed_slider_fraction",
+    "standard_digital_output_mask",
+    "standard_digital_output",
+    "configurable_digital_output_mask",
+    "configurable_digital_output",
+    "tool_digital_output_mask",
+    "tool_digital_output",
+    "standard_analog_output_mask",
+    "standard_analog_output_type",
+    "standard_analog_output_0",
+    "standard_analog_output_1",
+    "input_bit_registers0_to_31",
+    "input_bit_registers32_to_63",
+    *(f"input_int_register_{n}" for n in range(24)),
+    *(f"input_double_register_{n}" for n in range(24)),
+)
+"""The inputs an enabled adapter claims, as users of real controllers report them."""
+
+
+@dataclass(slots=True)
+class Faults:
+    """The switches. Durations in seconds, probabilities from 0 to 1 per data package."""
+
+    v1_only: bool = False
+    """Refuse protocol version 2."""
+    text_on_connect: str | None = None
+    """Text message sent before anything was asked, hence in protocol v1 layout."""
+    boot_restart: float | None = None
+    """Restart the interface once this long after the start: connections closed, registers and timestamp back to 0."""
+    adapter: str | None = None
+    """One of `ADAPTERS`: claims `ADAPTER_FIELDS` for good."""
+    hold: tuple[str, ...] = ()
+    """Inputs claimed by the controller itself from the start."""
+    strict_lists: bool = False
+    """Ignore lists of names beyond `STRICT_LIST_BYTES` with a text message."""
+    linger: float = 0.0
+    """How long claims outlive their connection."""
+    overflow_close: float | None = 1.0
+    """Close a client that has not read for this long once its buffers are full; None only skips its packages."""
+    drop: float = 0.0
+    """Probability that a package is not sent."""
+    duplicate: float = 0.0
+    """Probability that a package is sent twice."""
+    split: float = 0.0
+    """Probability that a package leaves in two segments, one cycle apart."""
+    seed: int = 0
+    """Seed of the three probabilities; each connection draws its own sequence from it."""
+    freeze: bool = False
+    """Packages go on, the timestamp and everything that follows from it stands still."""
+    silence: bool = False
+    """No data packages; everything else is answered."""
+
+    @property
+    def mangles(self) -> bool:
+        """Whether any data package may be touched."""
+        return bool(self.drop or self.duplicate or self.split)
+
+
+class Mangler:
+    """Loses, doubles and splits the data packages of one connection, reproducibly."""
+
+    def __init__(self, faults: Faults, connection: int) -> None:
+        self._faults = faults
+        self._random = Random(f"{faults.seed}/{connection}")
+        self._rest = b""
+
+    def mangle(self, package: bytes) -> bytes:
+        """The bytes to send in this cycle in place of `package`, the held back rest of the last one first."""
+        chance, faults = self._random.random, self._faults
+        drop, duplicate, split = chance() < faults.drop, chance() < faults.duplicate, chance() < faults.split
+        out = b"" if drop else package * 2 if duplicate else package
+        if not split or not out:
+            return self.flush() + out
+        cut = self._random.randrange(1, len(package))
+        now, rest = self.flush() + out[:cut], out[cut:]
+        self._rest = rest
+        return now
+
+    def flush(self) -> bytes:
+        """The rest of a split package: it must leave before anything else does."""
+        rest, self._rest = self._rest, b""
+        return rest

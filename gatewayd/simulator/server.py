@@ -1,0 +1,282 @@
+"""The simulated controller on a TCP port: sockets, the clock that drives its cycles, and nothing else.
+
+The cycle counter follows the clock. A cycle that comes late is made up for by shortened ones, never by a burst; what is
+more than `MAKE_UP` cycles late is skipped, packages and all.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import socket
+from types import TracebackType
+from typing import Self, cast
+
+from gatewayd.rtde.codec import ProtocolError
+from gatewayd.rtde.messages import TextLevel
+from gatewayd.rtde.types import DEFAULT_PORT
+from gatewayd.simulator.controller import Controller
+from gatewayd.simulator.faults import Faults, Mangler
+from gatewayd.simulator.session import Session
+from gatewayd.simulator.store import Scalar
+
+__all__ = ["DEFAULT_PORT", "MAKE_UP", "MOST_CONNECTIONS", "SimulatedController"]
+
+MAKE_UP = 5
+"""Cycles of lateness that are made up for."""
+MOST_CONNECTIONS = 16
+"""Clients served at a time unless told otherwise."""
+
+_SHORTEST_CYCLE = 0.6  # of a period: two packages are never nearer than this
+_IDLE = 0.01  # seconds between cycles while nobody is connected
+_SEND_BUFFER = 65536
+_MOST_UNSENT = 1 << 18  # replies that a client has not fetched
+_DOWN = 0.2  # seconds a restart takes
+_log = logging.getLogger(__name__)
+
+
+class SimulatedController:
+    """Serves one `Controller`; an asynchronous context manager, or `start` and `stop`.
+
+    `port` 0 takes a free one, which is kept over `stop` and `start`. OSError if the address cannot be had.
+    """
+
+    def __init__(
+        self,
+        controller: Controller | None = None,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        connections: int = MOST_CONNECTIONS,
+    ) -> None:
+        self.controller = controller or Controller()
+        self.host = host
+        self.port = port
+        """The TCP port; once started the real one."""
+        self.refused = 0
+        """Connections turned away because there were too many."""
+        self.malformed = 0
+        """Connections closed for bytes that are not RTDE."""
+        self.overflowed = 0
+        """Connections closed because the client did not read."""
+        self._most = connections
+        self._connections: dict[int, _Connection] = {}
+        self._number = 0
+        self._server: asyncio.Server | None = None
+        self._ticking: asyncio.TimerHandle | None = None
+        self._booting: asyncio.TimerHandle | None = None
+        self._restarting: asyncio.Task[None] | None = None
+        self._next = 0.0
+
+    async def __aenter__(self) -> Self:
+        await self.start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.stop()
+
+    @property
+    def clients(self) -> int:
+        """Clients connected now."""
+        return len(self._connections)
+
+    @property
+    def faults(self) -> Faults:
+        """The controller's fault switches."""
+        return self.controller.faults
+
+    async def start(self) -> None:
+        """Listen, and let the cycles run."""
+        await self._listen()
+        loop = asyncio.get_running_loop()
+        if self.faults.boot_restart is not None:
+            self._booting = loop.call_later(self.faults.boot_restart, self._boot)
+        self._next = loop.time()
+        self._tick()
+
+    async def stop(self) -> None:
+        """Close everything. The variables keep their values for the next `start`."""
+        for handle in (self._ticking, self._booting):
+            if handle is not None:
+                handle.cancel()
+        if self._restarting is not None:
+            self._restarting.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._restarting
+        await self._close()
+
+    async def restart(self) -> None:
+        """Boot again: close every connection, listen anew with timestamp and registers from the beginning."""
+        _log.info("restarting: timestamp and registers start again")
+        await self._close()
+        await asyncio.sleep(_DOWN)
+        self.controller.restart()
+        await self._listen()
+
+    def drop_clients(self) -> int:
+        """Cut every connection; returns how many there were."""
+        connections = list(self._connections.values())
+        for connection in connections:
+            connection.abort("dropped on request")
+        return len(connections)
+
+    def say(self, message: str, level: TextLevel = TextLevel.WARNING) -> None:
+        """Send a text message to every client."""
+        for connection in self._connections.values():
+            connection.say(message, level)
+
+    def get(self, field: str) -> tuple[Scalar, ...] | Scalar:
+        """A field's value now: a number, or a tuple for a vector. KeyError if there is no such field."""
+        values = self.controller.get(field)
+        return values if len(values) > 1 else values[0]
+
+    def set(self, field: str, *values: Scalar) -> None:
+        """Write any field, as the robot would; see `Controller.set`."""
+        self.controller.set(field, values)
+
+    def hold(self, *fields: str) -> None:
+        """Claim inputs for the controller itself; see `Controller.hold`."""
+        self.controller.hold(fields)
+
+    def free(self, *fields: str) -> None:
+        """Give up held inputs; see `Controller.free`."""
+        self.controller.free(fields)
+
+    async def _listen(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(self._accept, self.host, self.port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def _close(self) -> None:
+        if self._server is not None:
+            self._server.close()
+        for connection in list(self._connections.values()):
+            connection.abort("controller stops")
+        await asyncio.sleep(0)  # lets the transports report the loss, which releases the claims
+
+    def _boot(self) -> None:
+        self._restarting = asyncio.get_running_loop().create_task(self.restart())
+
+    def _accept(self) -> asyncio.Protocol:
+        self._number += 1
+        return _Connection(self, self._number)
+
+    def enter(self, number: int, connection: _Connection) -> bool:
+        """Note a new connection; False if there are too many."""
+        if len(self._connections) >= self._most:
+            self.refused += 1
+            return False
+        if not self._connections:  # from idle to full rate
+            self._schedule(asyncio.get_running_loop().time())
+        self._connections[number] = connection
+        return True
+
+    def leave(self, number: int) -> None:
+        """Forget a connection."""
+        self._connections.pop(number, None)
+
+    def _tick(self) -> None:
+        loop = asyncio.get_running_loop()
+        now = loop.time()
+        period = 1 / self.controller.rate
+        late = now - self._next
+        cycles = 1
+        if late > (MAKE_UP * period if self._connections else period):
+            cycles += int(late / period)
+        self.controller.advance(cycles)
+        for connection in list(self._connections.values()):
+            connection.cycle(now)
+        self._next += cycles * period
+        pause = _SHORTEST_CYCLE * period if self._connections else _IDLE
+        self._schedule(max(self._next, now + pause))
+
+    def _schedule(self, when: float) -> None:
+        if self._ticking is not None:
+            self._ticking.cancel()
+        self._ticking = asyncio.get_running_loop().call_at(when, self._tick)
+
+
+class _Connection(asyncio.Protocol):
+    """One client's socket."""
+
+    def __init__(self, server: SimulatedController, number: int) -> None:
+        self._server = server
+        self._number = number
+        self._mangler = Mangler(server.faults, number)
+        self._blocked_since: float | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast("asyncio.Transport", transport)
+        self._socket = cast("socket.socket", transport.get_extra_info("socket"))
+        peer = transport.get_extra_info("peername") or ("?", 0)
+        self._session = Session(self._server.controller, f"client {self._number} ({peer[0]}:{peer[1]})")
+        if not self._server.enter(self._number, self):
+            self.abort("too many connections")
+            return
+        # A small send buffer makes it show soon that a client does not read.
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._transport.write(self._session.greeting())
+        _log.info("%s connected", self._session)
+
+    def data_received(self, data: bytes) -> None:
+        # ur_rtde sends a request in two segments without NODELAY: each waits for the acknowledgement of the one before.
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
+        try:
+            replies = self._session.receive(data)
+        except ProtocolError as error:
+            self._server.malformed += 1
+            self.abort(str(error))
+            return
+        self._write(replies)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._server.leave(self._number)
+        linger = self._server.faults.linger
+        if linger:
+            asyncio.get_running_loop().call_later(linger, self._session.close)
+        else:
+            self._session.close()
+        _log.info("%s gone", self._session)
+
+    def abort(self, reason: str) -> None:
+        """Cut the connection at once."""
+        _log.warning("%s: %s; connection closed", self._session, reason)
+        self._transport.abort()
+
+    def say(self, message: str, level: TextLevel) -> None:
+        """Send a text message."""
+        self._write(self._session.text(message, level))
+
+    def cycle(self, now: float) -> None:
+        """Send the package that is due now, or skip it while the client does not read."""
+        package = self._session.package()
+        if self._transport.is_closing():
+            return
+        if self._transport.get_write_buffer_size():
+            self._blocked(now)
+            return
+        self._blocked_since = None
+        if self._server.faults.mangles:
+            package = self._mangler.mangle(package) if package else self._mangler.flush()
+        if package:
+            self._transport.write(package)
+
+    def _blocked(self, now: float) -> None:
+        limit = self._server.faults.overflow_close
+        if self._blocked_since is None:
+            self._blocked_since = now
+        elif limit is not None and now - self._blocked_since > limit:
+            self._server.overflowed += 1
+            self.abort(f"has not read for {limit:g} s")
+
+    def _write(self, data: bytes) -> None:
+        if not data:
+            return
+        self._transport.write(self._mangler.flush() + data)
+        if self._transport.get_write_buffer_size() > _MOST_UNSENT:
+            self._server.overflowed += 1
+            self.abort("does not fetch its answers")

@@ -1,0 +1,234 @@
+"""One client's connection, as the controller sees it: packages in, packages out. No sockets, no clock.
+
+What the guides leave open is decided as in the public clients' experience: inputs need no START, a second output
+recipe replaces the first at once, whatever cannot be understood is answered with a text message and ignored.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gatewayd.rtde.codec import MAX_PACKAGE, ControllerProtocol, ProtocolError
+from gatewayd.rtde.messages import (
+    ERROR_WORDS,
+    IN_USE,
+    NOT_FOUND,
+    ControllerMessage,
+    ControllerVersion,
+    DataPackage,
+    ExecutableMessage,
+    GetControllerVersion,
+    InputsSetup,
+    OutputsSetup,
+    Pause,
+    PauseReply,
+    ProtocolVersionReply,
+    RequestProtocolVersion,
+    SetupInputs,
+    SetupOutputs,
+    Start,
+    StartReply,
+    TextLevel,
+    TextMessage,
+)
+from gatewayd.rtde.recipe import Recipe
+from gatewayd.rtde.types import DataType
+from gatewayd.simulator.controller import Controller
+from gatewayd.simulator.faults import STRICT_LIST_BYTES
+from gatewayd.simulator.masks import Effect, effects
+from gatewayd.simulator.store import Store, View
+
+__all__ = ["MOST_INPUT_RECIPES", "SOURCE", "Session"]
+
+MOST_INPUT_RECIPES = 255
+"""Per connection; ids count from 1, 0 says refused."""
+SOURCE = "URControl"
+"""Source of the controller's text messages."""
+
+_OUTPUT_RECIPE = 1
+_DATA_HEAD = 4
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class _InputRecipe:
+    """The way from an input package into the store."""
+
+    recipe: Recipe
+    cells: tuple[int, ...]
+    effects: tuple[Effect, ...]
+
+    def apply(self, payload: bytes, store: Store) -> None:
+        """ProtocolError if the payload has not the recipe's length; nothing is written then."""
+        cells = store.cells
+        for cell, value in zip(self.cells, self.recipe.unpack(payload), strict=True):
+            cells[cell] = value
+        store.edition += 1
+        for effect in self.effects:
+            effect(store)
+
+
+class Session:
+    """The protocol state of one connection. Owner of its claims; `str` names it in the log."""
+
+    def __init__(self, controller: Controller, name: str) -> None:
+        self._controller = controller
+        self._name = name
+        self._protocol = ControllerProtocol()
+        self._inputs: list[_InputRecipe] = []
+        self._view: View | None = None
+        self._period = 1
+        self._started = False
+        self._out: list[bytes] = []
+
+    def __str__(self) -> str:
+        return self._name
+
+    @property
+    def streaming(self) -> bool:
+        """Whether data packages are being sent."""
+        return self._started and self._view is not None
+
+    def greeting(self) -> bytes:
+        """What is sent before anything was asked."""
+        text = self._controller.faults.text_on_connect
+        if text is None:
+            return b""
+        return self._protocol.send(TextMessage(text, SOURCE, TextLevel.WARNING))
+
+    def text(self, message: str, level: TextLevel) -> bytes:
+        """A text message to the client, in the layout of the version it speaks."""
+        return self._protocol.send(TextMessage(message, SOURCE, level))
+
+    def receive(self, data: bytes) -> bytes:
+        """The answers to `data`, in order. Raises ProtocolError for bytes that are not RTDE.
+
+        What was answered before the offending bytes is lost with the connection, as on a real controller.
+        """
+        for message in self._protocol.receive(data):
+            self._handle(message)
+        out = b"".join(self._out)
+        self._out.clear()
+        return out
+
+    def package(self) -> bytes:
+        """The data package of this cycle; empty if none is due."""
+        controller = self._controller
+        if not self._started or self._view is None or controller.faults.silence:
+            return b""
+        if controller.cycle % self._period:
+            return b""
+        recipe = _OUTPUT_RECIPE if self._protocol.version > 1 else None
+        return self._protocol.send(DataPackage(recipe, self._view.payload()))
+
+    def close(self) -> None:
+        """Give up every claim."""
+        self._controller.claims.release(self)
+
+    def _handle(self, message: ExecutableMessage) -> None:
+        match message:
+            case DataPackage():
+                self._data(message)
+            case SetupOutputs():
+                self._setup_outputs(message)
+            case SetupInputs():
+                self._setup_inputs(message)
+            case RequestProtocolVersion():
+                newest = 1 if self._controller.faults.v1_only else 2
+                self._answer(ProtocolVersionReply(1 <= message.version <= newest))
+            case GetControllerVersion():
+                self._answer(ControllerVersion(*self._controller.version, build=0))
+            case Start():
+                self._started = self._view is not None
+                self._answer(StartReply(self._started))
+            case Pause():
+                self._started = False
+                self._answer(PauseReply(accepted=True))
+            case TextMessage():
+                _log.info("%s says (level %d) %s: %s", self, message.level, message.source, message.message)
+
+    def _answer(self, message: ControllerMessage) -> None:
+        self._out.append(self._protocol.send(message))
+
+    def _complain(self, message: str, level: TextLevel = TextLevel.ERROR) -> None:
+        _log.info("%s: %s", self, message)
+        self._answer(TextMessage(message, SOURCE, level))
+
+    def _setup_outputs(self, message: SetupOutputs) -> None:
+        if not self._acceptable(message.names):
+            return
+        kinds = [self._controller.output_type(name) for name in message.names]
+        types = tuple(kind.word if kind else NOT_FOUND for kind in kinds)
+        valid = bool(types) and NOT_FOUND not in types
+        if valid and not self._fits([kind for kind in kinds if kind]):
+            self._complain("the output recipe is larger than a data package")
+            valid = False
+        self._view = self._controller.store.view(message.names) if valid else None
+        self._period = self._controller.period(message.frequency)
+        if self._protocol.version > 1:
+            self._reply(OutputsSetup(_OUTPUT_RECIPE if valid else 0, types))
+        else:
+            self._reply(OutputsSetup(None, types))
+
+    def _setup_inputs(self, message: SetupInputs) -> None:
+        if not message.names:
+            _log.info("%s: empty input recipe, not confirmed", self)
+            return
+        if not self._acceptable(message.names):
+            return
+        kinds = [self._controller.input_type(name) for name in message.names]
+        taken = self._controller.claims.taken(self, message.names)
+        types = tuple(
+            NOT_FOUND if kind is None else IN_USE if name in taken else kind.word
+            for name, kind in zip(message.names, kinds, strict=True)
+        )
+        self._reply(InputsSetup(self._add_inputs(message.names, types, kinds), types))
+
+    def _add_inputs(
+        self, names: tuple[str, ...], types: Sequence[str], kinds: Sequence[DataType | None]
+    ) -> int:
+        """The id of the new recipe, its fields claimed; 0 and nothing claimed if it cannot be."""
+        known = [kind for kind in kinds if kind is not None]
+        if not ERROR_WORDS.isdisjoint(types):
+            return 0
+        if len(self._inputs) >= MOST_INPUT_RECIPES:
+            self._complain(f"a connection has {MOST_INPUT_RECIPES} input recipes at most")
+            return 0
+        if not self._fits(known):
+            self._complain("the input recipe is larger than a data package")
+            return 0
+        self._controller.claims.claim(self, names)
+        store = self._controller.store
+        cells = [cell for name in names for cell in range(store.place(name).start, store.place(name).stop)]
+        self._inputs.append(_InputRecipe(Recipe(names, known), tuple(cells), effects(names)))
+        return len(self._inputs)
+
+    def _data(self, message: DataPackage) -> None:
+        number = message.recipe or 0
+        if not 1 <= number <= len(self._inputs):
+            self._complain(f"data package for unknown input recipe {number}")
+            return
+        try:
+            self._inputs[number - 1].apply(message.payload, self._controller.store)
+        except ProtocolError as error:
+            self._complain(f"input recipe {number}: {error.reason}")
+
+    def _acceptable(self, names: tuple[str, ...]) -> bool:
+        size = sum(map(len, names)) + len(names) - 1
+        if not self._controller.faults.strict_lists or size <= STRICT_LIST_BYTES:
+            return True
+        self._complain(f"list of {size} bytes is longer than {STRICT_LIST_BYTES}")
+        return False
+
+    def _reply(self, message: OutputsSetup | InputsSetup) -> None:
+        """Answer a setup; a list of types too long for a package becomes a complaint."""
+        try:
+            self._answer(message)
+        except ValueError:
+            self._complain("the list of types is larger than a package")
+
+    @staticmethod
+    def _fits(kinds: Sequence[DataType]) -> bool:
+        return Recipe([""] * len(kinds), kinds).size + _DATA_HEAD <= MAX_PACKAGE

@@ -1,0 +1,238 @@
+"""What the outputs of an undisturbed robot show: one pure function of the moment for every field that moves by itself,
+and the first value of those that only change when told to.
+
+The values are consistent rather than exact: speeds are the derivatives of positions, forces and currents follow the
+load, temperatures and voltages drift within what a real arm shows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+
+from gatewayd.simulator.arm import ELBOW, Moment, Vector, acceleration, frames, joints, pose, twist
+
+__all__ = ["CYCLE_FIELDS", "INITIAL", "SIGNALS", "Signal"]
+
+Signal = Callable[[Moment], Vector]
+"""The elements of a field's value at a moment; a scalar has one."""
+
+CYCLE_FIELDS = frozenset({"timestamp", "control_step"})
+"""Fields that follow the step counter exactly."""
+
+_GRAVITY = 9.82
+_PAYLOAD = 1.2  # kg
+_ARM_MASS = 18.4  # kg, moved share of a UR5e
+_LOADED = (0.0, 62.0, 24.0, 3.6, 0.4, 0.0)  # Nm of gravity at full reach
+_INERTIA = (2.1, 2.6, 0.9, 0.12, 0.08, 0.02)  # kg m2 seen by each joint
+_FRICTION = (4.0, 5.0, 3.5, 1.2, 1.0, 0.8)  # Nm s/rad
+_TORQUE_CONSTANT = (13.26, 13.26, 13.26, 9.76, 9.76, 9.76)  # Nm/A at the joint's output
+_WARMTH = (31.0, 33.5, 32.0, 35.0, 36.5, 37.0)  # degrees Celsius
+_TRACKING_ERROR = 2e-5  # rad
+_SENSOR_RIPPLE = 0.35  # N, Nm/10
+
+
+def _ripple(moment: Moment, number: int) -> float:
+    """Repeatable noise of amplitude 1, different for each `number`."""
+    phase = moment.time * (41.0 + 7.3 * number) + number
+    return 0.6 * math.sin(phase) + 0.4 * math.sin(2.7 * phase)
+
+
+def _target_q(moment: Moment) -> Vector:
+    return joints(moment.path)[0]
+
+
+def _target_qd(moment: Moment) -> Vector:
+    rate = moment.rate
+    return tuple(speed * rate for speed in joints(moment.path)[1])
+
+
+def _target_qdd(moment: Moment) -> Vector:
+    square = moment.rate * moment.rate
+    return tuple(change * square for change in joints(moment.path)[2])
+
+
+def _actual_q(moment: Moment) -> Vector:
+    return tuple(q + _TRACKING_ERROR * _ripple(moment, n) for n, q in enumerate(_target_q(moment)))
+
+
+def _actual_qd(moment: Moment) -> Vector:
+    return tuple(qd + 0.001 * moment.rate * _ripple(moment, 6 + n) for n, qd in enumerate(_target_qd(moment)))
+
+
+@lru_cache(4)
+def _torques(moment: Moment) -> Vector:
+    """Joint torques in Nm: gravity by the horizontal reach, inertia and friction."""
+    (_, lift, elbow, wrist, *_), qd, qdd = _target_q(moment), _target_qd(moment), _target_qdd(moment)
+    lever = (0.0, math.cos(lift), math.cos(lift + elbow), math.cos(lift + elbow + wrist), 0.3, 0.0)
+    parts = zip(_LOADED, lever, _INERTIA, qdd, _FRICTION, qd, strict=True)
+    return tuple(g * c + i * a + f * v for g, c, i, a, f, v in parts)
+
+
+def _target_current(moment: Moment) -> Vector:
+    return tuple(torque / k for torque, k in zip(_torques(moment), _TORQUE_CONSTANT, strict=True))
+
+
+def _actual_current(moment: Moment) -> Vector:
+    return tuple(a + 0.02 * _ripple(moment, 12 + n) for n, a in enumerate(_target_current(moment)))
+
+
+def _actual_current_as_torque(moment: Moment) -> Vector:
+    return tuple(a * k for a, k in zip(_actual_current(moment), _TORQUE_CONSTANT, strict=True))
+
+
+def _pose(moment: Moment) -> Vector:
+    return _pose_at(moment.path)
+
+
+_pose_at = lru_cache(2)(pose)
+
+
+def _actual_pose(moment: Moment) -> Vector:
+    return tuple(x + 1e-5 * _ripple(moment, 18 + n) for n, x in enumerate(_pose(moment)))
+
+
+def _tcp_speed(moment: Moment) -> Vector:
+    return twist(moment.path, moment.rate)
+
+
+@lru_cache(2)
+def _tcp_acceleration(moment: Moment) -> Vector:
+    return acceleration(moment.path, moment.rate)
+
+
+@lru_cache(2)
+def _wrench(moment: Moment) -> Vector:
+    """Force and torque at the tool beyond its payload: what the payload's inertia makes of the acceleration."""
+    inertia = (-_PAYLOAD,) * 3 + (-0.02,) * 3
+    ripple = (_SENSOR_RIPPLE,) * 3 + (_SENSOR_RIPPLE / 10,) * 3
+    parts = zip(inertia, _tcp_acceleration(moment), ripple, strict=True)
+    return tuple(m * a + r * _ripple(moment, 24 + n) for n, (m, a, r) in enumerate(parts))
+
+
+def _raw_wrench(moment: Moment) -> Vector:
+    x, y, z, *torque = _wrench(moment)
+    return (x, y, z - _PAYLOAD * _GRAVITY, *torque)
+
+
+def _force(moment: Moment) -> Vector:
+    return (math.hypot(*_wrench(moment)[:3]),)
+
+
+def _accelerometer(moment: Moment) -> Vector:
+    """Acceleration plus gravity's reaction, turned into the flange's frame."""
+    ax, ay, az = _tcp_acceleration(moment)[:3]
+    az += _GRAVITY
+    return tuple(ax * x + ay * y + az * z for x, y, z in frames(moment.path).rotation)
+
+
+def _momentum(moment: Moment) -> Vector:
+    return (0.4 * _ARM_MASS * math.hypot(*twist(moment.path, moment.rate, ELBOW)[:3]),)
+
+
+def _power(moment: Moment) -> float:
+    """Electrical power in W: standby plus what the joints do."""
+    return 85.0 + sum(abs(t * v) for t, v in zip(_torques(moment), _target_qd(moment), strict=True))
+
+
+def _temperatures(moment: Moment) -> Vector:
+    warm = 1 - math.exp(-moment.time / 1800)
+    return tuple(24 + (w - 24) * warm + 0.05 * _ripple(moment, n) for n, w in enumerate(_WARMTH))
+
+
+def _around(value: float, spread: float, number: int) -> Signal:
+    """A scalar that stays within `spread` of `value`."""
+    return lambda moment: (value + spread * _ripple(moment, number),)
+
+
+def _encoder(counts_per_second: float) -> Signal:
+    """A raw counter of an incremental encoder: INT32 that wraps."""
+    return lambda moment: (
+        (int(moment.path * counts_per_second) + 0x8000_0000) % 0x1_0000_0000 - 0x8000_0000,
+    )
+
+
+SIGNALS: Mapping[str, Signal] = {
+    "timestamp": lambda moment: (moment.time,),
+    "control_step": lambda moment: (moment.step,),
+    "target_q": _target_q,
+    "target_qd": _target_qd,
+    "target_qdd": _target_qdd,
+    "target_current": _target_current,
+    "target_moment": _torques,
+    "actual_q": _actual_q,
+    "actual_qd": _actual_qd,
+    "actual_qdd": _target_qdd,
+    "actual_current": _actual_current,
+    "actual_current_as_torque": _actual_current_as_torque,
+    "actual_moment": _actual_current_as_torque,
+    "joint_control_output": _actual_current,
+    "actual_TCP_pose": _actual_pose,
+    "target_TCP_pose": _pose,
+    "actual_TCP_speed": _tcp_speed,
+    "target_TCP_speed": _tcp_speed,
+    "actual_TCP_acceleration": _tcp_acceleration,
+    "target_TCP_acceleration": _tcp_acceleration,
+    "actual_TCP_force": _wrench,
+    "ft_raw_wrench": _raw_wrench,
+    "wrench_calc_from_currents": _wrench,
+    "tcp_force_scalar": _force,
+    "actual_tool_accelerometer": _accelerometer,
+    "elbow_position": lambda moment: frames(moment.path).origins[ELBOW],
+    "elbow_velocity": lambda moment: twist(moment.path, moment.rate, ELBOW)[:3],
+    "actual_momentum": _momentum,
+    "joint_temperatures": _temperatures,
+    "tool_temperature": lambda moment: (27 + 8 * (1 - math.exp(-moment.time / 2400)),),
+    "actual_execution_time": _around(0.31, 0.04, 31),
+    "actual_main_voltage": _around(48.1, 0.05, 32),
+    "actual_robot_voltage": _around(48.0, 0.08, 33),
+    "actual_robot_current": lambda moment: (_power(moment) / 48,),
+    "actual_joint_voltage": lambda moment: tuple(48 - 0.3 * abs(a) for a in _actual_current(moment)),
+    "io_current": _around(42.0, 1.5, 34),
+    "tool_output_current": _around(61.0, 2.0, 35),
+    "euromap67_24V_voltage": _around(24.0, 0.05, 36),
+    "euromap67_24V_current": _around(38.0, 1.0, 37),
+    "standard_analog_input0": _around(5.0, 1.5, 0),
+    "standard_analog_input1": _around(12.0, 0.4, 1),
+    "tool_analog_input0": _around(3.3, 0.2, 2),
+    "tool_analog_input1": _around(1.1, 0.1, 3),
+    "joint_position_deviation_ratio": _around(0.06, 0.03, 38),
+    "collision_detection_ratio": _around(0.12, 0.06, 39),
+    "actual_robot_energy_consumed": lambda moment: (moment.time * 95 / 3600,),
+    "actual_robot_braking_energy_dissipated": lambda moment: (moment.path * 1.7 / 3600,),
+    "encoder0_raw": _encoder(4096),
+    "encoder1_raw": _encoder(-1024),
+    "script_control_line": lambda moment: (12 + int(moment.path) % 8,),
+}
+"""Fields that change by themselves."""
+
+INITIAL: Mapping[str, float | Vector] = {
+    "robot_mode": 7,
+    "joint_mode": (253,) * 6,
+    "safety_mode": 1,
+    "safety_status": 1,
+    "safety_status_bits": 0b1,
+    "robot_status_bits": 0b11,
+    "runtime_state": 2,
+    "speed_scaling": 1.0,
+    "target_speed_fraction": 1.0,
+    "time_scale_source": 1,
+    "target_execution_time": 2.0,
+    "actual_current_window": (4.0, 4.0, 4.0, 2.0, 2.0, 2.0),
+    "tcp_offset": (0.0, 0.0, 0.12, 0.0, 0.0, 0.0),
+    "payload": _PAYLOAD,
+    "payload_cog": (0.0, 0.0, 0.06),
+    "payload_inertia": (0.003, 0.003, 0.002, 0.0, 0.0, 0.0),
+    "target_gravity": (0.0, 0.0, _GRAVITY),
+    "analog_io_types": 0b0001,
+    "standard_analog_output0": 4.0,
+    "standard_analog_output1": 4.0,
+    "tool_mode": 253,
+    "tool_analog_input_types": 0b11,
+    "tool_output_voltage": 24,
+    "tool_digital_output0_mode": 1,
+    "tool_digital_output1_mode": 1,
+    "euromap67_input_bits": 0,
+}
+"""First values of fields that change only when told to; every other field starts at 0."""
