@@ -213,7 +213,9 @@ class Connection(asyncio.Protocol):
                 pace.package(_TIMESTAMP.unpack_from(package.payload)[0], now)
         last = pace.timestamp
         if self._clocked and not pace.package(values[0], now):
-            text = f"the controller's clock went back from {last} s to {values[0]} s: its RTDE service has restarted"
+            text = (
+                f"the controller's clock went from {last} s to {values[0]} s: its RTDE service has restarted"
+            )
             self._fail(LossReason.RESTARTED, text)
             return None
         self._handler.values(values, now)

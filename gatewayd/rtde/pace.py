@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 __all__ = ["Pace", "Statistics"]
 
+_LONGEST_GAP = 3600.0
+"""Seconds between packages beyond which the timestamp is not believed; a connection does not live so long silent."""
+
 
 @dataclass(slots=True)
 class Statistics:
@@ -45,7 +48,7 @@ class Pace:
         return self._timestamp
 
     def package(self, timestamp: float, now: float) -> bool:
-        """Count a package; False if the controller's time went back, that is, if it has restarted."""
+        """Count a package; False if the controller's time went back or leapt, that is, if it has restarted."""
         self._window_packages += 1
         statistics = self._statistics
         statistics.packages += 1
@@ -54,7 +57,7 @@ class Pace:
         if last is None:
             return True
         elapsed = timestamp - last
-        if not elapsed >= 0.0:
+        if not 0.0 <= elapsed <= _LONGEST_GAP:
             return False
         if elapsed > 1.5 * self._period:
             statistics.skipped += round(elapsed / self._period) - 1

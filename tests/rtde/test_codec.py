@@ -99,7 +99,10 @@ def test_a_client_hears_what_a_controller_says_however_it_is_cut(
 
 def test_single_bytes_are_enough() -> None:
     client, controller = speaking(2)
-    said = [messages.OutputsSetup(1, ("DOUBLE",)), messages.DataPackage(1, b"12345678")]
+    said: list[messages.ControllerMessage] = [
+        messages.OutputsSetup(1, ("DOUBLE",)),
+        messages.DataPackage(1, b"12345678"),
+    ]
     stream = b"".join(controller.send(message) for message in said)
     assert receive_all(client.receive, [bytes((byte,)) for byte in stream]) == said
 

@@ -1,0 +1,222 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gatewayd.rtde.catalogue import INPUTS
+from gatewayd.rtde.claims import (
+    REFUSED,
+    REGISTERS_KEY,
+    WATCHDOG_KEY,
+    Claims,
+    HandshakeError,
+    recipe_key,
+    sort_types,
+)
+from gatewayd.rtde.messages import IN_USE, NOT_FOUND, InputsSetup
+from gatewayd.rtde.types import DataType
+
+REGISTERS = tuple(f"input_int_register_{number}" for number in range(6))
+
+
+class Controller:
+    """Answers input setups: what is taken is taken."""
+
+    def __init__(self, taken: set[str] | None = None, missing: set[str] | None = None) -> None:
+        self.taken = taken or set()
+        self.missing = missing or set()
+        self.ids = 0
+        self.asked: list[tuple[str, ...]] = []
+
+    def word(self, name: str) -> str:
+        if name in self.missing or name not in INPUTS:
+            return NOT_FOUND
+        return IN_USE if name in self.taken else INPUTS[name].type.word
+
+    def converse(self, claims: Claims) -> None:
+        while (request := claims.request()) is not None:
+            self.asked.append(request.names)
+            types = tuple(map(self.word, request.names))
+            good = not {NOT_FOUND, IN_USE} & set(types)
+            self.ids += good
+            claims.answer(InputsSetup(self.ids if good else 0, types))
+
+
+def held(claims: Claims) -> dict[str, tuple[str, ...]]:
+    return {key: claimed.recipe.names for key, claimed in claims.recipes.items()}
+
+
+@pytest.mark.parametrize(
+    "name, key",
+    [
+        ("input_int_register_0", REGISTERS_KEY),
+        ("input_bit_registers0_to_31", REGISTERS_KEY),
+        ("input_double_register_47", REGISTERS_KEY),
+        ("speed_slider_mask", "speed_slider"),
+        ("speed_slider_fraction", "speed_slider"),
+        ("standard_digital_output_mask", "standard_digital_output"),
+        ("configurable_digital_output", "configurable_digital_output"),
+        ("tool_digital_output_mask", "tool_digital_output"),
+        ("standard_analog_output_type", "standard_analog_output"),
+        ("standard_analog_output_1", "standard_analog_output"),
+        ("external_force_torque", "external_force_torque"),
+    ],
+)
+def test_what_must_arrive_together_shares_a_recipe(name: str, key: str) -> None:
+    assert recipe_key(name) == key
+
+
+def test_all_registers_are_claimed_with_one_request_and_the_watchdog_apart() -> None:
+    claims = Claims((*REGISTERS, "speed_slider_mask", "speed_slider_fraction"), REGISTERS[5])
+    controller = Controller()
+    controller.converse(claims)
+    assert held(claims) == {
+        REGISTERS_KEY: REGISTERS[:5],
+        "speed_slider": ("speed_slider_mask", "speed_slider_fraction"),
+        WATCHDOG_KEY: (REGISTERS[5],),
+    }
+    assert len(controller.asked) == 3
+    assert [claimed.id for claimed in claims.recipes.values()] == [1, 2, 3]
+    assert not claims.refused
+
+
+def test_a_watchdog_need_not_be_among_the_fields() -> None:
+    claims = Claims((), "input_int_register_9")
+    Controller().converse(claims)
+    assert held(claims) == {WATCHDOG_KEY: ("input_int_register_9",)}
+
+
+def test_no_fields_ask_for_nothing() -> None:
+    """Controllers do not answer an empty input recipe."""
+    assert Claims(()).request() is None
+
+
+def test_refused_fields_cost_only_themselves() -> None:
+    claims = Claims((*REGISTERS, "tool_digital_output"))
+    Controller({REGISTERS[1], REGISTERS[4]}, {"tool_digital_output"}).converse(claims)
+    assert held(claims) == {REGISTERS_KEY: (REGISTERS[0], REGISTERS[2], REGISTERS[3], REGISTERS[5])}
+    assert claims.refused == {
+        REGISTERS[1]: IN_USE,
+        REGISTERS[4]: IN_USE,
+        "tool_digital_output": NOT_FOUND,
+    }
+    assert claims.retriable
+
+
+def test_a_field_that_is_freed_joins_the_rest_in_one_new_recipe() -> None:
+    claims = Claims(REGISTERS)
+    controller = Controller({REGISTERS[1], REGISTERS[4]})
+    controller.converse(claims)
+    claims.take_change()
+    controller.taken = {REGISTERS[4]}
+    claims.retry()
+    controller.converse(claims)
+    assert claims.take_change()
+    assert held(claims) == {REGISTERS_KEY: tuple(name for name in REGISTERS if name != REGISTERS[4])}
+    assert claims.recipes[REGISTERS_KEY].id == 2
+    assert claims.refused == {REGISTERS[4]: IN_USE}
+
+
+def test_asking_again_in_vain_costs_one_request_and_no_id() -> None:
+    claims = Claims(REGISTERS)
+    controller = Controller({REGISTERS[1]})
+    controller.converse(claims)
+    before = claims.recipes[REGISTERS_KEY]
+    claims.take_change()
+    controller.asked.clear()
+    claims.retry()
+    controller.converse(claims)
+    assert controller.asked == [REGISTERS]
+    assert claims.recipes[REGISTERS_KEY] is before
+    assert not claims.take_change()
+
+
+def test_a_missing_field_is_not_asked_for_again() -> None:
+    claims = Claims(("tool_digital_output",))
+    controller = Controller(missing={"tool_digital_output"})
+    controller.converse(claims)
+    claims.retry()
+    assert claims.request() is None
+    assert not claims.retriable
+
+
+def test_a_recipe_refused_without_a_reason_is_retried_and_does_not_end_the_talk() -> None:
+    claims = Claims((*REGISTERS, "speed_slider_mask"))
+    assert claims.request()
+    claims.answer(InputsSetup(0, ("INT32",) * 6))
+    assert claims.request()
+    claims.answer(InputsSetup(1, ("UINT32",)))
+    assert set(claims.refused.values()) == {REFUSED}
+    assert claims.retriable
+    assert held(claims) == {"speed_slider": ("speed_slider_mask",)}
+
+
+def test_a_type_that_is_not_known_costs_only_its_field() -> None:
+    claims = Claims(REGISTERS[:2])
+    assert claims.request()
+    claims.answer(InputsSetup(1, ("INT32", "STRING")))
+    request = claims.request()
+    assert request is not None
+    assert request.names == REGISTERS[:1]
+    assert claims.refused == {REGISTERS[1]: "STRING"}
+
+
+def test_after_255_recipes_the_connection_is_used_up() -> None:
+    claims = Claims(REGISTERS[:2])
+    controller = Controller({REGISTERS[1]})
+    controller.converse(claims)
+    for _ in range(254):
+        assert not claims.exhausted
+        controller.taken = set()
+        claims.retry()
+        controller.converse(claims)
+        claims._groups[0].refused[REGISTERS[1]] = IN_USE
+    claims.retry()
+    assert claims.request() is None
+    assert claims.exhausted
+
+
+@pytest.mark.parametrize("words", [(), ("INT32",), ("INT32",) * 3])
+def test_answers_must_have_a_type_for_each_name(words: tuple[str, ...]) -> None:
+    claims = Claims(REGISTERS[:2])
+    claims.request()
+    with pytest.raises(HandshakeError, match=f"{len(words)} types for 2 fields"):
+        claims.answer(InputsSetup(1, words))
+
+
+def test_an_answer_that_nobody_asked_for_is_an_error() -> None:
+    with pytest.raises(HandshakeError, match="not asked for"):
+        Claims(()).answer(InputsSetup(1, ()))
+
+
+def test_types_are_told_from_error_words() -> None:
+    assert sort_types(("a", "b", "c"), ("BOOL", "IN_USE", "odd")) == (
+        [DataType.BOOL],
+        {"b": "IN_USE", "c": "odd"},
+    )
+
+
+@given(
+    wanted=st.lists(st.sampled_from(sorted(INPUTS)), unique=True, max_size=30),
+    rounds=st.lists(st.sets(st.sampled_from(sorted(INPUTS)), max_size=60), min_size=1, max_size=6),
+    missing=st.sets(st.sampled_from(sorted(INPUTS)), max_size=20),
+    watchdog=st.none() | st.sampled_from(sorted(INPUTS)),
+)
+def test_whatever_is_free_is_held_and_nothing_else(
+    wanted: list[str], rounds: list[set[str]], missing: set[str], watchdog: str | None
+) -> None:
+    """What was once claimed stays claimed; each field is either held in exactly one newest recipe or refused."""
+    claims = Claims(wanted, watchdog)
+    controller = Controller(missing=missing)
+    everything = {*wanted, *((watchdog,) if watchdog else ())}
+    ours: set[str] = set()
+    for taken in rounds:
+        controller.taken = taken - ours
+        controller.converse(claims)
+        names = [name for claimed in claims.recipes.values() for name in claimed.recipe.names]
+        assert len(names) == len(set(names))
+        assert set(names) == everything - missing - controller.taken
+        assert set(claims.refused) == everything - set(names)
+        ours = set(names)
+        claims.retry()

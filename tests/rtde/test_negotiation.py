@@ -1,0 +1,255 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+
+from gatewayd.rtde import messages as m
+from gatewayd.rtde.catalogue import Series
+from gatewayd.rtde.claims import HandshakeError
+from gatewayd.rtde.negotiation import TOO_LONG, Event, Negotiation, State, Step, Wishes
+
+E_SERIES = m.ControllerVersion(5, 12, 0, 1101)
+CB3 = m.ControllerVersion(3, 15, 8, 1)
+DATA = m.DataPackage(1, b"")
+WISHES = Wishes(("output_int_register_0",), ("input_int_register_0",))
+TO_OUTPUTS = (m.ProtocolVersionReply(True), E_SERIES)
+TO_INPUTS = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE", "INT32", "INT32")))
+TO_START = (*TO_INPUTS, m.InputsSetup(1, ("INT32",)))
+TO_RUNNING = (*TO_START, m.StartReply(True))
+
+
+def talk(wishes: Wishes, replies: Sequence[m.ControllerMessage]) -> tuple[Negotiation, list[Step]]:
+    negotiation = Negotiation(wishes)
+    steps = [Step(negotiation.begin())]
+    steps += [negotiation.handle(reply) for reply in replies]
+    return negotiation, steps
+
+
+def test_the_whole_way_in_version_2() -> None:
+    negotiation, steps = talk(WISHES, TO_RUNNING)
+    assert steps == [
+        (m.RequestProtocolVersion(2), None),
+        (m.GetControllerVersion(), None),
+        (m.SetupOutputs(("timestamp", "output_int_register_0", "input_int_register_0"), 500.0), None),
+        (m.SetupInputs(("input_int_register_0",)), None),
+        (m.Start(), None),
+        (None, Event.STARTED),
+    ]
+    session = negotiation.session()
+    assert (session.protocol, session.series, session.controller) == (2, Series.E, E_SERIES)
+    assert session.outputs.names == ("timestamp", "output_int_register_0", "input_int_register_0")
+    assert session.inputs["registers"].id == 1
+    assert session.unavailable == ()
+    assert not negotiation.waiting
+
+
+def test_version_1_is_spoken_when_2_is_refused() -> None:
+    """Version 1 can neither choose a frequency nor name an output recipe."""
+    replies = (
+        m.ProtocolVersionReply(False),
+        m.ProtocolVersionReply(True),
+        CB3,
+        m.OutputsSetup(None, ("DOUBLE",)),
+    )
+    negotiation, steps = talk(Wishes(frequency=10.0), (*replies, m.StartReply(True)))
+    assert [step.send for step in steps] == [
+        m.RequestProtocolVersion(2),
+        m.RequestProtocolVersion(1),
+        m.GetControllerVersion(),
+        m.SetupOutputs(("timestamp",)),
+        m.Start(),
+        None,
+    ]
+    assert negotiation.session().protocol == 1
+    assert negotiation.session().period == 0.008
+
+
+@pytest.mark.parametrize(
+    "version, wanted, asked, period",
+    [
+        (E_SERIES, 0.0, 500.0, 0.002),
+        (E_SERIES, 500.0, 500.0, 0.002),
+        (E_SERIES, 200.0, 200.0, 0.004),
+        (E_SERIES, 250.0, 250.0, 0.004),
+        (E_SERIES, 10.0, 10.0, 0.1),
+        (E_SERIES, 1000.0, 500.0, 0.002),
+        (E_SERIES, 0.1, 1.0, 1.0),
+        (CB3, 0.0, 125.0, 0.008),
+        (CB3, 500.0, 125.0, 0.008),
+        (CB3, 50.0, 50.0, 0.016),
+        (m.ControllerVersion(10, 7, 0, 0), 0.0, 500.0, 0.002),
+        (m.ControllerVersion(12, 0, 0, 0), 0.0, 500.0, 0.002),
+        (m.ControllerVersion(4, 0, 0, 0), 0.0, 125.0, 0.008),
+    ],
+)
+def test_the_controller_divides_its_rate_by_a_whole_number(
+    version: m.ControllerVersion, wanted: float, asked: float, period: float
+) -> None:
+    replies = (m.ProtocolVersionReply(True), version, m.OutputsSetup(1, ("DOUBLE",)), m.StartReply(True))
+    negotiation, steps = talk(Wishes(frequency=wanted), replies)
+    assert steps[2].send == m.SetupOutputs(("timestamp",), asked)
+    assert negotiation.session().period == pytest.approx(period)
+
+
+def test_outputs_that_are_not_found_are_left_out_and_told() -> None:
+    wishes = Wishes(("a", "b", "c"))
+    replies = (*TO_OUTPUTS, m.OutputsSetup(0, ("DOUBLE", "NOT_FOUND", "INT32", "STRING")))
+    negotiation, steps = talk(wishes, replies)
+    assert steps[-1].send == m.SetupOutputs(("timestamp", "b"), 500.0)
+    negotiation.handle(m.OutputsSetup(1, ("DOUBLE", "INT32")))
+    negotiation.handle(m.StartReply(True))
+    told = {one.field: one.word for one in negotiation.session().unavailable}
+    assert told == {"a": "NOT_FOUND", "c": "STRING"}
+    assert all(one.output and one.hint for one in negotiation.session().unavailable)
+
+
+def test_inputs_in_use_are_told_with_their_likely_holder() -> None:
+    wishes = Wishes(
+        inputs=("input_int_register_0", "input_int_register_1", "tool_digital_output"), read_back=False
+    )
+    replies = (
+        *TO_OUTPUTS,
+        m.OutputsSetup(1, ("DOUBLE",)),
+        m.InputsSetup(0, ("INT32", "IN_USE")),
+        m.InputsSetup(1, ("INT32",)),
+        m.InputsSetup(0, ("NOT_FOUND",)),
+        m.StartReply(True),
+    )
+    negotiation, _ = talk(wishes, replies)
+    in_use, missing = negotiation.session().unavailable
+    assert (in_use.field, in_use.output, in_use.word) == ("input_int_register_1", False, "IN_USE")
+    assert "PROFINET" in in_use.hint
+    assert (missing.field, missing.word) == ("tool_digital_output", "NOT_FOUND")
+
+
+def test_claimed_later_the_session_has_the_new_recipe() -> None:
+    negotiation, _ = talk(WISHES, (*TO_INPUTS, m.InputsSetup(0, ("IN_USE",)), m.StartReply(True)))
+    before = negotiation.session()
+    assert before.inputs == {}
+    assert negotiation.retry_claims() == m.SetupInputs(("input_int_register_0",))
+    assert negotiation.waiting
+    assert negotiation.retry_claims() is None
+    assert negotiation.handle(DATA) == (None, None)
+    assert negotiation.handle(m.InputsSetup(1, ("INT32",))) == (None, Event.INPUTS_CHANGED)
+    assert negotiation.session().inputs["registers"].id == 1
+    assert negotiation.session().unavailable == ()
+    assert before.inputs == {}
+    assert negotiation.retry_claims() is None
+
+
+def test_retried_in_vain_nothing_is_told() -> None:
+    negotiation, _ = talk(WISHES, (*TO_INPUTS, m.InputsSetup(0, ("IN_USE",)), m.StartReply(True)))
+    negotiation.retry_claims()
+    assert negotiation.handle(m.InputsSetup(0, ("IN_USE",))) == (None, None)
+
+
+def test_data_is_as_good_as_the_answer_to_a_start() -> None:
+    negotiation, steps = talk(WISHES, (*TO_START, DATA))
+    assert steps[-1] == (None, Event.STARTED)
+    assert negotiation.handle(m.StartReply(True)) == (None, None)
+
+
+@pytest.mark.parametrize("replies", [TO_START, (*TO_START, DATA)], ids=["first", "after data"])
+def test_a_refused_start_ends_the_talk(replies: Sequence[m.ControllerMessage]) -> None:
+    negotiation, _ = talk(WISHES, replies)
+    with pytest.raises(HandshakeError, match="refused to start"):
+        negotiation.handle(m.StartReply(False))
+
+
+@pytest.mark.parametrize(
+    "replies, words",
+    [
+        ((m.ProtocolVersionReply(False),) * 2, "neither protocol version 2 nor 1"),
+        ((*TO_OUTPUTS, m.OutputsSetup(0, ("NOT_FOUND",) * 3)), "none of the wanted outputs"),
+        ((*TO_OUTPUTS, m.OutputsSetup(0, ("DOUBLE", "INT32", "INT32"))), "without naming a field"),
+        ((*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",))), "1 types for 3 fields"),
+        ((m.StartReply(True),), "StartReply while the answer to protocol version 2 was awaited"),
+        ((*TO_RUNNING, E_SERIES), "ControllerVersion while data was awaited"),
+        ((*TO_RUNNING, m.InputsSetup(1, ())), "not asked for"),
+    ],
+)
+def test_what_ends_the_talk(replies: Sequence[m.ControllerMessage], words: str) -> None:
+    with pytest.raises(HandshakeError, match=words):
+        talk(WISHES, replies)
+
+
+@pytest.mark.parametrize("replies", [(), TO_OUTPUTS, TO_INPUTS, TO_RUNNING], ids=len)
+def test_data_out_of_season_does_no_harm(replies: Sequence[m.ControllerMessage]) -> None:
+    negotiation, _ = talk(WISHES, replies)
+    state = negotiation.state
+    assert negotiation.handle(DATA) == (None, None)
+    assert negotiation.state is state
+
+
+def test_pause_and_resume() -> None:
+    negotiation, _ = talk(WISHES, TO_RUNNING)
+    assert negotiation.pause() == m.Pause()
+    assert negotiation.handle(DATA) == (None, None)
+    assert negotiation.handle(m.PauseReply(True)) == (None, Event.PAUSED)
+    assert negotiation.pause() is None
+    assert not negotiation.running
+    assert negotiation.resume() == m.Start()
+    assert negotiation.handle(m.StartReply(True)) == (None, Event.RESUMED)
+    assert negotiation.running
+
+
+def test_a_pause_during_the_set_up_is_kept() -> None:
+    negotiation, _ = talk(WISHES, TO_INPUTS)
+    assert negotiation.pause() is None
+    assert negotiation.handle(m.InputsSetup(1, ("INT32",))) == (None, Event.STARTED)
+    assert negotiation.state is State.PAUSED
+
+
+def test_a_pause_while_starting_and_a_resume_while_pausing_are_kept() -> None:
+    negotiation, _ = talk(WISHES, TO_START)
+    assert negotiation.pause() is None
+    assert negotiation.handle(m.StartReply(True)) == (m.Pause(), Event.STARTED)
+    assert negotiation.resume() is None
+    assert negotiation.handle(m.PauseReply(True)) == (m.Start(), Event.PAUSED)
+
+
+def test_a_session_can_begin_paused() -> None:
+    negotiation, steps = talk(Wishes(running=False), (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",))))
+    assert steps[-1] == (None, Event.STARTED)
+    assert negotiation.settled
+
+
+def test_inputs_can_be_claimed_while_paused() -> None:
+    wishes = Wishes(inputs=("input_int_register_0",), read_back=False, running=False)
+    replies = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",)), m.InputsSetup(0, ("IN_USE",)))
+    negotiation, _ = talk(wishes, replies)
+    assert negotiation.retry_claims()
+    assert negotiation.handle(m.InputsSetup(1, ("INT32",))).event is Event.INPUTS_CHANGED
+
+
+def test_subscription_has_the_timestamp_first_and_everything_once() -> None:
+    wishes = Wishes(
+        ("robot_mode", "timestamp", "input_int_register_1"),
+        ("input_int_register_1", "input_int_register_2", "speed_slider_mask"),
+        watchdog="input_int_register_3",
+    )
+    assert wishes.subscription() == (
+        "timestamp",
+        "robot_mode",
+        "input_int_register_1",
+        "input_int_register_2",
+        "input_int_register_3",
+    )
+
+
+def test_a_shortened_subscription_leaves_out_read_backs_and_says_so() -> None:
+    wishes = Wishes(inputs=("input_int_register_0",), shortened=True)
+    replies = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",)), m.InputsSetup(1, ("INT32",)), m.StartReply(True))
+    negotiation, steps = talk(wishes, replies)
+    assert steps[2].send == m.SetupOutputs(("timestamp",), 500.0)
+    (left_out,) = negotiation.session().unavailable
+    assert (left_out.field, left_out.output, left_out.word) == ("input_int_register_0", True, TOO_LONG)
+
+
+def test_what_is_awaited_is_put_in_words() -> None:
+    negotiation, _ = talk(WISHES, TO_OUTPUTS)
+    assert negotiation.awaited == "the answer to the output recipe"
+    negotiation, _ = talk(WISHES, (*TO_INPUTS, m.InputsSetup(0, ("IN_USE",)), m.StartReply(True)))
+    negotiation.retry_claims()
+    assert negotiation.awaited == "the answer to an input recipe"
