@@ -1,0 +1,231 @@
+"""From an expanded cell to the plan that runs."""
+
+from __future__ import annotations
+
+import pytest
+
+from gatewayd.core.definition import (
+    Direction,
+    Fallback,
+    FallbackKind,
+    Limits,
+    Lock,
+    ValueKind,
+    Variable,
+    Writer,
+)
+from gatewayd.mapping.compile import compile_plan
+from gatewayd.mapping.document import read_document
+from gatewayd.mapping.expand import expand
+from gatewayd.mapping.plan import Area, Plan, WatchdogPlan
+from gatewayd.mapping.source import parse
+
+GOOD = """gatewayd: 1
+cell: press-3
+robot:
+  host: 192.168.1.10
+  series: e
+  frequency: 250
+  watchdog: {field: input_int_register_23, frequency: 5, requires: [plc]}
+modbus:
+  listen: 127.0.0.1:1502
+  allow: [192.168.1.0/24]
+writers:
+  hmi: {modbus: [192.168.1.0/28, 192.168.1.21], timeout: 3s}
+  plc: {modbus: 192.168.1.20}
+groups:
+  motion: {owner: [plc, hmi], lease: 2s}
+variables:
+  start: {robot: input_bit_register_33, modbus: 0.0, owner: plc}
+  force: {robot: input_double_register_0, modbus: {holding: 20, type: int16, scale: 0.1}, group: motion,
+          limits: [0, 150], clamp: true, unit: N, comment: how hard, on_release: 10}
+  speed: {robot: input_double_register_1, modbus: 24, group: motion, on_release: hold}
+  clock: {robot: timestamp, modbus: 30}
+  mode: {robot: robot_mode, modbus: [100, {input: 0, order: CDAB}], on_stale: -1}
+  stop: {robot: input_bit_register_34, modbus: {coil: 1}, owner: [hmi, plc], on_release: true}
+  lamps: {robot: output_bit_register_0..1, modbus: {discrete: 7}, on_stale: exception}
+"""
+
+
+def compiled(text: str = GOOD) -> Plan:
+    document, findings = read_document(parse(text.encode(), "cell.yaml"))
+    assert findings == ()
+    return compile_plan(expand(document))
+
+
+def variable(name: str) -> Variable:
+    return next(found for found in compiled().cell.variables if found.name == name)
+
+
+def test_variables_are_numbered_in_file_order() -> None:
+    variables = compiled().cell.variables
+    assert [found.number for found in variables] == list(range(1, 9))
+    assert variables[-1].name == "lamps[1]"
+
+
+def test_bit_of_a_register_word() -> None:
+    start = variable("start")
+    assert (start.direction, start.kind) == (Direction.INPUT, ValueKind.BOOL)
+    assert (start.field, start.bit, start.element) == ("input_bit_registers32_to_63", 1, None)
+    assert (start.low, start.high) == (None, None)
+
+
+def test_everything_a_line_says_is_in_the_variable() -> None:
+    force = variable("force")
+    assert force.limits == Limits(0, 150, clamp=True)
+    assert (force.unit, force.comment) == ("N", "how hard")
+    assert force.on_release == Fallback(FallbackKind.VALUE, 10.0)
+    assert type(force.on_release.value) is float
+    assert variable("speed").on_release.kind is FallbackKind.HOLD
+    assert variable("stop").on_release == Fallback(FallbackKind.VALUE, True)
+    assert variable("lamps[0]").on_stale.kind is FallbackKind.EXCEPTION
+
+
+def test_integers_know_the_range_of_the_robots_type() -> None:
+    mode = variable("mode")
+    assert (mode.low, mode.high, mode.on_stale.value) == (-(1 << 31), (1 << 31) - 1, -1)
+
+
+def test_locks_and_writers_by_index() -> None:
+    cell = compiled().cell
+    assert cell.writers == (Writer("hmi", 3.0), Writer("plc", None))
+    assert cell.locks == (
+        Lock("start", (0,), (1,), takeover=False, lease=None),
+        Lock("motion", (1, 2), (1, 0), takeover=True, lease=2.0),
+        Lock("stop", (5,), (0, 1), takeover=True, lease=5.0),
+    )
+    assert [found.lock for found in cell.variables] == [0, 1, 1, None, None, 2, None, None]
+
+
+def test_robot_plan_lists_fields_by_first_variable() -> None:
+    """Without the timestamp, which the link asks for in any case, and without the watchdog's register."""
+    robot = compiled().robot
+    assert robot.outputs == ("robot_mode", "output_bit_registers0_to_31")
+    assert robot.inputs == (
+        "input_bit_registers32_to_63",
+        "input_double_register_0",
+        "input_double_register_1",
+    )
+    assert robot.watchdog == WatchdogPlan("input_int_register_23", 5.0, (1,))
+    assert (robot.host, robot.port, robot.frequency, robot.verify) == ("192.168.1.10", 30004, 250.0, True)
+
+
+def test_modbus_plan() -> None:
+    """Placements by variable; peers from the most specific network to the widest."""
+    modbus = compiled().modbus
+    assert modbus is not None
+    assert (modbus.host, modbus.port, modbus.unit, modbus.fill_gaps) == ("127.0.0.1", 1502, 1, False)
+    assert [str(network) for network in modbus.allow] == ["192.168.1.0/24"]
+    assert [(str(network), writer) for network, writer in modbus.writers] == [
+        ("192.168.1.20/32", 1),
+        ("192.168.1.21/32", 0),
+        ("192.168.1.0/28", 0),
+    ]
+    places = [
+        (placed.variable, placed.area, placed.address, placed.bit, placed.words)
+        for placed in modbus.placements
+    ]
+    assert places == [
+        (0, Area.HOLDING, 0, 0, 1),
+        (1, Area.HOLDING, 20, None, 1),
+        (2, Area.HOLDING, 24, None, 4),
+        (3, Area.HOLDING, 30, None, 4),
+        (4, Area.HOLDING, 100, None, 2),
+        (4, Area.INPUT, 0, None, 2),
+        (5, Area.COIL, 1, None, 1),
+        (6, Area.DISCRETE, 7, None, 1),
+        (7, Area.DISCRETE, 8, None, 1),
+    ]
+    codec = modbus.placements[1].codec
+    assert codec is not None
+    assert codec.encode(12.34) == (123).to_bytes(2, "big")
+
+
+def test_without_a_modbus_section_there_is_no_modbus_plan() -> None:
+    text = "gatewayd: 1\ncell: c\nrobot: {host: r}\nvariables: {a: {robot: robot_mode}}"
+    assert compiled(text).modbus is None
+
+
+@pytest.mark.parametrize(
+    "robot, seconds",
+    [
+        ("frequency: 250, series: e", 0.05),
+        ("frequency: 10", 0.5),
+        ("frequency: 60, series: cb3", 0.08),
+        ("series: x", 0.05),
+        ("frequency: 10, stale_after: 2s", 2.0),
+    ],
+)
+def test_stale_after(robot: str, seconds: float) -> None:
+    """Five periods as the controller divides them, at least 50 ms; or as the file says."""
+    text = f"gatewayd: 1\ncell: c\nrobot: {{host: r, {robot}}}\nvariables: {{a: {{robot: robot_mode}}}}"
+    assert compiled(text).cell.stale_after == pytest.approx(seconds)
+
+
+def test_compiling_is_deterministic() -> None:
+    assert compiled() == compiled()
+
+
+@pytest.mark.parametrize(
+    "old, new",
+    [
+        ("gatewayd: 1", "# a comment\ngatewayd: 1"),
+        ("comment: how hard", "comment: rather hard"),
+        ("{robot: timestamp, modbus: 30}", "{modbus: 30, robot: timestamp}"),
+        ("{robot: timestamp, modbus: 30}", "{robot: 'timestamp', modbus: {holding: 30, type: float64}}"),
+        ("timeout: 3s", "timeout: 3000ms"),
+        ("modbus: 192.168.1.20", "modbus: [192.168.1.20/32]"),
+        ("frequency: 250", "frequency: 250.0"),
+    ],
+)
+def test_fingerprint_stays_with_the_meaning(old: str, new: str) -> None:
+    """Comments, formatting and other words for the same thing do not count."""
+    assert old in GOOD
+    assert compiled(GOOD.replace(old, new)).cell.fingerprint == compiled().cell.fingerprint
+
+
+CHANGES = [
+    ("cell: press-3", "cell: press-4"),
+    ("192.168.1.10", "192.168.1.11"),
+    ("frequency: 250", "frequency: 125"),
+    ("frequency: 5", "frequency: 6"),
+    ("requires: [plc]", "requires: [hmi]"),
+    ("127.0.0.1:1502", "127.0.0.1:1503"),
+    ("allow: [192.168.1.0/24]", "allow: [192.168.0.0/16]"),
+    ("192.168.1.21", "192.168.1.22"),
+    ("timeout: 3s", "timeout: 4s"),
+    ("lease: 2s", "lease: 3s"),
+    ("owner: [plc, hmi]", "owner: [hmi, plc]"),
+    ("start:", "begin:"),
+    ("input_bit_register_33", "input_bit_register_35"),
+    ("modbus: 0.0", "modbus: 0.1"),
+    ("type: int16", "type: uint16"),
+    ("scale: 0.1", "scale: 0.01"),
+    ("limits: [0, 150]", "limits: [0, 151]"),
+    ("clamp: true", "clamp: false"),
+    ("unit: N", "unit: kN"),
+    ("on_release: 10", "on_release: 0"),
+    ("on_release: hold", "on_release: clear"),
+    ("on_release: true", "on_release: false"),
+    ("on_stale: -1", "on_stale: hold"),
+    ("order: CDAB", "order: DCBA"),
+    ("{coil: 1}", "{coil: 2}"),
+    ("owner: [hmi, plc]", "takeover: false, owner: [hmi, plc]"),
+    ("discrete: 7", "holding: 7.0"),
+]
+
+
+def test_fingerprint_changes_with_every_change_of_meaning() -> None:
+    """A PLC that compares it knows that the map is the one it was built for."""
+    fingerprints = {compiled().cell.fingerprint}
+    for old, new in CHANGES:
+        assert old in GOOD, old
+        fingerprints.add(compiled(GOOD.replace(old, new)).cell.fingerprint)
+    assert len(fingerprints) == len(CHANGES) + 1
+    assert all(0 <= fingerprint < 1 << 32 for fingerprint in fingerprints)
+
+
+def test_cell_with_errors_is_not_compiled() -> None:
+    document, _ = read_document(parse(b"gatewayd: 1\ncell: c\nvariables: {}", "f"))
+    with pytest.raises(ValueError, match="f has errors"):
+        compile_plan(expand(document))

@@ -1,0 +1,110 @@
+"""The one door: bytes in; findings, and a plan where there is no error, out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gatewayd.mapping.diagnostics import Severity
+from gatewayd.mapping.loader import Loaded, load, load_together, read_bytes
+from gatewayd.mapping.source import MAXIMUM_BYTES
+
+MAPPINGS = Path(__file__).parents[2] / "mappings"
+GOOD = {path.name: path.read_bytes() for path in sorted(MAPPINGS.glob("*.yaml"))}
+MINIMAL = b"gatewayd: 1\ncell: c\nrobot: {host: r}\nvariables: {a: {robot: robot_mode}}\n"
+
+
+def has_errors(loaded: Loaded) -> bool:
+    return any(finding.severity is Severity.ERROR for finding in loaded.diagnostics)
+
+
+def test_smallest_mapping_has_a_plan() -> None:
+    loaded = load(MINIMAL, "small.yaml")
+    assert not has_errors(loaded)
+    assert loaded.plan is not None
+    assert (loaded.plan.source, loaded.plan.cell.name) == ("small.yaml", "c")
+    assert loaded.lines[1] == "cell: c"
+
+
+def test_a_plan_exists_only_without_errors() -> None:
+    """Findings of all stages come in one pass, from top to bottom."""
+    text = MINIMAL.replace(b"cell: c", b"cell: C") + b"  # \nextra: 1\n"
+    text = text.replace(b"robot_mode", b"robot_mod")
+    loaded = load(text, "f")
+    assert loaded.plan is None
+    lines = [finding.position.line for finding in loaded.diagnostics]
+    assert lines == sorted(lines)
+    assert {2, 4, 6} <= set(lines)
+
+
+def test_files_loaded_together_keep_their_own_findings() -> None:
+    first, second = load_together([("a.yaml", MINIMAL), ("b.yaml", b"[")])
+    assert first.plan is not None
+    assert second.plan is None
+    assert {finding.position.file for finding in second.diagnostics} == {"b.yaml"}
+
+
+def test_reading_stops_at_the_limit(tmp_path: Path) -> None:
+    """A device or a log file named by mistake does not fill the memory."""
+    path = tmp_path / "big.yaml"
+    path.write_bytes(b"#" * (MAXIMUM_BYTES + 10))
+    data = read_bytes(path)
+    assert len(data) == MAXIMUM_BYTES + 1
+    assert [finding.rule.slug for finding in load(data, str(path)).diagnostics] == ["too-large"]
+
+
+@given(st.binary(max_size=200))
+def test_no_bytes_raise(data: bytes) -> None:
+    """Any bytes give a plan or an error, and never an exception."""
+    loaded = load(data, "f")
+    assert (loaded.plan is None) == has_errors(loaded)
+
+
+SNIPPETS = b"""0 -1 0.16 65535 65536 400001 60000 1e9 .inf 0x10 ~ [] {} any plc none hold exception true 5s 0ms bit bool
+uint64 float32 CDAB 10.0.0.0/8 0.0.0.0:1 '[::1]:1' input_bit_register_0..127 output_double_register_0..47 actual_q
+'actual_q[9]' robot_mode.3 timestamp * & ! | > : - , ' " #""".split()
+
+
+@st.composite
+def mutated(draw: st.DrawFn) -> bytes:
+    """A shipped mapping with words replaced, lines doubled, dropped or moved, and bytes changed."""
+    data = draw(st.sampled_from(sorted(GOOD.values())))
+    for _ in range(draw(st.integers(1, 4))):
+        match draw(st.integers(0, 3)):
+            case 0:
+                words = data.split(b" ")
+                words[draw(st.integers(0, len(words) - 1))] = draw(st.sampled_from(SNIPPETS))
+                data = b" ".join(words)
+            case 1:
+                lines = data.splitlines()
+                line = draw(st.integers(0, len(lines) - 1))
+                data = b"\n".join(
+                    lines[:line] + lines[line + 1 :] + draw(st.sampled_from([[], [lines[line]]]))
+                )
+            case 2:
+                at = draw(st.integers(0, len(data) - 1))
+                data = data[:at] + draw(st.binary(max_size=2)) + data[at + 1 :]
+            case _:
+                data = data[: draw(st.integers(0, len(data)))]
+        data = data or b" "
+    return data
+
+
+@settings(max_examples=150)
+@given(mutated())
+def test_no_mutation_of_a_good_file_raises(data: bytes) -> None:
+    """Nearly right files reach the rules and the compiler: findings, never a traceback."""
+    loaded = load(data, "f")
+    assert (loaded.plan is None) == has_errors(loaded)
+    for finding in loaded.diagnostics:
+        assert finding.message
+        assert finding.position.line >= 1
+        assert finding.position.column >= 1
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_loading_is_deterministic(name: str) -> None:
+    assert load(GOOD[name], name).plan == load(GOOD[name], name).plan

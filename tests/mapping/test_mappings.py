@@ -1,0 +1,96 @@
+"""The shipped mappings: what they promise in their comments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gatewayd.core.definition import Direction
+from gatewayd.mapping.loader import Loaded, load
+from gatewayd.mapping.plan import Area, Plan
+
+MAPPINGS = Path(__file__).parents[2] / "mappings"
+NAMES = [path.name for path in sorted(MAPPINGS.glob("*.yaml"))]
+
+
+def loaded(name: str) -> Loaded:
+    return load((MAPPINGS / name).read_bytes(), name)
+
+
+def plan(name: str) -> Plan:
+    found = loaded(name).plan
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_passes_strictly(name: str) -> None:
+    """No error and no warning."""
+    findings = loaded(name).diagnostics
+    assert [(str(finding.position), finding.rule.slug, finding.message) for finding in findings] == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_listens_on_loopback_and_says_how_to_change_it(name: str) -> None:
+    modbus = plan(name).modbus
+    assert modbus is not None
+    assert (modbus.host, modbus.port) == ("127.0.0.1", 1502)
+    text = (MAPPINGS / name).read_text()
+    assert "0.0.0.0:502" in text
+    assert text.startswith("# yaml-language-server: $schema=schema.json\n")
+
+
+def test_ready_made_files_are_there() -> None:
+    assert {"full-image.yaml", "small-cell.yaml", "two-plcs.yaml"} <= set(NAMES)
+
+
+def test_full_image_is_full() -> None:
+    """64 bits, 24 integers and 24 doubles each way, bits both packed and as coils or discrete inputs."""
+    found = plan("full-image.yaml")
+    for direction in Direction:
+        fields = [variable.field for variable in found.cell.variables if variable.direction is direction]
+        side = direction.value
+        assert fields.count(f"{side}_bit_registers0_to_31") == 32
+        assert fields.count(f"{side}_bit_registers32_to_63") == 32
+        for kind in ("int", "double"):
+            assert {f"{side}_{kind}_register_{number}" for number in range(24)} <= set(fields)
+        assert len(fields) == 64 + 24 + 24
+    assert found.modbus is not None
+    areas = [placement.area for placement in found.modbus.placements]
+    assert (areas.count(Area.COIL), areas.count(Area.DISCRETE)) == (64, 64)
+
+
+@pytest.mark.parametrize(
+    "name, address, bit",
+    [
+        ("in_bits[0]", 0, 0),
+        ("in_bits[63]", 3, 15),
+        ("in_ints[23]", 146, None),
+        ("in_doubles[23]", 292, None),
+        ("out_bits[16]", 1001, 0),
+        ("out_ints[0]", 1100, None),
+        ("out_doubles[23]", 1292, None),
+    ],
+)
+def test_full_image_has_the_documented_addresses(name: str, address: int, bit: int | None) -> None:
+    """The table in the file's head and in the reference; PLC programs are built on it."""
+    found = plan("full-image.yaml")
+    index = next(variable.number - 1 for variable in found.cell.variables if variable.name == name)
+    assert found.modbus is not None
+    places = [
+        (placement.address, placement.bit)
+        for placement in found.modbus.placements
+        if placement.variable == index and placement.area is Area.HOLDING
+    ]
+    assert places == [(address, bit)]
+
+
+def test_two_plcs_share_by_priority() -> None:
+    """The group goes to the cell PLC first; the line PLC alone stops the line."""
+    found = plan("two-plcs.yaml")
+    names = [writer.name for writer in found.cell.writers]
+    locks = {lock.name: ([names[owner] for owner in lock.owners], lock.takeover) for lock in found.cell.locks}
+    assert locks["motion"] == (["cell_plc", "panel"], True)
+    assert locks["line_stop"] == (["line_plc"], False)
+    assert locks["call"] == (names, False)

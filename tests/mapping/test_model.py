@@ -1,0 +1,113 @@
+"""The typed models of the mapping language."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pydantic import BaseModel, ValidationError
+
+from gatewayd.core.definition import Fallback
+from gatewayd.mapping import model
+from gatewayd.mapping.plan import Area
+
+SECTIONS = [
+    model.MappingFile,
+    model.Robot,
+    model.Watchdog,
+    model.Modbus,
+    model.WriterSpec,
+    model.Group,
+    model.VariableSpec,
+    model.PlacementSpec,
+]
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_every_key_is_described(section: type[BaseModel]) -> None:
+    """Descriptions are what editors show and what hints quote."""
+    assert [key for key, field in section.model_fields.items() if not field.description] == []
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_unknown_keys_are_refused(section: type[BaseModel]) -> None:
+    with pytest.raises(ValidationError) as caught:
+        section.model_validate({"no_such_key": 1})
+    assert any(error["type"] == "extra_forbidden" for error in caught.value.errors())
+
+
+def placements(value: Any) -> list[tuple[Area, int, int | None]]:
+    spec = model.VariableSpec.model_validate({"robot": "x", "modbus": value})
+    return [(placed.area, placed.address, placed.bit) for placed in spec.modbus]
+
+
+def test_placements_have_short_forms() -> None:
+    """A number, a text, a table, or a list of these."""
+    assert placements(100) == [(Area.HOLDING, 100, None)]
+    assert placements("100.10") == [(Area.HOLDING, 100, 10)]
+    assert placements({"input": 7}) == [(Area.INPUT, 7, None)]
+    assert placements(["0.3", {"coil": 3}, {"discrete": 4}]) == [
+        (Area.HOLDING, 0, 3),
+        (Area.COIL, 3, None),
+        (Area.DISCRETE, 4, None),
+    ]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        {},
+        {"type": "int16"},
+        {"holding": 1, "coil": 1},
+        {"coil": "1.3"},
+        {"discrete": "1.0"},
+        None,
+        True,
+        [[1]],
+    ],
+)
+def test_placement_names_exactly_one_area(value: Any) -> None:
+    """Coils and discrete inputs are bits already."""
+    with pytest.raises(ValidationError) as caught:
+        placements(value)
+    assert {error["type"] for error in caught.value.errors()} <= {"bad-address", "wrong-type"}
+
+
+@pytest.mark.parametrize(
+    "section, value",
+    [
+        (model.Robot, {"host": "r", "port": 0}),
+        (model.Robot, {"host": "r", "frequency": 501}),
+        (model.Robot, {"host": ""}),
+        (model.Robot, {"host": "no host"}),
+        (model.Robot, {"host": "r", "verify": "yes"}),
+        (model.Robot, {"host": "r", "port": "30004"}),
+        (model.Modbus, {"unit": 0}),
+        (model.Modbus, {"unit": 248}),
+        (model.Modbus, {"connections": 0}),
+        (model.VariableSpec, {"robot": "x", "limits": [0]}),
+        (model.VariableSpec, {"robot": "x", "limits": [0, 1, 2]}),
+        (model.VariableSpec, {"robot": "x", "deadband": -1}),
+        (model.VariableSpec, {"robot": "x", "unit": 5}),
+        (model.VariableSpec, {"robot": "x", "owner": []}),
+    ],
+)
+def test_values_out_of_their_range_are_refused(section: type[BaseModel], value: Any) -> None:
+    with pytest.raises(ValidationError):
+        section.model_validate(value)
+
+
+def test_defaults_are_the_documented_ones() -> None:
+    """The contract names these; changing one changes the meaning of every file that relies on it."""
+    robot = model.Robot.model_validate({"host": "r"})
+    assert (robot.port, robot.frequency, robot.on_connect, robot.verify) == (30004, 0, "adopt", True)
+    modbus = model.Modbus()
+    assert (str(modbus.listen), modbus.unit, modbus.allow, modbus.connections) == ("127.0.0.1:502", 1, (), 32)
+    assert (modbus.idle_timeout, modbus.gaps, modbus.order) == (60.0, "refuse", "ABCD")
+    variable = model.VariableSpec.model_validate({"robot": "x"})
+    assert (variable.on_release, variable.on_stale, variable.clamp) == (Fallback(), Fallback(), False)
+
+
+def test_models_are_immutable() -> None:
+    with pytest.raises(ValidationError):
+        model.Modbus().unit = 2

@@ -1,0 +1,76 @@
+"""The JSON Schema that editors complete from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from gatewayd.mapping.schema import mapping_schema, schema_text
+from gatewayd.mapping.source import parse, plain
+
+MAPPINGS = Path(__file__).parents[2] / "mappings"
+VALIDATOR = jsonschema.Draft202012Validator(mapping_schema())
+
+
+def data(text: str) -> Any:
+    source = parse(text.encode(), "f")
+    assert source.root is not None, source.findings
+    return plain(source.root)
+
+
+def test_shipped_schema_is_current() -> None:
+    """`python -m gatewayd.mapping.schema > mappings/schema.json` renews it."""
+    assert (MAPPINGS / "schema.json").read_text() == schema_text()
+
+
+def test_schema_is_a_schema() -> None:
+    jsonschema.Draft202012Validator.check_schema(mapping_schema())
+
+
+@pytest.mark.parametrize("path", sorted(MAPPINGS.glob("*.yaml")), ids=lambda path: path.name)
+def test_shipped_mappings_follow_it(path: Path) -> None:
+    VALIDATOR.validate(data(path.read_text()))
+
+
+HEAD = "gatewayd: 1\ncell: c\nrobot: {host: r}\n"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "a: {robot: x, modbus: 0.10, owner: any, lease: 2s, on_release: hold}",
+        "a: {robot: x, modbus: [1, '2.3', {coil: 4}], owner: [plc, hmi], on_release: 3.5}",
+        "a: {robot: x_0..23, modbus: {holding: 7, type: int16, scale: 0.1, order: CDAB}, limits: [0, 1]}",
+        "a: {robot: 'x[0]', on_stale: exception, lease: none}",
+    ],
+)
+def test_schema_takes_what_check_takes(line: str) -> None:
+    VALIDATOR.validate(data(f"{HEAD}variables:\n  {line}"))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "a: {modbus: 1}",
+        "a: {robot: x, on_relase: hold}",
+        "a: {robot: x, modbus: {holding: 7, coil: 3}}",
+        "a: {robot: x, modbus: {type: int16}}",
+        "a: {robot: x, modbus: {holding: 7, type: int8}}",
+        "a: {robot: x, lease: 5}",
+        "a: {robot: x, limits: [1]}",
+        "a: {robot: x, on_release: exception}",
+        "9a: {robot: x}",
+    ],
+)
+def test_schema_marks_common_mistakes(line: str) -> None:
+    """An editor underlines them before `check` is run."""
+    assert not VALIDATOR.is_valid(data(f"{HEAD}variables:\n  {line}"))
+
+
+def test_every_property_is_described_for_the_editor() -> None:
+    schema = mapping_schema()
+    for section in (schema, *schema["$defs"].values()):
+        assert all("description" in value for value in section["properties"].values())
