@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 CANNOT_SERVE = 1
+WRONG_PROGRAM = 2
 SAFETY_TEXT = "SafetySetup has not been confirmed yet, therefore no data will be send yet"
 _PROBABILITY = click.FloatRange(0, 1)
 
@@ -221,7 +222,9 @@ def _controller(
             generation, software, frequency=frequency, uptime=uptime, program=rules, faults=faults
         )
     except ProgramError as error:
-        raise click.UsageError(str(error)) from error
+        mistake = click.ClickException(str(error))
+        mistake.exit_code = WRONG_PROGRAM
+        raise mistake from error
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--hold") from error
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from gatewayd.simulator.arm import ELBOW, Moment, Vector, acceleration, frames, joints, pose, twist
+from gatewayd.simulator.arm import ELBOW, Moment, Vector, acceleration, frames, joints, pose, thrust, twist
 
 __all__ = ["CYCLE_FIELDS", "INITIAL", "SIGNALS", "Signal"]
 
@@ -107,7 +107,7 @@ def _wrench(moment: Moment) -> Vector:
     """Force and torque at the tool beyond its payload: what the payload's inertia makes of the acceleration."""
     inertia = (-_PAYLOAD,) * 3 + (-0.02,) * 3
     ripple = (_SENSOR_RIPPLE,) * 3 + (_SENSOR_RIPPLE / 10,) * 3
-    parts = zip(inertia, _tcp_acceleration(moment), ripple, strict=True)
+    parts = zip(inertia, thrust(moment.path, moment.rate), ripple, strict=True)
     return tuple(m * a + r * _ripple(moment, 24 + n) for n, (m, a, r) in enumerate(parts))
 
 
@@ -122,7 +122,7 @@ def _force(moment: Moment) -> Vector:
 
 def _accelerometer(moment: Moment) -> Vector:
     """Acceleration plus gravity's reaction, turned into the flange's frame."""
-    ax, ay, az = _tcp_acceleration(moment)[:3]
+    ax, ay, az, *_ = thrust(moment.path, moment.rate)
     az += _GRAVITY
     return tuple(ax * x + ay * y + az * z for x, y, z in frames(moment.path).rotation)
 
