@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import math
-import struct
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
@@ -16,6 +16,9 @@ from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
 from gatewayd.rtde.codec import ControllerProtocol
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.types import DataType
+
+Connected = Callable[..., AbstractAsyncContextManager[tuple[client.RtdeClient, "Notebook"]]]
+"""Run a client with these settings against the controller for as long as the `async with` lasts."""
 
 E_SERIES = messages.ControllerVersion(5, 12, 0, 1101)
 
@@ -225,7 +228,7 @@ async def _until(condition: Callable[[], object], seconds: float = 5.0) -> None:
 
 
 @pytest.fixture
-def until() -> Callable[..., object]:
+def until() -> Callable[..., Awaitable[None]]:
     """Wait until a condition holds, five seconds at most."""
     return _until
 
@@ -240,19 +243,13 @@ async def controller() -> AsyncIterator[Controller]:
 
 
 @pytest.fixture
-def timestamp_package() -> bytes:
-    """A version 2 data package that holds a timestamp."""
-    return struct.pack(">HBBd", 12, 85, 1, 1.0)
-
-
-@pytest.fixture
-def connected(controller: Controller) -> object:
+def connected(controller: Controller) -> Connected:
     """Run a client against the controller for as long as the `async with` lasts."""
 
     @asynccontextmanager
-    async def run(**settings: object) -> AsyncIterator[tuple[client.RtdeClient, Notebook]]:
+    async def run(**settings: Any) -> AsyncIterator[tuple[client.RtdeClient, Notebook]]:
         notebook = Notebook()
-        wanted = client.ClientSettings("127.0.0.1", controller.port, **settings)  # type: ignore[arg-type]
+        wanted = client.ClientSettings(**{"host": "127.0.0.1", "port": controller.port, **settings})
         one = client.RtdeClient(wanted, notebook)
         task = asyncio.create_task(one.run())
         try:
