@@ -17,9 +17,14 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 CANNOT_SERVE = 1
-WRONG_PROGRAM = 2
 SAFETY_TEXT = "SafetySetup has not been confirmed yet, therefore no data will be send yet"
 _PROBABILITY = click.FloatRange(0, 1)
+
+
+class _ProgramMistakeError(click.ClickException):
+    """One line without the usage: it names the place itself."""
+
+    exit_code = 2
 
 
 def _seconds(_ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
@@ -222,9 +227,7 @@ def _controller(
             generation, software, frequency=frequency, uptime=uptime, program=rules, faults=faults
         )
     except ProgramError as error:
-        mistake = click.ClickException(str(error))
-        mistake.exit_code = WRONG_PROGRAM
-        raise mistake from error
+        raise _ProgramMistakeError(str(error)) from error
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--hold") from error
 

@@ -121,7 +121,7 @@ def twist(path: float, rate: float, point: int = FLANGE) -> Vector:
 
 
 def thrust(path: float, rate: float) -> Vector:
-    """The share of the flange's acceleration that the joints' accelerations make: near enough for a force, and cheap."""
+    """What the joints' accelerations make of the flange's: near enough for a force, and cheap."""
     return tuple(part * rate * rate for part in _jacobian(path, joints(path)[2], FLANGE))
 
 

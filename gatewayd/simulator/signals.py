@@ -141,6 +141,23 @@ def _temperatures(moment: Moment) -> Vector:
     return tuple(24 + (w - 24) * warm + 0.05 * _ripple(moment, n) for n, w in enumerate(_WARMTH))
 
 
+def _digital_inputs(moment: Moment) -> Vector:
+    """A light running over the standard inputs, another over the configurable ones, tool input 0 blinking."""
+    second = int(moment.path)
+    return (1 << second % 8 | 1 << 8 + second // 2 % 8 | (second // 4 & 1) << 16,)
+
+
+def _configurable_inputs(moment: Moment) -> Vector:
+    return (int(_digital_inputs(moment)[0]) >> 8 & 0xFF,)
+
+
+def _base_wrench(moment: Moment) -> Vector:
+    """What the mounting carries: the arm's weight, and its inertia along the flange's acceleration."""
+    x, y, z, *torque = thrust(moment.path, moment.rate)
+    share = 0.4 * _ARM_MASS
+    return (share * x, share * y, share * z + _ARM_MASS * _GRAVITY, *(share * part for part in torque))
+
+
 def _around(value: float, spread: float, number: int) -> Signal:
     """A scalar that stays within `spread` of `value`."""
     return lambda moment: (value + spread * _ripple(moment, number),)
@@ -182,6 +199,10 @@ SIGNALS: Mapping[str, Signal] = {
     "elbow_position": lambda moment: frames(moment.path).origins[ELBOW],
     "elbow_velocity": lambda moment: twist(moment.path, moment.rate, ELBOW)[:3],
     "actual_momentum": _momentum,
+    "target_base_wrench": _base_wrench,
+    "actual_digital_input_bits": _digital_inputs,
+    "actual_configurable_digital_input_bits": _configurable_inputs,
+    "euromap67_input_bits": lambda moment: (1 << int(moment.path) % 16,),
     "joint_temperatures": _temperatures,
     "tool_temperature": lambda moment: (27 + 8 * (1 - math.exp(-moment.time / 2400)),),
     "actual_execution_time": _around(0.31, 0.04, 31),
@@ -233,6 +254,5 @@ INITIAL: Mapping[str, float | Vector] = {
     "tool_output_voltage": 24,
     "tool_digital_output0_mode": 1,
     "tool_digital_output1_mode": 1,
-    "euromap67_input_bits": 0,
 }
 """First values of fields that change only when told to; every other field starts at 0."""
