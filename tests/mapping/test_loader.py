@@ -47,6 +47,18 @@ def test_files_loaded_together_keep_their_own_findings() -> None:
     assert {finding.position.file for finding in second.diagnostics} == {"b.yaml"}
 
 
+def test_a_file_named_twice_has_each_finding_once() -> None:
+    first, second = load_together([("a.yaml", b"["), ("a.yaml", b"[")])
+    assert len(first.diagnostics) == len(second.diagnostics) == 1
+
+
+def test_cells_that_share_a_listener_are_checked_against_each_other() -> None:
+    """Equal units on one listener cannot both be served; each file is fine by itself."""
+    text = MINIMAL.replace(b"variables", b"modbus: {listen: 127.0.0.1:1502}\nvariables")
+    assert load(text, "a.yaml").plan is not None
+    assert any(found.plan is None for found in load_together([("a.yaml", text), ("b.yaml", text)]))
+
+
 def test_reading_stops_at_the_limit(tmp_path: Path) -> None:
     """A device or a log file named by mistake does not fill the memory."""
     path = tmp_path / "big.yaml"
