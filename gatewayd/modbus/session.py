@@ -66,10 +66,9 @@ class Session:
                 self._reads[key] = (table.readable.reach, table.image, _heads(key), access)
 
     def received(self, count: int, now: float) -> bytes:
-        """`count` bytes were written to `buffer.space()`; returns the answers to all requests that are complete."""
+        """`count` bytes were written to `buffer.space`; returns the answers to all requests that are complete."""
         buffer, reads = self.buffer, self._reads
-        buffer.advance(count)
-        data, end = buffer.data, buffer.end
+        data, end = buffer.data, buffer.end + count
         answers = []
         start = 0
         seen: Access | None = None
@@ -97,7 +96,7 @@ class Session:
                 break
             start = frame.end
             answers.append(encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now)))
-        buffer.discard(start)
+        buffer.discard(start, end)
         return b"".join(answers)
 
     def _answer(self, unit: int, pdu: bytes, now: float) -> bytes:
