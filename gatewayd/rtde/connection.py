@@ -79,7 +79,7 @@ class Connection(asyncio.Protocol):
         self.done: asyncio.Future[Loss] = loop.create_future()
         """How the connection ended."""
         self.session: Session | None = None
-        """What was agreed, once the set-up is complete."""
+        """What was agreed; None before the set-up is complete and after the end."""
         self.started_at: float | None = None
         """When the set-up was complete."""
         self._loop = loop
@@ -333,6 +333,7 @@ class Connection(asyncio.Protocol):
 
     def _end(self) -> None:
         """Stop everything that could still call a handler."""
+        self.session = None
         for handle in (self._deadline, self._check, self._retry):
             if handle is not None:
                 handle.cancel()

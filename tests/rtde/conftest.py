@@ -42,6 +42,10 @@ class Script:
     time_zero: float = 100.0
     name_limit: int = 65535
     stop_reading: bool = False
+    spoil: Callable[[bytes], bytes] | None = None
+    """Applied to every package sent."""
+    spoiled: float = 0.0
+    """Share of packages to spoil, for `spoil`."""
 
 
 class Peer:
@@ -60,7 +64,8 @@ class Peer:
         self.step = 0
 
     def say(self, message: messages.ControllerMessage) -> None:
-        self.writer.write(self.protocol.send(message))
+        package = self.protocol.send(message)
+        self.writer.write(self.script.spoil(package) if self.script.spoil is not None else package)
 
     def text(self, words: str = "SafetySetup has not been confirmed yet") -> None:
         self.say(messages.TextMessage(words, "URControl", messages.TextLevel.WARNING))
