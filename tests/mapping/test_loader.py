@@ -161,7 +161,8 @@ def test_plans_are_consistent(made: list[tuple[str, str, int, str, str]]) -> Non
     """Whatever passes the rules compiles, and all indices of the plan lead somewhere."""
     text = "gatewayd: 1\ncell: c\nrobot: {host: r}\nmodbus: {listen: 127.0.0.1:502}\n"
     text += "writers: {plc: {modbus: 127.0.0.1}, hmi: {modbus: 127.0.0.2}}\ngroups: {g: {owner: plc}}\nvariables:\n"
-    for number, (field, area, address, kind, owner) in enumerate(made):
+    for number, (field, area, address, kind, some_owner) in enumerate(made):
+        owner = some_owner if field in INPUTS or field.startswith("input_") else ""
         text += f"  v{number}: {{robot: {field}, modbus: {{{area}: {address}{kind}}}{owner}}}\n"
     loaded = load(text.encode(), "f")
     plan = loaded.plan
