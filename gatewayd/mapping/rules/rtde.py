@@ -9,7 +9,8 @@ from math import floor, isclose
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.document import Document
-from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell, ReferenceProblem, Unresolved
+from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell, Unresolved
+from gatewayd.mapping.reference import ReferenceProblem
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 from gatewayd.mapping.rules.wording import number
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, REGISTERS, Series, SoftwareVersion, suggest
