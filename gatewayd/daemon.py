@@ -104,8 +104,8 @@ async def _open(listener: ModbusListener) -> None:
         try:
             await listener.start()
         except ListenError as error:
-            if str(error) != told:
-                told = str(error)
+            if error.strerror != told:
+                told = error.strerror
                 log.error(told, extra=fields(retry_s=RETRY_PERIOD))  # noqa: TRY400 - the text says it all
             await asyncio.sleep(RETRY_PERIOD)
         else:
