@@ -59,7 +59,7 @@ class ClientSettings:
     handshake_timeout: float = 2.0
     """For each answer of the set-up."""
     data_timeout: float = 1.0
-    """Without a package while the output runs: the connection is taken for dead."""
+    """Without a package while the output runs, five periods at least: the connection is taken for dead."""
     first_data_timeout: float = 30.0
     """The same before the first package: a controller whose safety set-up is unconfirmed sends none for a while."""
     claim_retry: float = 1.0

@@ -23,6 +23,7 @@ __all__ = ["ClientHandler", "Connection", "Tolerances"]
 _TIMESTAMP = struct.Struct(">d")
 _FIRST_CLAIM_RETRY = 0.1
 _MEASURE_EVERY = 1.0
+_PERIODS_OF_PATIENCE = 5
 _GOODBYE = 0.2
 
 
@@ -55,7 +56,7 @@ class Tolerances:
     handshake: float
     """For each answer."""
     data: float
-    """Between packages."""
+    """Between packages; five periods at least."""
     first_data: float
     """For the first package: until the safety set-up is confirmed a controller sends none."""
     claim_retry: float
@@ -98,6 +99,7 @@ class Connection(asyncio.Protocol):
         self._retry_delay = _FIRST_CLAIM_RETRY
         self._outputs = Recipe((), ())
         self._clocked = False
+        self._period = 0.0
         self._pace: Pace | None = None
         self._patience = tolerances.first_data
         self._heard = 0.0
@@ -137,10 +139,12 @@ class Connection(asyncio.Protocol):
         transport = self._transport
         if transport is None or self._lost.done():
             return
-        if not transport.is_closing():
-            transport.write_eof()
-            await asyncio.wait((self._lost,), timeout=_GOODBYE)
-        transport.abort()
+        try:
+            if not transport.is_closing():
+                transport.write_eof()
+                await asyncio.wait((self._lost,), timeout=_GOODBYE)
+        finally:
+            transport.abort()
 
     # what asyncio calls
 
@@ -201,7 +205,7 @@ class Connection(asyncio.Protocol):
         pace = self._pace
         assert pace is not None
         self._heard = now
-        self._patience = self._tolerances.data
+        self._patience = max(self._tolerances.data, _PERIODS_OF_PATIENCE * self._period)
         newest = packages.pop()
         try:
             values = self._outputs.unpack(newest.payload)
@@ -228,6 +232,7 @@ class Connection(asyncio.Protocol):
         self._statistics.sessions += 1
         self._outputs = session.outputs
         self._clocked = session.outputs.names[0] == TIMESTAMP and session.outputs.types[0] is DataType.DOUBLE
+        self._period = session.period
         self._pace = Pace(session.period, self._statistics, now)
         self._schedule_retry()
         self._watch()

@@ -112,6 +112,12 @@ async def test_silence_ends_the_connection(
         await until(lambda: len(seen.sessions) == 2)
 
 
+async def test_slow_packages_are_no_silence(connected: Connected, until: Until) -> None:
+    async with connected(frequency=10.0, data_timeout=0.02) as (_, seen):
+        await until(lambda: len(seen.packages) > 3)
+        assert not seen.losses
+
+
 async def test_the_first_package_may_take_longer(
     controller: Controller, connected: Connected, until: Until
 ) -> None:
