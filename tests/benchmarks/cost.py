@@ -10,7 +10,7 @@ from tests.benchmarks.controller import Controller
 from tests.benchmarks.image import DOUBLES_OUT, INTEGERS_IN
 from tests.benchmarks.latency import PERIOD, pace
 from tests.benchmarks.plc import Plc
-from tests.benchmarks.processes import cpu_seconds, free_port, resident_megabytes, wait_until
+from tests.benchmarks.processes import free_port, wait_for
 from tests.benchmarks.report import Table, at_most
 from tests.benchmarks.servers import Served, gateway, mapped_gateway, simulator
 
@@ -47,7 +47,7 @@ def run(seconds: float) -> list[Table]:
         table.add("CPU, one PLC", f"{_share(served, seconds, busy=True):.3g} %")
         packages, skipped, late = (now - then for now, then in zip(_counters(served), before, strict=True))
         table.add("packages", f"{packages}; the simulator left out {skipped}, {late} came late")
-        table.add("memory (RSS)", at_most(resident_megabytes(served.pid), MEMORY_AIM, " MB"))
+        table.add("memory (RSS)", at_most(served.process.resident_kilobytes() / 1024, MEMORY_AIM, " MB"))
     sent, overtaken = _skipped(seconds)
     table.add("packages gatewayd skipped", f"{at_most(overtaken, 0)} of {sent}")
     table.add("start to serving", at_most(median(_start() for _ in range(STARTS)), START_AIM, " s"))
@@ -74,12 +74,12 @@ def _skipped(seconds: float) -> tuple[int, int]:
 
 def _share(served: Served, seconds: float, *, busy: bool) -> float:
     """CPU time in percent of one core, while nobody asks or while a PLC does."""
-    begin, used = time.monotonic(), cpu_seconds(served.pid)
+    begin, used = time.monotonic(), served.process.cpu_seconds()
     if busy:
         _poll(served.port, begin + seconds)
     else:
         time.sleep(seconds)
-    return 100 * (cpu_seconds(served.pid) - used) / (time.monotonic() - begin)
+    return 100 * (served.process.cpu_seconds() - used) / (time.monotonic() - begin)
 
 
 def _poll(port: int, end: float) -> None:
@@ -106,6 +106,6 @@ def _start(robot: int | None = None) -> float:
     with mapped_gateway(robot or free_port()) as served:
         if robot is not None:
             plc = Plc(served.port)
-            wait_until(lambda: plc.read(ROBOT_STATE, 1) == FRESH, "fresh values")
+            wait_for(lambda: plc.read(ROBOT_STATE, 1) == FRESH, "fresh values")
             plc.close()
         return time.monotonic() - begin

@@ -12,7 +12,7 @@ from tests.benchmarks.controller import Controller
 from tests.benchmarks.image import DOUBLES_OUT
 from tests.benchmarks.latency import pace, stream
 from tests.benchmarks.plc import Plc
-from tests.benchmarks.processes import cpu_seconds, free_port, listens, python, running
+from tests.benchmarks.processes import free_port, listens, python, running
 from tests.benchmarks.report import Table, percentile
 from tests.benchmarks.servers import Served, mapped_gateway
 
@@ -65,17 +65,17 @@ def _script(controller: Controller) -> Iterator[Served]:
     port = free_port()
     with running(python(Path(__file__).with_name("user_script.py"), ROBOT_HOST, str(port))) as process:
         controller.wait_for_start()
-        while process.poll() is None and not listens(port):
+        while process.running and not listens(port):
             pace(controller, 0.02)
-        yield Served(process.pid, port)
+        yield Served(process, port)
 
 
 def _column(controller: Controller, served: Served, seconds: float) -> dict[str, str]:
     plc = Plc(served.port)
     pace(controller, 1.0)
-    before = cpu_seconds(served.pid)
+    before = served.process.cpu_seconds()
     pace(controller, seconds)
-    cpu = 100 * (cpu_seconds(served.pid) - before) / seconds
+    cpu = 100 * (served.process.cpu_seconds() - before) / seconds
     seen = stream(controller, plc, seconds, first=FIRST, count=DOUBLES)
     hammered = stream(controller, plc, seconds, first=FIRST, count=DOUBLES, hammer=True)
     silence = _silence(controller, plc)

@@ -64,7 +64,7 @@ def _measure(servers: dict[str, Server], seconds: float) -> Measured:
 
 
 def _load(served: Served, connections: int, request: Request, seconds: float) -> Load:
-    return measure(served.pid, served.port, connections, request, seconds / ROUNDS)
+    return measure(served.process, served.port, connections, request, seconds / ROUNDS)
 
 
 def _middle(loads: list[Load] | None, figure: str) -> float | None:
