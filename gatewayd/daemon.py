@@ -104,8 +104,9 @@ async def _open(listener: ModbusListener) -> None:
         try:
             await listener.start()
         except ListenError as error:
-            if error.strerror != told:
-                told = error.strerror
+            reason = error.strerror or str(error)
+            if reason != told:
+                told = reason
                 log.error(told, extra=fields(retry_s=RETRY_PERIOD))  # noqa: TRY400 - the text says it all
             await asyncio.sleep(RETRY_PERIOD)
         else:

@@ -74,9 +74,10 @@ def test_stops_within_a_second_whatever_its_peers_do(plant: Plant) -> None:
     daemon = plant.daemon(first, second)
     plc = plant.ready_plc()
     assert plc.write_integers(0, 77, 88) == 0
-    with socket.create_connection((HOST, plant.modbus)) as greedy, socket.create_connection(
-        (HOST, plant.modbus)
-    ) as half:
+    with (
+        socket.create_connection((HOST, plant.modbus)) as greedy,
+        socket.create_connection((HOST, plant.modbus)) as half,
+    ):
         half.sendall(b"\x00\x01\x00\x00\x00\x06\x01")
         greedy.setblocking(False)
         request = b"\x00\x01\x00\x00\x00\x06\x01\x03\xea\x60\x00\x7d"
@@ -113,12 +114,8 @@ def test_second_signal_forces(plant: Plant) -> None:
     assert daemon.wait() == FORCED
 
 
-@pytest.mark.parametrize(
-    "policy, after", [("adopt", (77, 88, 9.5, 2)), ("fallback", (0, 88, -1.5, 0))]
-)
-def test_killed_and_started_again(
-    plant: Plant, policy: str, after: tuple[int, int, float, int]
-) -> None:
+@pytest.mark.parametrize("policy, after", [("adopt", (77, 88, 9.5, 2)), ("fallback", (0, 88, -1.5, 0))])
+def test_killed_and_started_again(plant: Plant, policy: str, after: tuple[int, int, float, int]) -> None:
     """Bumpless: what the robot holds is taken over; with `on_connect: fallback` the policies are applied then."""
     # Each change of a register from 0 is counted by the robot program, so that a dip to 0 and back would show.
     program = "output_int_register_1 = count input_int_register_0"
@@ -136,7 +133,9 @@ def test_killed_and_started_again(
     plant.daemon(path)
     served = time.monotonic() - start
     plc = plant.ready_plc()
-    print(f"start -> listening: {served * 1000:.0f} ms, -> writable: {(time.monotonic() - start) * 1000:.0f} ms")
+    print(
+        f"start -> listening: {served * 1000:.0f} ms, -> writable: {(time.monotonic() - start) * 1000:.0f} ms"
+    )
     wait_for(lambda: held(simulator) == after, "what the policy says")
     assert (plc.integers(0, 2), plc.doubles(4), plc.read(8)) == ([*after[:2]], [after[2]], [after[3] >> 1])
     assert [plc.owner(number) for number in range(1, 5)] == [0] * 4
@@ -197,7 +196,9 @@ def unreadable(directory: Path) -> Path:
 def test_what_cannot_be_served_is_told_and_the_rest_runs(plant: Plant, tmp_path: Path) -> None:
     simulator = plant.simulator()
     broken = tmp_path / "broken.yaml"
-    broken.write_text("gatewayd: 1\ncell: broken\nrobot: {host: 10.0.0.1}\nvariables:\n  x: {robot: no_such_field}\n")
+    broken.write_text(
+        "gatewayd: 1\ncell: broken\nrobot: {host: 10.0.0.1}\nvariables:\n  x: {robot: no_such_field}\n"
+    )
     missing, secret = tmp_path / "missing.yaml", unreadable(tmp_path)
     good = plant.mapping(CELL, simulator.port)
     daemon = plant.daemon(missing, broken, secret, good)
@@ -211,7 +212,8 @@ def test_what_cannot_be_served_is_told_and_the_rest_runs(plant: Plant, tmp_path:
 
 
 @pytest.mark.parametrize(
-    "what, code", [("missing", 2), ("unreadable", 2), ("broken", 1), ("empty directory", 2), ("strict", 1), ("binary", 1)]
+    "what, code",
+    [("missing", 2), ("unreadable", 2), ("broken", 1), ("empty directory", 2), ("strict", 1), ("binary", 1)],
 )
 def test_nothing_to_serve_ends_with_a_code_and_no_traceback(
     plant: Plant, tmp_path: Path, what: str, code: int

@@ -61,7 +61,9 @@ def test_second_writer_is_refused_and_accepted_after_the_lease(cell: Cell) -> No
     wait_for(lambda: simulator.integer("input_int_register_0") == 0, "the release fallback in the robot")
     assert hmi.write_integers(0, 22) == 0
     assert hmi.owner(SHARED) == THE_HMI
-    wait_for(lambda: simulator.integer("input_int_register_0") == 22, "the second writer's value in the robot")
+    wait_for(
+        lambda: simulator.integer("input_int_register_0") == 22, "the second writer's value in the robot"
+    )
     assert plc.write_integers(0, 33) == BUSY
     daemon.wait_for_line("write refused", "variable=shared", "writer=hmi", "holder=plc", "new=22")
 

@@ -171,7 +171,7 @@ def test_writes_while_frozen_or_silent_still_reach_the_robot(plant: Plant) -> No
 
 
 def test_registers_in_use_cost_only_themselves(plant: Plant) -> None:
-    """Three registers claimed by the controller's fieldbus adapter: 0A for them, all others work, recovery when freed."""
+    """Three registers claimed elsewhere: 0A for them, all others work, and they recover when freed."""
     text = f"""\
 writers: {{plc: {{modbus: {PLC}}}}}
 variables:
@@ -271,7 +271,9 @@ def test_protocol_version_1_and_many_cut_connections(plant: Plant) -> None:
     assert len(daemon.lines("robot connected")) == 5
 
 
-@pytest.mark.parametrize("order", [("robot", "daemon", "plc"), ("daemon", "robot"), ("daemon", "plc", "robot")])
+@pytest.mark.parametrize(
+    "order", [("robot", "daemon", "plc"), ("daemon", "robot"), ("daemon", "plc", "robot")]
+)
 def test_started_in_any_order(plant: Plant, order: tuple[str, ...]) -> None:
     port = free_port()
     path = plant.mapping(CELL, port)

@@ -145,5 +145,8 @@ def test_watchdog_register_in_use_is_not_fed_and_costs_nothing_else(plant: Plant
     wait_for(lambda: simulator.integer("input_int_register_0") == 5, "the other registers")
     assert not plc.status(1) & FED
     simulator.do("free input_int_register_23")
-    wait_for(lambda: plc.write_integers(0, 5) == 0 and simulator.integer("input_int_register_23") > 3, "the feeding")
+    wait_for(
+        lambda: plc.write_integers(0, 5) == 0 and simulator.integer("input_int_register_23") > 3,
+        "the feeding",
+    )
     assert plc.status(1) & FED
