@@ -117,7 +117,7 @@ class LockTable:
         if now < self._next_expiry:
             return []
         ended = [lock for lock, expiry in enumerate(self.expires) if expiry <= now]
-        self._next_expiry = min((expiry for expiry in self.expires if expiry > now), default=math.inf)
+        self._next_expiry = min(self.expires, default=math.inf)
         return ended
 
     def held_by(self, writer: int) -> list[int]:

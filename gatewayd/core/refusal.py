@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = ["Reason", "Refusal"]
+__all__ = ["PRECEDENCE", "Reason", "Refusal"]
 
 
 class Reason(IntEnum):
