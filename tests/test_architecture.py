@@ -71,8 +71,6 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "cli": "tests/cli/test_main.py",
     "cli.completion": "tests/cli/test_main.py",
     "core": "a docstring",
-    "core.definition": "records; every other test of the core builds on them",
-    "core.refusal": "records; every other test of the core builds on them",
     "mapping": "a docstring",
     "mapping.plan": "records; tests/mapping/test_compile.py pins their content",
     "modbus": "a docstring",
