@@ -20,6 +20,7 @@ from gatewayd.rtde.loss import Loss, LossReason, connect_failure
 from gatewayd.rtde.negotiation import Session, State, Unavailable, Wishes
 from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.recipe import Scalar
+from gatewayd.rtde.resolve import resolve
 from gatewayd.rtde.types import DEFAULT_PORT
 
 __all__ = [
@@ -142,6 +143,7 @@ class RtdeClient:
             loss = await connection.done
         finally:
             self._connection = None
+            self.statistics.frequency = 0.0
             await connection.close()
         self._consider_list_length(wishes, connection)
         if connection.started_at is None:
@@ -166,13 +168,8 @@ class RtdeClient:
 
     async def _open_socket(self, loop: asyncio.AbstractEventLoop) -> socket.socket:
         """Try the host's addresses in turn; the error of the last if none answers."""
-        host = self._settings.host
-        try:
-            found = await loop.getaddrinfo(host, self._settings.port, type=socket.SOCK_STREAM)
-        except UnicodeError as error:
-            raise socket.gaierror(socket.EAI_NONAME, "not a host name") from error
         failure: OSError = socket.gaierror(socket.EAI_NONAME, "no address")
-        for family, kind, protocol, _, address in found:
+        for family, kind, protocol, address in await resolve(self._settings.host, self._settings.port):
             candidate = socket.socket(family, kind, protocol)
             try:
                 candidate.setblocking(False)

@@ -297,7 +297,9 @@ class Connection(asyncio.Protocol):
         now = monotonic()
         silence = now - self._heard
         if self._negotiation.running and silence > self._patience:
-            self._fail(LossReason.SILENT, f"no data from the controller for {silence:.1f} s")
+            first = self._pace is None or self._pace.timestamp is None
+            hint = ": is the robot powered and its safety set-up confirmed?" if first else ""
+            self._fail(LossReason.SILENT, f"no data from the controller for {silence:.1f} s{hint}")
             return
         if self._pace is not None and now - self._measured >= _MEASURE_EVERY:
             self._pace.measure(now)

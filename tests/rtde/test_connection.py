@@ -129,6 +129,7 @@ async def test_the_first_package_may_take_longer(
         assert not seen.losses
         await until(lambda: seen.losses)
         assert seen.losses[0].reason is LossReason.SILENT
+        assert "safety set-up confirmed" in seen.losses[0].text
 
 
 async def test_the_boot_restart_of_a_controller_is_only_a_new_connection(
