@@ -128,20 +128,17 @@ class _Connection(ServerRequestHandler):
             self.abort("internal error")
             return
         if answers:
-            self._send(answers)
+            try:
+                sent = os.write(self.descriptor, answers)
+            except (BlockingIOError, InterruptedError):
+                sent = 0
+            except OSError as error:
+                self.abort(str(error))
+                return
+            if sent < len(answers):
+                self.wire.write(answers[sent:])
         if session.broken:
             self.drop(f"no Modbus TCP: {session.broken}")
-
-    def _send(self, answers: bytes) -> None:
-        try:
-            sent = os.write(self.descriptor, answers)
-        except (BlockingIOError, InterruptedError):
-            sent = 0
-        except OSError as error:
-            self.abort(str(error))
-            return
-        if sent < len(answers):
-            self.wire.write(answers[sent:])
 
     def pause_writing(self) -> None:
         """The peer does not read its answers: take no more requests."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -29,18 +28,21 @@ _THIS_DEVICE = (0, 255)
 """Unit ids by which a client on TCP means the device itself (Messaging on TCP/IP Guide V1.0b, 4.4.2.3)."""
 
 
-@dataclass(frozen=True, slots=True)
 class Access:
     """What a peer may do with one unit."""
 
-    unit: Unit
-    writer: int | None
-    """The writer of the unit's cell that the peer is, if any."""
+    __slots__ = ("_writer_seen", "unit", "writer")
+
+    def __init__(self, unit: Unit, writer: int | None) -> None:
+        self.unit = unit
+        self.writer = writer
+        """The writer of the unit's cell that the peer is, if any."""
+        self._writer_seen = unit.cell.writer_seen
 
     def seen(self, now: float) -> None:
         """The peer has sent a request."""
         if self.writer is not None:
-            self.unit.cell.writer_seen(self.writer, now)
+            self._writer_seen(self.writer, now)
 
 
 class Session:
@@ -69,19 +71,19 @@ class Session:
         """`count` bytes were written to `buffer.space`; returns the answers to all requests that are complete."""
         buffer, reads = self.buffer, self._reads
         data, end = buffer.data, buffer.end + count
+        unpack = _READ.unpack_from
         answers = []
         start = 0
         seen: Access | None = None
         while start < end:
             if end - start >= _READ_FRAME:
-                transaction, protocol, length, key, address, quantity = _READ.unpack_from(data, start)
+                transaction, protocol, length, key, address, quantity = unpack(data, start)
                 read = reads.get(key)
                 if read is not None and length == _READ_LENGTH and not protocol:
                     reach, image, heads, access = read
                     if 0 < quantity <= reach[address]:
-                        answers.append(
-                            transaction + heads[quantity] + image[2 * address : 2 * (address + quantity)]
-                        )
+                        first = 2 * address
+                        answers.append(transaction + heads[quantity] + image[first : first + 2 * quantity])
                         start += _READ_FRAME
                         if access is not seen:
                             seen = access
@@ -96,8 +98,9 @@ class Session:
                 break
             start = frame.end
             answers.append(encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now)))
-        buffer.discard(start, end)
-        return b"".join(answers)
+        if start != end or buffer.end:
+            buffer.discard(start, end)
+        return answers[0] if len(answers) == 1 else b"".join(answers)
 
     def _answer(self, unit: int, pdu: bytes, now: float) -> bytes:
         access = self._accesses.get(unit)

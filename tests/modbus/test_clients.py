@@ -55,10 +55,10 @@ async def test_pymodbustcp_reads_and_writes_everything(
         identification = client.read_device_identification()
         assert identification is not None
         assert identification.vendor_name == b"gatewayd"
+        assert live_cell.image.values[index_of("count")] == 0x10002
         client.close()
 
     await asyncio.to_thread(converse)
-    assert live_cell.image.values[index_of("count")] == 0x10002
 
 
 async def mbpoll(listener: ModbusListener, *arguments: str) -> str:
