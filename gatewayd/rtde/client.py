@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import monotonic
 
+from gatewayd.rtde.claims import OLD_LIST_LIMIT
 from gatewayd.rtde.connection import ClientHandler, Connection, Tolerances
 from gatewayd.rtde.loss import Loss, LossReason, connect_failure
 from gatewayd.rtde.negotiation import Session, State, Unavailable, Wishes
@@ -34,8 +35,6 @@ __all__ = [
     "Unavailable",
 ]
 
-_OLD_LIST_LIMIT = 2048
-"""Bytes of a list of names that every controller takes (older guide, "Introduction"); newer ones take far more."""
 _KEEPALIVE = (("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCNT", 3))
 
 
@@ -90,7 +89,8 @@ class RtdeClient:
             settings.write_buffer,
         )
         self._connection: Connection | None = None
-        self._short_list = False
+        self._short_outputs = False
+        self._short_inputs = False
         self._paused = False
 
     @property
@@ -204,14 +204,20 @@ class RtdeClient:
             settings.watchdog,
             settings.frequency,
             settings.read_back,
-            self._short_list,
+            self._short_outputs,
+            self._short_inputs,
             not self._paused,
         )
 
     def _consider_list_length(self, wishes: Wishes, connection: Connection) -> None:
-        """Old controllers take 2048 bytes of names: if a longer list came to nothing, try without read-backs."""
+        """Old controllers take 2048 bytes of names: if a longer list came to nothing, try shorter ones next."""
         if connection.started_at is not None:
-            self._short_list = False
-        elif connection.state is State.OUTPUTS and self._settings.read_back:
-            length = len(",".join(wishes.subscription()))
-            self._short_list = not self._short_list and length > _OLD_LIST_LIMIT
+            self._short_outputs = self._short_inputs = False
+        elif connection.state is State.OUTPUTS and wishes.read_back:
+            self._short_outputs = not wishes.short_outputs and _is_long(wishes.subscription())
+        elif connection.state is State.INPUTS:
+            self._short_inputs = not wishes.short_inputs and _is_long(wishes.wanted_inputs())
+
+
+def _is_long(names: tuple[str, ...]) -> bool:
+    return len(",".join(names)) > OLD_LIST_LIMIT

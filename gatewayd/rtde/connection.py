@@ -155,6 +155,21 @@ class Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """See asyncio.Protocol."""
+        try:
+            self._receive(data)
+        except Exception as error:  # noqa: BLE001  asyncio would log it and go on; so `run` raises it
+            self._end()
+            if not self.done.done():
+                self.done.set_exception(error)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """See asyncio.Protocol."""
+        self._lost.set_result(None)
+        self._conclude(connection_failure(exc if isinstance(exc, OSError) else None, self._address))
+
+    # messages
+
+    def _receive(self, data: bytes) -> None:
         now = monotonic()
         packages: list[DataPackage] = []
         failure: ProtocolError | None = None
@@ -174,15 +189,6 @@ class Connection(asyncio.Protocol):
         if failure is not None:
             self._fail(LossReason.PROTOCOL, f"what the controller sent is not RTDE: {failure}")
 
-    def connection_lost(self, exc: Exception | None) -> None:
-        """See asyncio.Protocol."""
-        self._lost.set_result(None)
-        if exc is not None and not isinstance(exc, OSError) and not self.done.done():
-            self.done.set_exception(exc)
-        self._conclude(connection_failure(exc if isinstance(exc, OSError) else None, self._address))
-
-    # messages
-
     def _take(self, message: ControllerMessage) -> None:
         if isinstance(message, TextMessage):
             self._handler.text(message)
@@ -196,6 +202,8 @@ class Connection(asyncio.Protocol):
             self._request(step.send)
         elif not self._negotiation.waiting:
             self._disarm()
+        if self.done.done():
+            return
         if self._negotiation.claims.exhausted:
             self._give_up_recipes()
         elif step.event is not None:
@@ -307,7 +315,7 @@ class Connection(asyncio.Protocol):
         self._check = self._loop.call_later(min(self._tolerances.data / 4, _MEASURE_EVERY / 2), self._watch)
 
     def _schedule_retry(self) -> None:
-        if self._negotiation.claims.retriable:
+        if self._negotiation.claims.retriable and not self.done.done():
             delay = min(self._retry_delay, self._tolerances.claim_retry)
             self._retry_delay = 2 * delay
             self._retry = self._loop.call_later(delay, self._retry_claims)

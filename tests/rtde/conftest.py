@@ -111,6 +111,8 @@ class Peer:
         self.say(messages.OutputsSetup(int(good), words))
 
     def setup_inputs(self, names: tuple[str, ...]) -> None:
+        if len(",".join(names)) > self.script.name_limit:
+            return
         words = tuple(self.input_word(name) for name in names)
         good = not messages.ERROR_WORDS.intersection(words)
         number = 0

@@ -218,6 +218,21 @@ async def test_a_list_too_long_for_an_old_controller_is_tried_without_read_backs
         assert "registers" in seen.sessions[0].inputs
 
 
+async def test_more_inputs_than_an_old_controller_takes_at_once_are_claimed_by_parts(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.name_limit = 2048
+    bits = tuple(f"input_bit_register_{number}" for number in range(64, 128))
+    inputs = (*REGISTERS, *DOUBLES, *bits)
+    async with connected(inputs=inputs, handshake_timeout=0.1, read_back=False) as (client, seen):
+        await until(lambda: seen.packages)
+        claimed = seen.sessions[0].inputs
+        assert list(claimed) == ["registers", "registers 2"]
+        assert claimed["registers"].recipe.names + claimed["registers 2"].recipe.names == inputs
+        assert client.send("registers 2", [True] * claimed["registers 2"].recipe.count)
+        await until(lambda: controller.peer.written.get(bits[63]) is True)
+
+
 async def test_statistics_tell_the_measured_frequency(connected: Connected, until: Until) -> None:
     async with connected(frequency=50.0) as (client, seen):
         await until(lambda: client.statistics.frequency > 0)

@@ -226,16 +226,16 @@ async def test_after_the_end_no_handler_is_called(
     assert controller.peer.writer.is_closing()
 
 
-async def test_an_exception_of_a_handler_ends_the_client(controller: Controller) -> None:
+@pytest.mark.parametrize("error", [LookupError("a bug"), OSError("a bug")], ids=["lookup", "os"])
+async def test_an_exception_of_a_handler_ends_the_client(error: Exception, controller: Controller) -> None:
     class Failing:
         def session_started(self, session: object) -> None:
-            msg = "a bug"
-            raise LookupError(msg)
+            raise error
 
         values = inputs_changed = session_lost = text = session_started
 
     handler: Any = Failing()
-    with pytest.raises(LookupError, match="a bug"):
+    with pytest.raises(type(error), match="a bug"):
         await RtdeClient(ClientSettings("127.0.0.1", controller.port), handler).run()
 
 
