@@ -70,23 +70,25 @@ class Admission:
         variable = self._variables[index]
         lock = variable.lock
         standing = Standing.STRANGER if lock is None else self._ownership.standing(lock, writer)
-        takeable = standing is Standing.OWNER or standing is Standing.FREE
+        owned = standing is Standing.OWNER
+        takeable = owned or standing is Standing.FREE
         unchanged = change.implied and change.value == self._image.values[index]
         if unchanged and not takeable:
             return None
-        if lock is None or standing is Standing.STRANGER:
+        if lock is None or (not takeable and standing is Standing.STRANGER):
             return Refusal(Reason.NOT_WRITABLE, index)
         value = within(variable, change.value)
         if value is None:
             return Refusal(Reason.OUT_OF_LIMITS, index)
-        if standing is Standing.OWNER:
+        if owned:
             verdict.moves[lock] = Move.RENEW
         if not adopted:
             return Refusal(Reason.ROBOT_LOST, index)
         if not self._image.available[index]:
             return None if unchanged else Refusal(Reason.CLAIMED_ELSEWHERE, index)
-        if standing is Standing.LOWER or (change.implied and not takeable):
+        if not takeable and (change.implied or standing is Standing.LOWER):
             return Refusal(Reason.HELD, index, self._ownership.owners[lock])
-        verdict.moves[lock] = MOVES[standing, Act.WRITE]
+        if not owned:
+            verdict.moves[lock] = MOVES[standing, Act.WRITE]
         verdict.values.append((index, value))
         return None

@@ -258,6 +258,8 @@ class Cell:
         for lock, move in moves.items():
             former = self.ownership.owners[lock]
             self.ownership.apply(lock, writer, move, now)
+            if former == writer:
+                continue
             if move is Move.ACQUIRE:
                 self.events.append(Event(now, EventKind.ACQUIRED, lock=lock, writer=writer))
             elif move is Move.TAKE_OVER:

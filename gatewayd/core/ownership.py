@@ -97,14 +97,14 @@ class LockTable:
 
     def apply(self, lock: int, writer: int, move: Move, now: float) -> None:
         """Carry out a move that `decide` returned; refusals and NOTHING change nothing."""
-        if move is Move.RELEASE:
-            self.free(lock)
-        elif move <= Move.TAKE_OVER:
+        if move <= Move.TAKE_OVER:
             self.owners[lock] = writer
             lease = self.locks[lock].lease
             if lease is not None:
-                self.expires[lock] = now + lease
-                self._next_expiry = min(self._next_expiry, now + lease)
+                self.expires[lock] = expiry = now + lease
+                self._next_expiry = min(self._next_expiry, expiry)
+        elif move is Move.RELEASE:
+            self.free(lock)
 
     def free(self, lock: int) -> int | None:
         """Release unconditionally; returns the former owner."""
