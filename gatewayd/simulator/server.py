@@ -275,7 +275,7 @@ class _Connection(asyncio.Protocol):
             self.abort(f"has not read for {limit:g} s")
 
     def _write(self, data: bytes) -> None:
-        if not data:
+        if not data or self._transport.is_closing():
             return
         self._transport.write(self._mangler.flush() + data)
         if self._transport.get_write_buffer_size() > _MOST_UNSENT:
