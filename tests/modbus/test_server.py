@@ -15,6 +15,7 @@ import pytest
 from gatewayd.core.cell import Cell
 from gatewayd.mapping.plan import ModbusPlan
 from gatewayd.modbus import server
+from gatewayd.modbus.frames import BUFFER_SIZE, GREATEST_FRAME
 from gatewayd.modbus.peers import PeerEvent, PeerEventKind
 from gatewayd.modbus.server import ListenError, ModbusListener
 
@@ -211,6 +212,7 @@ async def test_a_peer_that_does_not_read_is_not_read_from_and_then_dropped(
     request = bytes.fromhex("0001 0000 0006 01 03 00c8 0060") * 500
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     dropped = False
+    unsent = 0
     begin = time.monotonic()
     while not dropped and time.monotonic() - begin < 5:
         try:
@@ -221,7 +223,9 @@ async def test_a_peer_that_does_not_read_is_not_read_from_and_then_dropped(
             dropped = True
         assert await is_served(*other)
         await asyncio.sleep(0.001)
+        unsent = max([unsent, *(one.wire.get_write_buffer_size() for one in listener._connections)])
     assert dropped
+    assert 0 < unsent < BUFFER_SIZE // len(READ) * GREATEST_FRAME
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 20_000
     assert events[-1].reason == "did not read its answers for 0.3 s"
     flood.close()
@@ -229,22 +233,22 @@ async def test_a_peer_that_does_not_read_is_not_read_from_and_then_dropped(
     await listener.close()
 
 
-async def test_a_slow_reader_gets_everything(listener: ModbusListener) -> None:
+async def test_a_slow_reader_gets_everything_in_order(listener: ModbusListener) -> None:
     peer = socket.socket()
     peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     peer.setblocking(False)
     loop = asyncio.get_running_loop()
     await loop.sock_connect(peer, ("127.0.0.1", listener.port))
     count = 5000
-    sending = loop.create_task(
-        loop.sock_sendall(peer, bytes.fromhex("0001 0000 0006 01 03 00c8 0060") * count)
-    )
-    received = 0
-    while received < count * (9 + 192):
+    requests = b"".join(struct.pack(">HHHBBHH", number, 0, 6, 1, 3, 200, 96) for number in range(count))
+    sending = loop.create_task(loop.sock_sendall(peer, requests))
+    received = bytearray()
+    while len(received) < count * (9 + 192):
         await asyncio.sleep(0)
-        received += len(await loop.sock_recv(peer, 65536))
+        received += await loop.sock_recv(peer, 65536)
     await sending
-    assert received == count * (9 + 192)
+    expected = (struct.pack(">HHHBBB", number, 0, 195, 1, 3, 192) + bytes(192) for number in range(count))
+    assert received == b"".join(expected)
     peer.close()
 
 
