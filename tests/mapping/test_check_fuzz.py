@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -249,6 +250,29 @@ HUGE = {
     "beyond the limit": b"#" * 1_100_000,
     "a wide range": b"gatewayd: 1\ncell: a\nrobot: {host: a}\nvariables: {a: {robot: output_int_register_0..9999}}\n",
 }
+
+
+TINY, GREAT = "0." + "0" * 306 + "1", "9" * 300 + ".5"
+
+
+@pytest.mark.parametrize("number", ["0", TINY, "0." + "0" * 320 + "1", GREAT, f"-{GREAT}"])
+@pytest.mark.parametrize("kind", ["int16", "uint64", "float32", "float64", "bool"])
+@pytest.mark.parametrize("robot", ["output_int_register_0", "input_double_register_0"])
+def test_numbers_at_the_ends_of_arithmetic(number: str, kind: str, robot: str) -> None:
+    """What is next to nothing or next to infinity divides and multiplies without a stumble."""
+    head = "gatewayd: 1\ncell: a\nmodbus: {}\nwriters: {plc: {modbus: 127.0.0.1}}\n"
+    controllers = ("robot: {host: a}", f"robot: {{host: a, frequency: {number}, stale_after: 1s}}")
+    scalings = (f"scale: {number}", f"offset: {number}", f"scale: {TINY}, offset: {number}")
+    policies = (
+        "limits: [0, 1]",
+        f"limits: [-{GREAT}, {GREAT}]",
+        f"on_stale: {number}",
+        f"on_release: {number}",
+    )
+    for controller, scaling, policy in product(controllers, scalings, policies):
+        place = f"{{holding: 0, type: {kind}, {scaling}}}"
+        variable = f"{{robot: {robot}, modbus: {place}, {policy}}}"
+        examine(f"{head}{controller}\nvariables: {{a: {variable}}}\n".encode())
 
 
 @pytest.mark.parametrize("data", HUGE.values(), ids=HUGE.keys())

@@ -265,6 +265,33 @@ def test_cells_on_different_ports_do_not_clash() -> None:
     assert [finding for one in loaded for finding in one.diagnostics] == []
 
 
+def test_an_owner_of_an_output_is_told_the_input() -> None:
+    """Outputs that are easily taken for inputs have their counterpart in the hint."""
+    hints = []
+    for field in ("output_int_register_3", "actual_digital_output_bits", "target_speed_fraction"):
+        text = HEAD + f"  a: {{robot: {field}, modbus: 10, owner: plc}}\n"
+        hints += [finding.hint for finding in load(text.encode(), "cell.yaml").diagnostics]
+    assert hints == [
+        "remove `owner`, or map an input such as input_int_register_3",
+        "remove `owner`, or map an input such as standard_digital_output (with its mask)",
+        "remove `owner`, or map an input such as speed_slider_fraction (with its mask)",
+    ]
+
+
+@pytest.mark.parametrize("peer", ["127.0.0.1", "127.0.0.40", "::1", "0.0.0.0/0"])
+def test_writers_on_this_machine_reach_a_loopback_listener(peer: str) -> None:
+    """So do networks that hold it."""
+    head = (
+        HEAD.replace("192.168.1.2:", "127.0.0.1:")
+        .replace("192.168.1.20", f"'{peer}'")
+        .replace("1.21", "1.22")
+    )
+    found = load(head.encode(), "cell.yaml").diagnostics
+    assert [
+        (finding.rule.id, "`hmi`" in finding.message) for finding in found if finding.rule.id == "GW219"
+    ] == [("GW219", True)]
+
+
 def test_mistakes_of_all_families_come_in_one_pass() -> None:
     """No finding hides another."""
     lines = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from ipaddress import ip_address
+from ipaddress import ip_address, ip_network
 
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.document import Part
@@ -16,6 +16,7 @@ __all__: list[str] = []
 
 _MODBUS_PORTS = (502, 802)
 _FIRST_FREE_PORT = 1024
+_LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
 _SHARED = ("allow", "connections", "idle_timeout")
 
 
@@ -171,7 +172,7 @@ def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     if modbus is None or not ip_address(modbus.spec.listen.host).is_loopback:
         return
     for writer in cell.document.writers.values():
-        if not any(network.network_address.is_loopback for network in writer.spec.modbus):
+        if not any(_meet(network, _LOOPBACK) for network in writer.spec.modbus):
             shown = _shown(writer.spec.modbus[0])
             message = (
                 f"the writer `{writer.name}` ({shown}) cannot reach {modbus.spec.listen}, "
