@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from os.path import isdir
 from pathlib import Path
 
 from gatewayd.logs import fields
@@ -35,7 +36,9 @@ def mapping_files(paths: Iterable[Path]) -> list[Path]:
     """The files meant: a directory stands for its *.yaml files, by name."""
     found: list[Path] = []
     for path in paths:
-        if path.is_dir():
+        if isdir(
+            path
+        ):  # unlike Path.is_dir it never raises: what is wrong with the name is told when it is opened
             inside = sorted(path.glob(PATTERN))
             if not inside:
                 log.error(
