@@ -24,7 +24,7 @@ HEADER_SIZE = 7
 GREATEST_PDU = 253
 """Bytes (Application Protocol V1.1b3, 4.1)."""
 GREATEST_FRAME = HEADER_SIZE + GREATEST_PDU
-BUFFER_SIZE = 2048
+BUFFER_SIZE = 1024
 """Bytes taken from a connection at a time; bounds what one peer can make us do before the next has its turn."""
 
 _LEAST_LENGTH = 2

@@ -280,25 +280,26 @@ class ModbusListener:
         wanted: dict[int, tuple[ModbusPlan, Cell]] = {}
         for plan, cell in units:
             if plan.unit in wanted:
-                message = (
+                raise ValueError(
                     f"unit {plan.unit} is served twice on {self.name}: give every cell a unit of its own"
                 )
-                raise ValueError(message)
             wanted[plan.unit] = (plan, cell)
-        former, self._units = self._units, {}
+        former = self._units
+        units_now: dict[int, Unit] = {}
         for number, (plan, cell) in wanted.items():
             kept = former.get(number)
-            if kept is not None and kept.plan is plan and kept.cell is cell:
-                self._units[number] = former.pop(number)
-            else:
-                self._units[number] = Unit(plan, cell)
+            if kept is None or kept.plan is not plan or kept.cell is not cell:
+                kept = Unit(plan, cell)
+            units_now[number] = kept
+        self._units = units_now
         now = time.monotonic()
         for connection in list(self._connections):
             if not self._admit(connection, now, "unit no longer served"):
                 connection.abort("not on the access list any more")
-        for unit in former.values():
-            unit.cell.health.modbus_connections = 0
-            unit.close()
+        for number, unit in former.items():
+            if units_now.get(number) is not unit:
+                unit.cell.health.modbus_connections = 0
+                unit.close()
         self._count()
 
     # -- called by connections ------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """One connection's requests: bytes in, answers out, in order, whatever the depth of pipelining. No input or output.
 
-Plain register reads, nearly all of the traffic, are answered here without leaving the loop; everything else goes to
+A single read of registers, nearly all of the traffic, is answered here at once; everything else goes to
 `gatewayd.modbus.functions`.
 """
 
@@ -21,7 +21,7 @@ _READ_HOLDING = 3
 _READ_INPUT = 4
 _READ_FRAME = 12
 _READ_LENGTH = 6
-_READ = struct.Struct(">2sHHHHH")
+_unpack_read = struct.Struct(">2sHHHHH").unpack_from
 """Transaction id, protocol id, length, unit id and function, address, quantity."""
 _HEAD = struct.Struct(">HHBBB")
 _THIS_DEVICE = (0, 255)
@@ -31,18 +31,13 @@ _THIS_DEVICE = (0, 255)
 class Access:
     """What a peer may do with one unit."""
 
-    __slots__ = ("_writer_seen", "unit", "writer")
+    __slots__ = ("unit", "writer", "writer_seen")
 
     def __init__(self, unit: Unit, writer: int | None) -> None:
         self.unit = unit
         self.writer = writer
         """The writer of the unit's cell that the peer is, if any."""
-        self._writer_seen = unit.cell.writer_seen
-
-    def seen(self, now: float) -> None:
-        """The peer has sent a request."""
-        if self.writer is not None:
-            self._writer_seen(self.writer, now)
+        self.writer_seen = unit.cell.writer_seen
 
 
 class Session:
@@ -69,44 +64,41 @@ class Session:
 
     def received(self, count: int, now: float) -> bytes:
         """`count` bytes were written to `buffer.space`; returns the answers to all requests that are complete."""
-        buffer, reads = self.buffer, self._reads
-        data, end = buffer.data, buffer.end + count
-        unpack = _READ.unpack_from
+        buffer = self.buffer
+        if count == _READ_FRAME and not buffer.end:
+            transaction, protocol, length, key, address, quantity = _unpack_read(buffer.data)
+            read = self._reads.get(key)
+            if read is not None and length == _READ_LENGTH and not protocol:
+                reach, image, heads, access = read
+                if 0 < quantity <= reach[address]:
+                    if access.writer is not None:
+                        access.writer_seen(access.writer, now)
+                    first = 2 * address
+                    answer: bytes = transaction + heads[quantity] + image[first : first + 2 * quantity]
+                    return answer
+        return self._answers(buffer.end + count, now)
+
+    def _answers(self, end: int, now: float) -> bytes:
+        """The answers to all requests that are complete before `end` of the buffer."""
         answers = []
         start = 0
-        seen: Access | None = None
-        while start < end:
-            if end - start >= _READ_FRAME:
-                transaction, protocol, length, key, address, quantity = unpack(data, start)
-                read = reads.get(key)
-                if read is not None and length == _READ_LENGTH and not protocol:
-                    reach, image, heads, access = read
-                    if 0 < quantity <= reach[address]:
-                        first = 2 * address
-                        answers.append(transaction + heads[quantity] + image[first : first + 2 * quantity])
-                        start += _READ_FRAME
-                        if access is not seen:
-                            seen = access
-                            access.seen(now)
-                        continue
-            try:
-                frame = split(data, start, end)
-            except FramingError as error:
-                self.broken = str(error)
-                break
-            if frame is None:
-                break
-            start = frame.end
-            answers.append(encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now)))
-        if start != end or buffer.end:
-            buffer.discard(start, end)
-        return answers[0] if len(answers) == 1 else b"".join(answers)
+        try:
+            while (frame := split(self.buffer.data, start, end)) is not None:
+                start = frame.end
+                answers.append(
+                    encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now))
+                )
+        except FramingError as error:
+            self.broken = str(error)
+        self.buffer.discard(start, end)
+        return b"".join(answers)
 
     def _answer(self, unit: int, pdu: bytes, now: float) -> bytes:
         access = self._accesses.get(unit)
         if access is None:
             return exception(pdu[0], ExceptionCode.TARGET_FAILED)
-        access.seen(now)
+        if access.writer is not None:
+            access.writer_seen(access.writer, now)
         return execute(access.unit, access.writer, pdu, now)
 
 
