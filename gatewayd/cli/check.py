@@ -34,7 +34,7 @@ Examples:
 A finding looks like this:
   cell.yaml:12:53: error GW214 register-overlap: `parts` lies at holding registers 101 to 102 (400102 to 400103), ...
       cell.yaml:11:53: `cycles`, holding registers 100 to 101 (400101 to 400102), first used here
-      hint: the first free address behind all others is 102 (400103)
+      hint: the line fits at 102 to 103 (400103 to 400104)
 
 \b
 Exit codes:

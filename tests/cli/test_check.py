@@ -149,6 +149,28 @@ def test_help_teaches_by_examples() -> None:
     assert "Exit codes:" in output
 
 
+@pytest.mark.parametrize("variable,coloured", [("PATH", True), ("NO_COLOR", False)])
+def test_colour_is_for_terminals(variable: str, coloured: bool) -> None:
+    """Findings are coloured on a terminal, unless NO_COLOR is set."""
+    terminal, end = os.openpty()
+    environment = {name: value for name, value in os.environ.items() if name != "NO_COLOR"} | {
+        "TERM": "xterm"
+    }
+    environment.setdefault(variable, "1")
+    subprocess.run(
+        [sys.executable, "-m", "gatewayd", "check", str(BAD)],
+        stdout=end,
+        check=False,
+        timeout=30,
+        env=environment,
+    )
+    os.close(end)
+    output = os.read(terminal, 4096)
+    os.close(terminal)
+    assert b"GW214" in output
+    assert (b"\x1b[31m" in output) == coloured
+
+
 def test_as_a_process_it_imports_no_server() -> None:
     """Neither pymodbus, nor asyncio, nor rich is paid for."""
     script = (

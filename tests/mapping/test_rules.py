@@ -108,7 +108,28 @@ def test_related_place_is_the_first_use() -> None:
     assert (found.position.line, found.position.column) == (base + 2, 45)
     assert [(item.position.line, item.position.column) for item in found.related] == [(base + 1, 45)]
     assert "100 to 101 (400101 to 400102)" in found.message
-    assert found.hint == "the first free address behind all others is 1000 (401001)"
+    assert found.hint == "the line fits at 103 to 104 (400104 to 400105)"
+
+
+ROOM = {
+    "behind the other": ("a: {robot: output_int_register_0, modbus: 100}", "101", "102 to 103 (400103 to 400104)"),
+    "between two others": (
+        "a: {robot: output_int_register_0, modbus: [100, 104, 110]}", "101", "102 to 103 (400103 to 400104)",
+    ),
+    "behind a gap that is too small": (
+        "a: {robot: output_int_register_0, modbus: [100, 103, 110]}", "101", "105 to 106 (400106 to 400107)",
+    ),
+    "nowhere": ("a: {robot: output_int_register_0, modbus: 59998}", "59998", ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("other,address,room", ROOM.values(), ids=ROOM.keys())
+def test_the_remedy_of_an_overlap_is_a_place_that_fits(other: str, address: str, room: str) -> None:
+    """The next room behind the place that was meant, or none."""
+    text = f"{HEAD}  {other}\n  b: {{robot: output_int_register_1, modbus: {address}}}\n"
+    (found,) = load(text.encode(), "cell.yaml").diagnostics
+    expected = f"the line fits at {room}" if room else "shorten one of the two lines, or use another area"
+    assert found.hint == expected
 
 
 OVERLAPS = {
