@@ -21,8 +21,8 @@ class Change:
     variable: int
     value: Value
     implied: bool = False
-    """A bit that is written only because its whole register is. It is written if the writer may have its lock without
-    a takeover; otherwise it must carry its present value, or the request is refused."""
+    """A bit that is written only because its whole register is. Where somebody else holds its lock, or the writer may
+    never have it, an unchanged bit is let pass unwritten; a changed one is judged like any other."""
 
 
 @dataclass(slots=True)
@@ -86,7 +86,7 @@ class Admission:
             return Refusal(Reason.ROBOT_LOST, index)
         if not self._image.available[index]:
             return None if unchanged else Refusal(Reason.CLAIMED_ELSEWHERE, index)
-        if not takeable and (change.implied or standing is Standing.LOWER):
+        if standing is Standing.LOWER:
             return Refusal(Reason.HELD, index, self._ownership.owners[lock])
         if not owned:
             verdict.moves[lock] = MOVES[standing, Act.WRITE]

@@ -75,7 +75,7 @@ class Cell:
         verdict = self._admission.judge(writer, changes, adopted=self._adopted)
         refusal = verdict.refusal
         if refusal is not None:
-            if writer is not None and refusal.reason.of_the_robot:
+            if writer is not None and refusal.reason.renews:
                 self._renew(writer, verdict.moves, now)
             self.refuse(writer, refusal, now, _value_for(changes, refusal.variable))
             return refusal

@@ -68,13 +68,20 @@ def test_without_a_robot_only_own_locks_are_renewed(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize("value, accepted", [(False, True), (True, False)])
-@pytest.mark.parametrize("owner, writer", [(PLC, HMI), (HMI, PLC)])
-def test_an_implied_bit_of_a_lower_or_higher_owner_passes_only_unchanged(
-    desk: Desk, owner: int, writer: int, value: bool, accepted: bool
+def test_an_implied_bit_of_a_higher_owner_passes_only_unchanged(
+    desk: Desk, value: bool, accepted: bool
 ) -> None:
-    desk.ownership.apply(1, owner, Move.ACQUIRE, 0.0)
-    verdict = desk.judge(writer, Change(LAMP, value, implied=True))
-    assert verdict == Verdict(None if accepted else Refusal(Reason.HELD, LAMP, owner))
+    desk.ownership.apply(1, PLC, Move.ACQUIRE, 0.0)
+    verdict = desk.judge(HMI, Change(LAMP, value, implied=True))
+    assert verdict == Verdict(None if accepted else Refusal(Reason.HELD, LAMP, PLC))
+
+
+@pytest.mark.parametrize("value, moves", [(False, {}), (True, {1: Move.TAKE_OVER})])
+def test_an_implied_bit_of_a_lower_owner_is_taken_over_only_to_change_it(
+    desk: Desk, value: bool, moves: dict[int, Move]
+) -> None:
+    desk.ownership.apply(1, HMI, Move.ACQUIRE, 0.0)
+    assert desk.judge(PLC, Change(LAMP, value, implied=True)).moves == moves
 
 
 def test_an_explicit_bit_takes_over_even_unchanged(desk: Desk) -> None:

@@ -141,13 +141,21 @@ def test_an_implied_changed_bit_that_the_writer_may_never_write_refuses_all(cell
     assert cell.image.values[LAMP] is False
 
 
-@pytest.mark.parametrize("holder, writer", [(HMI, PLC), (PLC, HMI)])
-def test_an_implied_bit_takes_no_lock_over(cell: Cell, holder: int, writer: int) -> None:
-    write(cell, holder, LAMP, True, 1.0)
-    assert cell.write(writer, [Change(LAMP, True, implied=True)], 1.5) is None
-    assert cell.write(writer, [Change(LAMP, False, implied=True)], 1.5) == Refusal(Reason.HELD, LAMP, holder)
-    assert owner(cell, 1) == holder
+def test_an_implied_bit_of_a_higher_owner_must_keep_its_value(cell: Cell) -> None:
+    write(cell, PLC, LAMP, True, 1.0)
+    assert cell.write(HMI, [Change(LAMP, True, implied=True)], 1.5) is None
+    assert cell.write(HMI, [Change(LAMP, False, implied=True)], 1.5) == Refusal(Reason.HELD, LAMP, PLC)
+    assert owner(cell, 1) == PLC
     assert cell.image.values[LAMP] is True
+
+
+def test_an_implied_bit_takes_a_lock_over_only_to_change_it(cell: Cell) -> None:
+    write(cell, HMI, LAMP, True, 1.0)
+    assert cell.write(PLC, [Change(LAMP, True, implied=True)], 1.5) is None
+    assert owner(cell, 1) == HMI
+    assert cell.write(PLC, [Change(LAMP, False, implied=True)], 1.5) is None
+    assert owner(cell, 1) == PLC
+    assert cell.image.values[LAMP] is False
 
 
 def test_an_implied_bit_of_a_robot_output_may_pass_unchanged(cell: Cell) -> None:

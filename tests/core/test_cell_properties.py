@@ -267,7 +267,7 @@ class Model:
             return None if self.untouched(change) else Refusal(Reason.CLAIMED_ELSEWHERE, index)
         lock = LOCK_OF[index]
         holder = self.owner[lock]
-        if holder in (None, writer) or (not change.implied and self.outranks(writer, lock)):
+        if holder in (None, writer) or self.outranks(writer, lock):
             return None
         return Refusal(Reason.HELD, index, holder)
 
@@ -286,7 +286,7 @@ class Model:
         refusals = [refusal for change in request if (refusal := self.judge(writer, change)) is not None]
         if refusals:
             refusal = min(refusals, key=lambda one: TELLING_ORDER.index(one.reason))
-            if refusal.reason in (Reason.ROBOT_LOST, Reason.CLAIMED_ELSEWHERE) and writer is not None:
+            if refusal.reason is Reason.ROBOT_LOST and writer is not None:
                 for change in request:
                     lock = LOCK_OF.get(change.variable)
                     if lock is not None and self.owner[lock] == writer:

@@ -25,8 +25,5 @@ def test_what_can_never_work_is_told_before_what_may_pass() -> None:
     assert set(sorted(Reason, key=PRECEDENCE.__getitem__)[-3:]) == passing
 
 
-def test_only_the_robots_reasons_are_of_the_robot() -> None:
-    assert {reason for reason in Reason if reason.of_the_robot} == {
-        Reason.ROBOT_LOST,
-        Reason.CLAIMED_ELSEWHERE,
-    }
+def test_only_a_lost_robot_leaves_an_owner_its_lease() -> None:
+    assert [reason for reason in Reason if reason.renews] == [Reason.ROBOT_LOST]
