@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from gatewayd.core import status
 from gatewayd.mapping.diagnostics import Diagnostic, Rule
 from gatewayd.mapping.loader import load, load_together
-from gatewayd.mapping.rules import catalogue
+from gatewayd.mapping.rules import bounds, catalogue, places
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
@@ -96,6 +97,12 @@ def test_every_check_has_its_own_rule() -> None:
     """Nothing is entered twice."""
     entered = [rule.id for rule, _ in [*CELL_CHECKS, *PLANT_CHECKS]]
     assert len(entered) == len(set(entered))
+
+
+def test_bounds_are_those_of_the_status_block() -> None:
+    """Said twice, so that a check need not import the running core."""
+    assert places.FIRST_STATUS_REGISTER == status.BASE
+    assert (bounds.MAXIMUM_VARIABLES, bounds.MAXIMUM_WRITERS) == (status.MAX_VARIABLES, status.MAX_WRITERS)
 
 
 def test_related_place_is_the_first_use() -> None:

@@ -195,7 +195,7 @@ def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     """
 Between two packages nothing can be known. With `stale_after` shorter than that, every value would be
 stale before its successor can come, and all fallbacks would act all the time. Leave it out (five periods,
-at least 50ms), or give it several periods.
+at least 100ms), or give it several periods.
 """,
 )
 def stale_too_soon(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
