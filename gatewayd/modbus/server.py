@@ -79,6 +79,7 @@ class _Connection(ServerRequestHandler):
         self.address: Address | None = None
         self.accesses: dict[int, Access] = {}
         self.last_request = 0.0
+        """When the last whole request came in; bytes that make none keep no connection open."""
         self.stalled_since: float | None = None
         self.reason = "closed by the peer"
         self.descriptor = -1
@@ -119,7 +120,6 @@ class _Connection(ServerRequestHandler):
         if not count:
             self.drop("closed by the peer")
             return
-        self.last_request = now
         try:
             answers = session.received(count, now)
         except Exception:  # noqa: BLE001 - a defect of ours costs this connection, not the others
@@ -128,6 +128,7 @@ class _Connection(ServerRequestHandler):
             self.abort("internal error")
             return
         if answers:
+            self.last_request = now
             try:
                 sent = os.write(self.descriptor, answers)
             except (BlockingIOError, InterruptedError):

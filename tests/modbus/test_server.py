@@ -9,6 +9,7 @@ import socket
 import struct
 import time
 from collections.abc import Awaitable, Callable
+from itertools import islice
 
 import pytest
 
@@ -175,22 +176,26 @@ async def test_a_full_listener_closes_the_connection_that_was_unused_longest(
         writer.close()
 
 
-async def test_an_idle_connection_is_closed(
+async def test_a_connection_without_requests_is_closed(
     live_cell: Cell, plan_of: PlanOf, events: list[PeerEvent]
 ) -> None:
+    """Bytes that never become a request are none."""
     listener = ModbusListener("127.0.0.1", 0, observe=events.append)
     listener.serve([(plan_of(idle_timeout=0.2), live_cell)])
     await listener.start()
-    idle, busy = await dial(listener), await dial(listener)
+    idle, dripping, busy = [await dial(listener) for _ in range(3)]
     begin = time.monotonic()
+    drops = iter(READ[:5])
     while time.monotonic() - begin < 0.5:
         assert await is_served(*busy)
-        await asyncio.sleep(0.02)
+        dripping[1].write(bytes(islice(drops, 1)))
+        await asyncio.sleep(0.03)
     assert await idle[0].read() == b""
+    assert await dripping[0].read() == b""
     assert [event.reason for event in events if event.kind is PeerEventKind.DISCONNECTED] == [
         "no request for 0.2 s"
-    ]
-    for _reader, writer in (idle, busy):
+    ] * 2
+    for _reader, writer in (idle, dripping, busy):
         writer.close()
     await listener.close()
 
@@ -370,3 +375,18 @@ async def test_values_of_one_request_are_of_one_moment(listener: ModbusListener,
     await task
     assert len(seen) > 10
     writer.close()
+
+
+async def test_listens_on_ipv6(live_cell: Cell, plan_of: PlanOf, events: list[PeerEvent]) -> None:
+    listener = ModbusListener("::1", 0, observe=events.append)
+    listener.serve([(plan_of(allow=("::1/128",)), live_cell)])
+    try:
+        await listener.start()
+    except ListenError:
+        pytest.skip("this machine has no IPv6 loopback")
+    assert listener.name == "[::1]:0"
+    reader, writer = await asyncio.open_connection("::1", listener.port)
+    assert await is_served(reader, writer)
+    assert events[0].peer == f"[::1]:{writer.get_extra_info('sockname')[1]}"
+    writer.close()
+    await listener.close()

@@ -147,3 +147,14 @@ def test_units_can_be_exchanged_between_two_requests(session: Session, unit: Uni
     assert feed(session, stream("03 000a 0001")) == bytes.fromhex("0001 0000 0003 01 83 0b")
     session.serve({7: Access(unit, PLC)})
     assert feed(session, stream("03 000a 0001", unit=7)) == bytes.fromhex("0001 0000 0005 07 03 02 0000")
+
+
+def test_what_is_held_back_is_so_for_connections_that_exist(session: Session, cell: Cell) -> None:
+    request = stream("03 012c 0001")
+    assert feed(session, request) == bytes.fromhex("0001 0000 0005 01 03 02 0000")
+    cell.robot_lost("cable", NOW)
+    assert feed(session, request) == bytes.fromhex("0001 0000 0003 01 83 0b")
+    cell.robot_connected(NOW)
+    cell.package_arrived(2.0, NOW)
+    cell.outputs_written(NOW)
+    assert feed(session, request) == bytes.fromhex("0001 0000 0005 01 03 02 0000")
