@@ -227,6 +227,25 @@ variables:
     daemon.wait_for_line("register available", "field=input_int_register_5")
 
 
+def test_claims_of_the_last_connection_linger(plant: Plant) -> None:
+    """A controller may keep the claims of a dead connection for a while: the gateway's own are its own again."""
+    simulator = plant.simulator("--program", "demo", "--linger", "1200")
+    daemon = plant.daemon(plant.mapping(CELL, simulator.port))
+    plc = plant.ready_plc()
+    assert plc.write_integers(0, 7) == 0
+    wait_for(lambda: plc.integers(20) == [7], "the echo")
+    simulator.do("drop-clients")
+    daemon.wait_for_line("register unavailable", "field=input_int_register_0", "IN_USE")
+    wait_for(lambda: plc.robot_state == FRESH, "the next session")
+    assert plc.quality(COMMAND) == UNAVAILABLE
+    assert plc.write_integers(0, 8) == NO_PATH
+    wait_for(lambda: qualities(plc) == [GOOD] * 8, "the registers to be good again")
+    assert plc.integers(0) == [7]
+    assert simulator.integer("input_int_register_0") == 7
+    assert plc.write_integers(0, 9) == 0
+    wait_for(lambda: simulator.integer("input_int_register_0") == 9, "a write")
+
+
 def test_robot_messages_are_logged_on_one_line(plant: Plant) -> None:
     simulator = plant.simulator("--program", "demo", "--text-on-connect", "SafetySetup not confirmed")
     daemon = plant.daemon(plant.mapping(CELL, simulator.port))
