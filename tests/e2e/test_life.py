@@ -13,6 +13,7 @@ import pytest
 from tests.e2e.plant import Plant
 from tests.e2e.plc import FAILED, HMI, PLC, Plc
 from tests.e2e.processes import HOST, Simulator, free_port, wait_for
+from tests.e2e.slow_names import NAME
 
 CELL = f"""\
 writers:
@@ -93,6 +94,22 @@ def test_stops_within_a_second_whatever_its_peers_do(plant: Plant) -> None:
     print(f"SIGTERM beside hanging peers -> exit {code}: {took * 1000:.0f} ms")
     assert code == 0
     assert took < 1
+
+
+def test_stops_within_a_second_while_a_name_is_looked_up(plant: Plant) -> None:
+    """The system's resolver cannot be interrupted; it must not hold the process."""
+    path = plant.mapping(CELL, 30004)
+    path.write_text(path.read_text().replace(f"host: {HOST}", f"host: {NAME}"))
+    daemon = plant.start("slow_names", "run", str(path))
+    daemon.wait_for_line("listening for Modbus")
+    assert "does not answer" in daemon.wait_for_line("no robot", NAME)
+    start = time.monotonic()
+    daemon.signal(signal.SIGTERM)
+    assert daemon.wait() == 0
+    took = time.monotonic() - start
+    print(f"SIGTERM while a name is looked up: {took * 1000:.0f} ms")
+    assert took < 1
+    daemon.wait_for_line("stopped")
 
 
 def test_stops_at_once_before_anything_was_there(plant: Plant) -> None:
