@@ -102,8 +102,8 @@ async def _play(console: Console, port: int, told: str, seconds: float | None, *
     scene.listen_to_logs()
     async with scene.playing():
         console.print(
-            f"[bold]gatewayd demo[/]: robot (simulated) {HOST}:{scene.robot.port}, "
-            f"gateway Modbus TCP [bold]{HOST}:{port}[/]{told}, PLC from {PLC_ADDRESS}",
+            f"[bold]gatewayd demo[/]: simulated robot on port {scene.robot.port}, "
+            f"gateway on Modbus TCP [bold]{HOST}:{port}[/]{told}, PLC at {PLC_ADDRESS}",
             soft_wrap=True,
         )
         if live:

@@ -122,7 +122,7 @@ def snapshot(scene: Scene, now: float) -> Snapshot:
 
 
 def describe(event: Event, cell: Cell) -> str:
-    """The event as a sentence without its capital and full stop: `you wrote part_number = 7: refused with exception 06, held by plc`."""
+    """The event in words: `you wrote part_number = 7: refused with exception 06, held by plc`."""
     return " ".join(_words(event, cell))
 
 

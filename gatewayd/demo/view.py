@@ -56,7 +56,7 @@ def screen(shot: Snapshot, before: Snapshot | None, pokes: Sequence[Poke], width
     shown = list(pokes) if height >= fixed + _LEAST_EVENTS + len(pokes) + _FRAME_OF_POKES else []
     room = height - fixed - (len(shown) + _FRAME_OF_POKES if shown else 0) - _ABOVE
     events = min(max(room, _LEAST_EVENTS), _MOST_EVENTS)
-    parts: list[RenderableType] = [_links(shot), table, *_events(shot, events)]
+    parts: list[RenderableType] = [_links(shot, wide=width >= _SPACIOUS), table, *_events(shot, events)]
     if shown:
         parts.extend(_hints(shown))
     return Group(*parts)
@@ -78,7 +78,7 @@ def plain(shot: Snapshot) -> str:
     return "\n".join([links, *lines, *(f"  {one.clock} {one.text}" for one in shot.happenings[-3:]), ""])
 
 
-def _links(shot: Snapshot) -> Text:
+def _links(shot: Snapshot, *, wide: bool) -> Text:
     text = Text(no_wrap=True, overflow="ellipsis")
     text.append(" ● ", "green" if shot.fresh else "red").append("robot ", "bold")
     text.append(f"{shot.frequency:.1f} Hz" if shot.fresh else shot.robot)
@@ -87,15 +87,15 @@ def _links(shot: Snapshot) -> Text:
     text.append(f"{shot.handshakes} handshakes, {shot.verified} values right")
     if shot.wrong:
         text.append(f", {shot.wrong} wrong", "bold red")
-    text.append(f"   {shot.accepted} writes, ")
+    text.append(f"   {shot.accepted} writes, " if wide else "   ")
     return text.append(f"{shot.refused} refused", "bold red" if shot.refused else "")
 
 
 def _table(lines: Sequence[Line], old: dict[int, str], *, wide: bool, gap: int) -> Table:
     table = Table(box=box.SIMPLE_HEAD, padding=(0, gap, 0, 0), pad_edge=False)
     table.add_column("   variable", no_wrap=True, min_width=14)
-    table.add_column("robot register", no_wrap=True, overflow="ellipsis")
-    table.add_column("Modbus", justify="right", no_wrap=True)
+    table.add_column("robot register", no_wrap=True, max_width=None if wide else 20)
+    table.add_column("Modbus", justify="right", no_wrap=True, min_width=6)
     if wide:
         table.add_column("4xxxxx", no_wrap=True)
     table.add_column("value", justify="right", no_wrap=True, min_width=8)
