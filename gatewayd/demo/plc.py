@@ -166,6 +166,7 @@ class Plc:
         self.connected = False
         self.refused = 0
         """Writes that were answered with an exception."""
+        self._stopped = False
         self._client = AsyncModbusTcpClient(
             host,
             port=port,
@@ -175,10 +176,14 @@ class Plc:
             reconnect_delay=0,
         )
 
+    def stop(self) -> None:
+        """End `run` after the present scan. Cancelling alone is not enough: a connect that succeeds swallows it."""
+        self._stopped = True
+
     async def run(self) -> None:
-        """Scan until cancelled; a lost connection is made anew."""
+        """Scan until `stop`; a lost connection is made anew."""
         try:
-            while True:
+            while not self._stopped:
                 try:
                     self.connected = self._client.connected or await self._client.connect()
                     if self.connected:

@@ -78,6 +78,7 @@ class Scene:
             try:
                 yield
             finally:
+                self.plc.stop()
                 plc.cancel()
                 with suppress(asyncio.CancelledError):
                     await plc

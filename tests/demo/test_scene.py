@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 from importlib.resources import files
 
@@ -42,3 +43,12 @@ async def test_somebody_else_is_refused_with_busy(scene: Scene, until) -> None: 
 def test_port_in_use_is_not_free() -> None:
     with socket.create_server((HOST, 0)) as taken, pytest.raises(OSError, match="in use"):
         free_port(HOST, taken.getsockname()[1])
+
+
+@pytest.mark.parametrize("milliseconds", [0, 0.5, 1, 1.5, 2, 20])
+async def test_ends_at_any_time(milliseconds: float) -> None:
+    """Also while the PLC is about to connect."""
+    scene = Scene(0)
+    async with asyncio.timeout(10):
+        async with scene.playing():
+            await asyncio.sleep(milliseconds / 1000)
