@@ -202,7 +202,7 @@ class RobotLink:
         refused = {(one.field, one.output): f"{one.word}: {one.hint}" for one in session.unavailable}
         for index, variable in enumerate(self._cell.definition.variables):
             reason = refused.get((variable.field, variable.direction is Direction.OUTPUT))
-            self._cell.set_availability([index], reason is None, reason or variable.field, now)
+            self._cell.set_availability([index], reason is None, reason or "", now)
 
     def _adopt(self, session: Session, flat: Sequence[Value], now: float) -> None:
         """Take over what the controller's inputs hold, as the package reads them back."""
