@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 import click
@@ -101,30 +102,29 @@ def _type(schema: Mapping[str, Any]) -> str:
 
 
 def _types(schema: Mapping[str, Any]) -> Iterator[str]:
-    pattern = schema.get("pattern", "")
     if "anyOf" in schema:
         for choice in schema["anyOf"]:
             yield from _types(choice)
-    elif "$ref" in schema:
-        yield "table"
-    elif "enum" in schema:
-        yield from (f"`{word}`" for word in schema["enum"])
-    elif "const" in schema:
-        yield f"`{schema['const']}`"
-    elif _DURATION.search(pattern):
+    elif "enum" in schema or "const" in schema:
+        yield from (f"`{word}`" for word in schema.get("enum", [schema.get("const")]))
+    elif _DURATION.search(schema.get("pattern", "")):
         yield "duration"
-        if "none" in pattern:
+        if "none" in schema["pattern"]:
             yield "`none`"
-    elif schema["type"] == "array":
-        yield "two numbers" if "prefixItems" in schema else "list"
-    elif schema["type"] == "object":
-        yield "table"
-    elif schema["type"] in ("integer", "number"):
-        yield {"integer": "whole number", "number": "number"}[schema["type"]] + _range(schema)
-    elif schema["type"] == "boolean":
-        yield "`true`, `false`"
+    elif "prefixItems" in schema:
+        yield "two numbers"
     else:
-        yield "text"
+        yield _TYPES[schema.get("type", "object")] + _range(schema)
+
+
+_TYPES = {
+    "array": "list",
+    "boolean": "`true`, `false`",
+    "integer": "whole number",
+    "number": "number",
+    "object": "table",
+    "string": "text",
+}
 
 
 def _range(schema: Mapping[str, Any]) -> str:
@@ -160,8 +160,9 @@ def help_text(name: str) -> str:
 
 def command_line() -> str:
     """The help of every command."""
-    parts = [f"## gatewayd\n\n```text\n{help_text('')}\n```"]
-    parts += [f"## gatewayd {name}\n\n```text\n{help_text(name)}\n```" for name in COMMANDS]
+    parts = [
+        f"## gatewayd {name}".rstrip() + "\n\n" + indent(help_text(name), "    ") for name in ("", *COMMANDS)
+    ]
     return "\n\n".join(parts)
 
 
@@ -291,7 +292,11 @@ def _fields(fields: Mapping[str, Field]) -> str:
         numbered = _NUMBERED.fullmatch(name)
         stem, number = (numbered[1], int(numbered[2])) if numbered else (name, -1)
         same = (
-            rows and numbered and rows[-1][1:] == facts and ranges[-1][0] == stem and ranges[-1][2] + 1 == number
+            rows
+            and numbered
+            and rows[-1][1:] == facts
+            and ranges[-1][0] == stem
+            and ranges[-1][2] + 1 == number
         )
         if same:
             ranges[-1] = (stem, ranges[-1][1], number)
@@ -312,15 +317,21 @@ def _since(field: Field, series: Series) -> str:
 # -- architecture -----------------------------------------------------------------------------------------------------
 
 
+_FOLDERS = ("core", "rtde", "robot", "simulator", "mapping", "mapping/rules", "modbus", "demo", "cli")
+"""Packages in the order in which a reader meets them; others follow by name."""
+
+
 def modules() -> str:
     """Every module with the first sentence of its docstring, by package."""
     parts = []
     package = ROOT / "gatewayd"
-    folders = ["core", "rtde", "simulator", "mapping", "mapping/rules", "modbus", "demo", "cli"]
-    assert {path.parent for path in package.rglob("*.py")} == {package, *(package / name for name in folders)}
-    for folder in ["", *folders]:
+    folders = {path.parent.relative_to(package).as_posix() for path in package.rglob("__init__.py")} - {"."}
+    known = [name for name in _FOLDERS if name in folders]
+    for folder in ["", *known, *sorted(folders.difference(known))]:
         rows = [(f"`{path.stem}`", _subject(path)) for path in sorted((package / folder).glob("[!_]*.py"))]
-        title = f"`gatewayd/{folder}/`: {_subject(package / folder / '__init__.py')}" if folder else "`gatewayd/`"
+        title = (
+            f"`gatewayd/{folder}/`: {_subject(package / folder / '__init__.py')}" if folder else "`gatewayd/`"
+        )
         parts.append(f"### {title}\n\n" + _table(("module", "subject"), rows))
     return "\n\n".join(parts)
 
