@@ -20,10 +20,10 @@ FILE = re.compile(r"<!-- file: (\S+) -->\n```yaml\n(.*?)^```", re.MULTILINE | re
 ELSEWHERE = {
     r'export PATH="\$PWD/\.venv/bin:\$PATH"': "the shell's own",
     r"gatewayd demo": "tests/cli/test_demo.py",
-    r"gatewayd run .*": "test_tutorial_works below, tests/e2e",
+    r"gatewayd run .*": "tests/docs/test_tutorial.py, tests/e2e",
     r"gatewayd simulate .*": "test_simulator_takes_the_options_of_the_guides below, tests/cli/test_simulate.py",
     r"mbpoll -0 -p 1502 -t 4:int -B -r 101 -c 2 127\.0\.0\.1": "tests/demo/test_view.py: the demonstration's own",
-    r"mbpoll -0 .*": "test_tutorial_works below, with another Modbus client",
+    r"mbpoll -0 .*": "tests/docs/test_tutorial.py, with another Modbus client",
     r"make (bench|demo)\b.*": "the Makefile; tests/test_docs.py knows its targets",
     r"apt install .*|apt-get install .*": "the system's",
 }
