@@ -119,7 +119,7 @@ def _cells(line: Line, *, changed: bool, wide: bool) -> Iterator[Text]:
     yield Text(line.address)
     if wide:
         yield Text(line.row.notation, "dim")
-    yield Text(line.value, "bold reverse" if changed and line.row.name != "tool_height" else "bold")
+    yield Text(line.value, "bold yellow" if changed and line.row.name != "tool_height" else "bold")
     yield Text(line.quality.name.lower(), _QUALITY_STYLES[line.quality])
     yield Text(line.age, "dim")
     if line.refused:
