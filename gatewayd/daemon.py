@@ -67,6 +67,24 @@ class Daemon:
             listener.serve(served)
             self.listeners.append(listener)
 
+    @property
+    def cells(self) -> list[Cell]:
+        """The cells that are served now."""
+        return [station.cell for station in self.stations]
+
+    def turns(self) -> dict[str, int]:
+        """A counter for each part that has to go on: cores, robot links, listeners. 0: it has not begun."""
+        found = {f"listener {listener.name}": listener.turns for listener in self.listeners}
+        for station in self.stations:
+            name = station.plan.cell.name
+            found[f"core of {name}"] = station.cell.health.heartbeat
+            found[f"robot link of {name}"] = station.robot.turns
+        return found
+
+    def troubles(self) -> list[str]:
+        """What concerns the gateway as a whole."""
+        return [f"not listening on {one.name}" for one in self.listeners if not one.listening]
+
     async def run(self, stop: asyncio.Event) -> None:
         """Serve until `stop` is set; then release every lock, give the robots the fallbacks, and close."""
         clocks = [_keep_running(partial(_tick, station.cell)) for station in self.stations]

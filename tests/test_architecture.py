@@ -30,10 +30,27 @@ LAYERS: dict[str, set[str]] = {
     "modbus": {"core", "logs", "mapping.codec", "mapping.plan", "modbus"},
     "logs": set(),
     "eventlog": {"core", "logs"},
+    "liveness": set(),
+    "sentence": {"core"},
+    "service": {"core", "liveness", "logs", "sentence", "systemd"},
     "startup": {"logs", "mapping"},
+    "systemd": set(),
     "daemon": {"core", "eventlog", "logs", "mapping", "modbus", "robot"},
     "demo": {"core", "daemon", "demo", "eventlog", "logs", "mapping", "modbus", "rtde", "simulator"},
-    "cli": {"cli", "core", "daemon", "demo", "eventlog", "logs", "mapping", "rtde", "simulator", "startup"},
+    "cli": {
+        "cli",
+        "core",
+        "daemon",
+        "demo",
+        "eventlog",
+        "logs",
+        "mapping",
+        "rtde",
+        "service",
+        "simulator",
+        "startup",
+        "systemd",
+    },
     "__main__": {"cli"},
 }
 """Module or package -> what it and everything in it may import; the longest name that fits decides."""
@@ -50,6 +67,7 @@ LIBRARIES: dict[str, set[str]] = {
 
 PURE = (
     "core",
+    "liveness",
     "mapping",
     "modbus.frames",
     "modbus.functions",
@@ -65,6 +83,7 @@ PURE = (
     "rtde.pace",
     "rtde.payloads",
     "rtde.recipe",
+    "sentence",
 )
 """What has no socket, no event loop and no clock."""
 

@@ -13,6 +13,7 @@ import click
 
 if TYPE_CHECKING:
     from gatewayd.daemon import Daemon
+    from gatewayd.startup import Startup
 
 __all__ = ["command"]
 
@@ -69,12 +70,22 @@ def command(files: tuple[Path, ...], log_format: str, log_level: str, *, strict:
         return UNREADABLE
     if not found.plans or (strict and (found.broken or found.unreadable)):
         return NOTHING_TO_RUN
-    asyncio.run(_serve(Daemon(found.plans)))
+    asyncio.run(_serve(Daemon(found.plans), _notes(found)))
     return 0
 
 
-async def _serve(daemon: Daemon) -> None:
+def _notes(found: Startup) -> list[str]:
+    """What the service manager shows until a reload mends it."""
+    count = found.broken + found.unreadable
+    return [f"{count} mapping file{'s' if count > 1 else ''} not served, see the log"] if count else []
+
+
+async def _serve(daemon: Daemon, notes: list[str]) -> None:
+    from gatewayd.service import Service
+    from gatewayd.systemd import Notifier
+
     stop = asyncio.Event()
+    service = Service(Notifier(os.environ, os.getpid()), daemon, notes)
     loop = asyncio.get_running_loop()
 
     def on_signal() -> None:
@@ -84,4 +95,6 @@ async def _serve(daemon: Daemon) -> None:
 
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, on_signal)
+    reporting = asyncio.create_task(service.run(stop))
     await daemon.run(stop)
+    await reporting

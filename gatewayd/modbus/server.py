@@ -224,6 +224,8 @@ class ModbusListener:
         self._denials = DenialLog()
         self._server: _Server | None = None
         self._sweeper: asyncio.TimerHandle | None = None
+        self.turns = 0
+        """Moves with each attempt to listen, and at least every other second from then on."""
 
     @property
     def port(self) -> int:
@@ -237,6 +239,11 @@ class ModbusListener:
         return len(self._connections)
 
     @property
+    def listening(self) -> bool:
+        """Whether connections are accepted now."""
+        return self._server is not None
+
+    @property
     def name(self) -> str:
         """Host and port, for messages."""
         return f"[{self._host}]:{self._port}" if ":" in self._host else f"{self._host}:{self._port}"
@@ -247,6 +254,7 @@ class ModbusListener:
         try:
             await server.listen()
         except OSError as error:
+            self.turns += 1
             remedy = _REMEDIES.get(error.errno or 0, "check modbus: listen:")
             cause = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
             message = f"cannot listen on {self.name}: {cause}; {remedy}"
@@ -388,6 +396,7 @@ class ModbusListener:
         return max(limited) if limited and len(limited) == len(timeouts) else None
 
     def _sweep(self) -> None:
+        self.turns += 1
         now = time.monotonic()
         idle = self._idle_timeout()
         for connection in list(self._connections):

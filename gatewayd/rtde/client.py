@@ -123,7 +123,9 @@ class RtdeClient:
         delay = self._settings.backoff
         attempts = 0
         while True:
+            self.statistics.turns += 1
             loss, lasted = await self._session()
+            self.statistics.turns += 1
             attempts = 0 if loss.started else attempts + 1
             if lasted > self._settings.backoff_limit:
                 delay = self._settings.backoff

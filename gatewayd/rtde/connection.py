@@ -277,6 +277,7 @@ class Connection(asyncio.Protocol):
             )
 
     def _request(self, message: ExecutableMessage) -> None:
+        self._statistics.turns += 1
         self._write(message)
         self._disarm()
         if not self.done.done():
@@ -302,6 +303,7 @@ class Connection(asyncio.Protocol):
         self._fail(LossReason.UNANSWERED, f"{what} did not come within {self._tolerances.handshake:g} s")
 
     def _watch(self) -> None:
+        self._statistics.turns += 1
         now = monotonic()
         silence = now - self._heard
         if self._negotiation.running and silence > self._patience:

@@ -28,6 +28,8 @@ class Statistics:
     """Input packages sent."""
     frequency: float = 0.0
     """Packages per second, measured lately."""
+    turns: int = 0
+    """Moves at least every other second while the client works, whatever the controller does."""
 
 
 class Pace:

@@ -1,0 +1,71 @@
+"""How the gateway is, in one sentence that a human understands: `systemctl status` shows it.
+
+A good cell reads `press-3: robot fresh at 500 Hz, 2 of 2 writers connected, 3 locks held`. What is wrong comes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from gatewayd.core.cell import Cell
+from gatewayd.core.freshness import Source
+
+__all__ = ["GREATEST_LIST", "sentence"]
+
+GREATEST_LIST = 4
+"""Cells told one by one; of more, only those with trouble, and the others as a number."""
+
+_SOURCES = {
+    Source.LOST: "robot not connected",
+    Source.WAITING: "robot connected but sends no data yet",
+    Source.FRESH: "robot fresh",
+    Source.SILENT: "robot silent",
+    Source.FROZEN: "robot frozen, its clock stands still",
+}
+
+
+def sentence(cells: Sequence[Cell], troubles: Iterable[str] = ()) -> str:
+    """`troubles` concern the gateway as a whole and stand in front."""
+    ill = [cell for cell in cells if not _is_well(cell)]
+    well = [cell for cell in cells if _is_well(cell)]
+    parts = [trouble for trouble in troubles if trouble]
+    if len(cells) <= GREATEST_LIST:
+        parts += map(_told, [*ill, *well])
+    else:
+        parts += map(_told, ill[:GREATEST_LIST])
+        more = len(ill) - GREATEST_LIST
+        if more > 0:
+            parts.append(f"{_number(more, 'more cell')} with trouble")
+        if well:
+            parts.append(f"{'all' if not ill else 'the other'} {_number(len(well), 'cell')} well")
+    return "; ".join(parts) or "no cell to serve"
+
+
+def _is_well(cell: Cell) -> bool:
+    return cell.freshness.state is Source.FRESH and not _unavailable(cell) and all(cell.writers.alive)
+
+
+def _told(cell: Cell) -> str:
+    facts = [_SOURCES[cell.freshness.state]]
+    if cell.freshness.state is Source.FRESH:
+        facts[0] += f" at {round(cell.health.frequency)} Hz" if cell.health.frequency else ""
+        if not cell.accepts_writes:
+            facts.append("its inputs not adopted yet")
+    unavailable = _unavailable(cell)
+    if unavailable:
+        facts.append(f"{_number(unavailable, 'variable')} unavailable")
+    writers = cell.writers.alive
+    if writers:
+        facts.append(f"{sum(writers)} of {_number(len(writers), 'writer')} connected")
+    if cell.ownership.owners:
+        held = sum(owner is not None for owner in cell.ownership.owners)
+        facts.append(f"{_number(held, 'lock')} held")
+    return f"{cell.definition.name}: {', '.join(facts)}"
+
+
+def _unavailable(cell: Cell) -> int:
+    return cell.image.available.count(False)
+
+
+def _number(count: int, noun: str) -> str:
+    return f"{count or 'no'} {noun}{'' if count == 1 else 's'}"
