@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from gatewayd.core.cell import Cell
+from gatewayd.core.definition import OPERATOR
 from gatewayd.core.events import Event, EventKind
 from gatewayd.logs import fields
 
@@ -25,6 +26,8 @@ LEVELS = {
     EventKind.TAKEN_OVER: logging.WARNING,
     EventKind.FALLBACK: logging.WARNING,
     EventKind.REFUSED: logging.WARNING,
+    EventKind.FORCED: logging.WARNING,
+    EventKind.UNFORCED: logging.WARNING,
     EventKind.ACQUIRED: logging.DEBUG,
     EventKind.RELEASED: logging.DEBUG,
 }
@@ -33,8 +36,8 @@ LEVELS = {
 _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 
 
-_Story = tuple[EventKind, dict[str, object]]
-"""An event without its variable."""
+_Story = tuple[int, EventKind, dict[str, object]]
+"""Level and event, without its variable."""
 
 
 class EventLog:
@@ -53,9 +56,10 @@ class EventLog:
 
     def __call__(self, event: Event) -> None:
         """Log the event."""
-        if not self._log.isEnabledFor(LEVELS.get(event.kind, logging.INFO)):
+        level = _level(event)
+        if not self._log.isEnabledFor(level):
             return
-        story = event.kind, self._fields(event)
+        story = level, event.kind, self._fields(event)
         if story != self._waiting:
             self._flush()
             self._waiting = story
@@ -74,11 +78,11 @@ class EventLog:
     def _flush(self) -> None:
         if self._waiting is None:
             return
-        (kind, found), names = self._waiting, self._names
+        (level, kind, found), names = self._waiting, self._names
         self._waiting, self._names = None, []
         subject = {"variable" if len(names) == 1 else "variables": _ranges(names)} if names else {}
         told = {"cell": self._definition.name, **subject, **found}
-        self._log.log(LEVELS.get(kind, logging.INFO), kind.value, extra=fields(**told))
+        self._log.log(level, kind.value, extra=fields(**told))
 
     def _fields(self, event: Event) -> dict[str, object]:
         definition = self._definition
@@ -101,7 +105,12 @@ class EventLog:
     def _writer(self, index: int | None, *, unknown: bool = False) -> str | None:
         if index is None:
             return "undeclared" if unknown else None
-        return self._definition.writers[index].name
+        return self._definition.writer_name(index)
+
+
+def _level(event: Event) -> int:
+    """What the local operator does is unusual, and told with the default settings too."""
+    return logging.WARNING if event.writer == OPERATOR else LEVELS.get(event.kind, logging.INFO)
 
 
 def _ranges(names: Iterable[str]) -> str:

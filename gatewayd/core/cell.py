@@ -6,24 +6,31 @@ Links call it; it calls its `listeners` after values or qualities changed. Every
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gatewayd.core.admission import Admission, Change
-from gatewayd.core.definition import CellDefinition, Direction, FallbackKind, Value
+from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, FallbackKind, Value
 from gatewayd.core.events import Event, EventKind, EventRing
+from gatewayd.core.forcing import Force, Forcing
 from gatewayd.core.freshness import Freshness, Source
 from gatewayd.core.health import Health
 from gatewayd.core.image import ProcessImage
+from gatewayd.core.limits import within
 from gatewayd.core.ownership import Act, LockTable, Move
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.refusal_log import REFUSAL_INTERVAL, RefusalLog
 from gatewayd.core.supervision import WriterTable
 
-__all__ = ["HEARTBEAT_PERIOD", "REFUSAL_INTERVAL", "Cell", "Change", "LastRefusal"]
+__all__ = ["HEARTBEAT_PERIOD", "REFUSAL_INTERVAL", "Cell", "Change", "LastRefusal", "Written"]
 
 HEARTBEAT_PERIOD = 0.1
 """Seconds between two counts of the heartbeat."""
+
+
+Written = Sequence[tuple[int, Value, Value]]
+"""What a write changed: variable, old and new value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +53,10 @@ class Cell:
         self.freshness = Freshness(definition.stale_after)
         self.events = EventRing()
         self.health = Health()
+        self.forcing = Forcing(self.image)
         self.listeners: list[Callable[[Direction], None]] = []
+        self.write_listeners: list[Callable[[int, Written, float], None]] = []
+        """Told of every accepted write that changes something: writer, changes, time. They must not raise."""
         self.last_refusal: LastRefusal | None = None
         self._admission = Admission(definition.variables, self.ownership, self.image)
         self._refusals = RefusalLog(self.events.append)
@@ -81,6 +91,7 @@ class Cell:
             return refusal
         if writer is not None:
             self._move(writer, verdict.moves, now)
+            self._tell_written(writer, verdict.values, now)
         self._set_inputs(verdict.values, now)
         self.health.writes_accepted += 1
         return None
@@ -131,6 +142,84 @@ class Cell:
         if self.writers.disconnected(writer):
             self._writer_lost(writer, now, reason)
 
+    # -- local operator ------------------------------------------------------------------------------------------
+
+    def take_lock(self, lock: int, now: float, until: float = math.inf, detail: str = "") -> None:
+        """The local operator takes a lock from whoever holds it; nobody else gets it until `until` or `free_lock`.
+
+        Taking it again changes `until`. Values stay as they are.
+        """
+        self._release_expired(now)
+        self.forcing.hold(lock, until)
+        self._hold(lock, now, detail)
+
+    def free_lock(self, lock: int, now: float, detail: str = "") -> bool:
+        """The local operator releases a lock, whoever holds it; release fallbacks apply. Whether there was an owner."""
+        self._release_expired(now)
+        owner = self.ownership.owners[lock]
+        if owner is None:
+            return False
+        by = f"released by the local operator{detail and ' '}{detail}"
+        if owner == OPERATOR:
+            self.forcing.holds.pop(lock, None)
+            self._end_forces(
+                [one for one in self.ownership.locks[lock].members if one in self.forcing.forces], now, by
+            )
+        if self.ownership.owners[lock] is not None:
+            self._free([lock], now, by)
+        return True
+
+    def force(
+        self, variable: int, value: Value, now: float, until: float, detail: str = ""
+    ) -> Refusal | None:
+        """The local operator puts `value` in place of what the variable's source tells, at the latest until `until`.
+
+        The robot gets a forced input as the operator's, who holds its lock so long; the fieldbus sees a forced output.
+        Forcing it again changes value and `until`. Refused like any write: limits, robot, register.
+        """
+        self._release_expired(now)
+        declared = self.definition.variables[variable]
+        is_input = declared.direction is Direction.INPUT
+        if is_input:
+            verdict = self._admission.judge(OPERATOR, [Change(variable, value)], adopted=self._adopted)
+            allowed, refusal = dict(verdict.values).get(variable), verdict.refusal
+        else:
+            allowed, refusal = within(declared, value), None
+        if allowed is None:
+            refusal = refusal or Refusal(Reason.OUT_OF_LIMITS, variable)
+            self.refuse(OPERATOR, refusal, now, value)
+            return refusal
+        old = self.image.values[variable]
+        self.forcing.lift()
+        self.forcing.put(variable, Force(allowed, now, until))
+        if declared.lock is not None:
+            self._hold(declared.lock, now, detail)
+        self.events.append(
+            Event(
+                now, EventKind.FORCED, variable, declared.lock, OPERATOR, old=old, new=allowed, detail=detail
+            )
+        )
+        if is_input:
+            self._set_inputs([(variable, allowed)], now)
+        self._notify(Direction.OUTPUT)
+        return None
+
+    def unforce(self, variable: int, now: float, detail: str = "") -> bool:
+        """End a force: an output shows the truth again, an input's release fallback applies. Whether there was one."""
+        self._release_expired(now)
+        if variable not in self.forcing.forces:
+            return False
+        self._end_forces([variable], now, f"ended by the local operator{detail and ' '}{detail}")
+        return True
+
+    def stop(self, now: float, detail: str) -> None:
+        """End every force and release every lock, the operator's as well; release fallbacks apply."""
+        self.forcing.holds.clear()
+        self._end_forces(list(self.forcing.forces), now, detail)
+        self._free(
+            [lock for lock, owner in enumerate(self.ownership.owners) if owner is not None], now, detail
+        )
+
     # -- robot side ----------------------------------------------------------------------------------------------
 
     def robot_connected(self, now: float, detail: str = "") -> None:
@@ -149,6 +238,7 @@ class Cell:
         self._adopted = False
         self.health.frequency = 0.0
         self.events.append(Event(now, EventKind.ROBOT_LOST, detail=reason))
+        self.forcing.lift()
         self.image.inputs_lost()
         if was_fresh:
             self._outputs_lost()
@@ -163,6 +253,8 @@ class Cell:
         news = self.freshness.package(timestamp, now)
         if news and not was_fresh:
             self.events.append(Event(now, EventKind.FRESH))
+        if news:
+            self.forcing.lift()
         return news
 
     def outputs_written(self, now: float) -> None:
@@ -181,6 +273,7 @@ class Cell:
         if self.freshness.state is Source.LOST:
             return
         first, self._adopted = not self._adopted, True
+        self.forcing.lift()
         for index, value in values.items():
             self.image.tell(index, value, now)
         if first:
@@ -189,6 +282,7 @@ class Cell:
         if self.definition.clear_on_connect:
             wanted.update(filter(self._wants_fallback, self.image.inputs if first else values))
         self._fall_back(sorted(wanted), now)
+        self._force_inputs(now)
         self._notify(Direction.INPUT)
 
     def set_availability(self, variables: Iterable[int], available: bool, reason: str, now: float) -> None:
@@ -202,6 +296,7 @@ class Cell:
         if not changed:
             return
         kind = EventKind.AVAILABLE if available else EventKind.UNAVAILABLE
+        self.forcing.lift()
         for index in changed:
             self.image.set_available(index, available)
             self.events.append(Event(now, kind, variable=index, detail=reason))
@@ -270,7 +365,58 @@ class Cell:
             if move is Move.RENEW:
                 self.ownership.apply(lock, writer, move, now)
 
+    def _hold(self, lock: int, now: float, detail: str) -> None:
+        """The operator holds the lock for as long as its takes and forces last."""
+        until = self.forcing.until(lock, self.ownership.locks[lock].members)
+        assert until is not None
+        former = self.ownership.hold(lock, until)
+        if former != OPERATOR:
+            kind = EventKind.ACQUIRED if former is None else EventKind.TAKEN_OVER
+            self.events.append(Event(now, kind, lock=lock, writer=OPERATOR, other=former, detail=detail))
+
+    def _end_forces(self, variables: Sequence[int], now: float, detail: str) -> None:
+        self.forcing.lift()
+        for index in variables:
+            force = self.forcing.forces.pop(index)
+            self.events.append(
+                Event(
+                    now, EventKind.UNFORCED, variable=index, writer=OPERATOR, old=force.value, detail=detail
+                )
+            )
+        self._fall_back(
+            [index for index in variables if self.definition.variables[index].lock is not None], now
+        )
+        self._settle(
+            {lock for index in variables if (lock := self.definition.variables[index].lock) is not None},
+            now,
+            detail,
+        )
+        self.image.find_unreadable()
+        self._notify(Direction.INPUT)
+        self._notify(Direction.OUTPUT)
+
+    def _settle(self, locks: Iterable[int], now: float, detail: str) -> None:
+        """Release the locks that the operator no longer needs."""
+        for lock in sorted(locks):
+            until = self.forcing.until(lock, self.ownership.locks[lock].members)
+            if until is not None:
+                self.ownership.hold(lock, until)
+            elif self.ownership.owners[lock] == OPERATOR:
+                self._free([lock], now, detail)
+
+    def _force_inputs(self, now: float) -> None:
+        """The robot gets what is forced, whatever its inputs held when they were adopted."""
+        for index, force in self.forcing.forces.items():
+            if self.definition.variables[index].direction is Direction.INPUT and self.image.available[index]:
+                self.image.tell(index, force.value, now)
+
     def _release_expired(self, now: float) -> None:
+        forces, holds = self.forcing.due(now)
+        if forces or holds:
+            for lock in holds:
+                del self.forcing.holds[lock]
+            self._end_forces(forces, now, "time limit")
+            self._settle(holds, now, "time limit")
         expired = self.ownership.expired(now)
         if expired:
             self._free(expired, now, "lease ended")
@@ -312,7 +458,17 @@ class Cell:
             self._due_fallbacks.discard(index)
         self._notify(Direction.INPUT)
 
+    def _tell_written(self, writer: int, values: Sequence[tuple[int, Value]], now: float) -> None:
+        if not self.write_listeners:
+            return
+        present = self.image.values
+        changed = [(index, present[index], value) for index, value in values if present[index] != value]
+        if changed:
+            for listener in self.write_listeners:
+                listener(writer, changed, now)
+
     def _outputs_lost(self) -> None:
+        self.forcing.lift()
         self.image.outputs_lost()
         self._notify(Direction.OUTPUT)
 
@@ -325,6 +481,7 @@ class Cell:
             self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_PERIOD, now)
 
     def _notify(self, direction: Direction) -> None:
+        self.forcing.lay()
         for listener in self.listeners:
             listener(direction)
 

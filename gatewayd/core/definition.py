@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 __all__ = [
+    "OPERATOR",
     "CellDefinition",
     "Direction",
     "Fallback",
@@ -21,6 +22,13 @@ __all__ = [
     "Variable",
     "Writer",
 ]
+
+OPERATOR = 254
+"""Writer index of the local operator, who is in no mapping and ranks above every owner. People see 255.
+
+The index is the same for every cell and lies beyond all declared writers, so that a reload never gives it to another.
+Only the control socket acts under it.
+"""
 
 Value = bool | int | float
 """A value in the robot's own unit: bool for a bit, int for integers, float for doubles."""
@@ -153,3 +161,7 @@ class CellDefinition:
     """Seconds without a fresh package after which outputs are stale."""
     clear_on_connect: bool = False
     """After adopting the controller's inputs, give ownerless inputs their release fallback at once."""
+
+    def writer_name(self, writer: int) -> str:
+        """The name of a declared writer; `operator` for the local operator."""
+        return "operator" if writer == OPERATOR else self.writers[writer].name

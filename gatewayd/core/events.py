@@ -34,6 +34,8 @@ class EventKind(Enum):
     RELEASED = "lock released"
     FALLBACK = "fallback applied"
     REFUSED = "write refused"
+    FORCED = "value forced"
+    UNFORCED = "force ended"
 
 
 @dataclass(frozen=True, slots=True)

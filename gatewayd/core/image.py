@@ -21,6 +21,8 @@ class Quality(IntEnum):
     """The controller does not have the field, or gave it to another client."""
     NEVER = 3
     """No value has come since the gateway started, or since the controller has the field."""
+    FORCED = 4
+    """The local operator put the value there (`gatewayd.core.forcing`)."""
 
 
 class ProcessImage:
@@ -50,7 +52,7 @@ class ProcessImage:
         self.outputs = _indices(variables, Direction.OUTPUT)
         self.values: list[Value] = [variable.kind.zero for variable in variables]
         self.times: list[float] = [-math.inf] * len(variables)
-        """Time of the last write, fallback or adoption, for inputs."""
+        """Time of the last write, fallback or adoption, for inputs; of the force, for forced outputs."""
         self.quality: list[Quality] = [Quality.NEVER] * len(variables)
         self.available = [True] * len(variables)
         """Whether the controller has the variable's field, and gave it to us if it is an input."""
@@ -60,14 +62,14 @@ class ProcessImage:
             index for index in self.outputs if variables[index].on_stale.kind is FallbackKind.EXCEPTION
         )
         self.unreadable = self._exceptions
-        """Outputs whose policy is `exception` and whose value is not good now."""
+        """Outputs whose policy is `exception` and whose value is neither good nor forced now."""
         self._outputs_told = False
         for index in self.outputs:
             self._show_fallback(index)
 
     def time_of(self, index: int) -> float:
         """When the source told the value; minus infinity if it never did."""
-        if self.variables[index].direction is Direction.INPUT:
+        if self.variables[index].direction is Direction.INPUT or self.quality[index] is Quality.FORCED:
             return self.times[index]
         told = self.quality[index] in (Quality.GOOD, Quality.STALE)
         return self.output_time if told else -math.inf
@@ -96,7 +98,7 @@ class ProcessImage:
         for index in self.outputs:
             if self.available[index]:
                 self.quality[index] = Quality.GOOD
-        self._find_unreadable()
+        self.find_unreadable()
 
     def outputs_lost(self) -> None:
         """The robot has stopped telling: outputs show their fallbacks until `outputs_told`."""
@@ -104,7 +106,7 @@ class ProcessImage:
         for index in self.outputs:
             self._show_fallback(index)
         self._doubt(self.outputs)
-        self._find_unreadable()
+        self.find_unreadable()
 
     def set_available(self, index: int, available: bool) -> None:
         """The controller gave or refused the field. What it gave is not good before it was told."""
@@ -116,7 +118,12 @@ class ProcessImage:
         if self.variables[index].direction is Direction.OUTPUT:
             self._outputs_told = False
             self._show_fallback(index)
-            self._find_unreadable()
+            self.find_unreadable()
+
+    def find_unreadable(self) -> None:
+        """Bring `unreadable` up to date after qualities changed."""
+        shown = (Quality.GOOD, Quality.FORCED)
+        self.unreadable = frozenset(index for index in self._exceptions if self.quality[index] not in shown)
 
     def _doubt(self, variables: Iterable[int]) -> None:
         for index in variables:
@@ -126,11 +133,6 @@ class ProcessImage:
     def _show_fallback(self, index: int) -> None:
         variable = self.variables[index]
         self.values[index] = variable.on_stale.apply(self.values[index], variable.kind)
-
-    def _find_unreadable(self) -> None:
-        self.unreadable = frozenset(
-            index for index in self._exceptions if self.quality[index] is not Quality.GOOD
-        )
 
 
 def _indices(variables: Sequence[Variable], direction: Direction) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from enum import Enum, IntEnum
 
-from gatewayd.core.definition import Lock
+from gatewayd.core.definition import OPERATOR, Lock
 
 __all__ = ["MOVES", "Act", "LockTable", "Move", "Standing"]
 
@@ -65,6 +65,10 @@ MOVES: dict[tuple[Standing, Act], Move] = {
 }
 
 
+_OPERATORS = {None: Standing.FREE, OPERATOR: Standing.OWNER}
+"""How the local operator stands to a lock, by its owner; to any other owner's it is HIGHER."""
+
+
 class LockTable:
     """The owners of a cell's locks. Locks and writers are indices; times are monotonic seconds."""
 
@@ -79,7 +83,9 @@ class LockTable:
         self._next_expiry = math.inf
 
     def standing(self, lock: int, writer: int) -> Standing:
-        """How `writer` stands to `lock` now."""
+        """How `writer` stands to `lock` now. The local operator ranks above all others, takeover or not."""
+        if writer == OPERATOR:
+            return _OPERATORS.get(self.owners[lock], Standing.HIGHER)
         ranks = self._ranks[lock]
         rank = ranks.get(writer)
         if rank is None:
@@ -89,7 +95,8 @@ class LockTable:
             return Standing.FREE
         if owner == writer:
             return Standing.OWNER
-        return Standing.HIGHER if self.locks[lock].takeover and rank < ranks[owner] else Standing.LOWER
+        outranks = owner != OPERATOR and self.locks[lock].takeover and rank < ranks[owner]
+        return Standing.HIGHER if outranks else Standing.LOWER
 
     def decide(self, lock: int, writer: int, act: Act) -> Move:
         """What `act` would do; changes nothing."""
@@ -105,6 +112,13 @@ class LockTable:
                 self._next_expiry = min(self._next_expiry, expiry)
         elif move is Move.RELEASE:
             self.free(lock)
+
+    def hold(self, lock: int, until: float) -> int | None:
+        """Give the lock to the local operator until that time, whatever its lease; returns the former owner."""
+        former, self.owners[lock] = self.owners[lock], OPERATOR
+        self.expires[lock] = until
+        self._next_expiry = min(self._next_expiry, until)
+        return former
 
     def free(self, lock: int) -> int | None:
         """Release unconditionally; returns the former owner."""

@@ -95,8 +95,13 @@ FIELDS = (
     StatusField(26, 1, "modbus_connections", "open Modbus connections to this unit's listener"),
     StatusField(30, 1, "refusal_reason", "last refusal: " + ", ".join(f"{r.value} {r.text}" for r in Reason)),
     StatusField(31, 1, "refusal_variable", "number of the variable in the last refusal"),
-    StatusField(32, 1, "refusal_writer", "number of the writer that was refused; 0 if it is not declared"),
-    StatusField(33, 1, "refusal_holder", "number of the writer that held it"),
+    StatusField(
+        32,
+        1,
+        "refusal_writer",
+        "number of the writer that was refused; 0 if it is not declared, 255 the local operator",
+    ),
+    StatusField(33, 1, "refusal_holder", "number of the writer that held it; 255 the local operator"),
     StatusField(34, 2, "refusal_age", "milliseconds since the last refusal"),
     StatusField(REQUEST, 1, "request", "write a variable's number to take its lock; reads 0"),
     StatusField(
@@ -109,13 +114,21 @@ TABLES = (
         64, 64, "good", "one bit for each variable, 1 = good; variable n is bit (n-1)%16 of word (n-1)/16"
     ),
     StatusTable(128, 64, "writers_alive", "one word for each writer: 1 = connected and heard in time"),
-    StatusTable(192, MAX_VARIABLES, "owner", "one word for each variable: number of the writer that owns it"),
+    StatusTable(
+        192,
+        MAX_VARIABLES,
+        "owner",
+        "one word for each variable: number of the writer that owns it; 255 the local operator",
+    ),
     StatusTable(
         1216, MAX_VARIABLES, "lease", "one word for each variable: milliseconds of its owner's lease left"
     ),
     StatusTable(2240, MAX_VARIABLES, "age", "one word for each variable: age of its value in milliseconds"),
     StatusTable(
-        3264, MAX_VARIABLES, "quality", "one word for each variable: 0 good, 1 stale, 2 unavailable, 3 never"
+        3264,
+        MAX_VARIABLES,
+        "quality",
+        "one word for each variable: 0 good, 1 stale, 2 unavailable, 3 never, 4 forced",
     ),
 )
 LENGTH = 4288

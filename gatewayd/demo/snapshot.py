@@ -147,8 +147,8 @@ _BAD = {
 def _words(event: Event, cell: Cell) -> Iterator[str]:
     definition = cell.definition
     variable = definition.variables[event.variable] if event.variable is not None else None
-    writer = definition.writers[event.writer].name if event.writer is not None else "a stranger"
-    other = definition.writers[event.other].name if event.other is not None else ""
+    writer = definition.writer_name(event.writer) if event.writer is not None else "a stranger"
+    other = definition.writer_name(event.other) if event.other is not None else ""
     lock = definition.locks[event.lock].name if event.lock is not None else ""
     unit = variable.unit if variable is not None else ""
     if event.kind is EventKind.REFUSED and event.reason is not None:
@@ -179,7 +179,7 @@ def _line(cell: Cell, row: Row, now: float) -> Line:
     if variable.lock is not None:
         holder = cell.ownership.owners[variable.lock]
         if holder is not None:
-            owner = cell.definition.writers[holder].name
+            owner = cell.definition.writer_name(holder)
             left = cell.ownership.remaining(variable.lock, now)
             lease = f"{left:.1f} s" if left < math.inf else ""
     return Line(
@@ -198,7 +198,7 @@ def _refused(cell: Cell, index: int, now: float) -> str:
     last = cell.last_refusal
     if last is None or last.refusal.variable != index or now - last.time > REFUSAL_SHOWN:
         return ""
-    writer = cell.definition.writers[last.writer].name if last.writer is not None else "a stranger"
+    writer = cell.definition.writer_name(last.writer) if last.writer is not None else "a stranger"
     return f"{writer} refused: {_EXCEPTIONS[last.refusal.reason]}"
 
 

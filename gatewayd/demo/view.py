@@ -22,6 +22,7 @@ _QUALITY_STYLES = {
     Quality.STALE: "yellow",
     Quality.UNAVAILABLE: "red",
     Quality.NEVER: "dim",
+    Quality.FORCED: "magenta",
 }
 _WIDE = 97
 """Columns of a terminal that has room for the 4xxxxx form too."""

@@ -207,6 +207,7 @@ _QUALITIES = {
     Quality.STALE: "the source has stopped telling; outputs show `on_stale`",
     Quality.UNAVAILABLE: "the controller does not have the field, or gave the register to another client",
     Quality.NEVER: "nothing has been told yet",
+    Quality.FORCED: "the local operator put the value there for commissioning",
 }
 _SOURCES = {
     Source.LOST: "no connection to the controller",

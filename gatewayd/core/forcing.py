@@ -1,0 +1,99 @@
+"""What the local operator holds and forces, and the picture that forced values make on the process image.
+
+A force is an overlay: the truth is kept beside it. Whoever is about to change the image calls `lift` first, which
+puts the truth back, and `lay` afterwards; between the two nobody looks. A forced output is FORCED whatever the robot
+does; a forced input is FORCED while the robot has it, and says what is wrong (stale, unavailable) otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from gatewayd.core.definition import Direction, Value
+from gatewayd.core.image import ProcessImage, Quality
+
+__all__ = ["Force", "Forcing"]
+
+
+@dataclass(frozen=True, slots=True)
+class Force:
+    """A value that the local operator put in place of what a variable's source tells."""
+
+    value: Value
+    since: float
+    until: float
+    """Monotonic time at which it ends by itself."""
+
+
+class Forcing:
+    """The forces and the taken locks of one cell; variables and locks are indices."""
+
+    __slots__ = ("_image", "_truth", "forces", "holds", "next_due")
+
+    def __init__(self, image: ProcessImage) -> None:
+        self._image = image
+        self._truth: dict[int, tuple[Value, Quality]] = {}
+        """What lies under the overlay, while it is laid."""
+        self.forces: dict[int, Force] = {}
+        """By variable."""
+        self.holds: dict[int, float] = {}
+        """Locks that the operator took, and until when; infinity: until they are released."""
+        self.next_due = math.inf
+        """Nothing ends by itself before this time."""
+
+    def put(self, variable: int, force: Force) -> None:
+        """Force a variable; `lay` shows it."""
+        self.forces[variable] = force
+        self.next_due = min(self.next_due, force.until)
+
+    def hold(self, lock: int, until: float) -> None:
+        """Note that the operator took a lock."""
+        self.holds[lock] = until
+        self.next_due = min(self.next_due, until)
+
+    def until(self, lock: int, members: Iterable[int]) -> float | None:
+        """How long the operator needs the lock of these variables; None: no longer."""
+        ends = [self.forces[member].until for member in members if member in self.forces]
+        if lock in self.holds:
+            ends.append(self.holds[lock])
+        return max(ends, default=None)
+
+    def due(self, now: float) -> tuple[list[int], list[int]]:
+        """The variables whose forces and the locks whose holds have ended. Cheap while nothing can have."""
+        if now < self.next_due:
+            return [], []
+        variables = [variable for variable, force in self.forces.items() if force.until <= now]
+        locks = [lock for lock, until in self.holds.items() if until <= now]
+        left = [force.until for force in self.forces.values() if force.until > now]
+        left += [until for until in self.holds.values() if until > now]
+        self.next_due = min(left, default=math.inf)
+        return variables, locks
+
+    def lift(self) -> None:
+        """Put the truth back into the image, to be changed. Cheap while nothing is forced."""
+        if not self._truth:
+            return
+        image = self._image
+        for index, (value, quality) in self._truth.items():
+            image.quality[index] = quality
+            if image.variables[index].direction is Direction.OUTPUT:
+                image.values[index] = value
+        self._truth.clear()
+
+    def lay(self) -> None:
+        """Show what is forced, if it is not shown already. Cheap while nothing is forced."""
+        if not self.forces or self._truth:
+            return
+        image = self._image
+        for index, force in self.forces.items():
+            quality = image.quality[index]
+            self._truth[index] = image.values[index], quality
+            if image.variables[index].direction is Direction.OUTPUT:
+                image.values[index] = force.value
+                image.times[index] = force.since
+                image.quality[index] = Quality.FORCED
+            elif quality is Quality.GOOD:
+                image.quality[index] = Quality.FORCED
+        image.find_unreadable()
