@@ -13,7 +13,7 @@ from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load_together, read_bytes
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["Startup", "load_plans", "mapping_files"]
+__all__ = ["PATTERN", "Startup", "load_plans", "mapping_files"]
 
 PATTERN = "*.yaml"
 """The files of a configuration directory."""

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from gatewayd.mapping.report import Outcome, Unreadable
 
 __all__ = ["command"]
@@ -24,6 +26,7 @@ STDIN = "-"
 Examples:
   gatewayd check my-cell.yaml
   gatewayd check cells/*.yaml               cells of one gateway: what they share is checked too
+  gatewayd check /etc/gatewayd              the same for all of a directory
   gatewayd check --separately a.yaml b.yaml two mappings that never run together
   gatewayd check --strict my-cell.yaml      warnings count as errors
   gatewayd check --format github *.yaml     annotations in a pull request
@@ -70,7 +73,8 @@ def command(
     """Find every mistake of mapping FILES, all in one pass, each with file, line and column.
 
     Checked is all that can be known without the plant: the text, the Modbus addresses, the robot's fields, who may
-    write, what happens when a side is lost, and what number conversions lose. `-` reads standard input.
+    write, what happens when a side is lost, and what number conversions lose. `-` reads standard input, a directory
+    stands for its *.yaml files.
     """
     if explain is not None:
         click.echo(_explain(explain), nl=False)
@@ -91,7 +95,7 @@ def _check(files: tuple[str, ...], *, separately: bool) -> Outcome:
     readable: list[tuple[str, bytes]] = []
     unreadable: list[Unreadable] = []
     # A file named twice is one cell, not two that clash.
-    for file in dict.fromkeys(files):
+    for file in dict.fromkeys(_named(files)):
         content = _read(file)
         if isinstance(content, bytes):
             readable.append((_shown(file), content))
@@ -100,6 +104,18 @@ def _check(files: tuple[str, ...], *, separately: bool) -> Outcome:
     loaded = tuple(load(data, name) for name, data in readable) if separately else load_together(readable)
     findings = tuple(finding for one in loaded for finding in one.diagnostics)
     return Outcome(tuple(name for name, _ in readable), findings, tuple(unreadable))
+
+
+def _named(files: tuple[str, ...]) -> Iterator[str]:
+    """The files meant: a directory stands for its mapping files, as in `gatewayd run`; an empty one for itself."""
+    from os.path import isdir
+    from pathlib import Path
+
+    from gatewayd.startup import PATTERN
+
+    for file in files:
+        inside = sorted(Path(file).glob(PATTERN)) if isdir(file) else []  # noqa: PTH112 - as in startup.py
+        yield from map(str, inside) if inside else (file,)
 
 
 def _read(file: str) -> bytes | Unreadable:
@@ -115,7 +131,7 @@ def _read(file: str) -> bytes | Unreadable:
             return sys.stdin.buffer.read(MAXIMUM_BYTES + 1)
         return read_bytes(Path(file))
     except IsADirectoryError:
-        return Unreadable(_shown(file), f"it is a directory; name the files in it, {_shown(file)}/*.yaml")
+        return Unreadable(_shown(file), "no mapping file (*.yaml) in this directory")
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         return Unreadable(_shown(file), reason)

@@ -70,10 +70,7 @@ def test_unreadable_files_hide_nothing(tmp_path: Path) -> None:
     done = check(tmp_path / "gone.yaml", tmp_path, BAD)
     assert done.exit_code == 2
     assert f"{tmp_path}/gone.yaml: cannot be read: No such file or directory" in done.output
-    assert (
-        f"{tmp_path}: cannot be read: it is a directory; name the files in it, {tmp_path}/*.yaml"
-        in done.output
-    )
+    assert f"{tmp_path}: cannot be read: no mapping file (*.yaml) in this directory" in done.output
     assert "error GW214 register-overlap" in done.output
     assert done.output.endswith("1 file checked, 2 files not readable: 1 error\n")
 
@@ -184,3 +181,12 @@ def test_as_a_process_it_imports_no_server() -> None:
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert "\x1b" not in done.stdout
+
+
+def test_a_directory_stands_for_its_mapping_files(tmp_path: Path) -> None:
+    """As for `gatewayd run`: cells that would serve together are checked together."""
+    for name in ("b.yaml", "a.yaml"):
+        (tmp_path / name).write_text(GOOD.read_text())
+    (tmp_path / "notes.txt").write_text("not a mapping")
+    assert check(tmp_path).output == check(tmp_path / "a.yaml", tmp_path / "b.yaml").output
+    assert check(tmp_path).exit_code == 1
