@@ -11,7 +11,7 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
 from gatewayd.core.cell import Cell
@@ -67,7 +67,14 @@ class RobotLink:
         self._feeds = 0
         self._loss_told: tuple[str, float] = ("", -math.inf)
         self._closing = False
+        self.sent_listeners: list[Callable[[], None]] = []
+        """Called after packages went to the controller. They must not raise."""
         cell.listeners.append(self._on_change)
+
+    @property
+    def trouble(self) -> str:
+        """Why there was no session at the last attempt; empty since the last one began."""
+        return self._loss_told[0]
 
     @property
     def turns(self) -> int:
@@ -222,6 +229,8 @@ class RobotLink:
             self._next_send = now + self._cycle
             if self._client.send(key, flat):
                 self._inputs.sent(key, flat, now)
+                for listener in self.sent_listeners:
+                    listener()
 
     async def _feed_watchdog(self, period: float) -> None:
         while True:
