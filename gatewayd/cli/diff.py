@@ -1,0 +1,83 @@
+"""`gatewayd diff`: what a new mapping file changes of an old one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from gatewayd.mapping.plan import Plan
+
+__all__ = ["command"]
+
+SAME, DIFFERENT, UNREADABLE = 0, 1, 2
+"""Exit codes."""
+
+
+@click.command(
+    name="diff",
+    epilog="""\b
+Examples:
+  gatewayd diff running.yaml my-cell.yaml
+  git show HEAD:my-cell.yaml | gatewayd diff - my-cell.yaml
+  gatewayd diff --format json old.yaml new.yaml
+
+\b
+A line begins with + (added), - (removed) or ~ (changed, old -> new).
+Exit codes:
+  0  no difference
+  1  differences
+  2  wrong usage, or a file cannot be read or has errors (they are listed)
+""",
+)
+@click.argument("old", type=click.Path(allow_dash=True))
+@click.argument("new", type=click.Path(allow_dash=True))
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="For people or for programs.",
+)
+@click.pass_context
+def command(context: click.Context, old: str, new: str, form: str) -> None:
+    """Tell what the mapping NEW changes of the mapping OLD: variables, owners, addresses, settings of the links.
+
+    Compared is what the files mean: order of keys, spelling and formatting do not count. `-` reads standard input.
+    """
+    from gatewayd.mapping.diff import as_json, as_text, compare
+
+    if old == new == "-":
+        raise click.UsageError("only one of the two files can be standard input")
+    plans = [_load(file) for file in (old, new)]
+    before, after = plans
+    if before is None or after is None:
+        context.exit(UNREADABLE)
+    changes = compare(before, after)
+    click.echo(as_json(changes) if form == "json" else as_text(changes), nl=False)
+    context.exit(DIFFERENT if changes else SAME)
+
+
+def _load(file: str) -> Plan | None:
+    """The plan; None after its findings were told."""
+    import sys
+    from pathlib import Path
+
+    from gatewayd.mapping.loader import load, read_bytes
+    from gatewayd.mapping.report import Outcome, as_text
+    from gatewayd.mapping.source import MAXIMUM_BYTES
+
+    name = "stdin" if file == "-" else str(click.format_filename(file))
+    try:
+        loaded = load(
+            sys.stdin.buffer.read(MAXIMUM_BYTES + 1) if file == "-" else read_bytes(Path(file)), name
+        )
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        click.echo(f"{name}: cannot be read: {reason}", err=True)
+        return None
+    if loaded.plan is None:
+        click.echo(as_text(Outcome((name,), loaded.diagnostics)), nl=False, err=True)
+    return loaded.plan
