@@ -9,12 +9,14 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from gatewayd.core.cell import Cell
+from gatewayd.core.definition import CellDefinition
+from gatewayd.core.succession import Succession, succeed
 from gatewayd.eventlog import EventLog
 from gatewayd.logs import fields
 from gatewayd.mapping.plan import ModbusPlan, Plan
@@ -37,18 +39,44 @@ Address = tuple[str, int]
 """Host and port of a listener."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Station:
-    """One cell with its links."""
+    """One cell with its links. A reload puts other ones in their place."""
 
     plan: Plan
     cell: Cell = field(init=False)
     robot: RobotLink = field(init=False)
 
     def __post_init__(self) -> None:
-        self.cell = Cell(self.plan.cell)
-        self.cell.events.listeners.append(EventLog(self.cell))
+        self._furnish(Cell(self.plan.cell))
         self.robot = RobotLink(self.plan.robot, self.cell)
+
+    def succeed(self, plan: Plan, now: float) -> tuple[str, ...]:
+        """Go on with another plan, by the same robot link if that can be; names of inputs left as they were."""
+        succession = self._hand_over(plan.cell, now)
+        self.plan = plan
+        self._furnish(succession.cell)
+        if not self.robot.rebind(plan.robot, self.cell, now):
+            self.cell.robot_lost("the new mapping needs another session", now)
+            self.robot = RobotLink(plan.robot, self.cell, self.robot)
+        return succession.stranded
+
+    def retire(self, now: float) -> tuple[str, ...]:
+        """Release everything for good; names of inputs left as they were."""
+        return self._hand_over(replace(self.plan.cell, variables=(), locks=(), writers=()), now).stranded
+
+    def _hand_over(self, definition: CellDefinition, now: float) -> Succession:
+        """End the cell: the robot is given what falls due by that, and nobody listens to it any more."""
+        former = self.cell
+        succession = succeed(former, definition, now)
+        self.robot.flush(now)
+        former.listeners.clear()
+        former.events.listeners.clear()
+        return succession
+
+    def _furnish(self, cell: Cell) -> None:
+        self.cell = cell
+        cell.events.listeners.append(EventLog(cell))
 
 
 class Daemon:
@@ -56,16 +84,11 @@ class Daemon:
 
     def __init__(self, plans: Sequence[Plan]) -> None:
         self.stations = [Station(plan) for plan in plans]
-        units: dict[Address, list[tuple[ModbusPlan, Cell]]] = {}
-        for station in self.stations:
-            modbus = station.plan.modbus
-            if modbus is not None:
-                units.setdefault((modbus.host, modbus.port), []).append((modbus, station.cell))
         self.listeners: list[ModbusListener] = []
-        for (host, port), served in units.items():
-            listener = ModbusListener(host, port, observe=_log_peer)
-            listener.serve(served)
-            self.listeners.append(listener)
+        self._group: asyncio.TaskGroup | None = None
+        self._tasks: dict[object, asyncio.Task[None]] = {}
+        """Of stations (their clocks), robot links and listeners."""
+        self._serve({})
 
     @property
     def cells(self) -> list[Cell]:
@@ -87,16 +110,124 @@ class Daemon:
 
     async def run(self, stop: asyncio.Event) -> None:
         """Serve until `stop` is set; then release every lock, give the robots the fallbacks, and close."""
-        clocks = [_keep_running(partial(_tick, station.cell)) for station in self.stations]
-        robots = [_keep_running(station.robot.run) for station in self.stations]
-        listeners = [_open(listener) for listener in self.listeners]
         async with asyncio.TaskGroup() as group:
-            tasks = [group.create_task(work) for work in (*clocks, *listeners, *robots)]
+            self._group = group
+            for station in self.stations:
+                self._begin_station(station)
+            for listener in self.listeners:
+                self._begin(listener, partial(_open, listener))
             await stop.wait()
+            self._group = None
             await self._close()
-            for task in tasks:
+            for task in list(self._tasks.values()):
                 task.cancel()
         log.info("stopped")
+
+    # -- another mapping ---------------------------------------------------------------------------------------------
+
+    @property
+    def running(self) -> bool:
+        """Whether there is anything to swap: false before `run` and once it stops."""
+        return self._group is not None
+
+    async def open_new(self, plans: Iterable[Plan]) -> list[ModbusListener]:
+        """Listeners for addresses that are new, open, but serving nobody yet. Raises ListenError, all closed again.
+
+        One that must wait for the end of a present listener, of the same port, is left to `swap`.
+        """
+        wanted = {(plan.modbus.host, plan.modbus.port) for plan in plans if plan.modbus is not None}
+        present = {listener.address for listener in self.listeners}
+        ports = {port for _host, port in present - wanted}
+        opened: list[ModbusListener] = []
+        for host, port in sorted(wanted - present):
+            if port in ports:
+                continue
+            listener = ModbusListener(host, port, observe=_log_peer)
+            try:
+                await listener.start()
+            except ListenError:
+                await asyncio.gather(*(one.close() for one in opened))
+                raise
+            opened.append(listener)
+        return opened
+
+    def swap(self, plans: Sequence[Plan], now: float, opened: Iterable[ModbusListener] = ()) -> list[str]:
+        """Serve these plans instead, between two packages; cells are known by their names.
+
+        Links whose settings did not change stay up. Returns the inputs that are gone and could not be given their
+        release fallback, as `cell: name`.
+        """
+        former = {station.plan.cell.name: station for station in self.stations}
+        successors: dict[Cell, Cell] = {}
+        stranded: list[str] = []
+        self.stations = []
+        for plan in plans:
+            name = plan.cell.name
+            station = former.pop(name, None)
+            if station is None:
+                station = Station(plan)
+                self._begin_station(station)
+            elif station.plan != plan:
+                stranded += self._replace(station, plan, now, successors)
+            self.stations.append(station)
+        for station in former.values():
+            stranded += [f"{station.plan.cell.name}: {name}" for name in station.retire(now)]
+            self._end(station)
+            self._end(station.robot)
+        self.listeners += opened
+        self._serve(successors)
+        return stranded
+
+    def _replace(self, station: Station, plan: Plan, now: float, successors: dict[Cell, Cell]) -> list[str]:
+        cell, robot = station.cell, station.robot
+        stranded = station.succeed(plan, now)
+        station.cell.health.modbus_connections = 0
+        successors[cell] = station.cell
+        if station.robot is not robot:
+            self._begin(station.robot, partial(_keep_running, station.robot.run), self._end(robot))
+        return [f"{plan.cell.name}: {name}" for name in stranded]
+
+    def _serve(self, successors: Mapping[Cell, Cell]) -> None:
+        """Have a listener for every address of the stations' plans, and no other."""
+        units: dict[Address, list[tuple[ModbusPlan, Cell]]] = {}
+        for station in self.stations:
+            modbus = station.plan.modbus
+            if modbus is not None:
+                units.setdefault((modbus.host, modbus.port), []).append((modbus, station.cell))
+        for listener in [one for one in self.listeners if one.address not in units]:
+            listener.serve((), successors)
+            self.listeners.remove(listener)
+            self._begin(listener, partial(listener.close, "no longer configured"), self._end(listener))
+        for listener in self.listeners:
+            listener.serve(units.pop(listener.address), successors)
+        for (host, port), served in units.items():
+            listener = ModbusListener(host, port, observe=_log_peer)
+            listener.serve(served)
+            self.listeners.append(listener)
+            self._begin(listener, partial(_open, listener))
+
+    def _begin_station(self, station: Station) -> None:
+        self._begin(station, partial(_keep_running, partial(_tick, station)))
+        self._begin(station.robot, partial(_keep_running, station.robot.run))
+
+    def _begin(
+        self, part: object, work: Callable[[], Awaitable[None]], former: asyncio.Task[None] | None = None
+    ) -> None:
+        """Have the part's work done, once a former task has ended. Before `run` it is left to that."""
+        if self._group is not None:
+            task = self._tasks[part] = self._group.create_task(_after(former, work))
+            task.add_done_callback(lambda ended: self._forget(part, ended))
+
+    def _forget(self, part: object, task: asyncio.Task[None]) -> None:
+        if self._tasks.get(part) is task:
+            del self._tasks[part]
+
+    def _end(self, part: object) -> asyncio.Task[None] | None:
+        """Have the part's work cancelled; returns its task, which still says goodbye."""
+        task = self._tasks.pop(part, None)
+        if task is not None:
+            task.cancel()
+        return task
 
     async def _close(self) -> None:
         """First nobody writes any more, then the robots get what the policies declare, then the links close."""
@@ -110,10 +241,21 @@ class Daemon:
                 await asyncio.gather(*(station.robot.close() for station in self.stations))
 
 
-async def _tick(cell: Cell) -> None:
+async def _tick(station: Station) -> None:
     while True:
-        cell.tick(time.monotonic())
+        station.cell.tick(time.monotonic())
         await asyncio.sleep(TICK)
+
+
+async def _after(former: asyncio.Task[None] | None, work: Callable[[], Awaitable[None]]) -> None:
+    """Do the work once the former task has ended; if cancelled before, end after it all the same."""
+    if former is not None:
+        try:
+            await asyncio.wait((former,))
+        except asyncio.CancelledError:
+            await asyncio.wait((former,))
+            raise
+    await work()
 
 
 async def _open(listener: ModbusListener) -> None:

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import os
 import signal
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -70,7 +71,7 @@ def command(files: tuple[Path, ...], log_format: str, log_level: str, *, strict:
         return UNREADABLE
     if not found.plans or (strict and (found.broken or found.unreadable)):
         return NOTHING_TO_RUN
-    asyncio.run(_serve(Daemon(found.plans), _notes(found)))
+    asyncio.run(_serve(Daemon(found.plans), files, _notes(found)))
     return 0
 
 
@@ -80,12 +81,16 @@ def _notes(found: Startup) -> list[str]:
     return [f"{count} mapping file{'s' if count > 1 else ''} not served, see the log"] if count else []
 
 
-async def _serve(daemon: Daemon, notes: list[str]) -> None:
+async def _serve(daemon: Daemon, files: Sequence[Path], notes: list[str]) -> None:
+    from gatewayd.reload import Reloader
     from gatewayd.service import Service
     from gatewayd.systemd import Notifier
 
     stop = asyncio.Event()
     service = Service(Notifier(os.environ, os.getpid()), daemon, notes)
+    reloader = Reloader(
+        daemon, files, service.reload_begins, lambda outcome: service.reload_ended(outcome.notes)
+    )
     loop = asyncio.get_running_loop()
 
     def on_signal() -> None:
@@ -95,6 +100,9 @@ async def _serve(daemon: Daemon, notes: list[str]) -> None:
 
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, on_signal)
+    loop.add_signal_handler(signal.SIGHUP, reloader.ask)
     reporting = asyncio.create_task(service.run(stop))
+    reloading = asyncio.create_task(reloader.run())
     await daemon.run(stop)
+    reloading.cancel()
     await reporting

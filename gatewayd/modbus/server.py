@@ -12,7 +12,8 @@ import logging
 import os
 import socket
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, cast
 
 from pymodbus.server import ModbusTcpServer
@@ -244,6 +245,11 @@ class ModbusListener:
         return self._server is not None
 
     @property
+    def address(self) -> tuple[str, int]:
+        """Host and port as asked for."""
+        return self._host, self._port
+
+    @property
     def name(self) -> str:
         """Host and port, for messages."""
         return f"[{self._host}]:{self._port}" if ":" in self._host else f"{self._host}:{self._port}"
@@ -280,11 +286,14 @@ class ModbusListener:
         # The transports close their sockets in the next turn of the loop.
         await asyncio.sleep(0)
 
-    def serve(self, units: Iterable[tuple[ModbusPlan, Cell]]) -> None:
+    def serve(
+        self, units: Iterable[tuple[ModbusPlan, Cell]], successors: Mapping[Cell, Cell] = MappingProxyType({})
+    ) -> None:
         """Answer for these units, and for no others, from the next request on; connections stay.
 
-        A unit whose plan and cell are the very objects served already goes on untouched. Raises ValueError for two
-        units of one number.
+        A unit whose plan and cell are the very objects served already goes on untouched. `successors` are cells that
+        took over the connections of another one, so that a writer that is there before and after never leaves. Raises
+        ValueError for two units of one number.
         """
         wanted: dict[int, tuple[ModbusPlan, Cell]] = {}
         for plan, cell in units:
@@ -303,7 +312,7 @@ class ModbusListener:
         self._units = units_now
         now = time.monotonic()
         for connection in list(self._connections):
-            if not self._admit(connection, now, "unit no longer served"):
+            if not self._admit(connection, now, "unit no longer served", successors):
                 connection.abort("not on the access list any more")
         for number, unit in former.items():
             if units_now.get(number) is not unit:
@@ -345,7 +354,13 @@ class ModbusListener:
 
     # -- inside ---------------------------------------------------------------------------------------------------
 
-    def _admit(self, connection: _Connection, now: float, reason: str) -> bool:
+    def _admit(
+        self,
+        connection: _Connection,
+        now: float,
+        reason: str,
+        successors: Mapping[Cell, Cell] = MappingProxyType({}),
+    ) -> bool:
         """Give the connection the units its address may reach; returns whether there is any.
 
         Writers that it is both before and after stay connected throughout.
@@ -356,7 +371,7 @@ class ModbusListener:
             for number, unit in self._units.items()
             if address is not None and may_connect(address, unit.plan)
         }
-        before, after = _writers(connection.accesses), _writers(accesses)
+        before, after = _succeeded(_writers(connection.accesses), successors), _writers(accesses)
         connection.accesses = accesses
         connection.session.serve(accesses)
         for cell, writer in after:
@@ -427,6 +442,20 @@ def _set_options(sock: Any) -> None:
 
 def _writers(accesses: dict[int, Access]) -> list[tuple[Cell, int]]:
     return [(access.unit.cell, access.writer) for access in accesses.values() if access.writer is not None]
+
+
+def _succeeded(
+    writers: Iterable[tuple[Cell, int]], successors: Mapping[Cell, Cell]
+) -> list[tuple[Cell, int]]:
+    """The same writers in the cells that go on; without those that are declared no more."""
+    found = []
+    for cell, writer in writers:
+        successor = successors.get(cell, cell)
+        name = cell.definition.writers[writer].name
+        index = next((i for i, one in enumerate(successor.definition.writers) if one.name == name), None)
+        if index is not None:
+            found.append((successor, index))
+    return found
 
 
 def _names(connection: _Connection) -> tuple[str, ...]:

@@ -97,6 +97,24 @@ class ClaimedInputs:
             adopted |= new
         return adopted
 
+    def rebind(
+        self, variables: Sequence[Variable], now: float, without: Container[int] = ()
+    ) -> dict[int, Value]:
+        """Carry these variables from now on, `without` some, by the same recipes; nothing is sent by it.
+
+        Returns what the controller was last given for each of them, as far as packages read it back: elsewhere nobody
+        knows what it held before.
+        """
+        self._variables = variables
+        held: dict[int, Value] = {}
+        for recipe in self._recipes.values():
+            former = recipe.transfer
+            recipe.transfer = InputTransfer(variables, former.fields, former.slots, without)
+            recipe.transfer.rebase(recipe.by_field())
+            recipe.sent_at = max(recipe.sent_at, now)
+            held |= recipe.transfer.adopted(former.slots.keys() & self._slots.keys())
+        return held
+
     def due(self, image: ProcessImage) -> Iterator[tuple[str, tuple[Value, ...]]]:
         """Every recipe of which something was written or has changed since it was sent."""
         for key, recipe in self._recipes.items():

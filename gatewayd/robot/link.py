@@ -18,6 +18,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
 from gatewayd.logs import fields
 from gatewayd.mapping.plan import RobotPlan
 from gatewayd.robot.availability import unavailable
@@ -40,8 +41,10 @@ log = logging.getLogger("gatewayd.robot")
 class RobotLink:
     """Keeps `cell` and its controller in step while `run` runs."""
 
-    def __init__(self, plan: RobotPlan, cell: Cell) -> None:
+    def __init__(self, plan: RobotPlan, cell: Cell, former: RobotLink | None = None) -> None:
+        """With a `former` link the counters go on; its `run` must have ended before this one's begins."""
         self._plan = plan
+        self._subscribed = frozenset(plan.outputs)
         self._cell = cell
         watchdog = plan.watchdog
         self._client = RtdeClient(
@@ -55,6 +58,8 @@ class RobotLink:
             ),
             self,
         )
+        if former is not None:
+            self._client.statistics = former._client.statistics  # noqa: SLF001 - another one of the same class
         self._outputs = OutputTransfer((), {})
         self._slots: dict[str, slice] = {}
         self._has_timestamp = False
@@ -101,7 +106,51 @@ class RobotLink:
     async def close(self) -> None:
         """Send what is still due. Cancelling `run` afterwards ends the connection; what was sent is delivered."""
         self._closing = True
-        self._send(time.monotonic())
+        self.flush(time.monotonic())
+
+    def flush(self, now: float) -> None:
+        """Send what is still due at once."""
+        self._send(now)
+
+    @property
+    def settled(self) -> bool:
+        """False between the claim of registers and the package that tells what they hold: nothing is sent meanwhile."""
+        return self._session is None
+
+    def rebind(self, plan: RobotPlan, cell: Cell, now: float) -> bool:
+        """Go on with another plan and the successor of the cell, by the session that is there, at once.
+
+        False, and nothing has happened, if the plan needs another session: other settings, other inputs to claim, or
+        outputs that are not subscribed. Inputs that are new take over what the controller was last given.
+        """
+        if not self._serves(plan):
+            return False
+        if self._on_change in self._cell.listeners:
+            self._cell.listeners.remove(self._on_change)
+        self._plan, self._cell = plan, cell
+        cell.listeners.append(self._on_change)
+        session = self._client.session
+        if session is None:
+            return True
+        variables = cell.definition.variables
+        reasons = unavailable(session, variables)
+        self._outputs = OutputTransfer(variables, self._slots, reasons)
+        held = self._inputs.rebind(variables, now, reasons)
+        self._tell_availability(reasons, now)
+        if cell.accepts_writes:
+            quality = cell.image.quality
+            cell.adopt(
+                {index: value for index, value in held.items() if quality[index] is Quality.NEVER}, now
+            )
+        return True
+
+    def _serves(self, plan: RobotPlan) -> bool:
+        """Whether the session of the present plan is one for that plan too."""
+        return (
+            _session_of(plan) == _session_of(self._plan)
+            and frozenset(plan.inputs) == frozenset(self._plan.inputs)
+            and self._subscribed.issuperset(plan.outputs)
+        )
 
     # -- called by the client ----------------------------------------------------------------------------------------
 
@@ -245,3 +294,10 @@ class RobotLink:
         if watchdog is None or self._closing or cell.freshness.state is not Source.FRESH:
             return False
         return all(cell.writers.alive[writer] for writer in watchdog.requires)
+
+
+def _session_of(plan: RobotPlan) -> tuple[object, ...]:
+    """The settings that a session is made with."""
+    watchdog = plan.watchdog
+    fed = (watchdog.field, watchdog.frequency) if watchdog is not None else None
+    return plan.host, plan.port, plan.frequency, fed
