@@ -12,7 +12,7 @@ import json
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -114,6 +114,14 @@ class Audit:
         if watch is not None:
             watch.end()
 
+    def follow(self, cells: Iterable[Cell]) -> None:
+        """Watch these cells and no others."""
+        present = {id(cell): cell for cell in cells}
+        for cell in [watch.cell for watch in self._watches.values() if id(watch.cell) not in present]:
+            self.unwatch(cell)
+        for cell in present.values():
+            self.watch(cell)
+
     def tick(self, now: float) -> None:
         """Tell what was merged long enough. Cheap while nothing was."""
         for watch in self._watches.values():
@@ -154,10 +162,10 @@ class _Series:
 class _Watch:
     """One cell's writes and events, on their way to the audit."""
 
-    __slots__ = ("_audit", "_cell", "_next", "_series")
+    __slots__ = ("_audit", "_next", "_series", "cell")
 
     def __init__(self, cell: Cell, audit: Audit) -> None:
-        self._cell = cell
+        self.cell = cell
         self._audit = audit
         self._series: dict[int, _Series] = {}
         self._next = math.inf
@@ -167,8 +175,8 @@ class _Watch:
     def end(self) -> None:
         """Follow the cell no longer."""
         for listeners, mine in (
-            (self._cell.write_listeners, self.written),
-            (self._cell.events.listeners, self.happened),
+            (self.cell.write_listeners, self.written),
+            (self.cell.events.listeners, self.happened),
         ):
             if mine in listeners:
                 listeners.remove(mine)  # type: ignore[arg-type]
@@ -211,7 +219,7 @@ class _Watch:
         """An event of the cell."""
         if event.kind not in KINDS:
             return
-        definition = self._cell.definition
+        definition = self.cell.definition
         if event.variable is not None and event.variable in self._series:
             # In their order: what was written before a fallback or a force is told before it.
             self._tell(event.variable, self._series.pop(event.variable), event.time)
@@ -237,7 +245,7 @@ class _Watch:
     def _tell(self, index: int, one: _Series, now: float) -> None:
         if not one.untold:
             return
-        definition = self._cell.definition
+        definition = self.cell.definition
         self._audit.append(
             Record(
                 self._audit.wall(now - one.last if now < math.inf else 0.0),

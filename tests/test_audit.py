@@ -174,3 +174,12 @@ def test_values_are_plain_json(value: float, plain: object) -> None:
 
 def test_times_are_utc() -> None:
     assert utc(0.0) == "1970-01-01T00:00:00.000Z"
+
+
+def test_following_drops_cells_that_are_gone(cell: Cell, audit: Audit) -> None:
+    other = Cell(definition())
+    audit.follow([other])
+    assert not cell.write_listeners
+    assert len(other.write_listeners) == 1
+    audit.follow([other])
+    assert len(other.write_listeners) == 1

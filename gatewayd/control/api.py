@@ -1,0 +1,332 @@
+"""What can be asked of a running gateway and done to it, as plain values for JSON; no socket and no HTTP.
+
+The control socket and the status page answer from here. Queries take what came with the request as texts; whatever is
+wrong with it is an `ApiError`, which says what to do.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from typing import Any, Protocol
+
+from gatewayd import __version__
+from gatewayd.audit import Audit, utc
+from gatewayd.control.views import (
+    Json,
+    StationView,
+    cell_view,
+    declared_view,
+    event_view,
+    lock_view,
+    variable_view,
+)
+from gatewayd.core.definition import Value, ValueKind
+from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.mapping.plan import Plan
+
+__all__ = ["API_VERSION", "LONGEST_FORCE", "Api", "ApiError", "Cursor", "Gateway", "Moment"]
+
+API_VERSION = 1
+LONGEST_FORCE = 24 * 3600.0
+"""Seconds that a force may last at most; it can be renewed."""
+_GREATEST = sys.float_info.max
+_MOST = 1000
+"""Events or records in one answer."""
+
+
+class ApiError(Exception):
+    """A request that cannot be answered: HTTP status, a code for programs, a text for people."""
+
+    def __init__(self, status: int, code: str, message: str) -> None:
+        super().__init__(message)
+        self.status, self.code, self.message = status, code, message
+
+    def as_json(self) -> Json:
+        """`{"error": {"code": ..., "message": ...}}`."""
+        return {"error": {"code": self.code, "message": self.message}}
+
+
+class Gateway(Protocol):
+    """What the interface needs to know of the daemon."""
+
+    @property
+    def stations(self) -> Sequence[StationView]:
+        """The cells that are served now."""
+
+    def troubles(self) -> Sequence[str]:
+        """What is wrong with the gateway as a whole."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One moment on both clocks."""
+
+    now: float
+    """Monotonic seconds."""
+    wall: float
+    """Seconds since 1970, UTC."""
+
+
+@dataclass(slots=True)
+class Cursor:
+    """How far somebody has read each cell's events."""
+
+    read: dict[str, int] = field(default_factory=dict)
+
+
+class Api:
+    """The interface to one gateway. `notes` are standing troubles that no link tells."""
+
+    def __init__(
+        self, gateway: Gateway, audit: Audit, notes: Callable[[], Sequence[str]] = lambda: ()
+    ) -> None:
+        self._gateway = gateway
+        self._audit = audit
+        self._notes = notes
+        self._declared: dict[str, tuple[Plan, tuple[Json, ...]]] = {}
+        """What the mappings say of their variables, by cell: worked out once for each plan."""
+
+    # -- questions -----------------------------------------------------------------------------------------------
+
+    def version(self) -> Json:
+        """Versions of the interface and of the program."""
+        return {"api": API_VERSION, "version": __version__, "pid": os.getpid()}
+
+    def status(self, moment: Moment) -> Json:
+        """Everything at a glance."""
+        stations = self._gateway.stations
+        cells = [cell_view(station, moment.now) for station in stations]
+        troubles = [*self._notes(), *self._gateway.troubles()]
+        troubles += [f"{cell['name']}: {problem}" for cell in cells for problem in cell["problems"]]
+        started = min((station.cell.health.started for station in stations), default=math.inf)
+        return {
+            **self.version(),
+            "time": utc(moment.wall),
+            "uptime": round(max(0.0, moment.now - started), 3) if math.isfinite(started) else 0.0,
+            "healthy": not troubles,
+            "problems": troubles,
+            "cells": cells,
+        }
+
+    def variables(self, query: Mapping[str, str], moment: Moment) -> Json:
+        """All variables; `cell` and `name` (with * and ?) choose some."""
+        pattern = query.get("name", "*")
+        return {
+            "time": utc(moment.wall),
+            "variables": [
+                self._view(station, index, moment)
+                for station in self._stations(query.get("cell"))
+                for index, variable in enumerate(station.cell.definition.variables)
+                if fnmatchcase(variable.name, pattern) or variable.name == pattern
+            ],
+        }
+
+    def locks(self, query: Mapping[str, str], moment: Moment) -> Json:
+        """All locks; `cell` chooses those of one cell."""
+        return {
+            "time": utc(moment.wall),
+            "locks": [
+                lock_view(station.cell, index, moment.now)
+                for station in self._stations(query.get("cell"))
+                for index in range(len(station.cell.definition.locks))
+            ],
+        }
+
+    def events(self, query: Mapping[str, str], moment: Moment) -> Json:
+        """The last events, oldest first; `cell`, `limit` (100), and `after` with a sequence number of that cell."""
+        limit, after = _count(query, "limit", 100), _count(query, "after", 0, greatest=2**53)
+        stations = self._stations(query.get("cell"))
+        if after and len(stations) > 1:
+            raise ApiError(400, "bad_query", "`after` counts the events of one cell: say which with `cell`")
+        found = [one for station in stations for one in _events(station, after, moment)]
+        found.sort(key=lambda one: (one[0], one[1]["seq"]))
+        return {
+            "time": utc(moment.wall),
+            "events": [event for _time, event in found[max(0, len(found) - limit) :]],
+        }
+
+    def new_events(self, cursor: Cursor, query: Mapping[str, str], moment: Moment) -> list[Json]:
+        """What happened since the cursor was used last, and move it. A fresh cursor begins now.
+
+        The ring is the only buffer: who asks too seldom misses what it has forgotten, and sees it by `seq`.
+        """
+        found: list[tuple[float, Json]] = []
+        for station in self._stations(query.get("cell")):
+            ring, name = station.cell.events, station.cell.definition.name
+            read = cursor.read.get(name, ring.count)
+            if read != ring.count:
+                found += _events(station, read if read < ring.count else 0, moment)
+            cursor.read[name] = ring.count
+        found.sort(key=lambda one: (one[0], one[1]["seq"]))
+        return [event for _time, event in found]
+
+    def audit(self, query: Mapping[str, str], moment: Moment) -> Json:
+        """The last records, oldest first; `cell`, `variable`, `writer` and `limit` (100) choose some."""
+        limit = _count(query, "limit", 100)
+        if "cell" in query:
+            self._stations(query["cell"])
+        wanted = [(name, query[name]) for name in ("cell", "variable", "writer") if name in query]
+        found = [
+            record for record in self._audit if all(getattr(record, name) == text for name, text in wanted)
+        ]
+        latest = found[max(0, len(found) - limit) :]
+        return {"time": utc(moment.wall), "records": [record.as_json() for record in latest]}
+
+    # -- acts of the local operator ------------------------------------------------------------------------------
+
+    def take(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
+        """Take a lock; `for` seconds, or until it is released. The lock as it is then."""
+        station, lock = self._lock(name, body)
+        seconds = _seconds(body, required=False)
+        station.cell.take_lock(lock, moment.now, moment.now + seconds, who)
+        return lock_view(station.cell, lock, moment.now)
+
+    def release(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
+        """Release a lock, whoever holds it. The lock as it is then."""
+        station, lock = self._lock(name, body)
+        if not station.cell.free_lock(lock, moment.now, who):
+            raise ApiError(409, "not_owned", f"nobody owns {name}")
+        return lock_view(station.cell, lock, moment.now)
+
+    def force(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
+        """Force a variable to `value` `for` some seconds. The variable as it is then."""
+        station, index = self._variable(name, body)
+        cell = station.cell
+        variable = cell.definition.variables[index]
+        value = _value(variable.kind, body.get("value"))
+        seconds = _seconds(body, required=True)
+        refusal = cell.force(index, value, moment.now, moment.now + seconds, who)
+        if refusal is not None:
+            raise ApiError(409, _CODES[refusal.reason], f"{name} cannot be forced: {_why(refusal, station)}")
+        return self._view(station, index, moment)
+
+    def unforce(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
+        """End a force. The variable as it is then."""
+        station, index = self._variable(name, body)
+        if not station.cell.unforce(index, moment.now, who):
+            raise ApiError(409, "not_forced", f"{name} is not forced")
+        return self._view(station, index, moment)
+
+    # -- inside --------------------------------------------------------------------------------------------------
+
+    def _stations(self, cell: str | None) -> Sequence[StationView]:
+        if cell is None:
+            return self._gateway.stations
+        found = [one for one in self._gateway.stations if one.cell.definition.name == cell]
+        if not found:
+            names = ", ".join(one.cell.definition.name for one in self._gateway.stations)
+            raise ApiError(404, "no_such_cell", f"there is no cell {cell}; there is {names}")
+        return found
+
+    def _view(self, station: StationView, index: int, moment: Moment) -> Json:
+        plan = station.plan
+        plan_then, declared = self._declared.get(plan.cell.name, (None, ()))
+        if plan_then is not plan:
+            declared = declared_view(plan)
+            self._declared[plan.cell.name] = plan, declared
+        return variable_view(declared[index], station.cell, index, moment.now)
+
+    def _variable(self, name: str, body: Mapping[str, Any]) -> tuple[StationView, int]:
+        found = [
+            (station, index)
+            for station in self._stations(_text(body, "cell"))
+            for index, variable in enumerate(station.cell.definition.variables)
+            if variable.name == name
+        ]
+        return _only(found, "variable", name)
+
+    def _lock(self, name: str, body: Mapping[str, Any]) -> tuple[StationView, int]:
+        """By the lock's own name, or by that of a variable that it guards."""
+        found = []
+        for station in self._stations(_text(body, "cell")):
+            definition = station.cell.definition
+            named = next((index for index, lock in enumerate(definition.locks) if lock.name == name), None)
+            guarding = next((one.lock for one in definition.variables if one.name == name), None)
+            lock = named if named is not None else guarding
+            if lock is not None:
+                found.append((station, lock))
+        return _only(found, "lock", name)
+
+
+_CODES = {
+    Reason.OUT_OF_LIMITS: "out_of_limits",
+    Reason.ROBOT_LOST: "robot_lost",
+    Reason.CLAIMED_ELSEWHERE: "claimed_elsewhere",
+}
+
+
+def _why(refusal: Refusal, station: StationView) -> str:
+    limits = (
+        station.cell.definition.variables[refusal.variable].limits if refusal.variable is not None else None
+    )
+    if refusal.reason is Reason.OUT_OF_LIMITS and limits is not None:
+        return f"{refusal.reason.text}, {limits.low:g}..{limits.high:g}"
+    return refusal.reason.text
+
+
+def _only(found: list[tuple[StationView, int]], what: str, name: str) -> tuple[StationView, int]:
+    if not found:
+        raise ApiError(404, f"no_such_{what}", f"there is no {what} {name}")
+    if len(found) > 1:
+        cells = ", ".join(station.cell.definition.name for station, _index in found)
+        raise ApiError(409, "ambiguous", f"{name} is in several cells ({cells}): say which with `cell`")
+    return found[0]
+
+
+def _events(station: StationView, after: int, moment: Moment) -> Iterator[tuple[float, Json]]:
+    """The events that the ring still has, with sequence numbers beyond `after`."""
+    ring, cell = station.cell.events, station.cell
+    for seq, event in enumerate(ring, ring.count - len(ring) + 1):
+        if seq > after:
+            yield event.time, event_view(cell, seq, event, moment.now, moment.wall)
+
+
+def _count(query: Mapping[str, str], name: str, default: int, greatest: int = _MOST) -> int:
+    text = query.get(name)
+    if text is None:
+        return default
+    if not (text.isascii() and text.isdigit()) or len(text) > 16 or int(text) > greatest:
+        raise ApiError(400, "bad_query", f"`{name}` must be a whole number from 0 to {greatest}")
+    return int(text)
+
+
+def _text(body: Mapping[str, Any], name: str) -> str | None:
+    value = body.get(name)
+    if value is not None and not isinstance(value, str):
+        raise ApiError(400, "bad_request", f"`{name}` must be a text")
+    return value
+
+
+def _seconds(body: Mapping[str, Any], *, required: bool) -> float:
+    value = body.get("for")
+    if value is None and not required:
+        return math.inf
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= LONGEST_FORCE:
+        raise ApiError(
+            400, "bad_request", f"`for` must be seconds, more than 0 and at most {LONGEST_FORCE:.0f}"
+        )
+    return float(value)
+
+
+def _value(kind: ValueKind, value: object) -> Value:
+    """The JSON value as one of the variable's kind: true is 1 for a bit only, 3.0 is 3 for an integer."""
+    if kind is ValueKind.BOOL and value in (False, True):
+        return bool(value)
+    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _GREATEST:
+        if kind is ValueKind.FLOAT:
+            return float(value)
+        if kind is ValueKind.INT and value == int(value):
+            return int(value)
+    raise ApiError(400, "bad_value", f"`value` must be {_KINDS[kind]}")
+
+
+_KINDS = {
+    ValueKind.BOOL: "true or false, 1 or 0",
+    ValueKind.INT: "a whole number",
+    ValueKind.FLOAT: "a number",
+}

@@ -1,0 +1,141 @@
+"""The commands' side of the control interface: HTTP over the Unix socket, with nothing but the standard library."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import socket
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, urlencode
+
+from gatewayd.control.paths import candidates
+
+__all__ = ["Client", "ControlError", "NoDaemon", "find_socket", "segment"]
+
+_PATIENCE = 10.0
+"""Seconds for an answer; a gateway that takes longer hangs."""
+_FOLLOW_PATIENCE = 30.0
+"""Seconds for a sign of life while following; the server gives one every 10 s."""
+
+
+class NoDaemon(Exception):
+    """No daemon answers; the text says where it was looked for and what to do."""
+
+
+class ControlError(Exception):
+    """The daemon refuses; `code` is for programs, the text for people, `body` the whole answer."""
+
+    def __init__(self, status: int, code: str, message: str, body: Mapping[str, Any]) -> None:
+        super().__init__(message)
+        self.status, self.code, self.body = status, code, body
+
+
+def find_socket(named: Path | None, environ: Mapping[str, str]) -> Path:
+    """The socket that was named, or the first of the usual ones that exists. Raises NoDaemon."""
+    if named is not None:
+        return named
+    usual = candidates(environ)
+    found = next((path for path in usual if path.exists()), None)
+    if found is None:
+        places = " or ".join(map(str, usual))
+        raise NoDaemon(
+            f"no gatewayd runs here: there is no {places}; start one, or name its socket with --socket"
+        )
+    return found
+
+
+class Client:
+    """One daemon's control socket. Every call is a connection of its own."""
+
+    def __init__(self, path: Path, patience: float = _PATIENCE) -> None:
+        self.path = path
+        self._patience = patience
+
+    def get(self, path: str, **query: str | int | None) -> dict[str, Any]:
+        """Ask: `get("/v1/variables", name="tcp*")`. Raises NoDaemon, ControlError."""
+        connection, response = self._begin("GET", _with_query(path, query), None, self._patience)
+        return self._end(connection, response)
+
+    def post(self, path: str, body: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Do: `post("/v1/locks/start/take", {"for": 60})`. Raises NoDaemon, ControlError."""
+        connection, response = self._begin("POST", path, body or {}, self._patience)
+        return self._end(connection, response)
+
+    def follow(self, path: str, **query: str | int | None) -> Iterator[dict[str, Any]]:
+        """Every object that comes, until the daemon ends. Raises NoDaemon, ControlError."""
+        patience = max(self._patience, _FOLLOW_PATIENCE)
+        connection, response = self._begin("GET", _with_query(path, query), None, patience)
+        try:
+            if response.status != http.client.OK:
+                self._end(connection, response)
+            while line := response.readline():
+                if line.strip():
+                    yield json.loads(line)
+        except (OSError, http.client.HTTPException, ValueError):
+            return
+        finally:
+            connection.close()
+
+    def _begin(
+        self, method: str, path: str, body: Mapping[str, Any] | None, patience: float
+    ) -> tuple[http.client.HTTPConnection, http.client.HTTPResponse]:
+        connection = _UnixConnection(self.path, patience)
+        try:
+            text = None if body is None else json.dumps(body)
+            connection.request(method, path, text, {"Content-Type": "application/json"} if text else {})
+            return connection, connection.getresponse()
+        except (OSError, http.client.HTTPException) as error:
+            connection.close()
+            raise NoDaemon(_explain(self.path, error)) from error
+
+    def _end(
+        self, connection: http.client.HTTPConnection, response: http.client.HTTPResponse
+    ) -> dict[str, Any]:
+        try:
+            found = json.loads(response.read())
+        except (OSError, http.client.HTTPException, ValueError) as error:
+            raise NoDaemon(f"what answers at {self.path} is no gatewayd") from error
+        finally:
+            connection.close()
+        if response.status >= http.client.BAD_REQUEST:
+            told = found.get("error") or {}
+            code, message = told.get("code", "http"), told.get("message", f"HTTP {response.status}")
+            raise ControlError(response.status, code, message, found)
+        return dict(found)
+
+
+def segment(name: str) -> str:
+    """A name as one segment of a path."""
+    return quote(name, safe="")
+
+
+class _UnixConnection(http.client.HTTPConnection):
+    def __init__(self, path: Path, patience: float) -> None:
+        super().__init__("localhost", timeout=patience)
+        self._path = path
+
+    def connect(self) -> None:
+        """Connect to the socket file instead of to a host."""
+        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.sock.settimeout(self.timeout)
+        self.sock.connect(os.fspath(self._path))
+
+
+def _with_query(path: str, query: Mapping[str, str | int | None]) -> str:
+    given = {name: str(value) for name, value in query.items() if value is not None}
+    return f"{path}?{urlencode(given)}" if given else path
+
+
+def _explain(path: Path, error: Exception) -> str:
+    if isinstance(error, FileNotFoundError):
+        return f"no gatewayd listens at {path}: no such file; is it running, and with this --control?"
+    if isinstance(error, ConnectionRefusedError):
+        return f"no gatewayd listens at {path} any more: start it again"
+    if isinstance(error, PermissionError):
+        return f"you may not use {path}: become a member of the socket's group (ls -l {path}), or use sudo"
+    if isinstance(error, TimeoutError):
+        return f"the gatewayd at {path} does not answer: see its log"
+    return f"cannot talk to {path}: {error}"

@@ -1,0 +1,226 @@
+"""The control interface over HTTP (aiohttp): routes, limits, one form of error. The rest is `gatewayd.control.api`."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import pwd
+import socket
+import struct
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager, suppress
+from functools import lru_cache
+from typing import Any
+
+from aiohttp import web
+
+from gatewayd.control.api import Api, ApiError, Cursor, Moment
+from gatewayd.control.endpoint import Reload
+from gatewayd.control.views import Json
+from gatewayd.logs import fields
+
+__all__ = ["ALIVE_PERIOD", "FOLLOWERS", "GREATEST_BODY", "application", "serving"]
+
+GREATEST_BODY = 64 * 1024
+"""Bytes of a request's body."""
+REQUESTS = 64
+"""Requests under way at one time, those that follow events included."""
+FOLLOWERS = 16
+"""Requests that follow events at one time."""
+ALIVE_PERIOD = 10.0
+"""Seconds after which a follower gets an empty line where nothing happens."""
+_FOLLOW_PERIOD = 0.1
+_BODY_TIME = 5.0
+_WRITE_TIME = 30.0
+"""Seconds for which a follower may leave what it asked for unread."""
+_PEER_CREDENTIALS = struct.Struct("iII")
+
+log = logging.getLogger("gatewayd.control")
+
+_Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+_Act = Callable[[str, Mapping[str, Any], str, Moment], Json]
+_Question = Callable[[Mapping[str, str], Moment], Json]
+
+
+@asynccontextmanager
+async def serving(listening: socket.socket, api: Api, reload: Reload | None) -> AsyncIterator[None]:
+    """Serve on the socket while the context lasts."""
+    runner = web.AppRunner(
+        application(api, reload), access_log=None, handle_signals=False, shutdown_timeout=0.1
+    )
+    await runner.setup()
+    try:
+        await web.SockSite(runner, listening).start()
+        yield
+    finally:
+        await runner.cleanup()
+
+
+def application(api: Api, reload: Reload | None) -> web.Application:
+    """The routes."""
+    routes = _Routes(api, reload)
+    found = web.Application(client_max_size=GREATEST_BODY, middlewares=[routes.guard])
+    found.router.add_get("/v1/version", routes.version)
+    found.router.add_get("/v1/status", routes.status)
+    for name, question in (("variables", api.variables), ("locks", api.locks), ("audit", api.audit)):
+        found.router.add_get(f"/v1/{name}", routes.answer(question))
+    found.router.add_get("/v1/events", routes.events)
+    for name, act in (("locks/{name}/take", api.take), ("locks/{name}/release", api.release)):
+        found.router.add_post(f"/v1/{name}", routes.act(act))
+    for name, act in (("variables/{name}/force", api.force), ("variables/{name}/unforce", api.unforce)):
+        found.router.add_post(f"/v1/{name}", routes.act(act))
+    found.router.add_post("/v1/reload", routes.reload)
+    return found
+
+
+class _Routes:
+    def __init__(self, api: Api, reload: Reload | None) -> None:
+        self._api = api
+        self._reload = reload
+        self._under_way = 0
+        self._followers = 0
+        self.guard = web.middleware(self._guard)
+
+    async def _guard(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
+        """Bound what is under way, and give every error the same form."""
+        if self._under_way >= REQUESTS:
+            return _error(ApiError(503, "busy", f"{REQUESTS} requests are under way already"))
+        self._under_way += 1
+        try:
+            return await handler(request)
+        except ApiError as error:
+            return _error(error)
+        except web.HTTPException as error:
+            return _error(_HTTP_ERRORS.get(error.status) or ApiError(error.status, "http", error.reason))
+        except ConnectionError:
+            raise
+        except Exception:
+            log.exception("a control request could not be answered", extra=fields(path=request.path))
+            return _error(ApiError(500, "internal", "internal error, see the log"))
+        finally:
+            self._under_way -= 1
+
+    async def version(self, _request: web.Request) -> web.StreamResponse:
+        return _json(self._api.version())
+
+    async def status(self, _request: web.Request) -> web.StreamResponse:
+        return _json(self._api.status(_moment()))
+
+    def answer(self, question: _Question) -> _Handler:
+        async def handle(request: web.Request) -> web.StreamResponse:
+            return _json(question(request.query, _moment()))
+
+        return handle
+
+    def act(self, act: _Act) -> _Handler:
+        async def handle(request: web.Request) -> web.StreamResponse:
+            body, who = await _body(request), await _who(request)
+            return _json(act(request.match_info["name"], body, who, _moment()))
+
+        return handle
+
+    async def reload(self, request: web.Request) -> web.StreamResponse:
+        force = (await _body(request)).get("force", False)
+        if not isinstance(force, bool):
+            raise ApiError(400, "bad_request", "`force` must be true or false")
+        if self._reload is None:
+            raise ApiError(501, "no_reload", "this gateway cannot reload: restart it")
+        log.info("reload asked for", extra=fields(detail=await _who(request), force=force))
+        result = await self._reload(force)
+        return _json(dict(result.as_object()), 409 if result.exit_code else 200)
+
+    async def events(self, request: web.Request) -> web.StreamResponse:
+        follow = request.query.get("follow")
+        if follow is None or follow in ("0", "false"):
+            return _json(self._api.events(request.query, _moment()))
+        if self._followers >= FOLLOWERS:
+            raise ApiError(503, "busy", f"{FOLLOWERS} follow the events already")
+        moment, cursor = _moment(), Cursor()
+        limited = {"limit": "0"} | dict(request.query)
+        former = self._api.events(limited, moment)["events"]
+        self._api.new_events(cursor, request.query, moment)
+        self._followers += 1
+        try:
+            return await self._follow(request, cursor, former)
+        finally:
+            self._followers -= 1
+
+    async def _follow(self, request: web.Request, cursor: Cursor, found: list[Json]) -> web.StreamResponse:
+        response = web.StreamResponse(
+            headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"}
+        )
+        await response.prepare(request)
+        told = time.monotonic()
+        # A follower that is gone, or that leaves too much unread, is told nothing more.
+        with suppress(ConnectionError, TimeoutError):
+            while True:
+                if found or time.monotonic() - told >= ALIVE_PERIOD:
+                    told = time.monotonic()
+                    async with asyncio.timeout(_WRITE_TIME):
+                        await response.write("".join(map(_line, found)).encode() or b"\n")
+                await asyncio.sleep(_FOLLOW_PERIOD)
+                found = self._api.new_events(cursor, request.query, _moment())
+        return response
+
+
+_HTTP_ERRORS = {
+    404: ApiError(404, "no_such_path", "there is nothing at this path"),
+    405: ApiError(405, "wrong_method", "this path has another method"),
+    413: ApiError(413, "too_large", f"a request has {GREATEST_BODY} bytes at most"),
+}
+
+
+def _moment() -> Moment:
+    return Moment(time.monotonic(), time.time())
+
+
+def _line(event: Json) -> str:
+    return json.dumps(event, ensure_ascii=False, separators=(",", ":")) + "\n"
+
+
+def _json(value: Json, status: int = 200) -> web.Response:
+    headers = {"Cache-Control": "no-store"}
+    return web.Response(text=_line(value), status=status, content_type="application/json", headers=headers)
+
+
+def _error(error: ApiError) -> web.Response:
+    return _json(error.as_json(), error.status)
+
+
+async def _body(request: web.Request) -> dict[str, Any]:
+    """The JSON object that came with the request; none is an empty one."""
+    try:
+        async with asyncio.timeout(_BODY_TIME):
+            text = await request.text()
+    except TimeoutError:
+        raise ApiError(408, "too_slow", f"the body did not come within {_BODY_TIME:g} s") from None
+    except UnicodeDecodeError:
+        raise ApiError(400, "bad_json", "the body is no UTF-8") from None
+    try:
+        found = json.loads(text) if text.strip() else {}
+    except (ValueError, RecursionError):
+        raise ApiError(400, "bad_json", "the body is no JSON") from None
+    if not isinstance(found, dict):
+        raise ApiError(400, "bad_json", "the body must be a JSON object")
+    return found
+
+
+async def _who(request: web.Request) -> str:
+    """Who is at the other end, as the kernel knows it."""
+    sock = request.transport.get_extra_info("socket") if request.transport is not None else None
+    if sock is None or sock.family != socket.AF_UNIX:
+        return ""
+    raw = sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER_CREDENTIALS.size)
+    _pid, user, _group = _PEER_CREDENTIALS.unpack(raw)
+    # The user database may be on the network.
+    return f"by {await asyncio.to_thread(_user_name, user)}"
+
+
+@lru_cache(maxsize=32)
+def _user_name(user: int) -> str:
+    try:
+        return pwd.getpwuid(user).pw_name
+    except KeyError:
+        return f"user {user}"

@@ -1,0 +1,300 @@
+"""Cells as plain values for JSON: what `gatewayd.control.documented` promises, at one moment.
+
+Pure: the time is a parameter. `wall` is what the wall clock shows at monotonic time `now`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any, Protocol
+
+from gatewayd.audit import plain_value, utc
+from gatewayd.core.cell import Cell
+from gatewayd.core.definition import OPERATOR, Direction, Fallback, FallbackKind, Variable
+from gatewayd.core.events import Event, EventKind
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
+from gatewayd.mapping.plan import Area, Placement, Plan
+
+__all__ = [
+    "Json",
+    "StationView",
+    "cell_view",
+    "declared_view",
+    "event_view",
+    "lock_view",
+    "problems",
+    "robot_name",
+    "variable_view",
+]
+
+Json = dict[str, Any]
+
+_AREAS = {Area.COIL: "coil", Area.DISCRETE: "discrete", Area.INPUT: "input", Area.HOLDING: "holding"}
+_QUALITIES = tuple(one.name.lower() for one in Quality)
+_BIT_WORD = re.compile(r"(input|output)_bit_registers(\d+)_to_\d+")
+
+
+class StationView(Protocol):
+    """One cell as the daemon serves it."""
+
+    @property
+    def plan(self) -> Plan:
+        """Its mapping."""
+
+    @property
+    def cell(self) -> Cell:
+        """Its state."""
+
+
+def cell_view(station: StationView, now: float) -> Json:
+    """One cell of the status."""
+    plan, cell = station.plan, station.cell
+    health, definition, quality = cell.health, cell.definition, cell.image.quality
+    owners = cell.ownership.owners
+    found = problems(cell, now)
+    return {
+        "name": definition.name,
+        "source": plan.source,
+        "fingerprint": f"{definition.fingerprint:08X}",
+        "healthy": not found,
+        "problems": found,
+        "robot": _robot(plan, cell, now),
+        "modbus": None
+        if plan.modbus is None
+        else {
+            "listen": _address(plan.modbus.host, plan.modbus.port),
+            "unit": plan.modbus.unit,
+            "connections": health.modbus_connections,
+        },
+        "writers": [_writer(cell, index, now) for index in range(len(definition.writers))],
+        "variables": {"total": len(quality)} | {one.name.lower(): quality.count(one) for one in Quality},
+        "locks": {
+            "total": len(owners),
+            "owned": len(owners) - owners.count(None),
+            "operator": owners.count(OPERATOR),
+        },
+        "writes": {"accepted": health.writes_accepted, "refused": health.writes_refused},
+        "last_refusal": _last_refusal(cell, now),
+        "heartbeat": health.heartbeat,
+    }
+
+
+def problems(cell: Cell, now: float) -> list[str]:
+    """What keeps a cell from being healthy, each in words that a maintenance crew understands.
+
+    A writer that has not come yet is no problem: nobody knows whether it should be there. One that was there is.
+    """
+    found = []
+    state, quality = cell.freshness.state, cell.image.quality
+    if state is not Source.FRESH:
+        found.append(_SOURCES[state] + _since(now - cell.freshness.last_progress))
+    elif not cell.accepts_writes:
+        found.append("the robot's inputs are not adopted yet, nothing can be written")
+    unavailable = quality.count(Quality.UNAVAILABLE)
+    if unavailable:
+        found.append(
+            f"{unavailable} of {len(quality)} variables unavailable: {_some(cell, Quality.UNAVAILABLE)}"
+        )
+    if cell.forcing.forces:
+        names = sorted(cell.definition.variables[index].name for index in cell.forcing.forces)
+        found.append(f"forced by the local operator: {_list(names)}")
+    held = cell.ownership.held_by(OPERATOR)
+    if held:
+        names = [cell.definition.locks[lock].name for lock in held]
+        found.append(f"locks held by the local operator: {_list(names)}")
+    for index, writer in enumerate(cell.definition.writers):
+        seen = cell.writers.last_seen[index]
+        if not cell.writers.alive[index] and seen > -math.inf:
+            found.append(f"writer {writer.name} lost{_since(now - seen)}")
+    return found
+
+
+def declared_view(plan: Plan) -> tuple[Json, ...]:
+    """What the mapping says of each variable: the part of its view that does not change."""
+    places: dict[int, list[Json]] = {}
+    for one in plan.modbus.placements if plan.modbus is not None else ():
+        places.setdefault(one.variable, []).append(_place(one))
+    return tuple(
+        {
+            "cell": plan.cell.name,
+            "number": variable.number,
+            "name": variable.name,
+            "direction": variable.direction.value,
+            "kind": variable.kind.name.lower(),
+            "robot": robot_name(variable),
+            "modbus": places.get(index, []),
+            "unit": variable.unit,
+            "lock": plan.cell.locks[variable.lock].name if variable.lock is not None else None,
+            "limits": None if variable.limits is None else [variable.limits.low, variable.limits.high],
+            "fallback": _fallback(
+                variable.on_release if variable.direction is Direction.INPUT else variable.on_stale
+            ),
+            "comment": variable.comment,
+        }
+        for index, variable in enumerate(plan.cell.variables)
+    )
+
+
+def variable_view(declared: Json, cell: Cell, index: int, now: float) -> Json:
+    """One variable: what is `declared` of it, and how it is now."""
+    lock = cell.definition.variables[index].lock
+    owner = cell.ownership.owners[lock] if lock is not None else None
+    force = cell.forcing.forces.get(index)
+    return {
+        **declared,
+        "value": plain_value(cell.image.values[index]),
+        "quality": _QUALITIES[cell.image.quality[index]],
+        "age": _seconds(cell.image.age(index, now)),
+        "owner": None if owner is None else cell.definition.writer_name(owner),
+        "lease": None if lock is None or owner is None else _seconds(cell.ownership.remaining(lock, now)),
+        "forced": None
+        if force is None
+        else {"value": plain_value(force.value), "remaining": _seconds(force.until - now)},
+    }
+
+
+def lock_view(cell: Cell, index: int, now: float) -> Json:
+    """One lock."""
+    definition, lock = cell.definition, cell.definition.locks[index]
+    owner = cell.ownership.owners[index]
+    return {
+        "cell": definition.name,
+        "name": lock.name,
+        "members": [definition.variables[member].name for member in lock.members],
+        "owners": [definition.writers[writer].name for writer in lock.owners],
+        "takeover": lock.takeover,
+        "declared_lease": lock.lease,
+        "owner": None if owner is None else definition.writer_name(owner),
+        "remaining": None if owner is None else _seconds(cell.ownership.remaining(index, now)),
+    }
+
+
+def event_view(cell: Cell, seq: int, event: Event, now: float, wall: float) -> Json:
+    """One event; what does not apply is left out."""
+    definition = cell.definition
+
+    def name(writer: int | None) -> str | None:
+        return None if writer is None else definition.writer_name(writer)
+
+    found: Json = {
+        "seq": seq,
+        "time": utc(wall - (now - event.time)),
+        "cell": definition.name,
+        "event": event.kind.value,
+        "variable": definition.variables[event.variable].name if event.variable is not None else None,
+        "lock": definition.locks[event.lock].name if event.lock is not None else None,
+        "writer": name(event.writer) or ("undeclared" if event.kind is EventKind.REFUSED else None),
+        "other": name(event.other),
+        "reason": event.reason.text if event.reason is not None else None,
+        "old": plain_value(event.old),
+        "new": plain_value(event.new),
+        "repeats": event.repeats or None,
+        "detail": event.detail or None,
+    }
+    return {field: value for field, value in found.items() if value is not None}
+
+
+def robot_name(variable: Variable) -> str:
+    """What the variable is in the robot, as the mapping file names it."""
+    word = _BIT_WORD.fullmatch(variable.field)
+    if word is not None and variable.bit is not None:
+        return f"{word[1]}_bit_register_{int(word[2]) + variable.bit}"
+    element = "" if variable.element is None else f"[{variable.element}]"
+    return f"{variable.field}{element}" + ("" if variable.bit is None else f".{variable.bit}")
+
+
+_SOURCES = {
+    Source.LOST: "robot not connected",
+    Source.WAITING: "robot connected, but it sends no data yet",
+    Source.SILENT: "robot silent",
+    Source.FROZEN: "robot frozen, its clock stands still",
+}
+_LISTED = 3
+"""Names told one by one."""
+
+
+def _robot(plan: Plan, cell: Cell, now: float) -> Json:
+    health = cell.health
+    return {
+        "address": _address(plan.robot.host, plan.robot.port),
+        "state": cell.freshness.state.name.lower(),
+        "writable": cell.accepts_writes,
+        "age": _seconds(now - cell.freshness.last_progress),
+        "frequency": round(health.frequency, 1),
+        "packages": health.packages,
+        "skipped": health.skipped,
+        "late": health.late,
+        "sessions": health.sessions,
+        "mismatches": health.read_back_mismatches,
+        "watchdog": None if plan.robot.watchdog is None else health.watchdog_fed,
+    }
+
+
+def _writer(cell: Cell, index: int, now: float) -> Json:
+    writer, table = cell.definition.writers[index], cell.writers
+    return {
+        "name": writer.name,
+        "alive": table.alive[index],
+        "connections": table.connections[index],
+        "age": _seconds(now - table.last_seen[index]),
+        "timeout": writer.timeout,
+        "locks": len(cell.ownership.held_by(index)),
+    }
+
+
+def _last_refusal(cell: Cell, now: float) -> Json | None:
+    last = cell.last_refusal
+    if last is None:
+        return None
+    definition, refusal = cell.definition, last.refusal
+    return {
+        "variable": None if refusal.variable is None else definition.variables[refusal.variable].name,
+        "writer": None if last.writer is None else definition.writer_name(last.writer),
+        "holder": None if refusal.holder is None else definition.writer_name(refusal.holder),
+        "reason": refusal.reason.text,
+        "age": _seconds(now - last.time),
+    }
+
+
+def _place(placement: Placement) -> Json:
+    notation = placement.area.notation(placement.address)
+    return {
+        "area": _AREAS[placement.area],
+        "address": placement.address,
+        "bit": placement.bit,
+        "notation": notation if placement.bit is None else f"{notation}.{placement.bit}",
+    }
+
+
+def _fallback(fallback: Fallback) -> object:
+    return plain_value(fallback.value) if fallback.kind is FallbackKind.VALUE else fallback.kind.value
+
+
+def _address(host: str, port: int) -> str:
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def _seconds(seconds: float) -> float | None:
+    """To the millisecond; None for never and for no end."""
+    return round(max(0.0, seconds), 3) if math.isfinite(seconds) else None
+
+
+def _since(seconds: float) -> str:
+    return f" for {seconds:.0f} s" if math.isfinite(seconds) else ""
+
+
+def _some(cell: Cell, quality: Quality) -> str:
+    return _list(
+        [
+            one.name
+            for one, its in zip(cell.definition.variables, cell.image.quality, strict=True)
+            if its is quality
+        ]
+    )
+
+
+def _list(names: list[str]) -> str:
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
