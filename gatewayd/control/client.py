@@ -6,7 +6,7 @@ import http.client
 import json
 import os
 import socket
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlencode
@@ -64,7 +64,7 @@ class Client:
         connection, response = self._begin("POST", path, body or {}, self._patience)
         return self._end(connection, response)
 
-    def follow(self, path: str, **query: str | int | None) -> Iterator[dict[str, Any]]:
+    def follow(self, path: str, **query: str | int | None) -> Generator[dict[str, Any], None, None]:
         """Every object that comes, until the daemon ends. Raises NoDaemon, ControlError."""
         patience = max(self._patience, _FOLLOW_PATIENCE)
         connection, response = self._begin("GET", _with_query(path, query), None, patience)

@@ -81,9 +81,9 @@ class _Routes:
         self._reload = reload
         self._under_way = 0
         self._followers = 0
-        self.guard = web.middleware(self._guard)
 
-    async def _guard(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
+    @web.middleware
+    async def guard(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
         """Bound what is under way, and give every error the same form."""
         if self._under_way >= REQUESTS:
             return _error(ApiError(503, "busy", f"{REQUESTS} requests are under way already"))

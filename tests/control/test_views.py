@@ -1,0 +1,136 @@
+"""What is told is exactly what is documented, and problems are told in words."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from gatewayd.control import documented
+from gatewayd.control.api import Api
+from gatewayd.control.views import problems
+from gatewayd.core.cell import Change
+from tests.control.served import CYCLES, LIMIT, SPEED, Served, at
+
+PLC, HMI = 0, 1
+
+
+def test_the_status_has_the_documented_fields(api: Api, press: Served) -> None:
+    assert press.cell.write(PLC, [Change(LIMIT, 999.0)], 0.5) is not None
+    status = api.status(at(1.0))
+    (cell,) = status["cells"]
+    assert status.keys() == documented.STATUS.keys()
+    assert cell.keys() == documented.CELL.keys()
+    assert cell["robot"].keys() == documented.ROBOT.keys()
+    assert cell["modbus"].keys() == documented.MODBUS.keys()
+    assert cell["writers"][0].keys() == documented.WRITER.keys()
+    assert cell["last_refusal"].keys() == documented.REFUSAL.keys()
+    assert api.version().keys() == documented.VERSION.keys()
+
+
+def test_variables_and_locks_have_the_documented_fields(api: Api) -> None:
+    assert all(one.keys() == documented.VARIABLE.keys() for one in api.variables({}, at(1.0))["variables"])
+    assert all(one.keys() == documented.LOCK.keys() for one in api.locks({}, at(1.0))["locks"])
+
+
+def test_events_and_records_have_documented_fields_only(api: Api, press: Served) -> None:
+    cell = press.cell
+    assert cell.write(PLC, [Change(LIMIT, 1.0)], 1.0) is None
+    assert cell.write(HMI, [Change(LIMIT, 2.0)], 1.1) is not None
+    assert cell.force(CYCLES, 5, 1.2, 2.0, "by anna") is None
+    cell.take_lock(2, 1.3, detail="by anna")
+    cell.robot_lost("gone", 1.4)
+    events = api.events({}, at(2.0))["events"]
+    records = api.audit({}, at(2.0))["records"]
+    assert len(events) > 6
+    for told, fields, always in ((events, documented.EVENT, 4), (records, documented.AUDIT, 4)):
+        for one in told:
+            assert one.keys() <= fields.keys()
+            assert list(one)[:always] == list(fields)[:always]
+
+
+def test_a_variable_tells_both_places_and_its_owner(api: Api, press: Served) -> None:
+    assert press.cell.write(PLC, [Change(SPEED, 1.5)], 1.0) is None
+    (speed,) = api.variables({"name": "speed"}, at(1.5))["variables"]
+    assert speed["robot"] == "input_double_register_1"
+    assert speed["modbus"] == [{"area": "holding", "address": 24, "bit": None, "notation": "400025"}]
+    assert (speed["value"], speed["quality"], speed["age"]) == (1.5, "good", 0.5)
+    assert (speed["lock"], speed["owner"], speed["lease"], speed["fallback"]) == ("motion", "plc", 1.5, 0.5)
+    (cycles,) = api.variables({"name": "cycles"}, at(1.5))["variables"]
+    assert [place["notation"] for place in cycles["modbus"]] == ["400101", "300008"]
+    assert (cycles["lock"], cycles["owner"], cycles["fallback"]) == (None, None, "exception")
+
+
+@pytest.mark.parametrize(
+    "name, robot, notation",
+    [
+        ("start", "input_bit_register_33", "400001.1"),
+        ("tcp[[]2]", "actual_TCP_pose[2]", "400209"),
+        ("door", "actual_digital_input_bits.3", "100065"),
+    ],
+)
+def test_the_robots_side_is_named_as_the_mapping_names_it(
+    api: Api, name: str, robot: str, notation: str
+) -> None:
+    (found,) = api.variables({"name": name}, at(1.0))["variables"]
+    assert (found["robot"], found["modbus"][0]["notation"]) == (robot, notation)
+
+
+def test_a_force_is_told_with_what_is_left_of_it(api: Api, press: Served) -> None:
+    assert press.cell.force(CYCLES, 7, 1.0, 11.0) is None
+    (found,) = api.variables({"name": "cycles"}, at(4.0))["variables"]
+    assert (found["value"], found["quality"], found["age"]) == (7, "forced", 3.0)
+    assert found["forced"] == {"value": 7, "remaining": 7.0}
+
+
+class TestProblems:
+    def test_a_good_cell_has_none(self, press: Served) -> None:
+        assert problems(press.cell, 0.01) == []
+
+    def test_a_lost_robot_and_for_how_long(self, press: Served) -> None:
+        press.cell.robot_lost("gone", 1.0)
+        assert problems(press.cell, 8.0) == ["robot not connected for 8 s"]
+
+    def test_inputs_that_are_not_adopted(self, press: Served) -> None:
+        press.cell.robot_connected(1.0)
+        assert press.cell.package_arrived(1.0, 1.0)
+        assert problems(press.cell, 1.0) == ["the robot's inputs are not adopted yet, nothing can be written"]
+
+    def test_what_is_unavailable_by_name(self, press: Served) -> None:
+        press.cell.set_availability(range(5), False, "in use", 1.0)
+        assert problems(press.cell, 0.0) == ["5 of 12 variables unavailable: start, limit, speed and 2 more"]
+
+    def test_what_the_operator_left_behind(self, press: Served) -> None:
+        assert press.cell.force(SPEED, 1.0, 0.0, 9.0) is None
+        assert problems(press.cell, 0.0) == [
+            "forced by the local operator: speed",
+            "locks held by the local operator: motion",
+        ]
+
+    def test_a_writer_that_was_there_but_not_one_that_never_came(self, press: Served) -> None:
+        press.cell.writer_connected(HMI, 0.0)
+        press.cell.writer_disconnected(HMI, 0.0, "closed")
+        assert problems(press.cell, 0.0) == ["writer hmi lost for 0 s"]
+
+
+def _texts(value: object) -> list[object]:
+    if isinstance(value, Mapping):
+        return [one for inner in value.values() for one in _texts(inner)]
+    if isinstance(value, list):
+        return [one for inner in value for one in _texts(inner)]
+    return [value]
+
+
+@pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
+def test_odd_reals_are_still_json(api: Api, press: Served, odd: float) -> None:
+    assert press.cell.write(PLC, [Change(SPEED, odd)], 1.0) is None
+    answers: list[dict[str, Any]] = [
+        api.status(at(1.0)),
+        api.variables({}, at(1.0)),
+        api.events({}, at(1.0)),
+        api.audit({}, at(1.0)),
+    ]
+    assert str(odd) in _texts(json.loads(json.dumps(answers, allow_nan=False)))
