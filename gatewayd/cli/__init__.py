@@ -14,9 +14,11 @@ __all__ = ["COMMANDS", "command"]
 COMMANDS = {
     "demo": "Simulator, gateway and a small PLC program in one terminal.",
     "check": "Find every mistake of mapping files, without a robot.",
+    "diff": "Tell what a new mapping file changes of an old one.",
     "show": "Print the register table of a mapping file.",
     "simulate": "Be a robot controller to connect to.",
     "run": "Serve the cells of mapping files: the daemon.",
+    "reload": "Have the running gateway read its mapping files again.",
     "completion": "Print the completion script of a shell.",
 }
 """Name -> what the list of commands says. Module `gatewayd.cli.NAME` has the click command as `command`."""

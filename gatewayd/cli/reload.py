@@ -1,0 +1,93 @@
+"""`gatewayd reload`: have the running gateway read its mapping files again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ["PATIENCE", "command"]
+
+PATIENCE = 60.0
+"""Seconds for the answer: many large files take a while on a small machine."""
+NOT_DONE, UNREACHABLE = 1, 2
+"""Exit codes."""
+
+
+@click.command(
+    name="reload",
+    epilog="""\b
+Examples:
+  gatewayd reload
+  gatewayd reload --force     also change what is owned at this moment
+  gatewayd diff /etc/gatewayd/press.yaml new.yaml   before: what it would change
+
+\b
+Refused without --force: a change or removal of a variable that is owned now, a direction that turns round, more than
+30 % of a cell's variables gone, a whole cell gone. With any error in any file the old mapping runs on.
+Exit codes:
+  0  what runs now is what the files say
+  1  refused, or a file has errors: the old mapping runs on, the reasons are printed
+  2  wrong usage, or no gateway could be reached
+""",
+)
+@click.option("--force", is_flag=True, help="Apply it although it touches what is owned now.")
+@click.option(
+    "--socket",
+    type=click.Path(path_type=Path),
+    envvar="GATEWAYD_CONTROL",
+    help="Control socket of the gateway; found by itself where there is one.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print what the gateway answers, for programs.")
+@click.pass_context
+def command(context: click.Context, socket: Path | None, *, force: bool, as_json: bool) -> None:
+    """Have the running gateway read, check and compare its mapping files again, and serve them if that is safe.
+
+    Links whose settings did not change stay up; owners and values of variables that did not change stay as they are.
+    """
+    import json
+    import os
+
+    from gatewayd.control.client import Client, ControlError, NoDaemon, find_socket
+
+    try:
+        answer: Mapping[str, Any] = Client(find_socket(socket, os.environ), PATIENCE).post(
+            "/v1/reload", {"force": force}
+        )
+    except NoDaemon as error:
+        click.echo(str(error), err=True)
+        context.exit(UNREACHABLE)
+    except ControlError as error:
+        if "result" not in error.body:
+            click.echo(str(error), err=True)
+            context.exit(NOT_DONE)
+        answer = error.body
+    done = answer.get("result") in ("applied", "unchanged")
+    if as_json:
+        click.echo(json.dumps(answer, indent=2, ensure_ascii=False))
+    else:
+        for line in _lines(answer):
+            click.echo(line, err=not done)
+    context.exit(0 if done else NOT_DONE)
+
+
+def _lines(answer: Mapping[str, Any]) -> list[str]:
+    """What happened, in one line; then every reason, and what is or would be different."""
+    result, reasons = answer.get("result"), answer.get("reasons", ())
+    if result == "unchanged":
+        return ["nothing has changed"]
+    if result == "applied":
+        lines = [f"reloaded in {answer.get('swap_ms', 0):.1f} ms"]
+    elif result == "refused":
+        lines = ["refused, the old mapping runs on; --force applies it all the same:"]
+    else:
+        lines = ["failed, the old mapping runs on:"]
+    return [
+        *lines,
+        *(f"  {reason}" for reason in reasons),
+        *(f"  {change}" for change in answer.get("changes", ())),
+    ]

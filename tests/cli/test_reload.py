@@ -1,0 +1,87 @@
+"""`gatewayd reload`: what it prints and its exit codes, for every answer of a gateway. The whole way: tests/e2e."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from gatewayd.audit import Audit
+from gatewayd.cli.reload import command
+from gatewayd.control.api import Api
+from gatewayd.control.endpoint import bind
+from gatewayd.control.server import serving
+from gatewayd.daemon import Daemon
+from gatewayd.reload import Outcome
+from gatewayd.reload import Result as Ended
+
+CHANGE = "press: 1 variable added"
+Reloading = Callable[..., Awaitable[Result]]
+
+
+@pytest.fixture
+def reloading(tmp_path: Path) -> Reloading:
+    """`gatewayd reload ARGS` against a control socket behind which a reload ends so."""
+
+    async def run(outcome: Outcome | None, *args: str) -> Result:
+        asked: list[bool] = []
+
+        async def reload(force: bool) -> Outcome:
+            asked.append(force)
+            assert outcome is not None
+            return outcome
+
+        path = tmp_path / "control.sock"
+        with bind(path) as listening:
+            async with serving(listening, Api(Daemon([]), Audit()), reload if outcome is not None else None):
+                done = await asyncio.to_thread(CliRunner().invoke, command, ["--socket", str(path), *args])
+        assert asked == ([] if outcome is None else ["--force" in args])
+        return done
+
+    return run
+
+
+@pytest.mark.parametrize("outcome, code, said", [
+    (Outcome(Ended.UNCHANGED), 0, "nothing has changed\n"),
+    (Outcome(Ended.APPLIED, (), (CHANGE,), 0.0042), 0, f"reloaded in 4.2 ms\n  {CHANGE}\n"),
+    (Outcome(Ended.REFUSED, ("press: `x` is owned",), (CHANGE,)), 1,
+     f"refused, the old mapping runs on; --force applies it all the same:\n  press: `x` is owned\n  {CHANGE}\n"),
+    (Outcome(Ended.FAILED, ("a.yaml:1:1: GW001 syntax: bad", "b.yaml cannot be read")), 1,
+     "failed, the old mapping runs on:\n  a.yaml:1:1: GW001 syntax: bad\n  b.yaml cannot be read\n"),
+])  # fmt: skip
+async def test_every_ending_is_told(reloading: Reloading, outcome: Outcome, code: int, said: str) -> None:
+    done = await reloading(outcome)
+    assert (done.exit_code, done.output) == (code, said)
+    assert bool(done.stdout) == (code == 0), "what was not done is told on standard error"
+
+
+async def test_force_is_passed_on(reloading: Reloading) -> None:
+    assert (await reloading(Outcome(Ended.APPLIED), "--force")).exit_code == 0
+
+
+async def test_json_is_the_answer(reloading: Reloading) -> None:
+    done = await reloading(Outcome(Ended.REFUSED, ("why",), (CHANGE,)), "--json")
+    assert done.exit_code == 1
+    assert json.loads(done.output) == {
+        "result": "refused",
+        "text": "reload refused, the old mapping runs on: why",
+        "reasons": ["why"],
+        "changes": [CHANGE],
+        "swap_ms": 0.0,
+    }
+
+
+async def test_a_gateway_that_cannot_reload_says_so(reloading: Reloading) -> None:
+    done = await reloading(None)
+    assert done.exit_code == 1
+    assert "restart it" in done.stderr
+
+
+def test_no_gateway_is_exit_code_2(tmp_path: Path) -> None:
+    done = CliRunner().invoke(command, ["--socket", str(tmp_path / "nobody.sock")])
+    assert done.exit_code == 2
+    assert "nobody.sock" in done.stderr
