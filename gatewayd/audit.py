@@ -8,6 +8,7 @@ together. Refusals are merged by the cell itself.
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import time
@@ -41,6 +42,7 @@ KINDS = frozenset(
 )
 """Events that are audited."""
 
+_PERIOD = 0.2
 PlainValue = bool | int | float | str | None
 
 
@@ -126,6 +128,16 @@ class Audit:
         """Tell what was merged long enough. Cheap while nothing was."""
         for watch in self._watches.values():
             watch.tick(now)
+
+    async def run(self, cells: Callable[[], Iterable[Cell]]) -> None:
+        """Keep up with the gateway's cells until cancelled; then tell what was merged and not told yet."""
+        try:
+            while True:
+                self.follow(cells())
+                self.tick(time.monotonic())
+                await asyncio.sleep(_PERIOD)
+        finally:
+            self.follow(())
 
     def append(self, record: Record) -> None:
         """Keep the record, and give it to the sink."""

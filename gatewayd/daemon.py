@@ -72,6 +72,7 @@ class Station:
         self.robot.flush(now)
         former.listeners.clear()
         former.events.listeners.clear()
+        former.write_listeners.clear()
         return succession
 
     def _furnish(self, cell: Cell) -> None:
@@ -88,12 +89,19 @@ class Daemon:
         self._group: asyncio.TaskGroup | None = None
         self._tasks: dict[object, asyncio.Task[None]] = {}
         """Of stations (their clocks), robot links and listeners."""
+        self._observers: list[Callable[[Cell], None]] = []
         self._serve({})
 
     @property
     def cells(self) -> list[Cell]:
         """The cells that are served now."""
         return [station.cell for station in self.stations]
+
+    def observe(self, observer: Callable[[Cell], None]) -> None:
+        """Call `observer` with every cell, now and whenever a reload brings one, before anybody writes to it."""
+        self._observers.append(observer)
+        for cell in self.cells:
+            observer(cell)
 
     def turns(self) -> dict[str, int]:
         """A counter for each part that has to go on: cores, robot links, listeners. 0: it has not begun."""
@@ -166,6 +174,7 @@ class Daemon:
             station = former.pop(name, None)
             if station is None:
                 station = Station(plan)
+                self._show(station.cell)
                 self._begin_station(station)
             elif station.plan != plan:
                 stranded += self._replace(station, plan, now, successors)
@@ -181,11 +190,16 @@ class Daemon:
     def _replace(self, station: Station, plan: Plan, now: float, successors: dict[Cell, Cell]) -> list[str]:
         cell, robot = station.cell, station.robot
         stranded = station.succeed(plan, now)
+        self._show(station.cell)
         station.cell.health.modbus_connections = 0
         successors[cell] = station.cell
         if station.robot is not robot:
             self._begin(station.robot, partial(_keep_running, station.robot.run), self._end(robot))
         return [f"{plan.cell.name}: {name}" for name in stranded]
+
+    def _show(self, cell: Cell) -> None:
+        for observer in self._observers:
+            observer(cell)
 
     def _serve(self, successors: Mapping[Cell, Cell]) -> None:
         """Have a listener for every address of the stations' plans, and no other."""
@@ -234,8 +248,7 @@ class Daemon:
         await asyncio.gather(*(listener.close() for listener in self.listeners))
         now = time.monotonic()
         for station in self.stations:
-            for writer in range(len(station.plan.cell.writers)):
-                station.cell.release_all(writer, now, "the gateway stops")
+            station.cell.stop(now, "the gateway stops")
         with suppress(TimeoutError):
             async with asyncio.timeout(CLOSING_TIME):
                 await asyncio.gather(*(station.robot.close() for station in self.stations))

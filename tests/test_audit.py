@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 from itertools import pairwise
@@ -183,3 +184,16 @@ def test_following_drops_cells_that_are_gone(cell: Cell, audit: Audit) -> None:
     assert len(other.write_listeners) == 1
     audit.follow([other])
     assert len(other.write_listeners) == 1
+
+
+async def test_it_keeps_up_with_the_gateway_and_tells_the_rest_at_the_end(cell: Cell) -> None:
+    audit = Audit()
+    audit.watch(cell)
+    running = asyncio.create_task(audit.run(lambda: [cell]))
+    await asyncio.sleep(0)
+    for value in (1, 2):
+        assert cell.write(PLC, [Change(NUMBER, value)], 1.0) is None
+    assert written(audit) == [("plc", 0, 1, 1)]
+    running.cancel()
+    await asyncio.wait((running,))
+    assert written(audit) == [("plc", 0, 1, 1), ("plc", 1, 2, 1)]

@@ -124,3 +124,12 @@ async def test_a_link_that_ends_by_a_defect_is_started_again(
             await until(lambda: station.cell.freshness.state is Source.FRESH)
             assert station.cell.accepts_writes
     assert len([record for record in caplog.records if "internal error" in record.getMessage()]) == 2
+
+
+def test_an_observer_sees_every_cell_that_a_reload_brings_before_it_is_served() -> None:
+    first, second = plans((1, 8, 9), (2, 9, 9))
+    daemon = Daemon([first])
+    seen: list[str] = []
+    daemon.observe(lambda cell: seen.append(cell.definition.name))
+    daemon.swap([first, second], 1.0)
+    assert seen == ["cell-1", "cell-2"]
