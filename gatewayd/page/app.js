@@ -1,0 +1,140 @@
+// Asks the gateway four times a second and shows what it says. What is not answered in time is shown as old, at once.
+
+import { Picture } from "./picture.js";
+import { Variables } from "./variables.js";
+import { OPERATOR, clock, count, make, put, span } from "./words.js";
+
+const PERIOD = 250;
+const PATIENCE = 1500;                // without an answer for so long, nothing on the page is believed
+const EVENTS = 200;
+const byId = (id) => document.getElementById(id);
+
+const picture = new Picture(byId("picture"));
+const variables = new Variables(1000 / PERIOD);
+let layout = null, cell = null, events = 0;
+let answered = -Infinity, answeredAt = null, trouble = "";
+
+async function ask(path) {
+  const response = await fetch(path, { signal: AbortSignal.timeout(PATIENCE), cache: "no-store" });
+  if (!response.ok) throw new Error(`${response.status} ${(await response.text()).trim().slice(0, 100)}`);
+  return response.json();
+}
+
+async function choose() {
+  const { cells, gatewayd } = await ask("page/cells");
+  const names = cells.map((one) => one.name);
+  const wanted = decodeURIComponent(location.hash.slice(1));
+  cell = names.includes(wanted) ? wanted : names[0];
+  if (cell === undefined) throw new Error("the gateway serves no cell");
+  byId("cells").replaceChildren(...names.map((name) => new Option(name, name, false, name === cell)));
+  byId("chooser").hidden = names.length < 2;
+  put(byId("cell"), names.length < 2 ? cell : "");
+  document.title = `${cell} - gatewayd`;
+  byId("cells").title = `gatewayd ${gatewayd}`;
+  layout = await ask(`page/cells/${encodeURIComponent(cell)}`);
+  events = 0;
+  byId("happened").replaceChildren();
+  variables.build(layout);
+}
+
+async function look() {
+  if (layout === null) await choose();
+  const asked = layout;
+  const state = await ask(`page/cells/${encodeURIComponent(cell)}/state?since=${events}`);
+  if (asked !== layout) return;
+  if (state.fingerprint !== layout.fingerprint) {
+    layout = null;
+    return look();
+  }
+  const now = performance.now();
+  picture.show(state.picture);
+  variables.update(state, now);
+  showLocks(state);
+  showEvents(state.events);
+  document.body.dataset.level = state.picture.level;
+  answered = now;
+  answeredAt = new Date();
+  trouble = "";
+  judge();
+}
+
+function showLocks(state) {
+  const owned = byId("owned"), total = layout.locks.length;
+  put(byId("locks-count"), state.owned.length ? String(state.owned.length) : "");
+  put(byId("locks-summary"), `${state.owned.length} of ${total} owned`);
+  while (owned.children.length > state.owned.length) owned.lastChild.remove();
+  while (owned.children.length < state.owned.length) {
+    const item = make("li");
+    item.append(make("strong"), make("span", "by"), make("span", "left muted"));
+    owned.append(item);
+  }
+  state.owned.forEach(([lock, owner, left], index) => {
+    const [name, by, rest] = owned.children[index].children;
+    const { name: title, variables: members } = layout.locks[lock];
+    put(name, members.length > 1 ? `${title} (${count(members.length, "variable")})` : title);
+    put(by, owner === OPERATOR ? "local operator" : layout.writers[owner].name);
+    put(rest, left === null ? "until released" : `${span(left)} left`);
+  });
+}
+
+function showEvents({ count: told, latest }) {
+  const list = byId("happened");
+  if (told < events) list.replaceChildren();
+  events = told;
+  for (const event of latest) {
+    const item = make("li", event.bad ? "bad" : "");
+    const at = make("time", "muted", clock(new Date(event.time * 1000)));
+    at.dateTime = new Date(event.time * 1000).toISOString();
+    item.append(at, make("span", "", event.text));
+    list.prepend(item);
+  }
+  while (list.children.length > EVENTS) list.lastChild.remove();
+}
+
+// Whether what is shown may be believed, said where nobody can overlook it.
+function judge() {
+  const age = performance.now() - answered;
+  const contact = age <= PATIENCE ? "live" : answeredAt ? "lost" : trouble ? "lost" : "waiting";
+  const alarm = byId("alarm");
+  document.body.dataset.contact = contact;
+  put(byId("contact-words"), { live: "live", lost: "no answer", waiting: "connecting" }[contact]);
+  alarm.hidden = contact !== "lost";
+  if (contact !== "lost") return;
+  const since = answeredAt ? `since ${clock(answeredAt)} (${span(age)})` : "so far";
+  put(alarm, `No answer from the gateway ${since}. ${answeredAt ? "Everything below is old." : ""}`);
+  alarm.title = trouble;
+}
+
+async function run() {
+  for (;;) {
+    const begun = performance.now();
+    if (!document.hidden) {
+      try {
+        await look();
+      } catch (error) {
+        trouble = String(error.message ?? error);
+        if (trouble.startsWith("404")) layout = null;
+        judge();
+      }
+    }
+    await new Promise((done) => setTimeout(done, Math.max(20, PERIOD - (performance.now() - begun))));
+  }
+}
+
+function start() {
+  byId("cells").addEventListener("change", (event) => {
+    location.hash = encodeURIComponent(event.target.value);
+    layout = null;
+  });
+  for (const button of document.querySelectorAll(".tabs button")) {
+    button.addEventListener("click", () => {
+      document.body.dataset.tab = button.dataset.tab;
+      for (const one of document.querySelectorAll(".tabs button")) one.setAttribute("aria-pressed", String(one === button));
+    });
+  }
+  document.addEventListener("visibilitychange", judge);
+  setInterval(judge, PERIOD);
+  run();
+}
+
+start();

@@ -1,0 +1,77 @@
+// The cell as a picture: robot - gateway - buses - writers, each with its state in words.
+
+import { make, put } from "./words.js";
+
+const MARKS = { good: "●", warn: "▲", bad: "■", idle: "○" };
+const LEVELS = { good: "in order", warn: "attention", bad: "trouble", idle: "not there" };
+
+export class Picture {
+  constructor(place) {
+    this.place = place;
+    this.shape = "";
+    this.parts = [];
+  }
+
+  show(picture) {
+    const shape = `${picture.buses.length} ${picture.writers.length}`;
+    if (shape !== this.shape) this.build(picture, shape);
+    const told = [picture.robot, picture.gateway, ...picture.buses, ...picture.writers];
+    told.forEach((one, index) => this.fill(this.parts[index], one));
+    this.robotLink.dataset.level = picture.robot.level;
+    const flows = picture.buses.every((bus) => bus.level === "good");
+    this.busLink.dataset.level = flows ? "good" : "bad";
+  }
+
+  build(picture, shape) {
+    this.shape = shape;
+    this.parts = [];
+    const robot = this.node("robot"), gateway = this.node("gateway");
+    this.robotLink = this.link("RTDE");
+    this.busLink = this.link(picture.buses.length ? "Modbus TCP" : "no bus");
+    const buses = make("div", "buses");
+    picture.buses.forEach(() => buses.append(this.node("bus")));
+    const writers = make("ul", "writers plain");
+    writers.setAttribute("aria-label", "Writers");
+    picture.writers.forEach(() => {
+      const item = make("li");
+      item.append(this.node("writer"));
+      writers.append(item);
+    });
+    buses.append(writers);
+    this.place.replaceChildren(robot, this.robotLink, gateway, this.busLink, buses);
+  }
+
+  node(icon) {
+    const node = make("div", `node ${icon}`);
+    const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+    const use = document.createElementNS("http://www.w3.org/2000/svg", "use");
+    svg.setAttribute("aria-hidden", "true");
+    use.setAttribute("href", `#${icon}`);
+    svg.append(use);
+    const text = make("div", "about");
+    const name = make("strong"), state = make("p", "state"), facts = make("p", "facts muted");
+    const mark = make("span", "mark"), level = make("span", "unseen"), words = make("span");
+    mark.setAttribute("aria-hidden", "true");
+    state.append(mark, level, words);
+    text.append(name, state, facts);
+    node.append(svg, text);
+    this.parts.push({ node, name, mark, level, words, facts });
+    return node;
+  }
+
+  link(label) {
+    const link = make("div", "link");
+    link.append(make("span", "wire"), make("span", "label", label));
+    link.setAttribute("aria-hidden", "true");
+    return link;
+  }
+
+  fill(part, told) {
+    part.node.dataset.level = told.level;
+    put(part.name, told.name);
+    put(part.mark, MARKS[told.level]);
+    put(part.level, `${LEVELS[told.level]}: `);
+    put(part.words, told.words);
+    put(part.facts, told.facts);
+  }
+}
