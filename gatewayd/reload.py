@@ -184,8 +184,8 @@ class Reloader:
                 self.last = outcome
                 self._ended(outcome)
         level = logging.INFO if outcome.result.is_good else logging.ERROR
-        swap_ms = f"{outcome.swap * 1000:.1f}" if outcome.result is Result.APPLIED else None
-        log.log(level, outcome.text, extra=fields(swap_ms=swap_ms))
+        took = {"swap_ms": f"{outcome.swap * 1000:.1f}"} if outcome.result is Result.APPLIED else {}
+        log.log(level, outcome.text, extra=fields(**took))
         return outcome
 
     async def _reload(self, *, force: bool) -> Outcome:
