@@ -224,14 +224,18 @@ def _at(indices: Mapping[int, int], index: int | None) -> int | None:
 
 def _translated(event: Event, match: _Match) -> Event:
     """The event with the new indices; of what is gone the name is kept in the detail."""
-    return replace(
-        event,
-        variable=_at(match.variables, event.variable),
-        lock=_at(match.locks, event.lock),
-        writer=_at(match.writers, event.writer),
-        other=_at(match.writers, event.other),
-        detail=", ".join(filter(None, (event.detail, *_names_gone(event, match)))),
+    former = event.variable, event.lock, event.writer, event.other
+    indices = (
+        _at(match.variables, event.variable),
+        _at(match.locks, event.lock),
+        _at(match.writers, event.writer),
+        _at(match.writers, event.other),
     )
+    if indices == former:
+        return event
+    variable, lock, writer, other = indices
+    detail = ", ".join(filter(None, (event.detail, *_names_gone(event, match))))
+    return replace(event, variable=variable, lock=lock, writer=writer, other=other, detail=detail)
 
 
 def _names_gone(event: Event, match: _Match) -> Iterator[str]:
