@@ -11,14 +11,11 @@ import errno
 import logging
 import os
 import socket
+import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, cast
-
-from pymodbus.server import ModbusTcpServer
-from pymodbus.server.requesthandler import ServerRequestHandler
-from pymodbus.simulator import SimData, SimDevice
 
 from gatewayd.core.cell import Cell
 from gatewayd.logs import fields
@@ -35,6 +32,19 @@ from gatewayd.modbus.peers import (
 )
 from gatewayd.modbus.polling import ReadPoller
 from gatewayd.modbus.session import Access, Session
+
+# pymodbus.server imports aiohttp for a web page of its own, if it is there, and does without if not. It is there, for
+# the control interface, but imported at this point it would be most of the time until the gateway serves.
+_hidden = "aiohttp" not in sys.modules
+if _hidden:
+    sys.modules["aiohttp"] = None  # type: ignore[assignment]
+try:
+    from pymodbus.server import ModbusTcpServer
+    from pymodbus.server.requesthandler import ServerRequestHandler
+    from pymodbus.simulator import SimData, SimDevice
+finally:
+    if _hidden:
+        del sys.modules["aiohttp"]
 
 __all__ = ["ListenError", "ModbusListener"]
 

@@ -7,6 +7,8 @@ import errno
 import resource
 import socket
 import struct
+import subprocess
+import sys
 import time
 from collections.abc import Awaitable, Callable
 from itertools import islice
@@ -390,3 +392,13 @@ async def test_listens_on_ipv6(live_cell: Cell, plan_of: PlanOf, events: list[Pe
     assert events[0].peer == f"[::1]:{writer.get_extra_info('sockname')[1]}"
     writer.close()
     await listener.close()
+
+
+def test_the_start_does_not_wait_for_aiohttp() -> None:
+    """pymodbus would import it, though nothing of ours needs it before the gateway serves."""
+    script = (
+        "import sys, gatewayd.daemon, gatewayd.cli.run, gatewayd.operation; assert 'aiohttp' not in sys.modules; "
+        "import aiohttp.web"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
