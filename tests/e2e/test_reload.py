@@ -178,7 +178,7 @@ def test_what_is_owned_is_not_touched_unless_forced(plant: Plant) -> None:
     wait_for(lambda: plc.writable, "the robot to be writable")
     assert (plc.owner(1), plc.owner(2)) == (1, 1), "held and bit"
     assert in_robot(simulator) == (77, -1.5, 2)
-    controlled.daemon.wait_for_line("lock released", "lock=force", "writer=plc")
+    controlled.daemon.wait_for_line("fallback applied", "variable=force", "old=9.5 new=-1.5")
 
     again = controlled.reload("--json")
     assert json.loads(again.stdout)["result"] == "unchanged"
