@@ -15,6 +15,7 @@ import click
 if TYPE_CHECKING:
     from gatewayd.daemon import Daemon
     from gatewayd.startup import Startup
+    from gatewayd.status.launch import Settings
 
 __all__ = ["command"]
 
@@ -55,7 +56,42 @@ Exit codes:
     help="Least severity told; debug also tells every lock taken and released.",
 )
 @click.option("--strict", is_flag=True, help="Start only if every file can be served.")
-def command(files: tuple[Path, ...], log_format: str, log_level: str, *, strict: bool) -> int:
+@click.option(
+    "--control",
+    type=click.Path(path_type=Path),
+    envvar="GATEWAYD_CONTROL",
+    help="Control socket for gatewayd status, watch, force and so on; `none` for no socket. Default: in the runtime "
+    "directory of the service or of the session.",
+)
+@click.option(
+    "--audit",
+    type=click.Path(path_type=Path),
+    envvar="GATEWAYD_AUDIT",
+    help="Also write the audit (who wrote what, when) to this file, as JSON lines, rotated by size.",
+)
+@click.option(
+    "--status",
+    metavar="HOST:PORT",
+    envvar="GATEWAYD_STATUS",
+    help="Listen there for the status page, /metrics, /healthz and /readyz, say 127.0.0.1:9502. Off by default.",
+)
+@click.option(
+    "--token-file",
+    type=click.Path(path_type=Path),
+    envvar="GATEWAYD_TOKEN_FILE",
+    help="File with the token that the status listener asks for by everything but reading.",
+)
+def command(
+    files: tuple[Path, ...],
+    *,
+    log_format: str,
+    log_level: str,
+    control: Path | None,
+    audit: Path | None,
+    status: str | None,
+    token_file: Path | None,
+    strict: bool,
+) -> int:
     """Serve the robot cells of mapping FILES until stopped.
 
     A FILE may also be a directory: all its *.yaml files are meant. Cells with the same `modbus: listen:` share one
@@ -64,15 +100,30 @@ def command(files: tuple[Path, ...], log_format: str, log_level: str, *, strict:
     from gatewayd.daemon import Daemon
     from gatewayd.logs import Format, configure
     from gatewayd.startup import load_plans
+    from gatewayd.status.launch import Settings, SettingsError
 
+    try:
+        page = Settings(status, token_file) if status else None
+    except SettingsError as error:
+        raise click.UsageError(str(error)) from error
     configure(Format(log_format), logging.getLevelNamesMapping()[log_level.upper()])
     found = load_plans(files)
     if not found.plans and not found.broken:
         return UNREADABLE
     if not found.plans or (strict and (found.broken or found.unreadable)):
         return NOTHING_TO_RUN
-    asyncio.run(_serve(Daemon(found.plans), files, _notes(found)))
+    asyncio.run(
+        _serve(Daemon(found.plans), files, _notes(found), page=page, control=_socket(control), audit=audit)
+    )
     return 0
+
+
+def _socket(named: Path | None) -> Path | None:
+    from gatewayd.control.paths import default_socket
+
+    if named is None:
+        return default_socket(os.environ)
+    return None if str(named) == "none" else named
 
 
 def _notes(found: Startup) -> list[str]:
@@ -81,9 +132,19 @@ def _notes(found: Startup) -> list[str]:
     return [f"{count} mapping file{'s' if count > 1 else ''} not served, see the log"] if count else []
 
 
-async def _serve(daemon: Daemon, files: Sequence[Path], notes: list[str]) -> None:
+async def _serve(
+    daemon: Daemon,
+    files: Sequence[Path],
+    notes: list[str],
+    *,
+    page: Settings | None,
+    control: Path | None,
+    audit: Path | None,
+) -> None:
+    from gatewayd.operation import Operation
     from gatewayd.reload import Reloader
     from gatewayd.service import Service
+    from gatewayd.status.launch import serve
     from gatewayd.systemd import Notifier
 
     stop = asyncio.Event()
@@ -101,8 +162,21 @@ async def _serve(daemon: Daemon, files: Sequence[Path], notes: list[str]) -> Non
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, on_signal)
     loop.add_signal_handler(signal.SIGHUP, reloader.ask)
+    operation = Operation(
+        daemon, control, audit, lambda: service.notes, lambda force: reloader.reload(force=force)
+    )
+    operating = asyncio.create_task(operation.run())
     reporting = asyncio.create_task(service.run(stop))
     reloading = asyncio.create_task(reloader.run())
+    showing = (
+        asyncio.create_task(serve(page, daemon, (operation.api, operation.reload), lambda: service.notes))
+        if page
+        else None
+    )
     await daemon.run(stop)
     reloading.cancel()
+    operating.cancel()
+    if showing is not None:
+        showing.cancel()
+    await asyncio.wait((operating,))
     await reporting

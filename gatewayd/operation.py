@@ -1,0 +1,82 @@
+"""What those who run the gateway use beside the fieldbus: the audit and its file, and the control socket."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from gatewayd.audit import Audit
+from gatewayd.auditfile import AuditFile
+from gatewayd.control.api import Api, Gateway
+from gatewayd.control.endpoint import Endpoint, Reload
+from gatewayd.core.cell import Cell
+
+__all__ = ["RETRY_PERIOD", "Operated", "Operation"]
+
+RETRY_PERIOD = 2.0
+"""Seconds before what ended in a defect is started again."""
+
+log = logging.getLogger("gatewayd.operation")
+
+
+class Operated(Gateway, Protocol):
+    """What is needed of the daemon."""
+
+    @property
+    def cells(self) -> Iterable[Cell]:
+        """The cells that are served now."""
+
+    def observe(self, observer: Callable[[Cell], None]) -> None:
+        """Have `observer` called with every cell before anybody writes to it."""
+
+    def turns(self) -> Mapping[str, int]:
+        """A counter for each part of the gateway; 0: it has not begun."""
+
+
+class Operation:
+    """The audit from the first write on; the control socket at `control` once the gateway serves. None: without."""
+
+    def __init__(
+        self,
+        daemon: Operated,
+        control: Path | None,
+        audit_file: Path | None,
+        notes: Callable[[], Sequence[str]] = lambda: (),
+        reload: Reload | None = None,
+    ) -> None:
+        self.reload = reload
+        self._daemon = daemon
+        self._control = control
+        self._file = AuditFile(audit_file) if audit_file is not None else None
+        self.audit = Audit(self._file.write if self._file is not None else None)
+        daemon.observe(self.audit.watch)
+        self.api = Api(daemon, self.audit, lambda: (*notes(), *self._troubles()))
+
+    async def run(self) -> None:
+        """Run until cancelled; then write what is still to be written."""
+        try:
+            while True:
+                try:
+                    await self._run()
+                except Exception:
+                    log.exception("internal error, starting again")
+                    await asyncio.sleep(RETRY_PERIOD)
+        finally:
+            if self._file is not None:
+                self._file.close()
+
+    async def _run(self) -> None:
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self.audit.run(lambda: self._daemon.cells))
+            if self._control is not None:
+                group.create_task(Endpoint(self._control, self.api, self._is_serving, self.reload).run())
+
+    def _is_serving(self) -> bool:
+        return all(self._daemon.turns().values())
+
+    def _troubles(self) -> list[str]:
+        trouble = self._file.trouble if self._file is not None else ""
+        return [f"the audit file cannot be written: {trouble}"] if trouble else []
