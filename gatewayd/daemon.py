@@ -168,24 +168,35 @@ class Daemon:
         former = {station.plan.cell.name: station for station in self.stations}
         successors: dict[Cell, Cell] = {}
         stranded: list[str] = []
-        self.stations = []
-        for plan in plans:
-            name = plan.cell.name
-            station = former.pop(name, None)
-            if station is None:
-                station = Station(plan)
-                self._show(station.cell)
-                self._begin_station(station)
-            elif station.plan != plan:
-                stranded += self._replace(station, plan, now, successors)
-            self.stations.append(station)
-        for station in former.values():
-            stranded += [f"{station.plan.cell.name}: {name}" for name in station.retire(now)]
-            self._end(station)
-            self._end(station.robot)
         self.listeners += opened
-        self._serve(successors)
+        # Whatever happens on the way, afterwards the listeners serve the cells that there are.
+        try:
+            stations = [self._station_for(plan, former, now, successors, stranded) for plan in plans]
+            for station in former.values():
+                stranded += [f"{station.plan.cell.name}: {name}" for name in station.retire(now)]
+                self._end(station)
+                self._end(station.robot)
+            self.stations = stations
+        finally:
+            self._serve(successors)
         return stranded
+
+    def _station_for(
+        self,
+        plan: Plan,
+        former: dict[str, Station],
+        now: float,
+        successors: dict[Cell, Cell],
+        stranded: list[str],
+    ) -> Station:
+        station = former.pop(plan.cell.name, None)
+        if station is None:
+            station = Station(plan)
+            self._show(station.cell)
+            self._begin_station(station)
+        elif station.plan != plan:
+            stranded += self._replace(station, plan, now, successors)
+        return station
 
     def _replace(self, station: Station, plan: Plan, now: float, successors: dict[Cell, Cell]) -> list[str]:
         cell, robot = station.cell, station.robot

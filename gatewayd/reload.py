@@ -81,7 +81,7 @@ class Outcome:
             case Result.APPLIED:
                 return f"reloaded: {changes}" + (f" (but {reasons})" if reasons else "")
             case Result.REFUSED:
-                return f"reload refused, the old mapping runs on: {reasons}"
+                return f"reload refused, the old mapping runs on: {reasons} (gatewayd reload --force does it)"
         return f"reload failed, the old mapping runs on: {reasons}"
 
     @property
@@ -209,7 +209,9 @@ class Reloader:
         objected = () if force else self._objections(plans, differences)
         if objected or not self._daemon.running:
             await asyncio.gather(*(listener.close() for listener in opened))
-            return Outcome(Result.REFUSED, objected or ("the gateway stops",), told)
+            if objected:
+                return Outcome(Result.REFUSED, objected, told)
+            return Outcome(Result.FAILED, ("the gateway stops",), told)
         now = time.monotonic()
         stranded = self._daemon.swap(plans, now, opened)
         swap = time.monotonic() - now

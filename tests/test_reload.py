@@ -219,7 +219,8 @@ async def test_a_removed_input_gets_its_fallback_and_leaves_the_rest(rigged: Rig
         refused = await rig.reloader.reload()
         assert refused.result is Result.REFUSED
         assert refused.text == (
-            "reload refused, the old mapping runs on: press: `real` is owned now and would be removed"
+            "reload refused, the old mapping runs on: press: `real` is owned now and would be removed "
+            "(gatewayd reload --force does it)"
         )
         assert refused.exit_code == 1
         assert rig.value("real") == 9.5
@@ -404,7 +405,7 @@ async def test_after_the_end_nothing_is_swapped(rigged: Rigged) -> None:
     async with rigged() as rig:
         rig.write(VARIABLES + MORE)
     outcome = await rig.reloader.reload()
-    assert outcome.result is Result.REFUSED
+    assert outcome.result is Result.FAILED
     assert "the gateway stops" in outcome.text
 
 

@@ -47,7 +47,7 @@ def succeed(old: Cell, definition: CellDefinition, now: float) -> Succession:
     _take_history(old, new, match)
     _take_forcing(old, new, match)
     new._adopted = old._adopted
-    new._due_fallbacks = set(match.indices(old._due_fallbacks))
+    new._due_fallbacks = set(match.due(old._due_fallbacks))
     new._next_heartbeat = old._next_heartbeat
     return Succession(new, stranded)
 
@@ -73,6 +73,12 @@ class _Match:
             for index, lock in enumerate(old.locks)
             if lock.name in locks and self._same_members(lock, new.locks[locks[lock.name]])
         }
+        self.places = {
+            _place(variable): index
+            for index, variable in enumerate(new.variables)
+            if variable.direction is Direction.INPUT
+        }
+        """Registers that somebody will write, and by which variable."""
         self.old, self.new = old, new
 
     def _same_members(self, old: Lock, new: Lock) -> bool:
@@ -85,15 +91,21 @@ class _Match:
             owner == OPERATOR or self.writers.get(owner) in self.new.locks[successor].owners
         )
 
-    def indices(self, variables: set[int]) -> Iterator[int]:
-        """The new indices of those variables that go on."""
-        return (self.variables[index] for index in variables if index in self.variables)
+    def due(self, variables: set[int]) -> Iterator[int]:
+        """New indices of those inputs; what owes its register a fallback owes it under another name too."""
+        for index in variables:
+            successor = self.variables.get(index, self.places.get(_place(self.old.variables[index])))
+            if successor is not None:
+                yield successor
 
 
 def _identity(variable: Variable) -> tuple[object, ...]:
     """What has to be the same for a value to go on; limits, policies and addresses may differ."""
-    place = variable.field, variable.bit, variable.element
-    return variable.name, variable.direction, variable.kind, *place
+    return variable.name, variable.direction, variable.kind, *_place(variable)
+
+
+def _place(variable: Variable) -> tuple[object, ...]:
+    return variable.field, variable.bit, variable.element
 
 
 # -- before: what disappears is released -----------------------------------------------------------------------------
@@ -124,16 +136,10 @@ def _force_goes_on(match: _Match, index: int) -> bool:
 
 def _inputs_without_successor(match: _Match) -> list[int]:
     """Inputs whose register nobody would write any more, so that nobody could ever clear it."""
-    places = {
-        (variable.field, variable.bit, variable.element)
-        for variable in match.new.variables
-        if variable.direction is Direction.INPUT
-    }
     return [
         index
         for index, variable in enumerate(match.old.variables)
-        if variable.direction is Direction.INPUT
-        and (variable.field, variable.bit, variable.element) not in places
+        if variable.direction is Direction.INPUT and _place(variable) not in match.places
     ]
 
 

@@ -61,11 +61,6 @@ class Difference:
         """The detail about one fact; None if it is the same."""
         return next((detail for detail in self.details if detail.what == what), None)
 
-    @property
-    def matters(self) -> bool:
-        """Whether the gateway does anything differently: a comment is for people."""
-        return any(detail.what not in facts.FOR_PEOPLE for detail in self.details)
-
 
 @dataclass(frozen=True, slots=True)
 class Renumbered:
@@ -185,7 +180,7 @@ def _touches_owned(changes: Changes, owned: Collection[str]) -> Iterator[str]:
             continue
         if one.kind is Kind.REMOVED:
             yield f"`{one.name}` is owned now and would be removed"
-        elif one.matters and one.detail("direction") is None:
+        elif one.detail("direction") is None and not all(map(_is_harmless, one.details)):
             yield f"`{one.name}` is owned now and would change: {_changed(one.details)}"
     for one in changes.groups:
         for name in sorted(_members(changes.old, one.name).intersection(owned))[:1]:
@@ -193,6 +188,13 @@ def _touches_owned(changes: Changes, owned: Collection[str]) -> Iterator[str]:
                 f"`{name}` of the group `{one.name}` is owned now, and the group would change: "
                 f"{_changed(one.details)}"
             )
+
+
+def _is_harmless(detail: Detail) -> bool:
+    """Whether the owner cannot notice: words for people, or others who may own it too once it is free."""
+    if detail.what == "owner" and " > " not in detail.new:
+        return set(detail.old.split(", ")) <= set(detail.new.split(", "))
+    return detail.what in facts.FOR_PEOPLE
 
 
 def _turns_round(changes: Changes) -> Iterator[str]:

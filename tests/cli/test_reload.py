@@ -68,7 +68,7 @@ async def test_json_is_the_answer(reloading: Reloading) -> None:
     assert done.exit_code == 1
     assert json.loads(done.output) == {
         "result": "refused",
-        "text": "reload refused, the old mapping runs on: why",
+        "text": "reload refused, the old mapping runs on: why (gatewayd reload --force does it)",
         "reasons": ["why"],
         "changes": [CHANGE],
         "swap_ms": 0.0,

@@ -129,6 +129,17 @@ def test_fallbacks_that_fell_due_are_given_after_the_robot_is_back(cell: Cell, p
     assert new.image.values[START] is False
 
 
+def test_a_fallback_that_fell_due_is_owed_under_another_name_too(cell: Cell, press: CellDefinition) -> None:
+    assert cell.write(PLC, [Change(START, value=True)], 1.0) is None
+    cell.robot_lost("cable", 1.5)
+    succession = succeed(cell, changed(press, START, name="go"), 2.0)
+    assert succession.stranded == ()
+    new = succession.cell
+    new.robot_connected(3.0)
+    new.adopt({START: True}, 3.0)
+    assert new.image.values[START] is False
+
+
 def test_an_owner_that_may_own_no_longer_is_released_first(cell: Cell, press: CellDefinition) -> None:
     assert cell.write(HMI, [Change(LAMP, value=True)], 1.0) is None
     locks = list(press.locks)

@@ -199,6 +199,13 @@ def test_a_comment_on_what_is_owned_is_harmless() -> None:
     assert objections(changed(("unit: N", "unit: N, comment: hot")), {"force"}) == ()
 
 
+def test_one_more_who_may_own_it_too_is_harmless() -> None:
+    """`any` grows with every writer; only a list that takes over could take it away."""
+    more = ("  hmi: {modbus: 127.0.0.3}\n", "  hmi: {modbus: 127.0.0.3}\n  line: {modbus: 127.0.0.4}\n")
+    assert objections(changed(more), {"force"}) == ()
+    assert objections(changed(("owner: plc}", "owner: [plc, hmi], lease: 9s}")), {"start"})
+
+
 def test_a_direction_never_turns_unasked() -> None:
     changes = changed(("cycles: {robot: output_int_register_0, modbus: 100, on_stale: hold}",
                        "cycles: {robot: input_int_register_5, modbus: 100}"))  # fmt: skip
