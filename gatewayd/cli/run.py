@@ -34,7 +34,7 @@ Examples:
 
 \b
 Exit codes:
-  0    stopped by SIGTERM or SIGINT
+  0    stopped by SIGTERM or SIGINT, or by the end of its terminal; SIGHUP otherwise means: reload
   1    no mapping could be served (each reason stands in the log), or --strict and one of them could not
   2    wrong usage, or none of the files could be read
   130  forced by a second signal
@@ -159,9 +159,18 @@ async def _serve(
             os._exit(FORCED)
         stop.set()
 
+    in_terminal = os.isatty(0)
+
+    def on_hangup() -> None:
+        # Whoever closes the terminal in which it runs wants it gone; anybody else who sends SIGHUP wants a reload.
+        if in_terminal and not os.isatty(0):
+            on_signal()
+        else:
+            reloader.ask()
+
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, on_signal)
-    loop.add_signal_handler(signal.SIGHUP, reloader.ask)
+    loop.add_signal_handler(signal.SIGHUP, on_hangup)
     operation = Operation(
         daemon, control, audit, lambda: service.notes, lambda force: reloader.reload(force=force)
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -258,6 +259,29 @@ def test_two_signals_at_once(plant: Plant) -> None:
     assert plc.owner(HELD) == 1
     code, took = daemon.stop()
     assert (code, took < 1) == (0, True)
+
+
+def test_a_closed_terminal_is_no_reload(plant: Plant) -> None:
+    """In a terminal SIGHUP means a reload while the terminal is there, and the end once it is gone."""
+    path = plant.mapping(CELL, free_port())
+    terminal, own = os.openpty()
+    command = [sys.executable, "-m", "gatewayd", "run", str(path), "--control", "none"]
+    root = Path(__file__).parents[2]
+    log = plant.directory / "terminal.log"
+    with log.open("wb") as stream:
+        popen = subprocess.Popen(command, stdin=own, stderr=stream, start_new_session=True, cwd=root)
+    os.close(own)
+    try:
+        wait_for(lambda: "listening for Modbus" in log.read_text(), "the daemon to listen")
+        popen.send_signal(signal.SIGHUP)
+        wait_for(lambda: "nothing has changed" in log.read_text(), "a reload")
+        os.close(terminal)
+        popen.send_signal(signal.SIGHUP)
+        assert popen.wait(15) == 0
+        assert "stopped" in log.read_text()
+    finally:
+        popen.kill()
+        popen.wait()
 
 
 def test_a_reload_while_the_robot_is_away(plant: Plant) -> None:
