@@ -1,6 +1,6 @@
 // Asks the gateway four times a second and shows what it says. What is not answered in time is shown as old, at once.
 
-import { Picture } from "./picture.js";
+import { MARKS, Picture } from "./picture.js";
 import { Variables } from "./variables.js";
 import { OPERATOR, clock, count, make, put, span } from "./words.js";
 
@@ -29,7 +29,6 @@ async function choose() {
   byId("cells").replaceChildren(...names.map((name) => new Option(name, name, false, name === cell)));
   byId("chooser").hidden = names.length < 2;
   put(byId("cell"), names.length < 2 ? cell : "");
-  document.title = `${cell} - gatewayd`;
   byId("cells").title = `gatewayd ${gatewayd}`;
   layout = await ask(`page/cells/${encodeURIComponent(cell)}`);
   events = 0;
@@ -51,7 +50,7 @@ async function look() {
   variables.update(state, now);
   showLocks(state);
   showEvents(state.events);
-  document.body.dataset.level = state.picture.level;
+  document.title = `${MARKS[state.picture.level]} ${cell} - gatewayd`;
   answered = now;
   answeredAt = new Date();
   trouble = "";
@@ -101,6 +100,7 @@ function judge() {
   alarm.hidden = contact !== "lost";
   if (contact !== "lost") return;
   const since = answeredAt ? `since ${clock(answeredAt)} (${span(age)})` : "so far";
+  document.title = `? ${cell ?? ""} - no answer`;
   put(alarm, `No answer from the gateway ${since}. ${answeredAt ? "Everything below is old." : ""}`);
   alarm.title = trouble;
 }

@@ -2,7 +2,7 @@
 
 import { make, put } from "./words.js";
 
-const MARKS = { good: "●", warn: "▲", bad: "■", idle: "○" };
+export const MARKS = { good: "●", warn: "▲", bad: "■", idle: "○" };
 const LEVELS = { good: "in order", warn: "attention", bad: "trouble", idle: "not there" };
 
 export class Picture {

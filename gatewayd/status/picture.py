@@ -48,7 +48,7 @@ def robot(cell: Cell, address: str, trouble: str, now: float) -> Node:
         f"{health.frequency:.0f} packages/s, {health.skipped} skipped" if state is Source.FRESH else address
     )
     if state is Source.LOST:
-        return Node("Robot", Level.BAD, _lost(cell, trouble, now), facts)
+        return Node("Robot", Level.BAD, _lost(cell, address, trouble, now), facts)
     if state is not Source.FRESH:
         level = Level.WARN if state is Source.WAITING else Level.BAD
         age = now - cell.freshness.last_progress
@@ -62,11 +62,12 @@ def robot(cell: Cell, address: str, trouble: str, now: float) -> Node:
     return Node("Robot", Level.GOOD, "fresh and writable", facts)
 
 
-def _lost(cell: Cell, trouble: str, now: float) -> str:
+def _lost(cell: Cell, address: str, trouble: str, now: float) -> str:
+    trouble = trouble.removeprefix(f"{address}: ")
     last = next((event for event in reversed(list(cell.events)) if event.kind is EventKind.ROBOT_LOST), None)
     if last is None:
         return f"not connected: {trouble}" if trouble else "not connected yet"
-    return f"lost {_span(now - last.time)} ago: {trouble or last.detail}"
+    return f"lost {_span(now - last.time)} ago: {trouble or last.detail.removeprefix(f'{address}: ')}"
 
 
 def gateway(cell: Cell, hanging: Sequence[str], troubles: Sequence[str], now: float) -> Node:

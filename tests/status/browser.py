@@ -1,5 +1,7 @@
 """A headless Chromium, driven by the DevTools protocol over aiohttp's WebSocket: just what the page's tests need."""
 
+# ruff: noqa: ASYNC220, ASYNC240 - nothing else runs in a test's loop
+
 from __future__ import annotations
 
 import asyncio
@@ -30,7 +32,7 @@ _OPTIONS = (
     "--disable-sync",
     "--disable-extensions",
     "--no-pings",
-    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.*",
     "--remote-debugging-port=0",
 )
 _PATIENCE = 20.0
@@ -82,7 +84,9 @@ class Page:
 
     async def run(self, script: str) -> Any:
         """The value of a JavaScript expression."""
-        found = await self.command("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        found = await self.command(
+            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
+        )
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")
 

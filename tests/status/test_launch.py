@@ -1,0 +1,101 @@
+"""Options of the status listener, and that it comes up beside a daemon without holding it up."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import aiohttp
+import pytest
+
+from gatewayd.daemon import Daemon
+from gatewayd.status.launch import Settings, SettingsError, parse_address, read_token, serve
+from tests.e2e.processes import HOST, free_port
+from tests.status.press import TOKEN
+
+
+@pytest.mark.parametrize(
+    "text, address",
+    [
+        ("127.0.0.1:9502", ("127.0.0.1", 9502)),
+        ("[::1]:9502", ("::1", 9502)),
+        (":9502", ("127.0.0.1", 9502)),
+        ("gateway.plant:1", ("gateway.plant", 1)),
+        ("0.0.0.0:0", ("0.0.0.0", 0)),
+    ],
+)
+def test_addresses(text: str, address: tuple[str, int]) -> None:
+    assert parse_address(text) == address
+
+
+@pytest.mark.parametrize("text", ["", "9502", "127.0.0.1", "a:b", "a:70000", "::1:9502", "a:-1", "a:٣"])
+def test_what_is_no_address_is_said_with_an_example(text: str) -> None:
+    with pytest.raises(SettingsError, match=r"127\.0\.0\.1:9502"):
+        parse_address(text)
+
+
+def test_a_token_is_one_word_that_nobody_else_may_read(token_file: Path, tmp_path: Path) -> None:
+    assert Settings("127.0.0.1:0", token_file).token == TOKEN
+    token_file.chmod(0o644)
+    with pytest.raises(SettingsError, match="chmod o-rw"):
+        read_token(token_file)
+    for contents in (b"", b"short", b"two words that are long enough", b"\xff" * 30):
+        token_file.write_bytes(contents)
+        token_file.chmod(0o600)
+        with pytest.raises(SettingsError, match="token"):
+            read_token(token_file)
+    with pytest.raises(SettingsError, match="No such file"):
+        read_token(tmp_path / "nothing")
+    with pytest.raises(SettingsError, match="no ordinary file"):
+        read_token(Path("/dev/zero"))
+
+
+async def test_an_address_in_use_is_said_once_and_tried_again(
+    daemon: Daemon, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("gatewayd.status.launch.RETRY_PERIOD", 0.02)
+    monkeypatch.setattr(Daemon, "turns", lambda _self: {"core": 1})
+    port = free_port()
+    caplog.set_level("INFO")
+    squatter = await asyncio.start_server(lambda _r, _w: None, HOST, port)
+    serving = asyncio.create_task(serve(Settings(f"{HOST}:{port}"), daemon))
+    try:
+        await _said(caplog, "cannot listen")
+        await asyncio.sleep(0.1)
+        squatter.close()
+        await squatter.wait_closed()
+        await _said(caplog, "status page")
+        assert caplog.text.count("cannot listen") == 1
+        async with aiohttp.ClientSession() as session, session.get(f"http://{HOST}:{port}/healthz") as found:
+            assert found.status == 200
+    finally:
+        serving.cancel()
+        with suppress(asyncio.CancelledError):
+            await serving
+
+
+async def _said(caplog: pytest.LogCaptureFixture, words: str) -> None:
+    async with asyncio.timeout(10):
+        while words not in caplog.text:  # noqa: ASYNC110 - a log has no event to wait for
+            await asyncio.sleep(0.02)
+
+
+def test_nothing_of_it_is_imported_unless_asked_for() -> None:
+    """The daemon, and even the options of the status listener, do without aiohttp and prometheus-client."""
+    script = (
+        "import sys, gatewayd.cli.run, gatewayd.daemon, gatewayd.status.launch;"
+        "print([name for name in ('aiohttp', 'prometheus_client') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_wrong_option_is_wrong_usage(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "gatewayd", "run", "--status", "nonsense", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "127.0.0.1:9502" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,108 @@
+"""The JSON that the page polls."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import Any
+
+import pytest
+
+from gatewayd.core.events import Event, EventKind
+from gatewayd.daemon import Daemon, Station
+from gatewayd.status.probes import Probes
+from gatewayd.status.view import EVENTS, as_json, layout, overview, state
+from tests.status.press import CYCLES, FORCE_LIMIT, PLC, SPARE
+
+
+def told(station: Station, probes: Probes, since: int = 0) -> Any:
+    return json.loads(as_json(state(station, probes, since, time.monotonic())))
+
+
+def test_overview_names_the_cells(daemon: Daemon) -> None:
+    assert [cell["name"] for cell in json.loads(as_json(overview(daemon, "1")))["cells"]] == ["press"]
+
+
+def test_layout_has_both_addresses_of_every_place(station: Station) -> None:
+    found = json.loads(as_json(layout(station)))
+    start, force_limit, spare, cycles = found["variables"][:4]
+    assert start["places"] == [{"area": "holding", "address": "0.3", "notation": "400001.3", "type": "bit"}]
+    assert [(one["address"], one["notation"]) for one in cycles["places"]] == [
+        ("110", "400111"),
+        ("8", "300009"),
+    ]
+    assert (start["robot"], force_limit["limits"], force_limit["unit"]) == (
+        "input_bit_register_0",
+        [0, 150],
+        "N",
+    )
+    assert found["locks"][spare["lock"]]["owners"] == ["line"]
+    assert found["locks"][force_limit["lock"]] == {
+        "name": "force_limit",
+        "owners": ["plc", "hmi"],
+        "takeover": True,
+        "lease": 5.0,
+        "variables": ["force_limit"],
+    }
+
+
+def test_state_has_a_column_entry_for_every_variable(station: Station, probes: Probes) -> None:
+    found, count = told(station, probes), len(station.cell.definition.variables)
+    assert [len(found[column]) for column in ("values", "quality", "ages")] == [count] * 3
+    assert found["values"][FORCE_LIMIT] == 12.5
+    assert (found["quality"][SPARE], found["ages"][SPARE]) == (2, None)
+    assert 0 <= found["ages"][CYCLES] < 5000
+    assert found["fingerprint"] == json.loads(as_json(layout(station)))["fingerprint"]
+
+
+def test_owned_locks_tell_owner_and_what_is_left(station: Station, probes: Probes) -> None:
+    start, force_limit = told(station, probes)["owned"]
+    assert start == [0, PLC, None]
+    assert force_limit[:2] == [1, PLC]
+    assert 0 < force_limit[2] <= 5000
+
+
+def test_a_forced_output_tells_the_age_of_its_force(station: Station, probes: Probes) -> None:
+    now = time.monotonic()
+    station.cell.force(CYCLES, 77, now - 1, now + 60)
+    found = told(station, probes)
+    assert (found["values"][CYCLES], found["quality"][CYCLES]) == (77, 4)
+    assert found["ages"][CYCLES] >= 1000
+
+
+def test_picture_is_as_bad_as_its_worst_part(station: Station, probes: Probes) -> None:
+    picture = told(station, probes)["picture"]
+    assert picture["level"] == "bad"
+    assert picture["buses"] == [
+        {"name": "Modbus 127.0.0.1:15020", "level": "bad", "words": "not listening, see the log", "facts": ""}
+    ]
+    assert [one["name"] for one in picture["writers"]] == ["plc", "hmi", "line"]
+
+
+def test_only_events_that_are_new_come_again(station: Station, probes: Probes) -> None:
+    first = told(station, probes)["events"]
+    assert first["latest"][-1]["number"] == first["count"]
+    assert first["latest"][-1]["text"].startswith("hmi wrote start = 0: refused")
+    assert told(station, probes, first["count"])["events"]["latest"] == []
+    station.cell.events.append(Event(1.0, EventKind.FRESH))
+    again = told(station, probes, first["count"])["events"]
+    assert [(one["number"], one["bad"]) for one in again["latest"]] == [(first["count"] + 1, False)]
+
+
+@pytest.mark.parametrize("since", [-5, 10**9])
+def test_a_page_from_another_life_of_the_gateway_gets_everything(
+    station: Station, probes: Probes, since: int
+) -> None:
+    assert len(told(station, probes, since)["events"]["latest"]) == station.cell.events.count
+
+
+def test_answers_are_bounded(station: Station, probes: Probes) -> None:
+    for _ in range(3 * EVENTS):
+        station.cell.events.append(Event(1.0, EventKind.FRESH))
+    assert len(told(station, probes)["events"]["latest"]) == EVENTS
+
+
+def test_what_json_does_not_know_becomes_text(station: Station, probes: Probes) -> None:
+    values = station.cell.image.values
+    values[4:7] = [float("nan"), float("inf"), float("-inf")]
+    assert told(station, probes)["values"][4:7] == ["NaN", "Infinity", "-Infinity"]
