@@ -117,6 +117,14 @@ class _Connection(ServerRequestHandler):
         self.last_request = time.monotonic()
         if self.owner.connected(self):
             self.poller.add(self.descriptor, self.readable)
+            asyncio.get_running_loop().call_soon(self._pause_again)
+
+    def _pause_again(self) -> None:
+        """Keep the transport from reading: the asyncio of Python 3.11.2 (Debian 12) forgets what `pause_reading` said
+        before the connection was complete, and pymodbus would answer what it reads, from its own data store."""
+        if not self.wire.is_closing():
+            self.wire.resume_reading()
+            self.wire.pause_reading()
 
     def readable(self, now: float) -> None:
         """The socket has something to read: the hot path."""

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Awaitable, Callable
 from itertools import islice
+from typing import Any
 
 import pytest
 
@@ -402,3 +403,22 @@ def test_the_start_does_not_wait_for_aiohttp() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+async def test_an_old_asyncio_that_reads_in_spite_of_a_pause_reads_nothing(
+    listener: ModbusListener, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python 3.11.2 starts to read after `connection_made` whatever that said; pymodbus then answered from its own
+    store, with exceptions where the status block is."""
+
+    def add_reader(transport: Any, descriptor: int, callback: Callable[..., None], *args: Any) -> None:
+        if not transport.is_closing():
+            transport._loop._add_reader(descriptor, callback, *args)
+
+    monkeypatch.setattr("asyncio.selector_events._SelectorTransport._add_reader", add_reader)
+    for _ in range(20):
+        with socket.create_connection(("127.0.0.1", listener.port)) as plc:
+            plc.sendall(bytes.fromhex("0001 0000 0006 01 03 EA60 0001"))
+            plc.setblocking(False)
+            answer = await asyncio.get_running_loop().sock_recv(plc, 100)
+        assert answer == bytes.fromhex("0001 0000 0005 01 03 02 0001")
