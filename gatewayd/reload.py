@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Protocol
@@ -20,7 +20,7 @@ from typing import Protocol
 from gatewayd.core.cell import Cell
 from gatewayd.logs import fields
 from gatewayd.mapping.diagnostics import Diagnostic, Severity
-from gatewayd.mapping.diff import Changes, compare, objections
+from gatewayd.mapping.diff import Changes, as_text, compare, objections
 from gatewayd.mapping.loader import load_together, read_bytes
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.server import ListenError, ModbusListener
@@ -67,6 +67,8 @@ class Outcome:
     """What is or would be different, one line for each cell."""
     swap: float = 0.0
     """Seconds that the swap itself took."""
+    details: tuple[str, ...] = ()
+    """The changes one by one, as `gatewayd diff` tells them."""
 
     @property
     def text(self) -> str:
@@ -95,12 +97,13 @@ class Outcome:
         return 0 if self.result.is_good else 1
 
     def as_object(self) -> dict[str, object]:
-        """For JSON: `result`, `text`, `reasons`, `changes`, `swap_ms`."""
+        """For JSON: `result`, `text`, `reasons`, `changes`, `details`, `swap_ms`."""
         return {
             "result": self.result.value,
             "text": self.text,
             "reasons": list(self.reasons),
             "changes": list(self.changes),
+            "details": list(self.details),
             "swap_ms": round(self.swap * 1000, 3),
         }
 
@@ -196,27 +199,32 @@ class Reloader:
         differences = self._compare(plans)
         if not differences:
             return Outcome(Result.UNCHANGED)
-        told = tuple(one if isinstance(one, str) else one.summary for one in differences)
+        outcome = await self._swap(plans, differences, force=force)
+        told = (one if isinstance(one, str) else one.summary for one in differences)
+        return replace(outcome, changes=tuple(told), details=tuple(_details(differences)))
+
+    async def _swap(
+        self, plans: Sequence[Plan], differences: Sequence[Changes | str], *, force: bool
+    ) -> Outcome:
         objected = () if force else self._objections(plans, differences)
         if objected:
-            return Outcome(Result.REFUSED, objected, told)
+            return Outcome(Result.REFUSED, objected)
         try:
             opened = await self._daemon.open_new(plans)
         except ListenError as error:
-            return Outcome(Result.FAILED, (error.strerror or str(error),), told)
+            return Outcome(Result.FAILED, (error.strerror or str(error),))
         await self._settle()
         # From here to the swap nothing waits: what is owned now is owned in the swap.
         objected = () if force else self._objections(plans, differences)
         if objected or not self._daemon.running:
             await asyncio.gather(*(listener.close() for listener in opened))
             if objected:
-                return Outcome(Result.REFUSED, objected, told)
-            return Outcome(Result.FAILED, ("the gateway stops",), told)
+                return Outcome(Result.REFUSED, objected)
+            return Outcome(Result.FAILED, ("the gateway stops",))
         now = time.monotonic()
         stranded = self._daemon.swap(plans, now, opened)
-        swap = time.monotonic() - now
         left = tuple(f"the robot keeps what it holds in {name}" for name in stranded)
-        return Outcome(Result.APPLIED, left, told, swap)
+        return Outcome(Result.APPLIED, left, swap=time.monotonic() - now)
 
     def _compare(self, plans: Sequence[Plan]) -> list[Changes | str]:
         """What differs, by cell; a cell that is new or gone in one sentence."""
@@ -251,6 +259,14 @@ class Reloader:
             one.robot.settled for one in self._daemon.stations
         ):
             await asyncio.sleep(0.002)
+
+
+def _details(differences: Sequence[Changes | str]) -> Iterator[str]:
+    for changes in differences:
+        if isinstance(changes, str):
+            yield changes
+        else:
+            yield from as_text(changes).splitlines()
 
 
 def _owned(cell: Cell) -> set[str]:

@@ -86,8 +86,4 @@ def _lines(answer: Mapping[str, Any]) -> list[str]:
         lines = ["refused, the old mapping runs on; --force applies it all the same:"]
     else:
         lines = ["failed, the old mapping runs on:"]
-    return [
-        *lines,
-        *(f"  {reason}" for reason in reasons),
-        *(f"  {change}" for change in answer.get("changes", ())),
-    ]
+    return [*lines, *(f"  {one}" for one in (*reasons, *answer.get("details", ())))]

@@ -20,6 +20,7 @@ from gatewayd.reload import Outcome
 from gatewayd.reload import Result as Ended
 
 CHANGE = "press: 1 variable added"
+DETAIL = "+ more: direction output"
 Reloading = Callable[..., Awaitable[Result]]
 
 
@@ -47,8 +48,8 @@ def reloading(tmp_path: Path) -> Reloading:
 
 @pytest.mark.parametrize("outcome, code, said", [
     (Outcome(Ended.UNCHANGED), 0, "nothing has changed\n"),
-    (Outcome(Ended.APPLIED, (), (CHANGE,), 0.0042), 0, f"reloaded in 4.2 ms\n  {CHANGE}\n"),
-    (Outcome(Ended.REFUSED, ("press: `x` is owned",), (CHANGE,)), 1,
+    (Outcome(Ended.APPLIED, (), (), 0.0042, (CHANGE, DETAIL)), 0, f"reloaded in 4.2 ms\n  {CHANGE}\n  {DETAIL}\n"),
+    (Outcome(Ended.REFUSED, ("press: `x` is owned",), details=(CHANGE,)), 1,
      f"refused, the old mapping runs on; --force applies it all the same:\n  press: `x` is owned\n  {CHANGE}\n"),
     (Outcome(Ended.FAILED, ("a.yaml:1:1: GW001 syntax: bad", "b.yaml cannot be read")), 1,
      "failed, the old mapping runs on:\n  a.yaml:1:1: GW001 syntax: bad\n  b.yaml cannot be read\n"),
@@ -71,6 +72,7 @@ async def test_json_is_the_answer(reloading: Reloading) -> None:
         "text": "reload refused, the old mapping runs on: why (gatewayd reload --force does it)",
         "reasons": ["why"],
         "changes": [CHANGE],
+        "details": [],
         "swap_ms": 0.0,
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -241,6 +242,33 @@ def test_a_broken_file_changes_nothing_and_its_mending_is_taken(plant: Plant) ->
     assert plc.owner(HELD) == 1
     assert plc.reading_code(110, 2) == 0
     assert "Traceback" not in daemon.text()
+
+
+def test_the_service_manager_hears_of_it(plant: Plant, monkeypatch: pytest.MonkeyPatch) -> None:
+    """sd_notify(3): RELOADING with the time, then READY, and why the old mapping runs on until that is mended."""
+    path = plant.mapping(CELL, free_port())
+    address = plant.directory / "notify.sock"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(address))
+        manager.settimeout(15)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(address))
+        daemon = plant.daemon(path)
+        heard: list[str] = []
+
+        def hear(*parts: str) -> str:
+            while not heard or not all(part in heard[-1] for part in parts):
+                heard.append(manager.recv(4096).decode())
+            return heard[-1]
+
+        hear("READY=1")
+        path.write_text("gatewayd: [")
+        daemon.signal(signal.SIGHUP)
+        assert "MONOTONIC_USEC=" in hear("RELOADING=1")
+        assert "reload failed, the old mapping runs on" in hear("READY=1", "STATUS=")
+        plant.mapping(CELL + MORE, free_port())
+        daemon.signal(signal.SIGHUP)
+        hear("RELOADING=1")
+        assert "reload" not in hear("READY=1", "STATUS=")
 
 
 def test_two_signals_at_once(plant: Plant) -> None:

@@ -117,3 +117,26 @@ def test_variables_left_out_are_neither_adopted_nor_sent() -> None:
     assert adopted == {NUMBER: 5}
     bench.write(REAL, 1.0, 12.0)
     assert bench.send(12.0) == []
+
+
+def test_other_variables_are_carried_by_the_same_recipes() -> None:
+    """New ones begin with what the controller was last given, told or not; nothing is sent by it."""
+    bench = Bench()
+    bench.write(NUMBER, 7, 11.0)
+    assert bench.send(11.0) == [REGISTERS_KEY]
+    renamed = (VARIABLES[REAL], Variable(2, "count", Direction.INPUT, ValueKind.INT, "input_int_register_0"))
+    held = bench.inputs.rebind(renamed, 12.0)
+    assert held == {0: 2.5, 1: 7}
+    bench.image = ProcessImage(renamed)
+    bench.image.values[:] = [2.5, 7]
+    assert bench.send(12.0) == []
+    bench.write(1, 8, 13.0)
+    assert dict(bench.inputs.due(bench.image)) == {REGISTERS_KEY: (8, 2.5)}
+
+
+def test_what_packages_do_not_read_back_is_not_made_up_for_new_variables() -> None:
+    bench = Bench()
+    held = bench.inputs.rebind(
+        (Variable(1, "speed", Direction.INPUT, ValueKind.FLOAT, "speed_slider_fraction"),), 12.0
+    )
+    assert held == {}
