@@ -17,6 +17,7 @@ from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
+from gatewayd.core.succession import succeed
 from gatewayd.mapping.loader import load
 from gatewayd.robot import inputs as inputs_module
 from gatewayd.robot.link import RobotLink
@@ -383,3 +384,70 @@ async def test_the_watchdog_is_fed_for_living_writers_only(rigged: Rigged, until
         rig.cell.writer_disconnected(PLC, now(), "gone")
         await until(lambda: not rig.cell.health.watchdog_fed)
         await rig.link.close()
+
+
+def rebound(rig: Rig, variables: str, options: str = "") -> Cell | None:
+    """The cell that went on with these variables, by the same link; None if that takes another session."""
+    loaded = load((HEAD.format(port=rig.robot.port, options=options) + variables).encode(), "link.yaml")
+    assert loaded.plan is not None, loaded.diagnostics
+    now = time.monotonic()
+    new = succeed(rig.cell, loaded.plan.cell, now).cell
+    rig.link.flush(now)
+    if not rig.link.rebind(loaded.plan.robot, new, now):
+        return None
+    rig.cell = new
+    return new
+
+
+async def test_another_cell_goes_on_by_the_same_session(rigged: Rigged, until: Until) -> None:
+    """Another order, other limits, another name: values flow both ways at once, and nothing is sent by it."""
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.write((NUMBER, 7), (BIT, True))
+        await until(lambda: rig.get("output_int_register_0") == 7)
+        former, sent = rig.cell, rig.link._client.statistics.writes
+        lines = REGISTERS.splitlines(keepends=True)
+        new = rebound(rig, "".join(reversed(lines)).replace("real:", "other:"))
+        assert new is not None
+        assert [one.name for one in new.definition.variables] == ["lamp", "echo", "other", "number", "bit"]
+        assert new.image.values[1:] == [7, 0.0, 7, True]
+        assert new.image.quality[2] is Quality.GOOD, "what the controller was last given is known"
+        assert not former.listeners
+        assert rig.link._client.statistics.writes == sent
+        rig.robot.set("output_int_register_0", 1)
+        rig.write((3, 8))
+        await until(lambda: rig.get("input_int_register_0") == 8)
+        await until(lambda: new.image.values[1] == 8)
+        assert rig.get("input_bit_registers0_to_31") == 8
+        assert new.health.sessions == 1
+
+
+@pytest.mark.parametrize(
+    "variables, options",
+    [
+        (REGISTERS + "  more: {robot: input_int_register_1, modbus: 10}\n", ""),
+        (REGISTERS + "  more: {robot: output_int_register_1, modbus: 110}\n", ""),
+        (REGISTERS.replace("  real:", "  #"), ""),
+        (REGISTERS, ", frequency: 20"),
+        (REGISTERS, WATCHDOG),
+    ],
+    ids=["input added", "output added", "input removed", "frequency", "watchdog"],
+)
+async def test_what_the_session_cannot_carry_needs_another(
+    rigged: Rigged, until: Until, variables: str, options: str
+) -> None:
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        assert rebound(rig, variables, options) is None
+
+
+async def test_a_link_without_a_session_goes_on_too(rigged: Rigged, until: Until) -> None:
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        await rig.robot.stop()
+        await until(lambda: rig.cell.freshness.state is Source.LOST)
+        assert rebound(rig, REGISTERS.replace("on_release: hold", "on_release: 4")) is not None
+        await rig.robot.start()
+        await until(lambda: rig.cell.accepts_writes)
+        rig.write((NUMBER, 9))
+        await until(lambda: rig.get("input_int_register_0") == 9)
