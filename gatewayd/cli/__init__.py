@@ -19,6 +19,12 @@ COMMANDS = {
     "simulate": "Be a robot controller to connect to.",
     "run": "Serve the cells of mapping files: the daemon.",
     "reload": "Have the running gateway read its mapping files again.",
+    "status": "Print how the running gateway is.",
+    "watch": "Watch the variables of the running gateway live.",
+    "locks": "Print who owns what; take and release locks.",
+    "events": "Print what has happened, and what happens.",
+    "force": "Put a value in a variable's place for commissioning.",
+    "unforce": "End a force before its time.",
     "completion": "Print the completion script of a shell.",
 }
 """Name -> what the list of commands says. Module `gatewayd.cli.NAME` has the click command as `command`."""

@@ -159,7 +159,7 @@ class Cell:
         owner = self.ownership.owners[lock]
         if owner is None:
             return False
-        by = f"released by the local operator{detail and ' '}{detail}"
+        by = f"released by the local operator{detail and f' ({detail})'}"
         if owner == OPERATOR:
             self.forcing.holds.pop(lock, None)
             self._end_forces(
@@ -209,7 +209,7 @@ class Cell:
         self._release_expired(now)
         if variable not in self.forcing.forces:
             return False
-        self._end_forces([variable], now, f"ended by the local operator{detail and ' '}{detail}")
+        self._end_forces([variable], now, f"ended by the local operator{detail and f' ({detail})'}")
         return True
 
     def stop(self, now: float, detail: str) -> None:

@@ -72,7 +72,7 @@ class TestLocks:
         assert cell.ownership.owners[FORCE] is None
         assert cell.image.values[FORCE] == 10.0
         released = next(event for event in cell.events if event.kind is EventKind.RELEASED)
-        assert (released.writer, released.detail) == (HMI, "released by the local operator by anna")
+        assert (released.writer, released.detail) == (HMI, "released by the local operator (by anna)")
 
     def test_releasing_a_free_lock_does_nothing(self, cell: Cell) -> None:
         before = cell.events.count

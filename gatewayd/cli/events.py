@@ -1,0 +1,83 @@
+"""`gatewayd events`: what has happened, and what happens."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gatewayd.cli.remote import UNREACHABLE, cell_option, connect, json_option, refusals, socket_option
+
+__all__ = ["command"]
+
+
+@click.command(
+    name="events",
+    epilog="""\b
+Examples:
+  gatewayd events                          the last 20
+  gatewayd events --follow                 and everything that happens from now on
+  gatewayd events --follow --json | jq -r 'select(.event=="write refused") | .variable'
+  gatewayd events --audit --limit 100      who wrote what: old and new values
+
+\b
+Exit codes:
+  0  printed
+  1  refused
+  2  wrong usage, or no gateway could be reached; with --follow, it has ended
+""",
+)
+@socket_option
+@cell_option
+@click.option("-f", "--follow", is_flag=True, help="Go on with what happens, until Ctrl-C.")
+@click.option(
+    "-n", "--limit", type=click.IntRange(0, 1000), default=20, show_default=True, help="So many former ones."
+)
+@click.option("--audit", is_flag=True, help="The audit instead: accepted and refused writes.")
+@json_option
+@click.pass_context
+def command(
+    context: click.Context,
+    socket: Path | None,
+    cell: str | None,
+    *,
+    follow: bool,
+    limit: int,
+    audit: bool,
+    as_json: bool,
+) -> None:
+    """Print the last events of the running gateway: links, locks, refusals, fallbacks, forces."""
+    if follow and audit:
+        raise click.UsageError("--audit cannot be followed; gatewayd run --audit FILE writes a file that can")
+    client = connect(socket)
+    with refusals():
+        if audit:
+            for record in client.get("/v1/audit", limit=limit, cell=cell)["records"]:
+                _print(record, as_json=as_json)
+        elif not follow:
+            for event in client.get("/v1/events", limit=limit, cell=cell)["events"]:
+                _print(event, as_json=as_json)
+        else:
+            for event in client.follow("/v1/events", follow=1, limit=limit, cell=cell):
+                _print(event, as_json=as_json)
+            click.echo("the gateway has ended", err=True)
+            context.exit(UNREACHABLE)
+
+
+def _print(found: Mapping[str, Any], *, as_json: bool) -> None:
+    from gatewayd.cli import phrases
+
+    if as_json:
+        import json
+
+        # At once: whoever follows through a pipe wants to see it now.
+        click.echo(json.dumps(found, ensure_ascii=False))
+        return
+    if "what" in found:
+        text, bad = phrases.record(found), found["what"] == "write refused"
+    else:
+        text, bad = phrases.event(found), found["event"] in phrases.BAD_EVENTS
+    text = click.style(text, fg="yellow" if bad else None)
+    click.echo(f"{phrases.clock(found['time'])} {found['cell']}  {text}")

@@ -1,0 +1,74 @@
+"""`gatewayd force`: put a value in place of what a variable's source tells, for commissioning, with a time limit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gatewayd.cli.remote import DURATION, cell_option, complete_variables, connect, refusals, socket_option
+
+__all__ = ["command"]
+
+_TRUTHS = {"true": True, "on": True, "false": False, "off": False}
+
+
+@click.command(
+    name="force",
+    context_settings={"ignore_unknown_options": True},
+    epilog="""\b
+Examples:
+  gatewayd force part_number 7 --for 30s      the robot gets 7; PLC writes to it are refused meanwhile
+  gatewayd force cycles 99 --for 5min         the PLC reads 99, with quality `forced`
+  gatewayd force 'tcp[2]' -0.25
+  gatewayd unforce part_number                end it now
+
+\b
+Exit codes:
+  0  forced
+  1  refused: limits, robot not connected, register not ours
+  2  wrong usage, or no gateway could be reached
+""",
+)
+@click.argument("name", shell_complete=complete_variables)
+@click.argument("value")
+@click.option(
+    "--for", "seconds", type=DURATION, default="1min", show_default=True, metavar="TIME", help="At most 24h."
+)
+@socket_option
+@cell_option
+def command(name: str, value: str, seconds: float, socket: Path | None, cell: str | None) -> None:
+    """Force variable NAME to VALUE (a number in the robot's unit, or on and off).
+
+    An input: the robot gets the value, and its lock is yours so long. An output: the fieldbus sees the value. Declared
+    limits hold. Afterwards an output shows the truth again, and an input its release fallback until its owner writes.
+    """
+    from gatewayd.cli.phrases import span
+    from gatewayd.cli.phrases import value as shown
+    from gatewayd.control.client import segment
+
+    body: dict[str, Any] = {"value": _parse(value), "for": seconds}
+    client = connect(socket)
+    with refusals():
+        found = client.post(
+            f"/v1/variables/{segment(name)}/force", body if cell is None else {**body, "cell": cell}
+        )
+    side = "the robot gets it" if found["direction"] == "input" else "the fieldbus sees it"
+    click.echo(
+        f"{found['name']} is forced to {shown(found['value'], found['unit'])} for {span(seconds)}: {side}"
+    )
+    if found["quality"] != "forced":
+        click.echo(f"but its quality is {found['quality']}", err=True)
+
+
+def _parse(text: str) -> bool | int | float:
+    truth = _TRUTHS.get(text.lower())
+    if truth is not None:
+        return truth
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    raise click.BadParameter(f"{text!r} is no number, and neither on nor off", param_hint="VALUE")

@@ -1,0 +1,113 @@
+"""`gatewayd locks`: who owns what; take a lock as the local operator, or release one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gatewayd.cli.remote import (
+    DURATION,
+    cell_option,
+    complete_locks,
+    connect,
+    json_option,
+    refusals,
+    socket_option,
+)
+
+__all__ = ["command"]
+
+
+@click.group(
+    name="locks",
+    invoke_without_command=True,
+    epilog="""\b
+Examples:
+  gatewayd locks
+  gatewayd locks take motion --for 10min   whoever holds it; its writes are refused from now on
+  gatewayd locks release motion            whoever holds it; the release fallback applies
+
+\b
+Exit codes:
+  0  printed, taken, released
+  1  refused
+  2  wrong usage, or no gateway could be reached
+""",
+)
+@socket_option
+@cell_option
+@json_option
+@click.pass_context
+def command(context: click.Context, socket: Path | None, cell: str | None, *, as_json: bool) -> None:
+    """Print who owns what and for how long. What you take or release stands in events and audit with your name."""
+    context.obj = {"socket": socket, "cell": cell}
+    if context.invoked_subcommand is not None:
+        return
+    client = connect(socket)
+    with refusals():
+        locks = client.get("/v1/locks", cell=cell)["locks"]
+    if as_json:
+        import json
+
+        click.echo(json.dumps(locks, indent=2, ensure_ascii=False))
+        return
+    _print(locks)
+
+
+@command.command(name="take")
+@click.argument("name", shell_complete=complete_locks)
+@click.option(
+    "--for", "seconds", type=DURATION, metavar="TIME", help="Give it back after that time: 30s, 10min, 2h."
+)
+@click.pass_context
+def take(context: click.Context, name: str, seconds: float | None) -> None:
+    """Take lock NAME (of a variable or group) from whoever holds it, until it is released. Values stay as they are."""
+    lock = _post(context, name, "take", {} if seconds is None else {"for": seconds})
+    until = "until you release it" if seconds is None else f"for {seconds:g} s"
+    click.echo(f"{lock['name']} is the operator's {until}: {_members(lock)}")
+
+
+@command.command(name="release")
+@click.argument("name", shell_complete=complete_locks)
+@click.pass_context
+def release(context: click.Context, name: str) -> None:
+    """Release lock NAME, whoever holds it; the release fallbacks apply. A writer that goes on writing gets it again."""
+    lock = _post(context, name, "release", {})
+    click.echo(f"{lock['name']} is free")
+
+
+def _post(context: click.Context, name: str, act: str, body: Mapping[str, Any]) -> dict[str, Any]:
+    from gatewayd.control.client import segment
+
+    client, cell = connect(context.obj["socket"]), context.obj["cell"]
+    with refusals():
+        return client.post(
+            f"/v1/locks/{segment(name)}/{act}", body if cell is None else {**body, "cell": cell}
+        )
+
+
+def _print(locks: list[dict[str, Any]]) -> None:
+    from gatewayd.cli.phrases import age
+
+    several = len({lock["cell"] for lock in locks}) > 1
+    rows = [("lock", "owner", "left", "may own it", "variables")]
+    for lock in locks:
+        name = f"{lock['cell']}:{lock['name']}" if several else lock["name"]
+        left = age(lock["remaining"]) if lock["remaining"] is not None else ""
+        may = (" > " if lock["takeover"] else ", ").join(lock["owners"])
+        members = "" if lock["members"] == [lock["name"]] else _members(lock)
+        rows.append((name, lock["owner"] or "free", left, may, members))
+    widths = [max(len(row[column]) for row in rows) for column in range(4)]
+    for place, row in enumerate(rows):
+        line = "  ".join(f"{text:<{width}}" for text, width in zip(row, widths, strict=False)) + f"  {row[4]}"
+        colour = {"operator": "magenta", "free": None}.get(row[1], "green") if place else None
+        click.echo(click.style(line.rstrip(), bold=not place, fg=colour))
+
+
+def _members(lock: Mapping[str, Any]) -> str:
+    shown = lock["members"][:5]
+    more = len(lock["members"]) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more else "")

@@ -1,0 +1,187 @@
+"""`gatewayd status`: how a running gateway is, at a glance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gatewayd.cli.remote import cell_option, connect, json_option, refusals, socket_option
+
+__all__ = ["DEGRADED", "command"]
+
+DEGRADED = 1
+"""Exit code when something is wrong."""
+_EVENTS = 5
+_QUALITIES = ("stale", "unavailable", "never", "forced")
+
+Answer = Mapping[str, Any]
+
+
+@click.command(
+    name="status",
+    epilog="""\b
+Examples:
+  gatewayd status
+  gatewayd status --json | jq .cells[].robot.state
+  gatewayd status >/dev/null || echo "the cell needs a look"
+
+\b
+Exit codes:
+  0  healthy: robots fresh and writable, no variable unavailable, nothing forced or held by hand, no writer lost
+  1  degraded: what is wrong is printed
+  2  wrong usage, or no gateway could be reached
+""",
+)
+@socket_option
+@cell_option
+@json_option
+@click.pass_context
+def command(context: click.Context, socket: Path | None, cell: str | None, *, as_json: bool) -> None:
+    """Print how the running gateway is: links, rates, ages, owners, refusals, the last events."""
+    client = connect(socket)
+    with refusals():
+        answer = client.get("/v1/status")
+        if cell is not None:
+            events = client.get("/v1/events", limit=_EVENTS, cell=cell)["events"]
+            answer = _narrowed(answer, cell)
+        else:
+            events = client.get("/v1/events", limit=_EVENTS * max(1, len(answer["cells"])))["events"]
+        locks = client.get("/v1/locks", cell=cell)["locks"]
+    if as_json:
+        import json
+
+        click.echo(json.dumps(answer, indent=2, ensure_ascii=False))
+    else:
+        for line in _lines(answer, locks, events):
+            click.echo(line)
+    context.exit(0 if answer["healthy"] else DEGRADED)
+
+
+def _narrowed(answer: Answer, cell: str) -> dict[str, Any]:
+    """The answer for one cell alone."""
+    (one,) = [one for one in answer["cells"] if one["name"] == cell]
+    of_others = tuple(f"{other['name']}: " for other in answer["cells"] if other is not one)
+    problems = (
+        [text for text in answer["problems"] if not text.startswith(of_others)]
+        if of_others
+        else answer["problems"]
+    )
+    return {**answer, "cells": [one], "problems": problems, "healthy": not problems}
+
+
+def _lines(answer: Answer, locks: list[Answer], events: list[Answer]) -> Iterator[str]:
+    from gatewayd.cli import phrases
+
+    healthy = answer["healthy"]
+    state = click.style("healthy" if healthy else "degraded", fg="green" if healthy else "red", bold=True)
+    yield f"gatewayd {answer['version']} is {state}, up {phrases.span(answer['uptime'])} (pid {answer['pid']})"
+    for problem in answer["problems"]:
+        yield click.style(f"  ! {problem}", fg="red")
+    for cell in answer["cells"]:
+        yield ""
+        yield from _cell(cell, [lock for lock in locks if lock["cell"] == cell["name"]])
+    if events:
+        yield ""
+        yield click.style("last events", bold=True)
+        several = len(answer["cells"]) > 1
+        for event in events:
+            bad = event["event"] in phrases.BAD_EVENTS
+            where = f"{event['cell']}: " if several else ""
+            text = click.style(f"{where}{phrases.event(event)}", fg="yellow" if bad else None)
+            yield f"  {phrases.clock(event['time'])} {text}"
+
+
+def _cell(cell: Answer, locks: list[Answer]) -> Iterator[str]:
+    from gatewayd.cli.phrases import number
+
+    yield click.style(cell["name"], bold=True) + f"  {cell['source']}, mapping {cell['fingerprint']}"
+    yield from _part("robot", _robot(cell["robot"]))
+    modbus = cell["modbus"]
+    if modbus is not None:
+        connections = number(modbus["connections"], "connection")
+        yield from _part("modbus", [f"{modbus['listen']} unit {modbus['unit']}, {connections}"])
+    yield from _part("writers", [_writer(writer, cell["locks"]["total"]) for writer in cell["writers"]])
+    yield from _part("variables", [_variables(cell["variables"])])
+    yield from _part("locks", _locks(locks))
+    yield from _part("writes", _writes(cell))
+
+
+def _part(title: str, lines: list[str]) -> Iterator[str]:
+    for line in lines:
+        yield f"  {title:<10} {line}"
+        title = ""
+
+
+_STATES = {
+    "lost": ("not connected", "red"),
+    "waiting": ("connected, but it sends no data yet", "yellow"),
+    "fresh": ("fresh", "green"),
+    "silent": ("silent", "red"),
+    "frozen": ("frozen, its clock stands still", "red"),
+}
+
+
+def _robot(robot: Answer) -> list[str]:
+    from gatewayd.cli.phrases import age, number
+
+    words, colour = _STATES[robot["state"]]
+    first = f"{robot['address']} {click.style(words, fg=colour)}"
+    if robot["state"] == "fresh":
+        first += f" at {robot['frequency']:g} Hz"
+        if not robot["writable"]:
+            first += click.style(", not writable yet", fg="yellow")
+    first += f", last package {age(robot['age'])} ago" if robot["age"] is not None else ""
+    counts = [number(robot["packages"], "package"), f"{robot['skipped']} skipped", f"{robot['late']} late"]
+    counts += [number(robot["sessions"], "session")]
+    if robot["mismatches"]:
+        counts.append(click.style(f"{robot['mismatches']} read back differently", fg="red"))
+    if robot["watchdog"] is not None:
+        counts.append("watchdog fed" if robot["watchdog"] else click.style("watchdog not fed", fg="red"))
+    return [first, ", ".join(counts)]
+
+
+def _writer(writer: Answer, locks: int) -> str:
+    from gatewayd.cli.phrases import age
+
+    if writer["alive"]:
+        state, colour = f"there, last request {age(writer['age'])} ago", "green"
+    elif writer["age"] is None:
+        return f"{writer['name']} has not come yet"
+    else:
+        state, colour = f"lost, last request {age(writer['age'])} ago", "red"
+    return f"{writer['name']} {click.style(state, fg=colour)}, owns {writer['locks']} of {locks} locks"
+
+
+def _variables(counts: Answer) -> str:
+    if counts["good"] == counts["total"]:
+        return f"{counts['total']}, all good"
+    others = [f"{counts[one]} {one}" for one in _QUALITIES if counts[one]]
+    return f"{counts['total']}: {counts['good']} good, " + click.style(", ".join(others), fg="yellow")
+
+
+def _locks(locks: list[Answer]) -> list[str]:
+    from gatewayd.cli.phrases import age
+
+    held = [
+        f"{lock['name']}: {lock['owner']}"
+        + (f", {age(lock['remaining'])} left" if lock["remaining"] is not None else "")
+        for lock in locks
+        if lock["owner"] is not None
+    ]
+    shown = held[:_EVENTS] + ([f"and {len(held) - _EVENTS} more"] if len(held) > _EVENTS else [])
+    return shown or [f"none of {len(locks)} owned"]
+
+
+def _writes(cell: Answer) -> list[str]:
+    from gatewayd.cli.phrases import age
+
+    writes, last = cell["writes"], cell["last_refusal"]
+    lines = [f"{writes['accepted']} accepted, {writes['refused']} refused"]
+    if last is not None:
+        who, what = last["writer"] or "an undeclared peer", last["variable"] or "an address"
+        holder = f" ({last['holder']})" if last["holder"] else ""
+        lines.append(f"last refusal {age(last['age'])} ago: {who} wrote {what}: {last['reason']}{holder}")
+    return lines

@@ -1,0 +1,52 @@
+"""`gatewayd unforce`: end a force before its time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gatewayd.cli.remote import cell_option, complete_variables, connect, refusals, socket_option
+
+__all__ = ["command"]
+
+
+@click.command(
+    name="unforce",
+    epilog="""\b
+Examples:
+  gatewayd unforce part_number
+  gatewayd unforce --all
+
+\b
+Exit codes:
+  0  ended
+  1  it is not forced
+  2  wrong usage, or no gateway could be reached
+""",
+)
+@click.argument("name", required=False, shell_complete=complete_variables)
+@click.option("--all", "every", is_flag=True, help="End every force.")
+@socket_option
+@cell_option
+def command(name: str | None, socket: Path | None, cell: str | None, *, every: bool) -> None:
+    """End the force of variable NAME: an output shows the truth again, an input its release fallback."""
+    from gatewayd.cli.phrases import value
+    from gatewayd.control.client import segment
+
+    if every == (name is not None):
+        raise click.UsageError("name one variable, or use --all")
+    client = connect(socket)
+    with refusals():
+        if name is not None:
+            wanted = [(name, cell)]
+        else:
+            variables = client.get("/v1/variables", cell=cell)["variables"]
+            wanted = [(one["name"], one["cell"]) for one in variables if one["forced"] is not None]
+        for one, its_cell in wanted:
+            body = {} if its_cell is None else {"cell": its_cell}
+            found = client.post(f"/v1/variables/{segment(one)}/unforce", body)
+            shown = value(found["value"], found["unit"])
+            click.echo(f"{found['name']} is no longer forced: {shown}, {found['quality']}")
+    if not wanted:
+        click.echo("nothing is forced")

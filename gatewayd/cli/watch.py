@@ -1,0 +1,170 @@
+"""`gatewayd watch`: the variables of a running gateway, live in a terminal, or as lines for everything else."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from gatewayd.cli.remote import (
+    DURATION,
+    UNREACHABLE,
+    cell_option,
+    complete_variables,
+    connect,
+    refusals,
+    socket_option,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from gatewayd.cli.watching import Glimpse, View
+    from gatewayd.control.client import Client
+
+__all__ = ["command", "keys"]
+
+_EVENTS = 4
+_SEQUENCES = {
+    "\x1b[A": "up", "\x1b[B": "down", "\x1b[5~": "pgup", "\x1b[6~": "pgdn", "\x1b[H": "home", "\x1b[F": "end",
+    "\x1bOA": "up", "\x1bOB": "down", "\x1bOH": "home", "\x1bOF": "end", "\x1b[1~": "home", "\x1b[4~": "end",
+    "\x1b": "esc", "\r": "enter", "\n": "enter", "\x7f": "backspace", "\x08": "backspace",
+}  # fmt: skip
+"""What terminals send for keys that are no characters."""
+
+
+@click.command(
+    name="watch",
+    epilog="""\b
+Keys:
+  q quit, / filter, Esc clear, d direction, b only what is not good, space pause, arrows and PgUp PgDn scroll
+
+\b
+Examples:
+  gatewayd watch
+  gatewayd watch tcp              only names, registers and owners with tcp in them
+  gatewayd watch --once           one look, as lines
+  gatewayd watch | tee log.txt    lines, every interval
+
+\b
+Exit codes:
+  0  ended by q, Ctrl-C or --once
+  1  refused
+  2  wrong usage, or no gateway could be reached
+""",
+)
+@click.argument("text", default="", shell_complete=complete_variables)
+@click.option(
+    "--interval", type=DURATION, default="500ms", show_default=True, metavar="TIME", help="From look to look."
+)
+@click.option("--once", is_flag=True, help="One look, as lines.")
+@socket_option
+@cell_option
+@click.pass_context
+def command(
+    context: click.Context, text: str, socket: Path | None, cell: str | None, *, interval: float, once: bool
+) -> None:
+    """Watch values, qualities, ages and owners live; TEXT filters them by name, robot register or owner."""
+    from rich.console import Console
+
+    from gatewayd.cli.watching import View
+
+    client, console = connect(socket), Console(highlight=False)
+    interval = max(0.1, interval)
+    view = View(filter=text)
+    with refusals():
+        first = _look(client, cell)
+    if once or not console.is_terminal or console.is_dumb_terminal or not sys.stdin.isatty():
+        _lines(client, cell, first, view, interval=0.0 if once else interval)
+        context.exit(0 if once else UNREACHABLE)
+    _live(console, lambda: _look(client, cell), first, view, interval)
+
+
+def _look(client: Client, cell: str | None) -> Glimpse:
+    from gatewayd.cli.watching import Glimpse
+
+    status = client.get("/v1/status")
+    if cell is not None:
+        status["cells"] = [one for one in status["cells"] if one["name"] == cell]
+    return Glimpse(
+        status,
+        client.get("/v1/variables", cell=cell)["variables"],
+        client.get("/v1/events", cell=cell, limit=_EVENTS)["events"],
+    )
+
+
+def _lines(client: Client, cell: str | None, first: Glimpse, view: View, interval: float) -> None:
+    from gatewayd.cli.watching import plain
+
+    click.echo(plain(first, view))
+    while interval:
+        time.sleep(interval)
+        with refusals():
+            click.echo(plain(_look(client, cell), view))
+
+
+def _live(console: Console, look: Callable[[], Glimpse], first: Glimpse, view: View, interval: float) -> None:
+    """Pictures in place until q. A gateway that goes away is waited for; what is shown meanwhile is marked as old."""
+    from dataclasses import replace
+
+    from rich.live import Live
+
+    from gatewayd.cli.watching import press, screen, settled
+    from gatewayd.control.client import ControlError, NoDaemon
+
+    glimpse, before = first, None
+    due = time.monotonic() + interval
+    with _raw(sys.stdin.fileno()), Live(console=console, screen=True, auto_refresh=False) as picture:
+        while not view.over:
+            width, height = console.size
+            view = settled(view, glimpse, height)
+            picture.update(screen(glimpse, before, view, width), refresh=True)
+            for key in keys(sys.stdin.fileno(), max(0.0, due - time.monotonic())):
+                view = press(view, key)
+            if time.monotonic() < due:
+                continue
+            due = time.monotonic() + interval
+            if not view.paused:
+                try:
+                    glimpse, before = look(), glimpse
+                except (NoDaemon, ControlError) as error:
+                    glimpse, before = replace(glimpse, lost=str(error)), None
+
+
+def keys(descriptor: int, patience: float) -> Iterator[str]:
+    """What was typed, waiting for `patience` seconds at most: characters, and names of other keys."""
+    if not select.select([descriptor], [], [], patience)[0]:
+        return
+    data = os.read(descriptor, 1024)
+    if not data:
+        # The terminal is gone.
+        yield "\x03"
+        return
+    text = data.decode(errors="ignore")
+    while text:
+        known = next(
+            (one for one in sorted(_SEQUENCES, key=len, reverse=True) if text.startswith(one)), text[0]
+        )
+        text = text[len(known) :]
+        yield _SEQUENCES.get(known, known)
+
+
+@contextmanager
+def _raw(descriptor: int) -> Iterator[None]:
+    """Give every key at once and without echo; as before at the end."""
+    import termios
+    import tty
+
+    former = termios.tcgetattr(descriptor)
+    try:
+        tty.setcbreak(descriptor)
+        yield
+    finally:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, former)

@@ -1,0 +1,264 @@
+"""How `gatewayd watch` looks, and what its keys do. Pure: answers and a view in, a picture out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from typing import Any
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from gatewayd.cli import phrases
+
+__all__ = ["KEYS", "Glimpse", "Show", "View", "chosen", "plain", "press", "screen", "settled"]
+
+Answer = Mapping[str, Any]
+
+KEYS = "q quit   / filter   Esc clear   d direction   b only bad   space pause   ↑↓ PgUp PgDn scroll"
+_FRAME = 6
+"""Lines that are neither links nor variables nor events: heads, rules, keys."""
+_EVENTS = 4
+_WIDE, _SPACIOUS = 96, 124
+"""Columns from which on the Modbus place, and the robot's name, have room."""
+_QUALITY_STYLES = {
+    "good": "green",
+    "stale": "yellow",
+    "unavailable": "red",
+    "never": "dim",
+    "forced": "magenta",
+}
+_SOURCE_STYLES = {"fresh": "green", "waiting": "yellow"}
+
+
+class Show(Enum):
+    """Which variables."""
+
+    ALL = "all"
+    INPUTS = "to the robot"
+    OUTPUTS = "from the robot"
+
+
+_NEXT = {Show.ALL: Show.INPUTS, Show.INPUTS: Show.OUTPUTS, Show.OUTPUTS: Show.ALL}
+_DIRECTIONS = {Show.ALL: ("input", "output"), Show.INPUTS: ("input",), Show.OUTPUTS: ("output",)}
+
+
+@dataclass(frozen=True, slots=True)
+class Glimpse:
+    """What the gateway answered at one moment."""
+
+    status: Answer
+    variables: Sequence[Answer]
+    events: Sequence[Answer]
+    lost: str = ""
+    """Why it does not answer any more; the rest is then old."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What the keys have chosen."""
+
+    filter: str = ""
+    typing: bool = False
+    show: Show = Show.ALL
+    only_bad: bool = False
+    paused: bool = False
+    top: int = 0
+    """First variable shown."""
+    page: int = field(default=10, compare=False)
+    over: bool = False
+
+
+def press(view: View, key: str) -> View:
+    """The view after a key: a character, or the name of another key (`up`, `pgdn`, `esc`, `enter`, `backspace` ...)."""
+    if view.typing:
+        return _typed(view, key)
+    match key:
+        case "q" | "Q" | "\x03":
+            return replace(view, over=True)
+        case "/":
+            return replace(view, typing=True, top=0)
+        case "esc":
+            return replace(view, filter="", top=0)
+        case "d":
+            return replace(view, show=_NEXT[view.show], top=0)
+        case "b":
+            return replace(view, only_bad=not view.only_bad, top=0)
+        case " ":
+            return replace(view, paused=not view.paused)
+    step = {
+        "up": -1,
+        "k": -1,
+        "down": 1,
+        "j": 1,
+        "pgup": -view.page,
+        "pgdn": view.page,
+        "home": -(10**6),
+        "end": 10**6,
+    }
+    return replace(view, top=max(0, view.top + step.get(key, 0)))
+
+
+def _typed(view: View, key: str) -> View:
+    match key:
+        case "enter":
+            return replace(view, typing=False)
+        case "esc":
+            return replace(view, typing=False, filter="")
+        case "backspace":
+            return replace(view, filter=view.filter[:-1])
+        case "\x03":
+            return replace(view, over=True)
+    return replace(view, filter=view.filter + key) if len(key) == 1 and key.isprintable() else view
+
+
+def chosen(variables: Sequence[Answer], view: View) -> list[Answer]:
+    """The variables whose name, robot register or owner contains the filter, and that are asked for."""
+    wanted, directions = view.filter.lower(), _DIRECTIONS[view.show]
+    return [
+        one
+        for one in variables
+        if one["direction"] in directions
+        and not (view.only_bad and one["quality"] == "good")
+        and any(wanted in text.lower() for text in (one["name"], one["robot"], one["owner"] or ""))
+    ]
+
+
+def settled(view: View, glimpse: Glimpse, height: int) -> View:
+    """The view with its page as high as the screen allows, and scrolled no further than there is anything."""
+    page = _page_height(glimpse, height)
+    last = max(0, len(chosen(glimpse.variables, view)) - page)
+    return replace(view, page=page, top=min(view.top, last))
+
+
+def _page_height(glimpse: Glimpse, height: int) -> int:
+    """How many variables a screen of `height` lines has room for."""
+    return max(1, height - _FRAME - _EVENTS - len(glimpse.status.get("cells", ())))
+
+
+def screen(glimpse: Glimpse, before: Glimpse | None, view: View, width: int) -> Group:
+    """One picture of a `settled` view; values that differ from `before` are bright."""
+    variables = chosen(glimpse.variables, view)
+    room, top = view.page, view.top
+    old = {(one["cell"], one["name"]): one["value"] for one in before.variables} if before is not None else {}
+    shown = variables[top : top + room]
+    parts: list[RenderableType] = [_head(glimpse, view), *_links(glimpse)]
+    parts.append(_table(shown, old, glimpse, width))
+    parts += [Text("")] * (room - len(shown))
+    parts += [_range(top, len(shown), len(variables), view), *_events(glimpse), _keys(view)]
+    return Group(*parts)
+
+
+def plain(glimpse: Glimpse, view: View) -> str:
+    """One block of lines, for everything that is no terminal."""
+    lines = [f"{glimpse.status.get('time', '')} " + (glimpse.lost or _health(glimpse.status))]
+    lines += [f"  {cell['name']}: {_link_words(cell)}" for cell in glimpse.status.get("cells", ())]
+    for one in chosen(glimpse.variables, view):
+        arrow = "->" if one["direction"] == "input" else "<-"
+        lines.append(
+            f"  {arrow} {one['name']:<20} {phrases.value(one['value'], one['unit']):>14}  {one['quality']:<11} "
+            f"{phrases.age(one['age']):>9}  {phrases.owner(one)}".rstrip()
+        )
+    return "\n".join([*lines, ""])
+
+
+def _head(glimpse: Glimpse, view: View) -> Text:
+    text = Text(no_wrap=True, overflow="ellipsis")
+    if glimpse.lost:
+        return text.append(f" {glimpse.lost}: what stands below is old ", "bold white on red")
+    status = glimpse.status
+    colour = "green" if status["healthy"] else "red"
+    text.append(f" gatewayd {status['version']} ", "bold").append(_health(status), f"bold {colour}")
+    if view.paused:
+        text.append("  PAUSED: what stands below is old ", "bold black on yellow")
+    return text
+
+
+def _health(status: Answer) -> str:
+    if status["healthy"]:
+        return "healthy"
+    first, *more = status["problems"]
+    return f"degraded: {first}" + (f" (and {len(more)} more)" if more else "")
+
+
+def _links(glimpse: Glimpse) -> Iterator[Text]:
+    for cell in glimpse.status.get("cells", ()):
+        style = "dim" if glimpse.lost else _SOURCE_STYLES.get(cell["robot"]["state"], "red")
+        text = Text(no_wrap=True, overflow="ellipsis").append(" ● ", style).append(cell["name"], "bold")
+        yield text.append(f"  {_link_words(cell)}")
+
+
+def _link_words(cell: Answer) -> str:
+    robot, modbus, writes = cell["robot"], cell["modbus"], cell["writes"]
+    rate = f" at {robot['frequency']:g} Hz" if robot["state"] == "fresh" else ""
+    words = [f"robot {robot['state']}{rate}, age {phrases.age(robot['age'])}"]
+    if modbus is not None:
+        words.append(phrases.number(modbus["connections"], "Modbus connection"))
+    there = [writer["name"] for writer in cell["writers"] if writer["alive"]]
+    words.append(f"{', '.join(there)} there" if there else "no writer there")
+    words.append(f"writes {writes['accepted']} accepted, {writes['refused']} refused")
+    return "   ".join(words)
+
+
+def _table(shown: Sequence[Answer], old: Mapping[Any, Any], glimpse: Glimpse, width: int) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 2, 0, 0), pad_edge=False, expand=False, show_edge=False)
+    several = len(glimpse.status.get("cells", ())) > 1
+    table.add_column("   variable", no_wrap=True, min_width=18, max_width=32)
+    table.add_column("value", justify="right", no_wrap=True, min_width=10)
+    table.add_column("quality", no_wrap=True, min_width=11)
+    table.add_column("age", justify="right", no_wrap=True, min_width=7)
+    table.add_column("owner", no_wrap=True, min_width=18)
+    if width >= _WIDE:
+        table.add_column("Modbus", no_wrap=True, min_width=8, max_width=24)
+    if width >= _SPACIOUS:
+        table.add_column("robot register", no_wrap=True)
+    for one in shown:
+        table.add_row(*_cells(one, old, width, several=several), style="dim" if glimpse.lost else "")
+    return table
+
+
+def _cells(one: Answer, old: Mapping[Any, Any], width: int, *, several: bool) -> Iterator[Text]:
+    towards = one["direction"] == "input"
+    colour = "cyan" if towards else "green"
+    name = f"{one['cell']}:{one['name']}" if several else one["name"]
+    yield Text(" → " if towards else " ← ", f"bold {colour}").append(name, "bold default")
+    changed = old.get((one["cell"], one["name"]), one["value"]) != one["value"]
+    yield Text(phrases.value(one["value"], one["unit"]), "bold yellow" if changed else "bold")
+    yield Text(one["quality"], _QUALITY_STYLES.get(one["quality"], ""))
+    yield Text(phrases.age(one["age"]), "dim")
+    style = "magenta" if one["forced"] or one["owner"] == "operator" else "yellow" if one["lease"] else ""
+    yield Text(phrases.owner(one), style if towards or one["forced"] else "dim")
+    if width >= _WIDE:
+        yield Text(phrases.places(one), "dim")
+    if width >= _SPACIOUS:
+        yield Text(one["robot"], "dim")
+
+
+def _range(top: int, shown: int, found: int, view: View) -> Text:
+    text = Text(" ", no_wrap=True, overflow="ellipsis")
+    text.append(
+        f"{top + 1}-{top + shown} of {found}" if shown else "no variable fits", "dim" if shown else "yellow"
+    )
+    text.append(f"   direction: {view.show.value}" if view.show is not Show.ALL else "", "cyan")
+    text.append("   only bad" if view.only_bad else "", "cyan")
+    if view.typing:
+        text.append(f"   filter: {view.filter}▏", "bold yellow")
+    elif view.filter:
+        text.append(f"   filter: {view.filter}", "yellow")
+    return text
+
+
+def _events(glimpse: Glimpse) -> Iterator[Text]:
+    latest = glimpse.events[-_EVENTS:]
+    for one in latest:
+        text = Text(f" {phrases.clock(one['time'])} ", "dim", no_wrap=True, overflow="ellipsis")
+        yield text.append(phrases.event(one), "yellow" if one["event"] in phrases.BAD_EVENTS else "default")
+    yield from (Text("") for _ in range(_EVENTS - len(latest)))
+
+
+def _keys(view: View) -> Text:
+    keys = "type to filter by name, register or owner   Enter keep   Esc clear" if view.typing else KEYS
+    return Text(f" {keys}", "reverse", no_wrap=True, overflow="ellipsis")
