@@ -121,7 +121,8 @@ class _Connection(ServerRequestHandler):
 
     def _pause_again(self) -> None:
         """Keep the transport from reading: the asyncio of Python 3.11.2 (Debian 12) forgets what `pause_reading` said
-        before the connection was complete, and pymodbus would answer what it reads, from its own data store."""
+        before the connection was complete, and pymodbus would answer what it reads, from its own data store.
+        """
         if not self.wire.is_closing():
             self.wire.resume_reading()
             self.wire.pause_reading()

@@ -416,9 +416,9 @@ async def test_an_old_asyncio_that_reads_in_spite_of_a_pause_reads_nothing(
             transport._loop._add_reader(descriptor, callback, *args)
 
     monkeypatch.setattr("asyncio.selector_events._SelectorTransport._add_reader", add_reader)
-    for _ in range(20):
-        with socket.create_connection(("127.0.0.1", listener.port)) as plc:
-            plc.sendall(bytes.fromhex("0001 0000 0006 01 03 EA60 0001"))
-            plc.setblocking(False)
-            answer = await asyncio.get_running_loop().sock_recv(plc, 100)
-        assert answer == bytes.fromhex("0001 0000 0005 01 03 02 0001")
+    reader, writer = await dial(listener)
+    assert await is_served(reader, writer)
+    (connection,) = listener._connections
+    loop: Any = asyncio.get_running_loop()
+    assert connection.descriptor not in loop._selector.get_map()
+    writer.close()
