@@ -104,8 +104,9 @@ def _words(found: Mapping[str, Any]) -> Iterator[str]:
     variable, lock, detail = found.get("variable", ""), found.get("lock", ""), found.get("detail", "")
     match kind:
         case "write refused":
-            yield f"{writer} wrote {variable or 'an address'}"
-            yield f"= {value(found['new'])}:" if "new" in found else ":"
+            yield f"{writer} wrote {variable or 'an address'}" + (
+                f" = {value(found['new'])}:" if "new" in found else ":"
+            )
             yield "refused,"
             yield f"held by {other}" if other else found.get("reason", "")
             yield f"({found['repeats'] + 1} times)" if "repeats" in found else ""

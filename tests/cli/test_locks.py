@@ -1,0 +1,60 @@
+"""`gatewayd locks`: who owns what, and the local operator's hand in it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from gatewayd.core.cell import Change
+from gatewayd.core.definition import OPERATOR
+from tests.cli.conftest import Invoke, Running
+from tests.control.served import SPEED
+
+PLC = 0
+MOTION = 2
+
+
+def test_the_table(gateway: Running, invoke: Invoke) -> None:
+    gateway.do(lambda cell: cell.write(PLC, [Change(SPEED, 0.5)], 1.0))
+    lines = invoke("locks").output.splitlines()
+    assert [line.split()[0] for line in lines] == ["lock", "start", "limit", "motion"]
+    assert lines[3].split("  ")[0] == "motion"
+    assert "plc > hmi" in lines[3]
+    assert lines[3].endswith("speed, path")
+
+
+@pytest.mark.usefixtures("gateway")
+def test_json(invoke: Invoke) -> None:
+    assert [one["name"] for one in json.loads(invoke("locks", "--json").output)] == [
+        "start",
+        "limit",
+        "motion",
+    ]
+
+
+def test_take_and_release(gateway: Running, invoke: Invoke) -> None:
+    done = invoke("locks", "take", "path", "--for", "10min")
+    assert done.output == "motion is the operator's for 600 s: speed, path\n"
+    assert gateway.cell.ownership.owners[MOTION] == OPERATOR
+    assert "operator" in invoke("locks").output
+    assert invoke("locks", "release", "motion").output == "motion is free\n"
+    assert gateway.cell.ownership.owners[MOTION] is None
+
+
+@pytest.mark.usefixtures("gateway")
+def test_what_cannot_be_done(invoke: Invoke) -> None:
+    for arguments, says in (
+        (("release", "motion"), "nobody owns motion"),
+        (("take", "cycles"), "there is no lock cycles"),
+    ):
+        done = invoke("locks", *arguments)
+        assert (done.exit_code, done.output) == (1, f"Error: {says}\n")
+
+
+@pytest.mark.usefixtures("gateway")
+def test_a_time_needs_a_unit(invoke: Invoke) -> None:
+    for wrong in ("10", "-5s", "0s", "soon", "1e9s"):
+        done = invoke("locks", "take", "motion", "--for", wrong)
+        assert done.exit_code == 2
+        assert "no duration" in done.output or "No such option" in done.output
