@@ -42,6 +42,11 @@ LAYERS: dict[str, set[str]] = {
     "service": {"core", "liveness", "logs", "sentence", "systemd"},
     "reload": {"core", "logs", "mapping", "modbus.server", "robot.link", "startup"},
     "startup": {"logs", "mapping"},
+    "status": {"control", "core", "daemon", "liveness", "logs", "mapping.plan", "modbus.server", "status"},
+    "status.health": {"core"},
+    "status.histogram": set(),
+    "status.picture": {"core", "status.health"},
+    "status.words": {"core", "mapping.plan"},
     "systemd": set(),
     "daemon": {"core", "eventlog", "logs", "mapping", "modbus", "robot"},
     "demo": {"core", "daemon", "demo", "eventlog", "logs", "mapping", "modbus", "rtde", "simulator"},
@@ -60,6 +65,7 @@ LAYERS: dict[str, set[str]] = {
         "service",
         "simulator",
         "startup",
+        "status.launch",
         "systemd",
     },
     "__main__": {"cli"},
@@ -67,8 +73,9 @@ LAYERS: dict[str, set[str]] = {
 """Module or package -> what it and everything in it may import; the longest name that fits decides."""
 
 LIBRARIES: dict[str, set[str]] = {
-    "aiohttp": {"control.server"},
+    "aiohttp": {"control.server", "status.guard", "status.listener"},
     "click": {"__main__", "cli"},
+    "prometheus_client": {"status.metrics"},
     "pydantic": {"mapping"},
     "pydantic_core": {"mapping"},
     "pymodbus": {"demo", "modbus.server"},
@@ -99,6 +106,10 @@ PURE = (
     "rtde.payloads",
     "rtde.recipe",
     "sentence",
+    "status.health",
+    "status.histogram",
+    "status.picture",
+    "status.words",
 )
 """What has no socket, no event loop and no clock."""
 
@@ -123,13 +134,25 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "rtde.messages": "records; tests/rtde/test_codec.py pins them byte by byte",
     "rtde.types": "records; tests/rtde/test_recipe.py pins their formats",
     "simulator": "a docstring",
+    "status": "a docstring",
 }
 """Module -> why it has no test file of its own."""
 
 TESTED_TOGETHER = {"mapping.rules": "tests/mapping/test_rules.py"}
 """Package -> the one file that tests all its modules: rules are tested by their own bad and good examples."""
 
-WITHOUT_ALL = {"control", "core", "mapping", "modbus", "robot", "rtde", "simulator", "demo", "mapping.rules"}
+WITHOUT_ALL = {
+    "control",
+    "core",
+    "mapping",
+    "modbus",
+    "robot",
+    "rtde",
+    "simulator",
+    "status",
+    "demo",
+    "mapping.rules",
+}
 """Packages that export nothing themselves."""
 
 

@@ -30,6 +30,8 @@ from gatewayd.mapping.plan import Area
 from gatewayd.mapping.schema import mapping_schema
 from gatewayd.modbus.functions import EXCEPTION_OF, ExceptionCode
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series
+from gatewayd.status.histogram import BOUNDS
+from gatewayd.status.metrics import METRICS, PROCESS_METRICS
 
 __all__ = ["DOCS", "PARTS", "ROOT", "pages", "renewed"]
 
@@ -269,6 +271,24 @@ def _level(kind: EventKind) -> str:
     return "info" if level is None else LEVEL_NAMES[level][0]
 
 
+def metrics() -> str:
+    """What /metrics tells."""
+    rows = [
+        (f"`{one.name}`", one.kind.value, ", ".join(one.labels) or "none", one.meaning) for one in METRICS
+    ]
+    return _table(("name", "type", "labels", "meaning"), rows)
+
+
+def process_metrics() -> str:
+    """What prometheus-client tells of the process."""
+    return _table(("name", "meaning"), [(f"`{name}`", text) for name, text in PROCESS_METRICS.items()])
+
+
+def histogram_bounds() -> str:
+    """The bounds of the buckets, in milliseconds."""
+    return ", ".join(f"{bound * 1000:g}" for bound in BOUNDS) + " ms, and all the rest."
+
+
 # -- RTDE -------------------------------------------------------------------------------------------------------------
 
 
@@ -374,6 +394,9 @@ PARTS: dict[str, Callable[[], str]] = {
     "refusals": refusals,
     "exceptions": exceptions,
     "events": events,
+    "metrics": metrics,
+    "process-metrics": process_metrics,
+    "histogram-bounds": histogram_bounds,
     "rtde-inputs": rtde_inputs,
     "rtde-outputs": rtde_outputs,
     "modules": modules,
