@@ -12,7 +12,7 @@ COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate
 SOURCES = gatewayd tests
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test install dev lint format types check docs-check ci bench lock install-hook clean
+.PHONY: help demo test setup dev lint format types check docs-check unit-checks ci bench deb install lock install-hook clean
 
 help: ## Show this list
 	@echo "make TARGET, where TARGET is one of:"
@@ -24,7 +24,7 @@ demo: $(VENV)/.runtime ## Set up, then run simulator, gateway and a small PLC pr
 test: $(VENV)/.dev ## Set up, then pass the tests (ARGS="tests/core -x")
 	$(PY) -m pytest -n $(JOBS) $(ARGS)
 
-install: $(VENV)/.runtime ## Set up what the daemon needs
+setup: $(VENV)/.runtime ## Set up what the daemon needs
 dev: $(VENV)/.dev ## Set up what developers need
 
 lint: $(VENV)/.dev ## Lint and check the format
@@ -44,11 +44,20 @@ check: $(VENV)/.runtime ## Check the shipped mappings
 docs-check: $(VENV)/.dev ## Check that generated pages and links of docs/ are right
 	$(PY) -m pytest tests/test_docs.py $(ARGS)
 
+unit-checks: $(VENV)/.dev ## Let systemd judge the units: no mistake, and little that the service may do
+	$(PY) -m pytest tests/systemd/test_units.py $(ARGS)
+
 ci: ## Everything the project asks of a commit, in a clean clone of HEAD
 	.ci/run
 
 bench: $(VENV)/.dev ## Measure, and print the figures as ratios (ARGS="modbus latency")
 	$(PY) -m tests.benchmarks $(ARGS)
+
+deb: $(VENV)/.made ## Build the Debian package of this tree into dist/
+	packaging/deb dist $(PY)
+
+install: $(VENV)/.made ## Install as the package would, below DESTDIR (as root; see docs/howto/install.md)
+	packaging/install "$(DESTDIR)" $(PY)
 
 lock: ## Pin and hash the newest packages that pyproject.toml allows (needs uv)
 	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --group build -o requirements.lock

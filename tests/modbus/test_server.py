@@ -417,7 +417,8 @@ async def test_an_old_asyncio_that_reads_in_spite_of_a_pause_reads_nothing(
 
     monkeypatch.setattr("asyncio.selector_events._SelectorTransport._add_reader", add_reader)
     reader, writer = await dial(listener)
-    assert await is_served(reader, writer)
+    async with asyncio.timeout(5):
+        assert await is_served(reader, writer)
     (connection,) = listener._connections
     loop: Any = asyncio.get_running_loop()
     assert connection.descriptor not in loop._selector.get_map()

@@ -1,0 +1,176 @@
+"""A machine with systemd as PID 1 to install on, as an ordinary process (user-mode-linux).
+
+Its root is this machine's own file system, mounted read-only, with an overlay in memory on top: inside, everything can
+be installed, removed and broken, and nothing of it reaches this machine but the directory of the results.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import shlex
+import shutil
+import signal
+import struct
+import subprocess
+from pathlib import Path
+
+__all__ = ["LIMIT", "boot", "missing"]
+
+LIMIT = 115
+"""Seconds for one boot with everything that runs in it."""
+MEMORY = 1 << 30
+_MODULES = (
+    "fs/overlayfs/overlay",
+    "net/can/can",
+    "net/can/can-raw",
+    "drivers/net/can/dev/can-dev",
+    "drivers/net/can/vcan",
+)
+
+# Between processes the kernel keeps no more of the vector registers than SSE has.
+_TUNABLES = "glibc.cpu.hwcaps=-AVX2,-AVX,-AVX512F,-AVX512VL,-ERMS,-AVX_Fast_Unaligned_Load,-XSAVEC,-XSAVE"
+
+_INIT = """\
+#!/bin/sh
+export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/ GLIBC_TUNABLES={tunables}
+mount -t proc proc /proc; mount -t sysfs sys /sys; mount -t tmpfs -o size=80% tmp /mnt
+mkdir /mnt/results /mnt/upper /mnt/work /mnt/root
+mount -t hostfs -o {results} results /mnt/results || halt -f
+exec >/mnt/results/init.log 2>&1 </dev/null
+for module in {modules}; do
+    {python} -I {results}/insert.py "/usr/lib/uml/modules/$(uname -r)/kernel/$module.ko" || echo "no $module"
+done
+mount -t overlay overlay -o lowerdir=/,upperdir=/mnt/upper,workdir=/mnt/work /mnt/root || halt -f
+cd /mnt/root
+# Of the machine's own services nothing starts.
+rm -rf .dockerenv usr/sbin/policy-rc.d etc/systemd/system etc/fstab etc/network etc/rc?.d etc/init.d
+rm -rf etc/gatewayd usr/lib/gatewayd var/lib/gatewayd
+mkdir -p etc/systemd/system etc/systemd/system.conf.d etc/systemd/journald.conf.d srv/results
+for unit in {masked}; do ln -s /dev/null etc/systemd/system/$unit; done
+printf '[Manager]\\nDefaultEnvironment=GLIBC_TUNABLES={tunables}\\nDefaultTimeoutStopSec=5s\\n' \\
+    >etc/systemd/system.conf.d/test.conf
+printf '[Journal]\\nStorage=volatile\\nRateLimitIntervalSec=0\\n' >etc/systemd/journald.conf.d/test.conf
+printf '[Unit]\\nRequires=basic.target scenario.service\\n' >etc/systemd/system/test.target
+printf '%s\\n' '[Unit]' 'After=basic.target' '[Service]' 'Type=oneshot' \\
+    'ExecStart=/usr/bin/python3 -I /srv/results/scenario.py /srv/results' \\
+    'StandardOutput=append:/srv/results/scenario.log' 'StandardError=inherit' \\
+    'ExecStopPost=/usr/bin/systemctl halt --force --force' >etc/systemd/system/scenario.service
+echo 0123456789abcdef0123456789abcdef >etc/machine-id
+mount -t hostfs -o {results} results srv/results || halt -f
+exec 3>&1 >/dev/console 2>&1
+exec switch_root /mnt/root /lib/systemd/systemd --unit=test.target
+"""
+
+_MASKED = (
+    "systemd-udevd.service systemd-udev-trigger.service systemd-modules-load.service systemd-hwdb-update.service "
+    "systemd-random-seed.service systemd-update-utmp.service systemd-timesyncd.service systemd-networkd.service "
+    "systemd-resolved.service systemd-logind.service systemd-binfmt.service systemd-firstboot.service "
+    "systemd-remount-fs.service systemd-boot-update.service systemd-pcrphase.service systemd-pcrphase-sysinit.service "
+    "systemd-journal-catalog-update.service ldconfig.service apparmor.service dev-hugepages.mount "
+    "systemd-tmpfiles-setup-dev.service systemd-machine-id-commit.service systemd-journal-flush.service "
+    "e2scrub_reap.service fstrim.timer apt-daily.timer apt-daily-upgrade.timer dpkg-db-backup.timer e2scrub_all.timer "
+    "systemd-tmpfiles-clean.timer systemd-tmpfiles-setup.service systemd-sysusers.service systemd-sysctl.service "
+    "modprobe@configfs.service modprobe@dm_mod.service modprobe@fuse.service modprobe@loop.service "
+    "sys-kernel-config.mount sys-fs-fuse-connections.mount proc-sys-fs-binfmt_misc.automount dbus.socket"
+)
+
+_INSERT = """\
+import ctypes, os, sys
+libc = ctypes.CDLL(None, use_errno=True)
+failed = libc.syscall(313, os.open(sys.argv[1], os.O_RDONLY), b"", 0)
+sys.exit(os.strerror(ctypes.get_errno()) if failed else 0)
+"""
+"""insmod, for machines without kmod."""
+
+
+def missing() -> str:
+    """Why there can be no boot; empty if there can."""
+    if shutil.which("linux.uml") is None:
+        return "user-mode-linux is not installed (apt-get install user-mode-linux)"
+    if os.uname().machine != "x86_64":
+        return "user-mode-linux runs on x86_64 only"
+    if not Path("/lib/systemd/systemd").exists() or shutil.which("systemctl") is None:
+        return "systemd is not installed (apt-get install systemd)"
+    if shutil.which("dpkg") is None:
+        return "this machine has no dpkg"
+    if os.geteuid() != 0:
+        return "only root can offer the whole file system to the machine inside"
+    return ""
+
+
+def boot(results: Path, scenario: Path) -> int:
+    """Boot, run the program `scenario` as root with `results` as its argument, halt. Returns the kernel's exit status.
+
+    `results` must be a path without spaces; init.log, scenario.log and kernel.log in it tell what happened.
+    """
+    assert not any(character.isspace() for character in str(results))
+    shutil.copy(scenario, results / "scenario.py")
+    (results / "insert.py").write_text(_INSERT)
+    init = results / "init"
+    init.write_text(
+        _INIT.format(
+            results=results,
+            tunables=_TUNABLES,
+            python="/usr/bin/python3",
+            modules=shlex.join(_MODULES),
+            masked=_MASKED,
+        )
+    )
+    init.chmod(0o755)
+    kernel = ["linux.uml", f"mem={MEMORY >> 20}M", "rootfstype=hostfs", "ro", f"init={init}", "quiet"]
+    kernel += ["con=null", "con0=null,fd:1"]
+    with (results / "kernel.log").open("wb") as log:
+        machine = subprocess.Popen(
+            kernel,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            preexec_fn=_without_xstate,  # noqa: PLW1509 - tests start no threads
+            start_new_session=True,
+            env={**os.environ, "TMPDIR": _place_of_memory()},
+        )
+    try:
+        return machine.wait(LIMIT)
+    except subprocess.TimeoutExpired:
+        return -1
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(machine.pid, signal.SIGKILL)
+        machine.wait()
+
+
+def _place_of_memory() -> str:
+    """Where the kernel's memory may lie: in shared memory if there is enough, of which containers have little."""
+    place = os.statvfs("/dev/shm") if Path("/dev/shm").is_dir() else None  # noqa: S108 - user-mode-linux unlinks it
+    return "/dev/shm" if place is not None and place.f_bavail * place.f_frsize > MEMORY else "/tmp"  # noqa: S108
+
+
+def _without_xstate() -> None:
+    """Let this process and its children see a machine without PTRACE_GETREGSET (seccomp, no privilege needed).
+
+    Linux 6.1 as user-mode-linux asks for 2.7 kB of extended registers and dies on processors that have more of them
+    (AMX: 11 kB). Where the request fails altogether it is content with those of SSE.
+    """
+    load, equal, answer = 0x20, 0x15, 0x06
+    ptrace, get_register_set, set_register_set = 101, 0x4204, 0x4205
+    refuse, allow = 0x0005_0005, 0x7FFF_0000  # EIO
+    program = b"".join(
+        struct.pack("=HBBI", *instruction)
+        for instruction in (
+            (load, 0, 0, 0),
+            (equal, 0, 4, ptrace),
+            (load, 0, 0, 16),
+            (equal, 1, 0, get_register_set),
+            (equal, 0, 1, set_register_set),
+            (answer, 0, 0, refuse),
+            (answer, 0, 0, allow),
+        )
+    )
+    buffer = ctypes.create_string_buffer(program, len(program))
+    header = ctypes.create_string_buffer(struct.pack("@HP", len(program) // 8, ctypes.addressof(buffer)))
+    libc = ctypes.CDLL(None)
+    set_no_new_privileges, set_seccomp, mode_filter = 38, 22, 2
+    libc.prctl(set_no_new_privileges, 1, 0, 0, 0)
+    libc.prctl(set_seccomp, mode_filter, header, 0, 0)
