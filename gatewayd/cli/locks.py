@@ -62,27 +62,37 @@ def command(context: click.Context, socket: Path | None, cell: str | None, *, as
 @click.option(
     "--for", "seconds", type=DURATION, metavar="TIME", help="Give it back after that time: 30s, 10min, 2h."
 )
+@socket_option
+@cell_option
 @click.pass_context
-def take(context: click.Context, name: str, seconds: float | None) -> None:
+def take(
+    context: click.Context, name: str, seconds: float | None, socket: Path | None, cell: str | None
+) -> None:
     """Take lock NAME (of a variable or group) from whoever holds it, until it is released. Values stay as they are."""
-    lock = _post(context, name, "take", {} if seconds is None else {"for": seconds})
+    where = socket or context.obj["socket"], cell or context.obj["cell"]
+    lock = _post(where, name, "take", {} if seconds is None else {"for": seconds})
     until = "until you release it" if seconds is None else f"for {seconds:g} s"
     click.echo(f"{lock['name']} is the operator's {until}: {_members(lock)}")
 
 
 @command.command(name="release")
 @click.argument("name", shell_complete=complete_locks)
+@socket_option
+@cell_option
 @click.pass_context
-def release(context: click.Context, name: str) -> None:
+def release(context: click.Context, name: str, socket: Path | None, cell: str | None) -> None:
     """Release lock NAME, whoever holds it; the release fallbacks apply. A writer that goes on writing gets it again."""
-    lock = _post(context, name, "release", {})
+    lock = _post((socket or context.obj["socket"], cell or context.obj["cell"]), name, "release", {})
     click.echo(f"{lock['name']} is free")
 
 
-def _post(context: click.Context, name: str, act: str, body: Mapping[str, Any]) -> dict[str, Any]:
+def _post(
+    where: tuple[Path | None, str | None], name: str, act: str, body: Mapping[str, Any]
+) -> dict[str, Any]:
     from gatewayd.control.client import segment
 
-    client, cell = connect(context.obj["socket"]), context.obj["cell"]
+    socket, cell = where
+    client = connect(socket)
     with refusals():
         return client.post(
             f"/v1/locks/{segment(name)}/{act}", body if cell is None else {**body, "cell": cell}
