@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gatewayd.cli.remote import REFUSED, Refused, Unreachable, json_option, socket_option
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -14,8 +16,6 @@ __all__ = ["PATIENCE", "command"]
 
 PATIENCE = 60.0
 """Seconds for the answer: many large files take a while on a small machine."""
-NOT_DONE, UNREACHABLE = 1, 2
-"""Exit codes."""
 
 
 @click.command(
@@ -36,13 +36,8 @@ Exit codes:
 """,
 )
 @click.option("--force", is_flag=True, help="Apply it although it touches what is owned now.")
-@click.option(
-    "--socket",
-    type=click.Path(path_type=Path),
-    envvar="GATEWAYD_CONTROL",
-    help="Control socket of the gateway; found by itself where there is one.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print what the gateway answers, for programs.")
+@socket_option
+@json_option
 @click.pass_context
 def command(context: click.Context, socket: Path | None, *, force: bool, as_json: bool) -> None:
     """Have the running gateway read, check and compare its mapping files again, and serve them if that is safe.
@@ -54,17 +49,14 @@ def command(context: click.Context, socket: Path | None, *, force: bool, as_json
 
     from gatewayd.control.client import Client, ControlError, NoDaemon, find_socket
 
+    answer: Mapping[str, Any]
     try:
-        answer: Mapping[str, Any] = Client(find_socket(socket, os.environ), PATIENCE).post(
-            "/v1/reload", {"force": force}
-        )
+        answer = Client(find_socket(socket, os.environ), PATIENCE).post("/v1/reload", {"force": force})
     except NoDaemon as error:
-        click.echo(str(error), err=True)
-        context.exit(UNREACHABLE)
+        raise Unreachable(str(error)) from error
     except ControlError as error:
         if "result" not in error.body:
-            click.echo(str(error), err=True)
-            context.exit(NOT_DONE)
+            raise Refused(str(error)) from error
         answer = error.body
     done = answer.get("result") in ("applied", "unchanged")
     if as_json:
@@ -72,7 +64,7 @@ def command(context: click.Context, socket: Path | None, *, force: bool, as_json
     else:
         for line in _lines(answer):
             click.echo(line, err=not done)
-    context.exit(0 if done else NOT_DONE)
+    context.exit(0 if done else REFUSED)
 
 
 def _lines(answer: Mapping[str, Any]) -> list[str]:
