@@ -12,6 +12,7 @@ import time
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 
 from gatewayd.core.cell import Cell
 from gatewayd.eventlog import EventLog
@@ -68,10 +69,11 @@ class Daemon:
 
     async def run(self, stop: asyncio.Event) -> None:
         """Serve until `stop` is set; then release every lock, give the robots the fallbacks, and close."""
+        clocks = [_keep_running(partial(_tick, station.cell)) for station in self.stations]
         robots = [_keep_running(station.robot.run) for station in self.stations]
         listeners = [_open(listener) for listener in self.listeners]
         async with asyncio.TaskGroup() as group:
-            tasks = [group.create_task(work) for work in (self._tick(), *listeners, *robots)]
+            tasks = [group.create_task(work) for work in (*clocks, *listeners, *robots)]
             await stop.wait()
             await self._close()
             for task in tasks:
@@ -89,12 +91,11 @@ class Daemon:
             async with asyncio.timeout(CLOSING_TIME):
                 await asyncio.gather(*(station.robot.close() for station in self.stations))
 
-    async def _tick(self) -> None:
-        while True:
-            now = time.monotonic()
-            for station in self.stations:
-                station.cell.tick(now)
-            await asyncio.sleep(TICK)
+
+async def _tick(cell: Cell) -> None:
+    while True:
+        cell.tick(time.monotonic())
+        await asyncio.sleep(TICK)
 
 
 async def _open(listener: ModbusListener) -> None:
@@ -104,8 +105,9 @@ async def _open(listener: ModbusListener) -> None:
         try:
             await listener.start()
         except ListenError as error:
-            if str(error) != told:
-                told = str(error)
+            reason = error.strerror or str(error)
+            if reason != told:
+                told = reason
                 log.error(told, extra=fields(retry_s=RETRY_PERIOD))  # noqa: TRY400 - the text says it all
             await asyncio.sleep(RETRY_PERIOD)
         else:
@@ -114,12 +116,12 @@ async def _open(listener: ModbusListener) -> None:
 
 
 async def _keep_running(work: Callable[[], Awaitable[None]]) -> None:
-    """Start `work` again whenever it ends in an error, so that a defect in one link never ends the process."""
+    """Start `work` again whenever it ends in an error, so that a defect in one cell never ends the process."""
     while True:
         try:
             await work()
         except Exception:
-            log.exception("internal error, starting the link again")
+            log.exception("internal error, starting again")
             await asyncio.sleep(RETRY_PERIOD)
         else:
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from os.path import isdir
 from pathlib import Path
 
 from gatewayd.logs import fields
@@ -35,7 +36,8 @@ def mapping_files(paths: Iterable[Path]) -> list[Path]:
     """The files meant: a directory stands for its *.yaml files, by name."""
     found: list[Path] = []
     for path in paths:
-        if path.is_dir():
+        # Path.is_dir would raise for a name that no file can have; such a one is told when it is opened.
+        if isdir(path):  # noqa: PTH112
             inside = sorted(path.glob(PATTERN))
             if not inside:
                 log.error(

@@ -71,8 +71,6 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "cli": "tests/cli/test_main.py",
     "cli.completion": "tests/cli/test_main.py",
     "core": "a docstring",
-    "core.definition": "records; every other test of the core builds on them",
-    "core.refusal": "records; every other test of the core builds on them",
     "mapping": "a docstring",
     "mapping.plan": "records; tests/mapping/test_compile.py pins their content",
     "modbus": "a docstring",
@@ -82,6 +80,9 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "simulator": "a docstring",
 }
 """Module -> why it has no test file of its own."""
+
+TESTED_TOGETHER = {"mapping.rules": "tests/mapping/test_rules.py"}
+"""Package -> the one file that tests all its modules: rules are tested by their own bad and good examples."""
 
 WITHOUT_ALL = {"core", "mapping", "modbus", "rtde", "simulator", "demo", "mapping.rules"}
 """Packages that export nothing themselves."""
@@ -204,7 +205,10 @@ def file_of_tests(module: str) -> Path:
 
 @every_module
 def test_module_has_its_test_file(module: str) -> None:
-    if module in WITHOUT_TEST_FILE:
+    together = [file for package, file in TESTED_TOGETHER.items() if within(module, {package})]
+    if together:
+        assert (ROOT / together[0]).exists()
+    elif module in WITHOUT_TEST_FILE:
         assert not file_of_tests(module).exists(), (
             f"{module} has a test file now: strike it from WITHOUT_TEST_FILE"
         )
@@ -214,7 +218,14 @@ def test_module_has_its_test_file(module: str) -> None:
 
 def test_tables_name_only_what_exists() -> None:
     """No rule outlives the module that it is about."""
-    named = set(LAYERS) | ROBOT_LINK | set(PURE) | set(WITHOUT_TEST_FILE) | set.union(*LIBRARIES.values())
+    named = (
+        set(LAYERS)
+        | ROBOT_LINK
+        | set(PURE)
+        | set(WITHOUT_TEST_FILE)
+        | set(TESTED_TOGETHER)
+        | set.union(*LIBRARIES.values())
+    )
     assert named - set(MODULES) == set()
 
 

@@ -21,6 +21,12 @@ SAFETY_TEXT = "SafetySetup has not been confirmed yet, therefore no data will be
 _PROBABILITY = click.FloatRange(0, 1)
 
 
+class _ProgramMistakeError(click.ClickException):
+    """One line without the usage: it names the place itself."""
+
+    exit_code = 2
+
+
 def _seconds(_ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
     """A number of seconds; infinity for `never`, which only --overflow-close takes."""
     if value is None:
@@ -221,7 +227,7 @@ def _controller(
             generation, software, frequency=frequency, uptime=uptime, program=rules, faults=faults
         )
     except ProgramError as error:
-        raise click.UsageError(str(error)) from error
+        raise _ProgramMistakeError(str(error)) from error
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--hold") from error
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from enum import Enum, IntEnum
 
-__all__ = ["Freshness", "Happening", "Source"]
+__all__ = ["TRANSITIONS", "Freshness", "Happening", "Source"]
 
 
 class Source(IntEnum):
@@ -35,6 +35,7 @@ class Happening(Enum):
 TRANSITIONS: dict[tuple[Source, Happening], Source] = {
     (Source.LOST, Happening.CONNECTED): Source.WAITING,
     (Source.WAITING, Happening.PROGRESS): Source.FRESH,
+    (Source.WAITING, Happening.NO_PROGRESS): Source.FROZEN,
     (Source.WAITING, Happening.LOST): Source.LOST,
     (Source.FRESH, Happening.NO_PACKAGE): Source.SILENT,
     (Source.FRESH, Happening.NO_PROGRESS): Source.FROZEN,
@@ -63,8 +64,7 @@ class Freshness:
         self.last_progress = -math.inf
 
     def connected(self) -> None:
-        """A session with the controller has begun."""
-        self.timestamp = None
+        """A session with the controller has begun. One that was frozen and still is does not pass for fresh by it."""
         self._move(Happening.CONNECTED)
 
     def lost(self) -> None:
@@ -74,10 +74,14 @@ class Freshness:
     def package(self, timestamp: float | None, now: float) -> bool:
         """A package came. Returns whether it tells anything new: its timestamp differs from the last one's.
 
-        A controller whose recipe has no timestamp (None) is believed.
+        A controller whose recipe has no timestamp (None) is believed. A package outside a session tells nothing.
         """
+        if self.state is Source.LOST:
+            return False
         self.last_package = now
         if timestamp is not None and timestamp == self.timestamp:
+            if self.state is Source.WAITING:
+                self._move(Happening.NO_PROGRESS)
             return False
         self.timestamp = timestamp
         self.last_progress = now

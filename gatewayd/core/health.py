@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 __all__ = ["Health"]
@@ -11,10 +12,10 @@ __all__ = ["Health"]
 class Health:
     """All counts are since the start of the gateway."""
 
-    started: float = 0.0
-    """Monotonic time of the first tick."""
+    started: float = math.inf
+    """Monotonic time of the first tick; infinity before it."""
     heartbeat: int = 0
-    """Counts up every `gatewayd.core.cell.HEARTBEAT_PERIOD` while the core turns."""
+    """Counts up every `HEARTBEAT_PERIOD` while the core turns."""
     packages: int = 0
     skipped: int = 0
     """Packages the controller left out, seen from its timestamps."""

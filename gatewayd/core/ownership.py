@@ -97,14 +97,14 @@ class LockTable:
 
     def apply(self, lock: int, writer: int, move: Move, now: float) -> None:
         """Carry out a move that `decide` returned; refusals and NOTHING change nothing."""
-        if move is Move.RELEASE:
-            self.free(lock)
-        elif move <= Move.TAKE_OVER:
+        if move <= Move.TAKE_OVER:
             self.owners[lock] = writer
             lease = self.locks[lock].lease
             if lease is not None:
-                self.expires[lock] = now + lease
-                self._next_expiry = min(self._next_expiry, now + lease)
+                self.expires[lock] = expiry = now + lease
+                self._next_expiry = min(self._next_expiry, expiry)
+        elif move is Move.RELEASE:
+            self.free(lock)
 
     def free(self, lock: int) -> int | None:
         """Release unconditionally; returns the former owner."""
@@ -117,7 +117,7 @@ class LockTable:
         if now < self._next_expiry:
             return []
         ended = [lock for lock, expiry in enumerate(self.expires) if expiry <= now]
-        self._next_expiry = min((expiry for expiry in self.expires if expiry > now), default=math.inf)
+        self._next_expiry = min(self.expires, default=math.inf)
         return ended
 
     def held_by(self, writer: int) -> list[int]:

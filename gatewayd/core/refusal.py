@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = ["Reason", "Refusal"]
+__all__ = ["PRECEDENCE", "Reason", "Refusal"]
 
 
 class Reason(IntEnum):
@@ -32,9 +32,13 @@ class Reason(IntEnum):
         return _TEXTS[self]
 
     @property
-    def of_the_robot(self) -> bool:
-        """Whether the robot is the cause, not the writer: such a refusal still counts as a sign of life."""
-        return self in (Reason.ROBOT_LOST, Reason.CLAIMED_ELSEWHERE)
+    def renews(self) -> bool:
+        """Whether the owner keeps its lease: only the robot's absence stood in the way.
+
+        Any other refusal renews nothing, so that an owner whose requests are refused falls back to its declared state
+        instead of leaving its last accepted values in force.
+        """
+        return self is Reason.ROBOT_LOST
 
 
 _TEXTS = {

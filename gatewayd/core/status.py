@@ -8,7 +8,7 @@ greatest number of their width, which also stands for "never" (ages) and "no end
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from gatewayd.core.cell import Cell
@@ -124,18 +124,24 @@ LENGTH = 4288
 _HEADER = struct.Struct(">HHIHHHHIIHHIIIIIIH6xHHHHI")
 
 
+_Entries = Callable[[range, float], Iterable[int]]
+"""The words of some entries of a table at one time."""
+
+
 class StatusBlock:
     """The status block of one cell."""
 
     def __init__(self, cell: Cell) -> None:
         self._cell = cell
-        self._tables = (
-            (TABLES[0], self._good),
-            (TABLES[1], self._writers_alive),
-            (TABLES[2], self._owner),
-            (TABLES[3], self._lease),
-            (TABLES[4], self._age),
-            (TABLES[5], self._quality),
+        variables, writers = len(cell.definition.variables), len(cell.definition.writers)
+        good, alive, owner, lease, age, quality = TABLES
+        self._tables: tuple[tuple[int, int, _Entries], ...] = (
+            (good.offset, -(-variables // 16), self._good),
+            (alive.offset, writers, self._writers_alive),
+            (owner.offset, variables, self._owner),
+            (lease.offset, variables, self._lease),
+            (age.offset, variables, self._age),
+            (quality.offset, variables, self._quality),
         )
 
     def read(self, first: int, count: int, now: float) -> bytes:
@@ -143,16 +149,17 @@ class StatusBlock:
 
         The caller has checked that the range lies within `LENGTH`.
         """
-        block = bytearray(2 * LENGTH)
+        block = bytearray(2 * count)
         end = first + count
         if first < HEADER_WORDS:
-            header = self._header(now)
+            header = self._header(now)[2 * first : 2 * end]
             block[: len(header)] = header
-        for table, words in self._tables:
-            if first < table.offset + table.words and end > table.offset:
-                encoded = b"".join(word.to_bytes(2, "big") for word in words(now))
-                block[2 * table.offset : 2 * table.offset + len(encoded)] = encoded
-        return bytes(block[2 * first : 2 * end])
+        for offset, length, words in self._tables:
+            low, high = max(first, offset), min(end, offset + length)
+            if low < high:
+                encoded = struct.pack(f">{high - low}H", *words(range(low - offset, high - offset), now))
+                block[2 * (low - first) : 2 * (high - first)] = encoded
+        return bytes(block)
 
     def write(self, writer: int | None, first: int, words: Sequence[int], now: float) -> Refusal | None:
         """A writer takes or gives back a lock; any other word of the block is never writable.
@@ -214,39 +221,43 @@ class StatusBlock:
         flags = (
             cell.freshness.state is Source.FRESH,
             cell.accepts_writes,
-            all(quality is Quality.GOOD for quality in cell.image.quality),
-            any(owner is not None for owner in cell.ownership.owners),
+            cell.image.quality.count(Quality.GOOD) == len(cell.image.quality),
+            cell.ownership.owners.count(None) < len(cell.ownership.owners),
             health.writes_refused > 0,
             health.read_back_mismatches > 0,
             health.watchdog_fed,
         )
         return sum(1 << bit for bit, flag in enumerate(flags) if flag)
 
-    def _good(self, _now: float) -> Iterable[int]:
+    def _good(self, entries: range, _now: float) -> Iterable[int]:
         quality = self._cell.image.quality
-        for start in range(0, len(quality), 16):
-            word = quality[start : start + 16]
+        for entry in entries:
+            word = quality[16 * entry : 16 * entry + 16]
             yield sum(1 << bit for bit, one in enumerate(word) if one is Quality.GOOD)
 
-    def _writers_alive(self, _now: float) -> Iterable[int]:
-        return map(int, self._cell.writers.alive)
+    def _writers_alive(self, entries: range, _now: float) -> Iterable[int]:
+        return map(self._cell.writers.alive.__getitem__, entries)
 
-    def _owner(self, _now: float) -> Iterable[int]:
+    def _owner(self, entries: range, _now: float) -> Iterable[int]:
         owners = self._cell.ownership.owners
-        for variable in self._cell.definition.variables:
-            yield _number(owners[variable.lock]) if variable.lock is not None else 0
+        for lock in self._locks(entries):
+            yield _number(owners[lock]) if lock is not None else 0
 
-    def _lease(self, now: float) -> Iterable[int]:
+    def _lease(self, entries: range, now: float) -> Iterable[int]:
         remaining = self._cell.ownership.remaining
-        for variable in self._cell.definition.variables:
-            yield _milliseconds(remaining(variable.lock, now), _U16) if variable.lock is not None else 0
+        for lock in self._locks(entries):
+            yield _milliseconds(remaining(lock, now), _U16) if lock is not None else 0
 
-    def _age(self, now: float) -> Iterable[int]:
-        image = self._cell.image
-        return (_milliseconds(image.age(index, now), _U16) for index in range(len(image.values)))
+    def _age(self, entries: range, now: float) -> Iterable[int]:
+        age = self._cell.image.age
+        return (_milliseconds(age(index, now), _U16) for index in entries)
 
-    def _quality(self, _now: float) -> Iterable[int]:
-        return map(int, self._cell.image.quality)
+    def _quality(self, entries: range, _now: float) -> Iterable[int]:
+        return map(self._cell.image.quality.__getitem__, entries)
+
+    def _locks(self, entries: range) -> Iterable[int | None]:
+        variables = self._cell.definition.variables
+        return (variables[index].lock for index in entries)
 
 
 def _milliseconds(seconds: float, greatest: int) -> int:

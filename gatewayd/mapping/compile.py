@@ -34,7 +34,7 @@ from gatewayd.rtde.catalogue import Series
 __all__ = ["compile_plan", "fingerprint", "package_period"]
 
 _STALE_PERIODS: Final = 5
-_LEAST_STALE_AFTER: Final = 0.05
+_LEAST_STALE_AFTER: Final = 0.1
 _CASTS: Final[dict[ValueKind, Callable[[Value], Value]]] = {
     ValueKind.BOOL: bool,
     ValueKind.INT: round,

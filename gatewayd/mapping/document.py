@@ -102,7 +102,10 @@ def read_document(source: Source) -> tuple[Document, tuple[Diagnostic, ...]]:
         return Document(source, ""), source.findings
     reader = _Reader(source)
     document = reader.read(source.root)
-    return document, (*source.findings, *reader.findings)
+    # What stands in the place of an alias is refused already; that it is no number either helps nobody.
+    refused = {finding.position for finding in source.findings}
+    further = (finding for finding in reader.findings if finding.position not in refused)
+    return document, (*source.findings, *further)
 
 
 def _walk(node: Node, path: tuple[Step, ...], key: Position) -> tuple[Position, Position]:

@@ -7,7 +7,6 @@ expanded is kept as `Unresolved` or as a placement with a `PlacementProblem`: ru
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Final
@@ -18,8 +17,8 @@ from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.model import ANY, Group, PlacementSpec, VariableSpec
 from gatewayd.mapping.plan import Area
-from gatewayd.mapping.scalars import Reference
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, REGISTERS, Field, bit_word
+from gatewayd.mapping.reference import ReferenceProblem, Target, UnresolvedReference, resolve
+from gatewayd.rtde.catalogue import INPUTS, Field
 from gatewayd.rtde.types import DataType
 
 __all__ = [
@@ -37,7 +36,6 @@ __all__ = [
 SHARED_LEASE: Final = 5.0
 """Seconds of lease where several writers may own and the file says nothing."""
 
-_BITS: Final = {DataType.UINT8: 8, DataType.UINT32: 32, DataType.UINT64: 64, DataType.INT32: 32}
 _RANGES: Final = {
     DataType.UINT8: (0, 0xFF),
     DataType.UINT32: (0, 0xFFFF_FFFF),
@@ -52,30 +50,8 @@ _DEFAULT_TYPES: Final = {
     DataType.INT32: "int32",
     DataType.DOUBLE: "float64",
 }
-_ELEMENTS: Final = {
-    DataType.VECTOR3D: DataType.DOUBLE,
-    DataType.VECTOR6D: DataType.DOUBLE,
-    DataType.VECTOR6INT32: DataType.INT32,
-    DataType.VECTOR6UINT32: DataType.UINT32,
-}
-_FAMILIES: Final = {family.prefix: family for family in REGISTERS}
-_BIT_REGISTERS: Final = {"input_bit_register_": "input", "output_bit_register_": "output"}
-_WORD_BITS: Final = range(64)
 _MANY: Final = 2048
-
-
-class ReferenceProblem(Enum):
-    """Why a `robot:` reference names nothing."""
-
-    UNKNOWN_FIELD = auto()
-    NOT_NUMBERED = auto()
-    """A range of something that has no numbered registers."""
-    NO_SUCH_REGISTER = auto()
-    NOT_A_VECTOR = auto()
-    NO_SUCH_ELEMENT = auto()
-    NOT_AN_INTEGER = auto()
-    """Bits of a field that is no integer."""
-    NO_SUCH_BIT = auto()
+"""Some way beyond the limit of variables of a cell."""
 
 
 class PlacementProblem(Enum):
@@ -245,23 +221,6 @@ def expand(document: Document) -> ExpandedCell:
     return builder.finished()
 
 
-@dataclass(frozen=True, slots=True)
-class _Target:
-    """One value in the robot."""
-
-    name: str
-    field: Field
-    type: DataType
-    bit: int | None = None
-    element: int | None = None
-
-
-class _UnresolvedError(Exception):
-    def __init__(self, problem: ReferenceProblem, name: str, limit: int | None = None) -> None:
-        super().__init__()
-        self.problem, self.name, self.limit = problem, name, limit
-
-
 class _Builder:
     def __init__(self, document: Document) -> None:
         self.document = document
@@ -273,8 +232,8 @@ class _Builder:
 
     def add(self, part: Part[VariableSpec]) -> None:
         try:
-            targets = _resolve(part.spec.robot)
-        except _UnresolvedError as error:
+            targets = resolve(part.spec.robot)
+        except UnresolvedReference as error:
             self.unresolved.append(Unresolved(part, error.problem, error.name, error.limit))
             return
         family = part.spec.robot.many or len(targets) > 1
@@ -295,7 +254,7 @@ class _Builder:
             tuple(self.unresolved),
         )
 
-    def _variable(self, part: Part[VariableSpec], target: _Target, member: int | None) -> ConcreteVariable:
+    def _variable(self, part: Part[VariableSpec], target: Target, member: int | None) -> ConcreteVariable:
         name = part.name if member is None else f"{part.name}[{member}]"
         direction = Direction.INPUT if target.field.name in INPUTS else Direction.OUTPUT
         index = len(self.variables)
@@ -422,67 +381,3 @@ def _kind(data_type: DataType) -> ValueKind:
     if data_type is DataType.BOOL:
         return ValueKind.BOOL
     return ValueKind.INT if data_type in _RANGES else ValueKind.FLOAT
-
-
-def _resolve(reference: Reference) -> list[_Target]:
-    """Find what a reference names; raises `_UnresolvedError`."""
-    if reference.registers is not None:
-        return [_register(reference.field, number) for number in reference.registers]
-    family = _split_register(reference.field)
-    if family is not None:
-        whole = _register(*family)
-    else:
-        field = INPUTS.get(reference.field) or OUTPUTS.get(reference.field)
-        if field is None:
-            raise _UnresolvedError(ReferenceProblem.UNKNOWN_FIELD, reference.field)
-        whole = _Target(field.name, field, field.type)
-    elements = list(_elements(whole, reference.elements))
-    return (
-        elements
-        if reference.bits is None
-        else [bit for one in elements for bit in _bits(one, reference.bits)]
-    )
-
-
-def _split_register(field: str) -> tuple[str, int] | None:
-    """Split the name of a numbered register; None for other fields."""
-    prefix = field.rstrip("0123456789")
-    digits = field[len(prefix) :]
-    return (prefix, int(digits)) if digits and (prefix in _FAMILIES or prefix in _BIT_REGISTERS) else None
-
-
-def _register(prefix: str, number: int) -> _Target:
-    name = f"{prefix}{number}"
-    side = _BIT_REGISTERS.get(prefix)
-    if side is not None and number in _WORD_BITS:
-        word, bit = bit_word(side, number)
-        return _Target(name, (INPUTS if side == "input" else OUTPUTS)[word], DataType.BOOL, bit)
-    family = _FAMILIES.get(prefix)
-    if family is None:
-        raise _UnresolvedError(ReferenceProblem.NOT_NUMBERED, prefix)
-    if number not in family.numbers:
-        raise _UnresolvedError(ReferenceProblem.NO_SUCH_REGISTER, name, family.numbers[-1])
-    field = INPUTS.get(name) or OUTPUTS[name]
-    return _Target(name, field, field.type)
-
-
-def _elements(whole: _Target, wanted: range | None) -> Iterator[_Target]:
-    if not whole.type.is_vector:
-        if wanted is not None:
-            raise _UnresolvedError(ReferenceProblem.NOT_A_VECTOR, whole.name)
-        yield whole
-        return
-    for element in wanted if wanted is not None else range(whole.type.count):
-        if element >= whole.type.count:
-            raise _UnresolvedError(ReferenceProblem.NO_SUCH_ELEMENT, whole.name, whole.type.count)
-        yield _Target(f"{whole.name}[{element}]", whole.field, _ELEMENTS[whole.type], whole.bit, element)
-
-
-def _bits(whole: _Target, wanted: range) -> Iterator[_Target]:
-    width = _BITS.get(whole.type)
-    if width is None:
-        raise _UnresolvedError(ReferenceProblem.NOT_AN_INTEGER, whole.name)
-    for bit in wanted:
-        if bit >= width:
-            raise _UnresolvedError(ReferenceProblem.NO_SUCH_BIT, whole.name, width)
-        yield _Target(f"{whole.name}.{bit}", whole.field, DataType.BOOL, bit, whole.element)

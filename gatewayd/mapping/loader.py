@@ -53,15 +53,18 @@ def load(data: bytes, name: str) -> Loaded:
 def load_together(files: Sequence[tuple[str, bytes]]) -> tuple[Loaded, ...]:
     """Load files (name, bytes) that are to run in one process: what they share is checked too. Never raises."""
     cells: list[ExpandedCell] = []
-    findings: dict[str, list[Diagnostic]] = {}
+    findings: list[list[Diagnostic]] = []
     for name, data in files:
         document, found = read_document(parse(data, name))
         cell = expand(document)
         cells.append(cell)
-        findings.setdefault(name, []).extend((*found, *check_cell(cell)))
+        findings.append([*found, *check_cell(cell)])
+    positions = {name: index for index, (name, _) in enumerate(files)}
     for finding in check_plant(cells):
-        findings.setdefault(finding.position.file, []).append(finding)
-    return tuple(_finished(name, cell, findings[name]) for (name, _), cell in zip(files, cells, strict=True))
+        findings[positions[finding.position.file]].append(finding)
+    return tuple(
+        _finished(name, cell, found) for (name, _), cell, found in zip(files, cells, findings, strict=True)
+    )
 
 
 def _finished(name: str, cell: ExpandedCell, findings: Iterable[Diagnostic]) -> Loaded:

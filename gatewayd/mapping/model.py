@@ -97,7 +97,7 @@ class Robot(Section):
     )
     stale_after: Duration | None = Field(
         default=None,
-        description="time without a fresh package after which outputs are stale; default: 5 periods, at least 50ms",
+        description="time without a fresh package after which outputs are stale; default: 5 periods, at least 100ms",
     )
     on_connect: Literal["adopt", "fallback"] = Field(
         default="adopt",

@@ -47,7 +47,7 @@ def as_text(outcome: Outcome, *, colour: bool = False) -> str:
     lines: list[str] = []
     for finding in outcome.findings:
         lines.extend(_finding_lines(finding, colour=colour))
-    lines.extend(f"{item.file}: cannot be read: {item.reason}" for item in outcome.unreadable)
+    lines.extend(_printable(f"{item.file}: cannot be read: {item.reason}") for item in outcome.unreadable)
     if lines:
         lines.append("")
     lines.append(_summary(outcome))
@@ -83,16 +83,28 @@ def as_github(outcome: Outcome) -> str:
 
 def _finding_lines(finding: Diagnostic, *, colour: bool) -> list[str]:
     rule = finding.rule
-    place, label = str(finding.position), f"{rule.severity.value} {rule.id}"
+    place, label = _printable(str(finding.position)), f"{rule.severity.value} {rule.id}"
     if colour:
         place = f"{_BOLD}{place}{_PLAIN}"
         label = f"{_TINT[rule.severity]}{_BOLD}{label}{_PLAIN}"
-    lines = [f"{place}: {label} {rule.slug}: {finding.message}"]
-    details = [f"    {related.position}: {related.message}" for related in finding.related]
+    lines = [f"{place}: {label} {rule.slug}: {_printable(finding.message)}"]
+    details = [f"    {_printable(f'{item.position}: {item.message}')}" for item in finding.related]
     if finding.hint is not None:
-        details.append(f"    hint: {finding.hint}")
+        details.append(f"    hint: {_printable(finding.hint)}")
     lines.extend(f"{_DIM}{detail}{_PLAIN}" if colour else detail for detail in details)
     return lines
+
+
+def _printable(text: str) -> str:
+    """Text from a file as it may go to a terminal: line ends and control characters become escapes."""
+    if text.isprintable():
+        return text
+    return "".join(
+        character
+        if character.isprintable()
+        else character.encode("unicode_escape", "backslashreplace").decode()
+        for character in text
+    )
 
 
 def _summary(outcome: Outcome) -> str:

@@ -312,6 +312,8 @@ class _Reader:
             related = (Related(place, _CONTEXTS.get(_one_line(error.context), _one_line(error.context))),)
         problem = _one_line(error.problem or error.context or "not YAML")
         problem = problem.replace("'<stream end>'", "the end of the file")
+        if problem.startswith("expected <block end>"):
+            problem = "the indentation of this line fits none of the lines above"
         self._find(syntax.YAML_SYNTAX, problem, position, _syntax_hint(problem), related)
 
     def _unprintable(self, text: str, offset: int) -> None:

@@ -24,7 +24,7 @@ HEADER_SIZE = 7
 GREATEST_PDU = 253
 """Bytes (Application Protocol V1.1b3, 4.1)."""
 GREATEST_FRAME = HEADER_SIZE + GREATEST_PDU
-BUFFER_SIZE = 4096
+BUFFER_SIZE = 1024
 """Bytes taken from a connection at a time; bounds what one peer can make us do before the next has its turn."""
 
 _LEAST_LENGTH = 2
@@ -63,11 +63,9 @@ def split(data: bytearray, start: int, end: int) -> Frame | None:
     protocol = data[start + 2] << 8 | data[start + 3]
     length = data[start + 4] << 8 | data[start + 5]
     if protocol:
-        message = f"protocol id {protocol} instead of 0"
-        raise FramingError(message)
+        raise FramingError(f"protocol id {protocol} instead of 0")
     if not _LEAST_LENGTH <= length <= _GREATEST_LENGTH:
-        message = f"length {length} is not within {_LEAST_LENGTH}..{_GREATEST_LENGTH}"
-        raise FramingError(message)
+        raise FramingError(f"length {length} is not within {_LEAST_LENGTH}..{_GREATEST_LENGTH}")
     behind = start + _PREFIX + length
     if behind > end:
         return None
@@ -79,25 +77,24 @@ def split(data: bytearray, start: int, end: int) -> Frame | None:
 class FrameBuffer:
     """What has come in on one connection and is not answered yet. Its size never changes."""
 
-    __slots__ = ("_view", "data", "end")
+    __slots__ = ("_view", "data", "end", "space")
 
     def __init__(self, size: int = BUFFER_SIZE) -> None:
         self.data = bytearray(max(size, 2 * GREATEST_FRAME))
         self.end = 0
         """Position behind the last byte that came in."""
         self._view = memoryview(self.data)
+        self.space = (self._view,)
+        """Where the next bytes are to be written, as `os.readv` takes it; never empty after `discard`."""
 
-    def space(self) -> memoryview:
-        """Where the next bytes are to be written; never empty between two calls of `discard`."""
-        return self._view[self.end :]
+    def discard(self, start: int, end: int) -> None:
+        """What has come in reaches to `end`; forget what lies before `start`.
 
-    def advance(self, count: int) -> None:
-        """`count` bytes were written to `space`."""
-        self.end += count
-
-    def discard(self, start: int) -> None:
-        """Forget what lies before `start`; what is left is less than a frame and moves to the front."""
-        rest = self.end - start
-        if rest and start:
-            self.data[:rest] = self.data[start : self.end]
-        self.end = rest
+        The rest must be less than a frame; it moves to the front.
+        """
+        rest = end - start
+        if rest:
+            self.data[:rest] = self.data[start:end]
+        if rest != self.end:
+            self.end = rest
+            self.space = (self._view[rest:],)

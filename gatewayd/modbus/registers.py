@@ -251,7 +251,7 @@ class RegisterImage:
         values = self._cell.image.values
         for run in self._runs[direction]:
             run.refresh(values)
-        if self._cell.unreadable != self._held_back:
+        if self._cell.unreadable is not self._held_back:
             self._held_back = self._cell.unreadable
             for table in (self.holding, self.input, self.coils, self.discrete):
                 table.hold_back(self._held_back)

@@ -160,8 +160,7 @@ def _same_word(before: Placement, placement: Placement) -> bool:
 
 def _codec(placement: Placement) -> Codec:
     if placement.codec is None:
-        message = f"placement at {placement.area.notation(placement.address)} has no number encoding"
-        raise ValueError(message)
+        raise ValueError(f"placement at {placement.area.notation(placement.address)} has no number encoding")
     return placement.codec
 
 

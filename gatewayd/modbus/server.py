@@ -20,6 +20,7 @@ from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import SimData, SimDevice
 
 from gatewayd.core.cell import Cell
+from gatewayd.logs import fields
 from gatewayd.mapping.plan import ModbusPlan
 from gatewayd.modbus.functions import Unit
 from gatewayd.modbus.peers import (
@@ -31,6 +32,7 @@ from gatewayd.modbus.peers import (
     may_connect,
     writer_of,
 )
+from gatewayd.modbus.polling import ReadPoller
 from gatewayd.modbus.session import Access, Session
 
 __all__ = ["ListenError", "ModbusListener"]
@@ -39,11 +41,8 @@ UNUSED_AFTER = 10.0
 """Seconds without a request after which a connection without locks may have to make room for a new one."""
 STALLED_AFTER = 5.0
 """Seconds for which a peer may leave its answers unread."""
-_GREATEST_UNSENT = 65536
-"""Bytes of answers waiting for a peer above which none of its requests is read."""
 _SWEEP = 1.0
 """Seconds between two looks for connections that are idle or stalled."""
-_BACKLOG_DENIED = "too many connections"
 
 # A pulled cable is noticed after KEEPIDLE + KEEPCNT * KEEPINTVL seconds, or TCP_USER_TIMEOUT with answers under way.
 _KEEPALIVE = (
@@ -60,6 +59,7 @@ _REMEDIES = {
     errno.EADDRNOTAVAIL: "this machine has no such address; use one of its own or 0.0.0.0 under modbus: listen:",
 }
 
+_log = logging.getLogger("gatewayd.modbus")
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
 
 
@@ -67,20 +67,22 @@ class ListenError(OSError):
     """The address cannot be listened on; `errno` tells why, the text also what to do."""
 
 
-class _Connection(ServerRequestHandler, asyncio.BufferedProtocol):
+class _Connection(ServerRequestHandler):
     """One connection, from its acceptance on."""
 
     def __init__(self, server: _Server) -> None:
         super().__init__(server, None, None, None)  # type: ignore[no-untyped-call]
         self.owner = server.owner
+        self.poller = server.poller
         self.session = Session()
         self.peer = ""
         self.address: Address | None = None
         self.accesses: dict[int, Access] = {}
         self.last_request = 0.0
+        """When the last whole request came in; bytes that make none keep no connection open."""
         self.stalled_since: float | None = None
         self.reason = "closed by the peer"
-        self._write: Callable[[bytes], None] | None = None
+        self.descriptor = -1
 
     @property
     def wire(self) -> asyncio.Transport:
@@ -89,52 +91,78 @@ class _Connection(ServerRequestHandler, asyncio.BufferedProtocol):
 
     def callback_connected(self) -> None:
         """Called once, after the connection was accepted."""
-        self.wire.set_write_buffer_limits(high=_GREATEST_UNSENT)
-        self._write = self.wire.write
+        # Answers that the peer does not take stop its requests at once, so at most one turn's answers ever wait.
+        self.wire.set_write_buffer_limits(high=0)
+        self.wire.pause_reading()
         peer = self.wire.get_extra_info("peername")
         if not peer:
             self.wire.abort()
             return
         self.peer = f"[{peer[0]}]:{peer[1]}" if ":" in peer[0] else f"{peer[0]}:{peer[1]}"
         self.address = address_of(peer[0])
-        _set_options(self.wire.get_extra_info("socket"))
+        sock = self.wire.get_extra_info("socket")
+        self.descriptor = sock.fileno()
+        _set_options(sock)
         self.last_request = time.monotonic()
-        self.owner.connected(self)
+        if self.owner.connected(self):
+            self.poller.add(self.descriptor, self.readable)
 
-    def get_buffer(self, sizehint: int) -> memoryview:
-        """Where asyncio puts what it receives."""
-        return self.session.buffer.space()
-
-    def buffer_updated(self, nbytes: int) -> None:
-        """Called when `nbytes` were received: the hot path."""
+    def readable(self, now: float) -> None:
+        """The socket has something to read: the hot path."""
         session = self.session
-        self.last_request = now = time.monotonic()
-        answers = session.received(nbytes, now)
-        if answers and self._write is not None:
-            self._write(answers)
+        try:
+            count = os.readv(self.descriptor, session.buffer.space)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            self.abort(str(error))
+            return
+        if not count:
+            self.drop("closed by the peer")
+            return
+        try:
+            answers = session.received(count, now)
+        except Exception:  # noqa: BLE001 - a defect of ours costs this connection, not the others
+            received = bytes(session.buffer.data[: session.buffer.end + count]).hex(" ")
+            _log.exception("a request could not be answered", extra=fields(peer=self.peer, received=received))
+            self.abort("internal error")
+            return
+        if answers:
+            self.last_request = now
+            try:
+                sent = os.write(self.descriptor, answers)
+            except (BlockingIOError, InterruptedError):
+                sent = 0
+            except OSError as error:
+                self.abort(str(error))
+                return
+            if sent < len(answers):
+                self.wire.write(answers[sent:])
         if session.broken:
             self.drop(f"no Modbus TCP: {session.broken}")
 
     def pause_writing(self) -> None:
         """The peer does not read its answers: take no more requests."""
         self.stalled_since = time.monotonic()
-        self.wire.pause_reading()
+        self.poller.remove(self.descriptor)
 
     def resume_writing(self) -> None:
         """The peer has caught up."""
         self.stalled_since = None
         if not self.wire.is_closing():
-            self.wire.resume_reading()
+            self.poller.add(self.descriptor, self.readable)
 
     def drop(self, reason: str) -> None:
         """Close the connection after what was answered already."""
         self.reason = reason
+        self.poller.remove(self.descriptor)
         if self.transport is not None:
             self.wire.close()
 
     def abort(self, reason: str) -> None:
         """Close the connection at once."""
         self.reason = reason
+        self.poller.remove(self.descriptor)
         if self.transport is not None:
             self.wire.abort()
 
@@ -142,7 +170,7 @@ class _Connection(ServerRequestHandler, asyncio.BufferedProtocol):
         """Called after the connection has ended, whoever ended it."""
         if exc is not None:
             self.reason = str(exc)
-        self._write = None
+        self.poller.remove(self.descriptor)
         self.owner.disconnected(self)
 
 
@@ -152,6 +180,7 @@ class _Server(ModbusTcpServer):
     def __init__(self, owner: ModbusListener, host: str, port: int) -> None:
         super().__init__(SimDevice(1, [SimData(0)]), address=(host, port))
         self.owner = owner
+        self.poller = ReadPoller()
 
     def callback_new_connection(self) -> _Connection:
         """Called for every accepted connection."""
@@ -160,8 +189,17 @@ class _Server(ModbusTcpServer):
     async def listen(self) -> bool:
         """Start listening; unlike pymodbus's own, let the reason out if that fails."""
         self.is_listener = True
-        self.transport = await self.call_create()
+        try:
+            self.transport = await self.call_create()
+        except OSError:
+            self.poller.close()
+            raise
         return True
+
+    def stop(self) -> None:
+        """Stop listening; connections must be aborted by now."""
+        self.close()
+        self.poller.close()
 
 
 class ModbusListener:
@@ -225,7 +263,7 @@ class ModbusListener:
             connection.abort(reason)
         server, self._server = self._server, None
         if server is not None:
-            server.close()
+            server.stop()
         for connection in list(self._connections):
             self.disconnected(connection)
         for unit in self._units.values():
@@ -243,43 +281,45 @@ class ModbusListener:
         wanted: dict[int, tuple[ModbusPlan, Cell]] = {}
         for plan, cell in units:
             if plan.unit in wanted:
-                message = (
+                raise ValueError(
                     f"unit {plan.unit} is served twice on {self.name}: give every cell a unit of its own"
                 )
-                raise ValueError(message)
             wanted[plan.unit] = (plan, cell)
-        former, self._units = self._units, {}
+        former = self._units
+        units_now: dict[int, Unit] = {}
         for number, (plan, cell) in wanted.items():
             kept = former.get(number)
-            if kept is not None and kept.plan is plan and kept.cell is cell:
-                self._units[number] = former.pop(number)
-            else:
-                self._units[number] = Unit(plan, cell)
+            if kept is None or kept.plan is not plan or kept.cell is not cell:
+                kept = Unit(plan, cell)
+            units_now[number] = kept
+        self._units = units_now
         now = time.monotonic()
         for connection in list(self._connections):
             if not self._admit(connection, now, "unit no longer served"):
                 connection.abort("not on the access list any more")
-        for unit in former.values():
-            unit.cell.health.modbus_connections = 0
-            unit.close()
+        for number, unit in former.items():
+            if units_now.get(number) is not unit:
+                unit.cell.health.modbus_connections = 0
+                unit.close()
         self._count()
 
     # -- called by connections ------------------------------------------------------------------------------------
 
-    def connected(self, connection: _Connection) -> None:
-        """A peer has connected: take it, or refuse it."""
+    def connected(self, connection: _Connection) -> bool:
+        """A peer has connected: returns whether it is to be served; if not, it was refused."""
         now = time.monotonic()
         address = connection.address
         if address is None or not any(may_connect(address, unit.plan) for unit in self._units.values()):
             self._refuse(connection, PeerEventKind.DENIED, now)
-            return
+            return False
         if len(self._connections) >= self._most_connections() and not self._make_room(now):
             self._refuse(connection, PeerEventKind.FULL, now)
-            return
+            return False
         self._connections[connection] = None
         self._admit(connection, now, "")
         self._count()
         self._observe(PeerEvent(PeerEventKind.CONNECTED, connection.peer, _names(connection)))
+        return True
 
     def disconnected(self, connection: _Connection) -> None:
         """A connection has ended; called once or more for each."""

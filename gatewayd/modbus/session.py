@@ -1,6 +1,6 @@
 """One connection's requests: bytes in, answers out, in order, whatever the depth of pipelining. No input or output.
 
-Plain register reads, nearly all of the traffic, are answered here without leaving the loop; everything else goes to
+A single read of registers, nearly all of the traffic, is answered here at once; everything else goes to
 `gatewayd.modbus.functions`.
 """
 
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -22,25 +21,23 @@ _READ_HOLDING = 3
 _READ_INPUT = 4
 _READ_FRAME = 12
 _READ_LENGTH = 6
-_READ = struct.Struct(">2sHHHHH")
+_unpack_read = struct.Struct(">2sHHHHH").unpack_from
 """Transaction id, protocol id, length, unit id and function, address, quantity."""
 _HEAD = struct.Struct(">HHBBB")
 _THIS_DEVICE = (0, 255)
 """Unit ids by which a client on TCP means the device itself (Messaging on TCP/IP Guide V1.0b, 4.4.2.3)."""
 
 
-@dataclass(frozen=True, slots=True)
 class Access:
     """What a peer may do with one unit."""
 
-    unit: Unit
-    writer: int | None
-    """The writer of the unit's cell that the peer is, if any."""
+    __slots__ = ("unit", "writer", "writer_seen")
 
-    def seen(self, now: float) -> None:
-        """The peer has sent a request."""
-        if self.writer is not None:
-            self.unit.cell.writer_seen(self.writer, now)
+    def __init__(self, unit: Unit, writer: int | None) -> None:
+        self.unit = unit
+        self.writer = writer
+        """The writer of the unit's cell that the peer is, if any."""
+        self.writer_seen = unit.cell.writer_seen
 
 
 class Session:
@@ -66,45 +63,42 @@ class Session:
                 self._reads[key] = (table.readable.reach, table.image, _heads(key), access)
 
     def received(self, count: int, now: float) -> bytes:
-        """`count` bytes were written to `buffer.space()`; returns the answers to all requests that are complete."""
-        buffer, reads = self.buffer, self._reads
-        buffer.advance(count)
-        data, end = buffer.data, buffer.end
+        """`count` bytes were written to `buffer.space`; returns the answers to all requests that are complete."""
+        buffer = self.buffer
+        if count == _READ_FRAME and not buffer.end:
+            transaction, protocol, length, key, address, quantity = _unpack_read(buffer.data)
+            read = self._reads.get(key)
+            if read is not None and length == _READ_LENGTH and not protocol:
+                reach, image, heads, access = read
+                if 0 < quantity <= reach[address]:
+                    if access.writer is not None:
+                        access.writer_seen(access.writer, now)
+                    first = 2 * address
+                    answer: bytes = transaction + heads[quantity] + image[first : first + 2 * quantity]
+                    return answer
+        return self._answers(buffer.end + count, now)
+
+    def _answers(self, end: int, now: float) -> bytes:
+        """The answers to all requests that are complete before `end` of the buffer."""
         answers = []
         start = 0
-        seen: Access | None = None
-        while start < end:
-            if end - start >= _READ_FRAME:
-                transaction, protocol, length, key, address, quantity = _READ.unpack_from(data, start)
-                read = reads.get(key)
-                if read is not None and length == _READ_LENGTH and not protocol:
-                    reach, image, heads, access = read
-                    if 0 < quantity <= reach[address]:
-                        answers.append(
-                            transaction + heads[quantity] + image[2 * address : 2 * (address + quantity)]
-                        )
-                        start += _READ_FRAME
-                        if access is not seen:
-                            seen = access
-                            access.seen(now)
-                        continue
-            try:
-                frame = split(data, start, end)
-            except FramingError as error:
-                self.broken = str(error)
-                break
-            if frame is None:
-                break
-            start = frame.end
-            answers.append(encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now)))
-        buffer.discard(start)
+        try:
+            while (frame := split(self.buffer.data, start, end)) is not None:
+                start = frame.end
+                answers.append(
+                    encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now))
+                )
+        except FramingError as error:
+            self.broken = str(error)
+        self.buffer.discard(start, end)
         return b"".join(answers)
 
     def _answer(self, unit: int, pdu: bytes, now: float) -> bytes:
         access = self._accesses.get(unit)
         if access is None:
             return exception(pdu[0], ExceptionCode.TARGET_FAILED)
-        access.seen(now)
+        if access.writer is not None:
+            access.writer_seen(access.writer, now)
         return execute(access.unit, access.writer, pdu, now)
 
 

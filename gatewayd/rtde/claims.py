@@ -17,6 +17,7 @@ from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
 
 __all__ = [
+    "OLD_LIST_LIMIT",
     "REFUSED",
     "REGISTERS_KEY",
     "WATCHDOG_KEY",
@@ -33,6 +34,9 @@ WATCHDOG_KEY = "watchdog"
 """Key of the watchdog field's own recipe: whatever else is written must not feed it."""
 REFUSED = "REFUSED"
 """Our word for fields whose recipe the controller refused without saying why."""
+
+OLD_LIST_LIMIT = 2048
+"""Bytes of a list of names that every controller takes (older guide, "Introduction"); newer ones take far more."""
 
 _LAST_ID = 255
 _RETRIED = frozenset({IN_USE, REFUSED})
@@ -57,6 +61,18 @@ def recipe_key(name: str) -> str:
     if name.startswith("input_"):
         return REGISTERS_KEY
     return next((family for family in _FAMILIES if name.startswith(family)), name)
+
+
+def _parts(names: Sequence[str], limit: int | None) -> list[tuple[str, ...]]:
+    """Split so that no part is longer than `limit` when joined by commas."""
+    if limit is None:
+        return [tuple(names)]
+    parts: list[list[str]] = [[]]
+    for name in names:
+        if parts[-1] and len(",".join((*parts[-1], name))) > limit:
+            parts.append([])
+        parts[-1].append(name)
+    return [tuple(part) for part in parts]
 
 
 def sort_types(names: Sequence[str], words: Sequence[str]) -> tuple[list[DataType], dict[str, str]]:
@@ -108,13 +124,23 @@ class _Group:
 
 
 class Claims:
-    """The claims of one connection."""
+    """The claims of one connection.
 
-    def __init__(self, fields: Sequence[str], watchdog: str | None = None) -> None:
+    With `list_limit` no list of names is longer, in bytes; groups that are go into several recipes, the later ones
+    under the keys "registers 2" and so on.
+    """
+
+    def __init__(
+        self, fields: Sequence[str], watchdog: str | None = None, list_limit: int | None = None
+    ) -> None:
         members: dict[str, list[str]] = {}
         for name in dict.fromkeys((*fields, *((watchdog,) if watchdog else ()))):
             members.setdefault(WATCHDOG_KEY if name == watchdog else recipe_key(name), []).append(name)
-        self._groups = [_Group(key, tuple(names)) for key, names in members.items()]
+        self._groups = [
+            _Group(key if part == 1 else f"{key} {part}", names)
+            for key, whole in members.items()
+            for part, names in enumerate(_parts(whole, list_limit), 1)
+        ]
         self._queue: deque[_Group] = deque()
         self._used = 0
         self._changed = False

@@ -15,11 +15,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import monotonic
 
+from gatewayd.rtde.claims import OLD_LIST_LIMIT
 from gatewayd.rtde.connection import ClientHandler, Connection, Tolerances
 from gatewayd.rtde.loss import Loss, LossReason, connect_failure
 from gatewayd.rtde.negotiation import Session, State, Unavailable, Wishes
 from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.recipe import Scalar
+from gatewayd.rtde.resolve import resolve
 from gatewayd.rtde.types import DEFAULT_PORT
 
 __all__ = [
@@ -33,8 +35,6 @@ __all__ = [
     "Unavailable",
 ]
 
-_OLD_LIST_LIMIT = 2048
-"""Bytes of a list of names that every controller takes (older guide, "Introduction"); newer ones take far more."""
 _KEEPALIVE = (("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCNT", 3))
 
 
@@ -59,7 +59,7 @@ class ClientSettings:
     handshake_timeout: float = 2.0
     """For each answer of the set-up."""
     data_timeout: float = 1.0
-    """Without a package while the output runs: the connection is taken for dead."""
+    """Without a package while the output runs, five periods at least: the connection is taken for dead."""
     first_data_timeout: float = 30.0
     """The same before the first package: a controller whose safety set-up is unconfirmed sends none for a while."""
     claim_retry: float = 1.0
@@ -89,7 +89,8 @@ class RtdeClient:
             settings.write_buffer,
         )
         self._connection: Connection | None = None
-        self._short_list = False
+        self._short_outputs = False
+        self._short_inputs = False
         self._paused = False
 
     @property
@@ -142,6 +143,7 @@ class RtdeClient:
             loss = await connection.done
         finally:
             self._connection = None
+            self.statistics.frequency = 0.0
             await connection.close()
         self._consider_list_length(wishes, connection)
         if connection.started_at is None:
@@ -166,13 +168,8 @@ class RtdeClient:
 
     async def _open_socket(self, loop: asyncio.AbstractEventLoop) -> socket.socket:
         """Try the host's addresses in turn; the error of the last if none answers."""
-        host = self._settings.host
-        try:
-            found = await loop.getaddrinfo(host, self._settings.port, type=socket.SOCK_STREAM)
-        except UnicodeError as error:
-            raise socket.gaierror(socket.EAI_NONAME, "not a host name") from error
         failure: OSError = socket.gaierror(socket.EAI_NONAME, "no address")
-        for family, kind, protocol, _, address in found:
+        for family, kind, protocol, address in await resolve(self._settings.host, self._settings.port):
             candidate = socket.socket(family, kind, protocol)
             try:
                 candidate.setblocking(False)
@@ -207,14 +204,20 @@ class RtdeClient:
             settings.watchdog,
             settings.frequency,
             settings.read_back,
-            self._short_list,
+            self._short_outputs,
+            self._short_inputs,
             not self._paused,
         )
 
     def _consider_list_length(self, wishes: Wishes, connection: Connection) -> None:
-        """Old controllers take 2048 bytes of names: if a longer list came to nothing, try without read-backs."""
+        """Old controllers take 2048 bytes of names: if a longer list came to nothing, try shorter ones next."""
         if connection.started_at is not None:
-            self._short_list = False
-        elif connection.state is State.OUTPUTS and self._settings.read_back:
-            length = len(",".join(wishes.subscription()))
-            self._short_list = not self._short_list and length > _OLD_LIST_LIMIT
+            self._short_outputs = self._short_inputs = False
+        elif connection.state is State.OUTPUTS and wishes.read_back:
+            self._short_outputs = not wishes.short_outputs and _is_long(wishes.subscription())
+        elif connection.state is State.INPUTS:
+            self._short_inputs = not wishes.short_inputs and _is_long(wishes.wanted_inputs())
+
+
+def _is_long(names: tuple[str, ...]) -> bool:
+    return len(",".join(names)) > OLD_LIST_LIMIT

@@ -23,6 +23,7 @@ __all__ = ["ClientHandler", "Connection", "Tolerances"]
 _TIMESTAMP = struct.Struct(">d")
 _FIRST_CLAIM_RETRY = 0.1
 _MEASURE_EVERY = 1.0
+_PERIODS_OF_PATIENCE = 5
 _GOODBYE = 0.2
 
 
@@ -55,7 +56,7 @@ class Tolerances:
     handshake: float
     """For each answer."""
     data: float
-    """Between packages."""
+    """Between packages; five periods at least."""
     first_data: float
     """For the first package: until the safety set-up is confirmed a controller sends none."""
     claim_retry: float
@@ -79,7 +80,7 @@ class Connection(asyncio.Protocol):
         self.done: asyncio.Future[Loss] = loop.create_future()
         """How the connection ended."""
         self.session: Session | None = None
-        """What was agreed, once the set-up is complete."""
+        """What was agreed; None before the set-up is complete and after the end."""
         self.started_at: float | None = None
         """When the set-up was complete."""
         self._loop = loop
@@ -98,6 +99,7 @@ class Connection(asyncio.Protocol):
         self._retry_delay = _FIRST_CLAIM_RETRY
         self._outputs = Recipe((), ())
         self._clocked = False
+        self._period = 0.0
         self._pace: Pace | None = None
         self._patience = tolerances.first_data
         self._heard = 0.0
@@ -137,10 +139,12 @@ class Connection(asyncio.Protocol):
         transport = self._transport
         if transport is None or self._lost.done():
             return
-        if not transport.is_closing():
-            transport.write_eof()
-            await asyncio.wait((self._lost,), timeout=_GOODBYE)
-        transport.abort()
+        try:
+            if not transport.is_closing():
+                transport.write_eof()
+                await asyncio.wait((self._lost,), timeout=_GOODBYE)
+        finally:
+            transport.abort()
 
     # what asyncio calls
 
@@ -151,6 +155,21 @@ class Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """See asyncio.Protocol."""
+        try:
+            self._receive(data)
+        except Exception as error:  # noqa: BLE001  asyncio would log it and go on; so `run` raises it
+            self._end()
+            if not self.done.done():
+                self.done.set_exception(error)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """See asyncio.Protocol."""
+        self._lost.set_result(None)
+        self._conclude(connection_failure(exc if isinstance(exc, OSError) else None, self._address))
+
+    # messages
+
+    def _receive(self, data: bytes) -> None:
         now = monotonic()
         packages: list[DataPackage] = []
         failure: ProtocolError | None = None
@@ -170,15 +189,6 @@ class Connection(asyncio.Protocol):
         if failure is not None:
             self._fail(LossReason.PROTOCOL, f"what the controller sent is not RTDE: {failure}")
 
-    def connection_lost(self, exc: Exception | None) -> None:
-        """See asyncio.Protocol."""
-        self._lost.set_result(None)
-        if exc is not None and not isinstance(exc, OSError) and not self.done.done():
-            self.done.set_exception(exc)
-        self._conclude(connection_failure(exc if isinstance(exc, OSError) else None, self._address))
-
-    # messages
-
     def _take(self, message: ControllerMessage) -> None:
         if isinstance(message, TextMessage):
             self._handler.text(message)
@@ -192,6 +202,8 @@ class Connection(asyncio.Protocol):
             self._request(step.send)
         elif not self._negotiation.waiting:
             self._disarm()
+        if self.done.done():
+            return
         if self._negotiation.claims.exhausted:
             self._give_up_recipes()
         elif step.event is not None:
@@ -201,7 +213,7 @@ class Connection(asyncio.Protocol):
         pace = self._pace
         assert pace is not None
         self._heard = now
-        self._patience = self._tolerances.data
+        self._patience = max(self._tolerances.data, _PERIODS_OF_PATIENCE * self._period)
         newest = packages.pop()
         try:
             values = self._outputs.unpack(newest.payload)
@@ -228,6 +240,7 @@ class Connection(asyncio.Protocol):
         self._statistics.sessions += 1
         self._outputs = session.outputs
         self._clocked = session.outputs.names[0] == TIMESTAMP and session.outputs.types[0] is DataType.DOUBLE
+        self._period = session.period
         self._pace = Pace(session.period, self._statistics, now)
         self._schedule_retry()
         self._watch()
@@ -292,7 +305,9 @@ class Connection(asyncio.Protocol):
         now = monotonic()
         silence = now - self._heard
         if self._negotiation.running and silence > self._patience:
-            self._fail(LossReason.SILENT, f"no data from the controller for {silence:.1f} s")
+            first = self._pace is None or self._pace.timestamp is None
+            hint = ": is the robot powered and its safety set-up confirmed?" if first else ""
+            self._fail(LossReason.SILENT, f"no data from the controller for {silence:.1f} s{hint}")
             return
         if self._pace is not None and now - self._measured >= _MEASURE_EVERY:
             self._pace.measure(now)
@@ -300,7 +315,7 @@ class Connection(asyncio.Protocol):
         self._check = self._loop.call_later(min(self._tolerances.data / 4, _MEASURE_EVERY / 2), self._watch)
 
     def _schedule_retry(self) -> None:
-        if self._negotiation.claims.retriable:
+        if self._negotiation.claims.retriable and not self.done.done():
             delay = min(self._retry_delay, self._tolerances.claim_retry)
             self._retry_delay = 2 * delay
             self._retry = self._loop.call_later(delay, self._retry_claims)
@@ -333,6 +348,7 @@ class Connection(asyncio.Protocol):
 
     def _end(self) -> None:
         """Stop everything that could still call a handler."""
+        self.session = None
         for handle in (self._deadline, self._check, self._retry):
             if handle is not None:
                 handle.cancel()

@@ -11,7 +11,8 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -22,7 +23,7 @@ from gatewayd.core.freshness import Source
 from gatewayd.logs import fields
 from gatewayd.mapping.plan import RobotPlan
 from gatewayd.rtde.claims import WATCHDOG_KEY
-from gatewayd.rtde.client import ClientSettings, Loss, RtdeClient, Session
+from gatewayd.rtde.client import ClientSettings, Loss, LossReason, RtdeClient, Session
 from gatewayd.rtde.messages import TextMessage
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.transfer import InputTransfer, OutputTransfer, read_back
@@ -30,7 +31,7 @@ from gatewayd.rtde.transfer import InputTransfer, OutputTransfer, read_back
 __all__ = ["LOSS_INTERVAL", "VERIFY_AFTER", "RobotLink"]
 
 VERIFY_AFTER = 0.5
-"""Seconds after a write within which the controller must read the value back."""
+"""Seconds after a change within which the controller must read the value back."""
 LOSS_INTERVAL = 60.0
 """Seconds after which a connection that still fails for the same reason is told again."""
 _CYCLE_UNKNOWN = 0.002
@@ -48,8 +49,20 @@ class _Recipe:
     sent_at: float
     echo: slice | None
     """Where packages read the whole recipe back in its own order; None if they do not."""
+    changed: dict[str, float] = field(default_factory=dict)
+    """When a field was last given another value."""
     doubted: set[str] = field(default_factory=set)
     """Fields whose read-back differed and that were told already."""
+
+    def note(self, flat: tuple[Value, ...], now: float) -> None:
+        """Take down that `flat` was sent."""
+        former, self.sent, self.sent_at = self.sent, flat, now
+        if flat == former:
+            return
+        for name, slot in self.transfer.slots.items():
+            if flat[slot] != former[slot]:
+                self.changed[name] = now
+                self.doubted.discard(name)
 
 
 class RobotLink:
@@ -85,7 +98,15 @@ class RobotLink:
         cell.listeners.append(self._on_change)
 
     async def run(self) -> None:
-        """Stay connected until cancelled."""
+        """Stay connected until cancelled. Raises what is a defect, after the cell was told that the robot is lost."""
+        try:
+            await self._run()
+        except Exception:
+            with suppress(Exception):
+                self.session_lost(Loss(LossReason.FAILED, "internal error", started=True))
+            raise
+
+    async def _run(self) -> None:
         if self._plan.watchdog is None:
             await self._client.run()
             return
@@ -193,12 +214,26 @@ class RobotLink:
                 continue
             recipe = claimed.recipe
             transfer = InputTransfer(self._cell.definition.variables, recipe.names, recipe.slots)
-            known = former[key].transfer.fields if key in former else ()
-            transfer.rebase(_known(former.get(key)) | read_back(flat, self._slots, recipe.names))
-            values |= transfer.adopted(name for name in recipe.names if name not in known)
-            self._recipes[key] = _Recipe(transfer, tuple(transfer.base), now, self._echo(recipe))
+            known, told = _known(former.get(key)), read_back(flat, self._slots, recipe.names)
+            transfer.rebase(known | told)
+            adopted = transfer.adopted(told.keys() - known.keys())
+            values |= adopted
+            sent = self._present(transfer, adopted, known)
+            self._recipes[key] = _Recipe(transfer, sent, now, self._echo(recipe))
         self._tell_availability(session, now)
         self._cell.adopt(values, now)
+
+    def _present(
+        self, transfer: InputTransfer, adopted: Mapping[int, Value], known: Mapping[str, Sequence[Value]]
+    ) -> tuple[Value, ...]:
+        """What need not be sent: what was sent or told by the controller, and what neither it nor a writer told."""
+        values = self._cell.image.values.copy()
+        for index, value in adopted.items():
+            values[index] = value
+        flat = list(transfer.gather(values))
+        for name, sent in known.items():
+            flat[transfer.slots[name]] = sent
+        return tuple(flat)
 
     def _echo(self, recipe: Recipe) -> slice | None:
         slots = [self._slots.get(name) for name in recipe.names]
@@ -209,11 +244,12 @@ class RobotLink:
     def _verify(self, flat: Sequence[Value], now: float) -> None:
         """Tell once of every input that does not read back what was sent."""
         for recipe in self._recipes.values():
-            echoed = recipe.echo is not None and flat[recipe.echo] == recipe.sent
-            if now - recipe.sent_at < VERIFY_AFTER or (echoed and not recipe.doubted):
+            if recipe.echo is not None and flat[recipe.echo] == recipe.sent and not recipe.doubted:
                 continue
             for name, wanted in recipe.transfer.slots.items():
                 slot = self._slots.get(name)
+                if now - recipe.changed.get(name, -math.inf) < VERIFY_AFTER:
+                    continue
                 if slot is None or _same(flat[slot], recipe.sent[wanted]):
                     recipe.doubted.discard(name)
                 elif name not in recipe.doubted:
@@ -256,9 +292,7 @@ class RobotLink:
             if written or flat != recipe.sent:
                 self._next_send = now + self._cycle
                 if self._client.send(key, flat):
-                    recipe.sent = flat
-                    recipe.sent_at = now
-                    recipe.doubted.clear()
+                    recipe.note(flat, now)
 
     async def _feed_watchdog(self, period: float) -> None:
         while True:

@@ -13,7 +13,7 @@ from enum import Enum, auto
 from typing import ClassVar, NamedTuple
 
 from gatewayd.rtde.catalogue import OUTPUTS, Series, likely_holders
-from gatewayd.rtde.claims import Claims, HandshakeError, InputRecipe, sort_types
+from gatewayd.rtde.claims import OLD_LIST_LIMIT, Claims, HandshakeError, InputRecipe, sort_types
 from gatewayd.rtde.messages import (
     IN_USE,
     NOT_FOUND,
@@ -70,8 +70,10 @@ class Wishes:
     """Output packages per second; 0: as many as the controller makes."""
     read_back: bool = True
     """Subscribe the wanted `input_*` fields too, after the outputs."""
-    shortened: bool = False
+    short_outputs: bool = False
     """Leave the read-backs out all the same: the controller does not take the whole list."""
+    short_inputs: bool = False
+    """Claim the registers by several lists of at most `OLD_LIST_LIMIT` bytes instead of one."""
     running: bool = True
     """Start the output; else stay paused."""
 
@@ -89,7 +91,7 @@ class Wishes:
 
     def subscription(self) -> tuple[str, ...]:
         """Everything to subscribe, in order, each once."""
-        read_backs = self.read_backs() if self.read_back and not self.shortened else ()
+        read_backs = self.read_backs() if self.read_back and not self.short_outputs else ()
         names = (TIMESTAMP, *self.outputs, *read_backs)
         return tuple(dict.fromkeys(names))
 
@@ -159,7 +161,6 @@ class Step(NamedTuple):
 
 _NOTHING = Step()
 _AT_REST = frozenset({State.RUNNING, State.PAUSED})
-_SETTLED = frozenset({State.RUNNING, State.PAUSING, State.PAUSED, State.RESUMING})
 
 
 class Negotiation:
@@ -168,7 +169,8 @@ class Negotiation:
     def __init__(self, wishes: Wishes) -> None:
         self.state = State.NEW
         """What is awaited."""
-        self.claims = Claims(wishes.wanted_inputs(), wishes.watchdog)
+        limit = OLD_LIST_LIMIT if wishes.short_inputs else None
+        self.claims = Claims(wishes.wanted_inputs(), wishes.watchdog, limit)
         """The inputs."""
         self._wishes = wishes
         self._run = wishes.running
@@ -178,11 +180,6 @@ class Negotiation:
         self._controller: ControllerVersion | None = None
         self._outputs: Recipe | None = None
         self._period = 1 / _RATE_V1
-
-    @property
-    def settled(self) -> bool:
-        """Whether the set-up is done: running, paused or between the two."""
-        return self.state in _SETTLED
 
     @property
     def running(self) -> bool:
@@ -215,8 +212,8 @@ class Negotiation:
         raise HandshakeError(msg)
 
     def retry_claims(self) -> ExecutableMessage | None:
-        """Ask again for inputs that were in use, if any are and nothing is being asked."""
-        if not self.settled or self.claims.busy:
+        """Ask again for inputs that were in use, if any are and no answer is due."""
+        if self.waiting:
             return None
         self.claims.retry()
         return self.claims.request()
@@ -238,7 +235,7 @@ class Negotiation:
         return Start()
 
     def session(self) -> Session:
-        """What has been agreed. Only once `settled`."""
+        """What has been agreed. Only after `Event.STARTED`."""
         assert self._controller is not None
         assert self._outputs is not None
         return Session(
@@ -336,7 +333,7 @@ class Negotiation:
         outputs = [
             Unavailable(name, True, word, _output_hint(word)) for name, word in self._refused_outputs.items()
         ]
-        if self._wishes.read_back and self._wishes.shortened:
+        if self._wishes.read_back and self._wishes.short_outputs:
             outputs += [
                 Unavailable(name, True, TOO_LONG, _output_hint(TOO_LONG))
                 for name in self._wishes.read_backs()

@@ -24,7 +24,7 @@ class Recipe:
     Values travel as one flat tuple in which a vector takes as many places as it has elements.
     """
 
-    __slots__ = ("_struct", "names", "size", "slots", "types")
+    __slots__ = ("_struct", "count", "names", "size", "slots", "types")
 
     def __init__(self, names: Sequence[str], types: Sequence[DataType]) -> None:
         if len(names) != len(types):
@@ -41,6 +41,8 @@ class Recipe:
         for name, data_type in zip(self.names, self.types, strict=True):
             self.slots[name] = slice(place, place + data_type.count)
             place += data_type.count
+        self.count = place
+        """Places of the flat tuple."""
 
     def __repr__(self) -> str:
         fields = ", ".join(f"{name}: {kind.word}" for name, kind in zip(self.names, self.types, strict=True))
@@ -62,9 +64,8 @@ class Recipe:
             raise ValueError(self._complaint(values)) from error
 
     def _complaint(self, values: Sequence[Scalar]) -> str:
-        places = sum(kind.count for kind in self.types)
-        if len(values) != places:
-            return f"{len(values)} values for a recipe of {places}"
+        if len(values) != self.count:
+            return f"{len(values)} values for a recipe of {self.count}"
         for name, kind in zip(self.names, self.types, strict=True):
             for value in values[self.slots[name]]:
                 try:

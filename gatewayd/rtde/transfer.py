@@ -74,7 +74,9 @@ class InputTransfer:
         self.members = tuple(index for index, _variable in wanted)
         """Indices of the variables that the recipe carries."""
         self._singles = tuple((index, self._slot(one)) for index, one in wanted if one.bit is None)
-        self._bits = tuple((index, self._slot(one), 1 << one.bit) for index, one in wanted if one.bit is not None)
+        self._bits = tuple(
+            (index, self._slot(one), 1 << one.bit) for index, one in wanted if one.bit is not None
+        )
         self.base: list[Value] = [0] * max((slot.stop for slot in slots.values()), default=0)
 
     def rebase(self, held: Mapping[str, Sequence[Value]]) -> None:
@@ -84,8 +86,8 @@ class InputTransfer:
                 self.base[self.slots[field]] = values
 
     def adopted(self, fields: Iterable[str]) -> dict[int, Value]:
-        """The base as values by variable index, for the variables of `fields`."""
-        spans = [self.slots[field] for field in fields if field in self.slots]
+        """The base as values by variable index, for the variables of `fields`, which are some of the recipe's."""
+        spans = [self.slots[field] for field in fields]
         wanted = {slot for span in spans for slot in range(span.start, span.stop)}
         values: dict[int, Value] = {index: self.base[slot] for index, slot in self._singles if slot in wanted}
         for index, slot, mask in self._bits:

@@ -116,18 +116,13 @@ def pose(path: float) -> Vector:
 
 
 def twist(path: float, rate: float, point: int = FLANGE) -> Vector:
-    """Linear and angular velocity of the origin of frame `point`: the geometric Jacobian times the joint speeds."""
-    at = frames(path)
-    target = at.origins[point]
-    vx = vy = vz = wx = wy = wz = 0.0
-    for speed, origin, axis in zip(joints(path)[1][:point], at.origins, at.axes, strict=False):
-        ax, ay, az = axis[0] * speed, axis[1] * speed, axis[2] * speed
-        rx, ry, rz = target[0] - origin[0], target[1] - origin[1], target[2] - origin[2]
-        vx += ay * rz - az * ry
-        vy += az * rx - ax * rz
-        vz += ax * ry - ay * rx
-        wx, wy, wz = wx + ax, wy + ay, wz + az
-    return (vx * rate, vy * rate, vz * rate, wx * rate, wy * rate, wz * rate)
+    """Linear and angular velocity of the origin of frame `point`."""
+    return tuple(part * rate for part in _jacobian(path, joints(path)[1], point))
+
+
+def thrust(path: float, rate: float) -> Vector:
+    """What the joints' accelerations make of the flange's: near enough for a force, and cheap."""
+    return tuple(part * rate * rate for part in _jacobian(path, joints(path)[2], FLANGE))
 
 
 def acceleration(path: float, rate: float) -> Vector:
@@ -135,6 +130,21 @@ def acceleration(path: float, rate: float) -> Vector:
     before, after = twist(path - _DIFFERENCE, rate), twist(path + _DIFFERENCE, rate)
     scale = rate / (2 * _DIFFERENCE)
     return tuple((b - a) * scale for a, b in zip(before, after, strict=True))
+
+
+def _jacobian(path: float, rates: Vector, point: int) -> Vector:
+    """The geometric Jacobian of the origin of frame `point`, times a rate for each joint before it."""
+    at = frames(path)
+    target = at.origins[point]
+    vx = vy = vz = wx = wy = wz = 0.0
+    for rate, origin, axis in zip(rates[:point], at.origins, at.axes, strict=False):
+        ax, ay, az = axis[0] * rate, axis[1] * rate, axis[2] * rate
+        rx, ry, rz = target[0] - origin[0], target[1] - origin[1], target[2] - origin[2]
+        vx += ay * rz - az * ry
+        vy += az * rx - ax * rz
+        vz += ax * ry - ay * rx
+        wx, wy, wz = wx + ax, wy + ay, wz + az
+    return (vx, vy, vz, wx, wy, wz)
 
 
 def _mix(p: float, u: _Triple, q: float, v: _Triple) -> _Triple:

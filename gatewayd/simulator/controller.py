@@ -109,7 +109,7 @@ class Controller:
         if self.faults.freeze:
             return
         running = self._running()
-        fraction = float(self.store.cells[self._speed]) if running else 0.0
+        fraction = self._fraction() if running else 0.0
         path = self.store.moment.path + fraction * cycles / self.rate
         self._set_step(self.step + cycles, path, fraction)
         if running:
@@ -165,6 +165,11 @@ class Controller:
         self._speed = self.store.place("target_speed_fraction").start
         self._state = self.store.place("runtime_state").start
         return Interpreter(self._rules, self.store, self.rate, INPUTS)
+
+    def _fraction(self) -> float:
+        """Share of full speed; whatever else was written there means full speed."""
+        fraction = float(self.store.cells[self._speed])
+        return fraction if 0 <= fraction <= 1 else 1.0
 
     def _running(self) -> bool:
         """Whether the robot program runs; keeps the bit that says so in step."""

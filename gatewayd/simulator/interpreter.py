@@ -11,6 +11,7 @@ from collections.abc import Callable, Container, Iterable
 
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.program import Operation, Reference, Rule
+from gatewayd.simulator.signals import CYCLE_FIELDS
 from gatewayd.simulator.store import Scalar, Store, fitting
 
 __all__ = ["Interpreter"]
@@ -23,8 +24,8 @@ _Copy = tuple[slice, slice]
 class Interpreter:
     """A loaded program.
 
-    `protected` fields cannot be targets, nor can those that move by themselves. Raises ProgramError for a rule that
-    names what is not there.
+    `protected` fields cannot be targets; one that moves by itself moves no more once it is a target. Raises
+    ProgramError for a rule that names what is not there.
     """
 
     def __init__(
@@ -189,8 +190,10 @@ class Interpreter:
         at = self._cell(reference)
         if reference.field in self._protected:
             raise reference.error(f"{reference.field} is a controller input: only clients write it")
+        if reference.field in CYCLE_FIELDS:
+            raise reference.error(f"{reference.field} follows the controller's cycles and cannot be a target")
         if self._store.moves(reference.field):
-            raise reference.error(f"{reference.field} moves by itself and cannot be a target")
+            self._store.pin(reference.field, self._store.read(reference.field))
         return at
 
     def _type(self, reference: Reference) -> DataType:

@@ -8,8 +8,8 @@
 
 TARGET and SOURCE are RTDE names: a field (`output_int_register_0`), an element of a vector (`actual_TCP_pose[2]`), a
 bit of an integer (`actual_digital_input_bits.0`), or a reserved bit by its own name (`output_bit_register_0` to `_63`).
-`NAME_0..23` on both sides makes one rule for each number. A source may be any field, a target any but the inputs and
-the fields that move by themselves.
+`NAME_0..23` on both sides makes one rule for each number. A source may be any field, a target any but the inputs, which
+only clients write, and the cycle counters.
 
 - a plain source is echoed, multiplied and moved by the numbers; integers are rounded and kept within their range
 - `after` delays every change; `for` makes a pulse of that length out of every change from 0

@@ -23,12 +23,13 @@ from gatewayd.simulator.store import Scalar
 
 __all__ = ["DEFAULT_PORT", "MAKE_UP", "MOST_CONNECTIONS", "SimulatedController"]
 
-MAKE_UP = 5
+MAKE_UP = 25
 """Cycles of lateness that are made up for."""
 MOST_CONNECTIONS = 16
 """Clients served at a time unless told otherwise."""
 
-_SHORTEST_CYCLE = 0.6  # of a period: two packages are never nearer than this
+_SHORTEST_CYCLE = 0.75  # of a period, before the timer's error
+_TIMER_ERROR = 0.0005  # epoll rounds up to 1 ms: aiming this much early spreads the error evenly
 _IDLE = 0.01  # seconds between cycles while nobody is connected
 _SEND_BUFFER = 65536
 _MOST_UNSENT = 1 << 18  # replies that a client has not fetched
@@ -196,7 +197,7 @@ class SimulatedController:
     def _schedule(self, when: float) -> None:
         if self._ticking is not None:
             self._ticking.cancel()
-        self._ticking = asyncio.get_running_loop().call_at(when, self._tick)
+        self._ticking = asyncio.get_running_loop().call_at(when - _TIMER_ERROR, self._tick)
 
 
 class _Connection(asyncio.Protocol):
@@ -274,7 +275,7 @@ class _Connection(asyncio.Protocol):
             self.abort(f"has not read for {limit:g} s")
 
     def _write(self, data: bytes) -> None:
-        if not data:
+        if not data or self._transport.is_closing():
             return
         self._transport.write(self._mangler.flush() + data)
         if self._transport.get_write_buffer_size() > _MOST_UNSENT:

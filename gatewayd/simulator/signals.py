@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from gatewayd.simulator.arm import ELBOW, Moment, Vector, acceleration, frames, joints, pose, twist
+from gatewayd.simulator.arm import ELBOW, Moment, Vector, acceleration, frames, joints, pose, thrust, twist
 
 __all__ = ["CYCLE_FIELDS", "INITIAL", "SIGNALS", "Signal"]
 
@@ -107,7 +107,7 @@ def _wrench(moment: Moment) -> Vector:
     """Force and torque at the tool beyond its payload: what the payload's inertia makes of the acceleration."""
     inertia = (-_PAYLOAD,) * 3 + (-0.02,) * 3
     ripple = (_SENSOR_RIPPLE,) * 3 + (_SENSOR_RIPPLE / 10,) * 3
-    parts = zip(inertia, _tcp_acceleration(moment), ripple, strict=True)
+    parts = zip(inertia, thrust(moment.path, moment.rate), ripple, strict=True)
     return tuple(m * a + r * _ripple(moment, 24 + n) for n, (m, a, r) in enumerate(parts))
 
 
@@ -122,7 +122,7 @@ def _force(moment: Moment) -> Vector:
 
 def _accelerometer(moment: Moment) -> Vector:
     """Acceleration plus gravity's reaction, turned into the flange's frame."""
-    ax, ay, az = _tcp_acceleration(moment)[:3]
+    ax, ay, az, *_ = thrust(moment.path, moment.rate)
     az += _GRAVITY
     return tuple(ax * x + ay * y + az * z for x, y, z in frames(moment.path).rotation)
 
@@ -139,6 +139,23 @@ def _power(moment: Moment) -> float:
 def _temperatures(moment: Moment) -> Vector:
     warm = 1 - math.exp(-moment.time / 1800)
     return tuple(24 + (w - 24) * warm + 0.05 * _ripple(moment, n) for n, w in enumerate(_WARMTH))
+
+
+def _digital_inputs(moment: Moment) -> Vector:
+    """A light running over the standard inputs, another over the configurable ones, tool input 0 blinking."""
+    second = int(moment.path)
+    return (1 << second % 8 | 1 << 8 + second // 2 % 8 | (second // 4 & 1) << 16,)
+
+
+def _configurable_inputs(moment: Moment) -> Vector:
+    return (int(_digital_inputs(moment)[0]) >> 8 & 0xFF,)
+
+
+def _base_wrench(moment: Moment) -> Vector:
+    """What the mounting carries: the arm's weight, and its inertia along the flange's acceleration."""
+    x, y, z, *torque = thrust(moment.path, moment.rate)
+    share = 0.4 * _ARM_MASS
+    return (share * x, share * y, share * z + _ARM_MASS * _GRAVITY, *(share * part for part in torque))
 
 
 def _around(value: float, spread: float, number: int) -> Signal:
@@ -182,6 +199,10 @@ SIGNALS: Mapping[str, Signal] = {
     "elbow_position": lambda moment: frames(moment.path).origins[ELBOW],
     "elbow_velocity": lambda moment: twist(moment.path, moment.rate, ELBOW)[:3],
     "actual_momentum": _momentum,
+    "target_base_wrench": _base_wrench,
+    "actual_digital_input_bits": _digital_inputs,
+    "actual_configurable_digital_input_bits": _configurable_inputs,
+    "euromap67_input_bits": lambda moment: (1 << int(moment.path) % 16,),
     "joint_temperatures": _temperatures,
     "tool_temperature": lambda moment: (27 + 8 * (1 - math.exp(-moment.time / 2400)),),
     "actual_execution_time": _around(0.31, 0.04, 31),
@@ -233,6 +254,5 @@ INITIAL: Mapping[str, float | Vector] = {
     "tool_output_voltage": 24,
     "tool_digital_output0_mode": 1,
     "tool_digital_output1_mode": 1,
-    "euromap67_input_bits": 0,
 }
 """First values of fields that change only when told to; every other field starts at 0."""

@@ -77,6 +77,11 @@ class Store:
             value = self._initial.get(name, 0)
             self.write(name, value if isinstance(value, tuple) else (value,) * kind.count)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every field."""
+        return tuple(self._types)
+
     def type(self, name: str) -> DataType:
         """The type of a field; KeyError if there is none of that name."""
         return self._types[name]

@@ -8,7 +8,7 @@ import struct
 import time
 from dataclasses import dataclass
 
-from tests.benchmarks.processes import cpu_seconds
+from tests.benchmarks.processes import Process
 from tests.benchmarks.report import percentile
 
 __all__ = ["Load", "measure", "reading", "writing"]
@@ -51,16 +51,16 @@ def writing(first: int, count: int, unit: int = 1) -> Request:
     return Request(MBAP.pack(1, 0, len(pdu) + 1, unit) + pdu, 12)
 
 
-def measure(pid: int, port: int, connections: int, request: Request, seconds: float) -> Load:
+def measure(server: Process, port: int, connections: int, request: Request, seconds: float) -> Load:
     """Repeat `request` on so many connections. RuntimeError for an answer that is not the good one."""
     peers = [socket.create_connection(("127.0.0.1", port), 5) for _ in range(connections)]
     try:
         for peer in peers:
             peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         _drive(peers, request, WARM_UP)
-        before = cpu_seconds(pid)
+        before = server.cpu_seconds()
         round_trips, elapsed = _drive(peers, request, seconds)
-        cpu = cpu_seconds(pid) - before
+        cpu = server.cpu_seconds() - before
     finally:
         for peer in peers:
             peer.close()

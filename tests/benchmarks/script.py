@@ -12,7 +12,7 @@ from tests.benchmarks.controller import Controller
 from tests.benchmarks.image import DOUBLES_OUT
 from tests.benchmarks.latency import pace, stream
 from tests.benchmarks.plc import Plc
-from tests.benchmarks.processes import cpu_seconds, free_port, listens, python, running
+from tests.benchmarks.processes import free_port, listens, python, running
 from tests.benchmarks.report import Table, percentile
 from tests.benchmarks.servers import Served, mapped_gateway
 
@@ -28,10 +28,10 @@ SILENCE = 3.0
 """Seconds for which the controller says nothing while its connection stays open."""
 
 DEFINITION = """\
-Every double is the same number in each package; the PLC reads eight of them in one request after each package. The
-script maps 16 registers outward and nothing else; gatewayd serves the full image, inward and read-back too. Mixed:
-a block with doubles of two packages. Silence: the controller stops sending but keeps its connection, as behind a
-dead switch; how long until the registers tell."""
+Every double is the same number in each package; the PLC reads eight of them in one request, after each
+package and then without a pause. The script maps 16 registers outward and nothing else; gatewayd serves the
+full image, inward and read-back too. Mixed: a block with doubles of two packages. Silence: the controller
+stops sending but keeps its connection, as behind a dead switch; how long until the registers tell."""
 
 
 def run(seconds: float) -> list[Table]:
@@ -65,18 +65,19 @@ def _script(controller: Controller) -> Iterator[Served]:
     port = free_port()
     with running(python(Path(__file__).with_name("user_script.py"), ROBOT_HOST, str(port))) as process:
         controller.wait_for_start()
-        while process.poll() is None and not listens(port):
+        while process.running and not listens(port):
             pace(controller, 0.02)
-        yield Served(process.pid, port)
+        yield Served(process, port)
 
 
 def _column(controller: Controller, served: Served, seconds: float) -> dict[str, str]:
     plc = Plc(served.port)
     pace(controller, 1.0)
-    before = cpu_seconds(served.pid)
+    before = served.process.cpu_seconds()
     pace(controller, seconds)
-    cpu = 100 * (cpu_seconds(served.pid) - before) / seconds
-    seen = stream(controller, plc, seconds, FIRST, DOUBLES)
+    cpu = 100 * (served.process.cpu_seconds() - before) / seconds
+    seen = stream(controller, plc, seconds, first=FIRST, count=DOUBLES)
+    hammered = stream(controller, plc, seconds, first=FIRST, count=DOUBLES, hammer=True)
     silence = _silence(controller, plc)
     plc.close()
     controller.close()
@@ -84,7 +85,7 @@ def _column(controller: Controller, served: Served, seconds: float) -> dict[str,
         "CPU of one core, no PLC": f"{cpu:.3g} %",
         "package to PLC, p50": f"{percentile(seen.times, 0.5) * 1000:.3f} ms",
         "package to PLC, p99": f"{percentile(seen.times, 0.99) * 1000:.3f} ms",
-        "mixed blocks": f"{seen.mixed} of {seen.reads}",
+        "mixed blocks": f"{hammered.mixed} of {hammered.reads}",
         "silence told after": "never" if silence is None else f"{silence * 1000:.0f} ms",
     }
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tests.benchmarks.image import full_image
 from tests.benchmarks.plc import Plc
-from tests.benchmarks.processes import free_port, gatewayd, python, running, wait_until
+from tests.benchmarks.processes import Process, free_port, gatewayd, python, running, wait_for
 
 __all__ = ["Served", "gateway", "libmodbus", "libmodbus_is_there", "mapped_gateway", "simulator", "stock"]
 
@@ -25,7 +25,7 @@ FRESH = 2
 class Served:
     """A running server."""
 
-    pid: int
+    process: Process
     port: int
 
 
@@ -53,7 +53,7 @@ def libmodbus() -> Iterator[Served]:
         subprocess.run(["cc", "-O2", "-I/usr/include/modbus", "-o", program, source, "-lmodbus"], check=True)
         port = free_port()
         with running([str(program), str(port)], port) as process:
-            yield Served(process.pid, port)
+            yield Served(process, port)
 
 
 @contextmanager
@@ -61,7 +61,7 @@ def stock() -> Iterator[Served]:
     """pymodbus's server over 1000 registers."""
     port = free_port()
     with running(python(HERE / "stock_server.py", str(port)), port) as process:
-        yield Served(process.pid, port)
+        yield Served(process, port)
 
 
 @contextmanager
@@ -69,7 +69,7 @@ def simulator(frequency: float = 500) -> Iterator[Served]:
     """gatewayd's simulated controller."""
     port = free_port()
     with running(gatewayd("simulate", "--port", str(port), "--frequency", f"{frequency:g}"), port) as process:
-        yield Served(process.pid, port)
+        yield Served(process, port)
 
 
 @contextmanager
@@ -80,7 +80,7 @@ def mapped_gateway(robot: int, frequency: float = 500) -> Iterator[Served]:
         mapping = Path(folder) / "benchmark.yaml"
         mapping.write_text(full_image(robot, port, frequency))
         with running(gatewayd("run", mapping), port) as process:
-            yield Served(process.pid, port)
+            yield Served(process, port)
 
 
 @contextmanager
@@ -88,6 +88,6 @@ def gateway(frequency: float = 500) -> Iterator[Served]:
     """`gatewayd run` with the full image and a simulated robot whose values are fresh."""
     with simulator() as robot, mapped_gateway(robot.port, frequency) as served:
         plc = Plc(served.port)
-        wait_until(lambda: plc.read(60007, 1) == bytes((0, FRESH)), "the robot's values to be fresh")
+        wait_for(lambda: plc.read(60007, 1) == bytes((0, FRESH)), "the robot's values to be fresh")
         plc.close()
         yield served

@@ -94,9 +94,10 @@ class Plant:
         wait_for(lambda: plc.writable, "the robot to be writable")
         return plc
 
-    def start(self, name: str, *command: str) -> Process:
-        """Another program on this interpreter."""
-        process = Process([sys.executable, *command], self._log(name))
+    def start(self, module: str, *arguments: str | int) -> Process:
+        """Another program: a module of this directory."""
+        command = [sys.executable, "-m", f"tests.e2e.{module}", *map(str, arguments)]
+        process = Process(command, self._log(module))
         self._processes.append(process)
         return process
 

@@ -29,10 +29,10 @@ _TIMEOUT = 10.0
 class Plc:
     """One Modbus connection. Writes return the exception code, 0 if accepted; ConnectionError if it is gone."""
 
-    def __init__(self, port: int, source: str = PLC, unit: int = 1) -> None:
-        self._client = ModbusClient(HOST, port, unit, timeout=_TIMEOUT, auto_open=False)
+    def __init__(self, port: int, source: str = PLC, unit: int = 1, host: str = HOST) -> None:
+        self._client = ModbusClient(host, port, unit, timeout=_TIMEOUT, auto_open=False)
         self._source = source
-        self._port = port
+        self._address = (host, port)
         # pyModbusTCP connects from whatever address the system chooses; a PLC is known by its own.
         self._client._open = self._connect
         if not self._client.open():
@@ -40,7 +40,7 @@ class Plc:
 
     def _connect(self) -> None:
         try:
-            connected = socket.create_connection((HOST, self._port), _TIMEOUT, (self._source, 0))
+            connected = socket.create_connection(self._address, _TIMEOUT, (self._source, 0))
         except OSError as error:
             raise ModbusClient._NetworkError(MB_CONNECT_ERR, str(error)) from error
         self._client._sock = connected

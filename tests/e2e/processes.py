@@ -16,6 +16,8 @@ __all__ = ["HOST", "PATIENCE", "Daemon", "Process", "Simulator", "free_port", "w
 PATIENCE = 15.0
 """Seconds for what should take a moment: the machine may be busy, and a red test must not be its fault."""
 _PAUSE = 0.004
+_ROOT = Path(__file__).parents[2]
+"""Where `gatewayd` and `tests` are found by programs that are started as modules."""
 _PORTS = itertools.count(20000)
 
 
@@ -51,7 +53,13 @@ class Process:
         self.log = log
         with log.open("wb") as stream:
             self.popen = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stream, text=True, bufsize=1
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=stream,
+                text=True,
+                bufsize=1,
+                cwd=_ROOT,
             )
 
     @property

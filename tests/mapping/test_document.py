@@ -46,6 +46,7 @@ def test_good_file_has_no_findings() -> None:
         ("gatewayd: 1\ncell: C\nrobot: {host: r}\nvariables: {}", "bad-name", 2, 7),
         ("gatewayd: 1\ncell: c\nrobot: {}\nvariables: {}", "missing-key", 3, 1),
         ("gatewayd: 1\ncell: c\nrobot: [r]\nvariables: {}", "wrong-type", 3, 8),
+        (HEAD + "variables: {a: {robot: x, modbus: *b}}", "anchor-or-alias", 4, 35),
         (HEAD + "variables: []", "wrong-type", 4, 12),
         (HEAD + "variables:", "wrong-type", 4, 1),
         (HEAD + "variables: {}\nmodbs: {}", "unknown-key", 5, 1),

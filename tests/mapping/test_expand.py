@@ -36,49 +36,12 @@ def placed(line: str) -> tuple[ConcretePlacement, ...]:
     return expanded(line).placements
 
 
-@pytest.mark.parametrize(
-    "reference, targets",
-    [
-        ("input_bit_register_63", [("input_bit_registers32_to_63", 31, None)]),
-        ("input_bit_register_64", [("input_bit_register_64", None, None)]),
-        (
-            "output_bit_register_31..32",
-            [("output_bit_registers0_to_31", 31, None), ("output_bit_registers32_to_63", 0, None)],
-        ),
-        ("output_int_register_0..1", [(f"output_int_register_{n}", None, None) for n in (0, 1)]),
-        ("actual_tool_accelerometer", [("actual_tool_accelerometer", None, n) for n in (0, 1, 2)]),
-        ("'actual_TCP_pose[5]'", [("actual_TCP_pose", None, 5)]),
-        ("'actual_TCP_pose[0..1]'", [("actual_TCP_pose", None, 0), ("actual_TCP_pose", None, 1)]),
-        ("actual_digital_input_bits.3", [("actual_digital_input_bits", 3, None)]),
-        ("robot_status_bits.0..1", [("robot_status_bits", 0, None), ("robot_status_bits", 1, None)]),
-        ("input_bit_registers0_to_31", [("input_bit_registers0_to_31", None, None)]),
-    ],
-)
-def test_references(reference: str, targets: list[tuple[str, int | None, int | None]]) -> None:
-    """Field, bit and element of each variable; bits 0 to 63 are bits of the words that RTDE has."""
-    variables = expanded(f"a: {{robot: {reference}}}").variables
-    assert [(variable.field.name, variable.bit, variable.element) for variable in variables] == targets
-
-
-@pytest.mark.parametrize(
-    "reference, problem, name, limit",
-    [
-        ("actual_TCP_pos", ReferenceProblem.UNKNOWN_FIELD, "actual_TCP_pos", None),
-        ("robot_mode_0..3", ReferenceProblem.NOT_NUMBERED, "robot_mode_", None),
-        ("input_int_register_40..50", ReferenceProblem.NO_SUCH_REGISTER, "input_int_register_48", 47),
-        ("input_bit_register_128", ReferenceProblem.NO_SUCH_REGISTER, "input_bit_register_128", 127),
-        ("'robot_mode[0]'", ReferenceProblem.NOT_A_VECTOR, "robot_mode", None),
-        ("'actual_q[6]'", ReferenceProblem.NO_SUCH_ELEMENT, "actual_q", 6),
-        ("speed_scaling.0", ReferenceProblem.NOT_AN_INTEGER, "speed_scaling", None),
-        ("robot_mode.32", ReferenceProblem.NO_SUCH_BIT, "robot_mode", 32),
-    ],
-)
-def test_references_to_nothing(
-    reference: str, problem: ReferenceProblem, name: str, limit: int | None
-) -> None:
-    """They are kept for the rules, and the other variables are expanded."""
-    cell = expanded(f"a: {{robot: {reference}}}", "b: {robot: robot_mode}")
-    assert [(found.problem, found.name, found.limit) for found in cell.unresolved] == [(problem, name, limit)]
+def test_reference_to_nothing_is_kept_for_the_rules() -> None:
+    """The other variables are expanded."""
+    cell = expanded("a: {robot: 'robot_mode[0]'}", "b: {robot: robot_mode}")
+    assert [(found.part.name, found.problem, found.name, found.limit) for found in cell.unresolved] == [
+        ("a", ReferenceProblem.NOT_A_VECTOR, "robot_mode", None)
+    ]
     assert [variable.name for variable in cell.variables] == ["b"]
     assert not cell.is_complete
 

@@ -8,9 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gatewayd.core.definition import Direction
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together, read_bytes
 from gatewayd.mapping.source import MAXIMUM_BYTES
+from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
 
 MAPPINGS = Path(__file__).parents[2] / "mappings"
 GOOD = {path.name: path.read_bytes() for path in sorted(MAPPINGS.glob("*.yaml"))}
@@ -45,6 +47,18 @@ def test_files_loaded_together_keep_their_own_findings() -> None:
     assert first.plan is not None
     assert second.plan is None
     assert {finding.position.file for finding in second.diagnostics} == {"b.yaml"}
+
+
+def test_a_file_named_twice_has_each_finding_once() -> None:
+    first, second = load_together([("a.yaml", b"["), ("a.yaml", b"[")])
+    assert len(first.diagnostics) == len(second.diagnostics) == 1
+
+
+def test_cells_that_share_a_listener_are_checked_against_each_other() -> None:
+    """Equal units on one listener cannot both be served; each file is fine by itself."""
+    text = MINIMAL.replace(b"variables", b"modbus: {listen: 127.0.0.1:1502}\nvariables")
+    assert load(text, "a.yaml").plan is not None
+    assert any(found.plan is None for found in load_together([("a.yaml", text), ("b.yaml", text)]))
 
 
 def test_reading_stops_at_the_limit(tmp_path: Path) -> None:
@@ -108,3 +122,62 @@ def test_no_mutation_of_a_good_file_raises(data: bytes) -> None:
 @pytest.mark.parametrize("name", GOOD)
 def test_loading_is_deterministic(name: str) -> None:
     assert load(GOOD[name], name).plan == load(GOOD[name], name).plan
+
+
+TYPES = [
+    "",
+    ", type: int16",
+    ", type: uint64",
+    ", type: float32, order: DCBA",
+    ", scale: 0.01, offset: -3",
+    ", type: bool",
+]
+FIELDS = [
+    *sorted(INPUTS),
+    *sorted(OUTPUTS),
+    "input_bit_register_7",
+    "output_bit_register_0..63",
+    "robot_mode.3",
+]
+OWNERS = [
+    "",
+    ", owner: plc",
+    ", owner: [plc, hmi], lease: 3s",
+    ", owner: any",
+    ", group: g",
+    ", on_release: hold",
+]
+lines = st.tuples(
+    st.sampled_from(FIELDS),
+    st.sampled_from(["holding", "input", "coil", "discrete"]),
+    st.integers(0, 5000),
+    st.sampled_from(TYPES),
+    st.sampled_from(OWNERS),
+)
+
+
+@given(st.lists(lines, min_size=1, max_size=6))
+def test_plans_are_consistent(made: list[tuple[str, str, int, str, str]]) -> None:
+    """Whatever passes the rules compiles, and all indices of the plan lead somewhere."""
+    text = "gatewayd: 1\ncell: c\nrobot: {host: r}\nmodbus: {listen: 127.0.0.1:502}\n"
+    text += "writers: {plc: {modbus: 127.0.0.1}, hmi: {modbus: 127.0.0.2}}\ngroups: {g: {owner: plc}}\nvariables:\n"
+    for number, (field, area, address, kind, some_owner) in enumerate(made):
+        owner = some_owner if field in INPUTS or field.startswith("input_") else ""
+        text += f"  v{number}: {{robot: {field}, modbus: {{{area}: {address}{kind}}}{owner}}}\n"
+    loaded = load(text.encode(), "f")
+    plan = loaded.plan
+    assert (plan is None) == has_errors(loaded)
+    if plan is None:
+        return
+    cell = plan.cell
+    for index, lock in enumerate(cell.locks):
+        assert lock.owners
+        assert all(cell.variables[member].lock == index for member in lock.members)
+        assert all(owner < len(cell.writers) for owner in lock.owners)
+    for variable in cell.variables:
+        assert (variable.lock is not None) == (variable.direction is Direction.INPUT)
+    assert plan.modbus is not None
+    for placement in plan.modbus.placements:
+        variable = cell.variables[placement.variable]
+        if placement.codec is not None:
+            assert len(placement.codec.encode(variable.kind.zero)) == 2 * placement.words

@@ -27,8 +27,7 @@ def test_text_names_place_rule_message_and_remedy() -> None:
         "a.yaml:4:9: error GW201 register-overlap: `y` lies on `x`",
         "    a.yaml:3:7: `x` is here",
         "    hint: move it to 12",
-        "b,1:2.yaml:1:1: warning GW217 open-listener: 100% open",
-        "second line",
+        "b,1:2.yaml:1:1: warning GW217 open-listener: 100% open\\r\\nsecond line",
         "",
         "2 files checked: 1 error, 1 warning",
     ]
@@ -54,6 +53,13 @@ def test_text_is_coloured_only_on_demand() -> None:
     outcome = Outcome(("a.yaml",), (_error(),))
     assert "\x1b" not in as_text(outcome)
     assert "\x1b[31m\x1b[1merror GW201\x1b[0m" in as_text(outcome, colour=True)
+
+
+def test_text_escapes_control_characters() -> None:
+    """What a file says cannot steer the terminal."""
+    finding = _OPEN.at(Position("a.yaml", 1, 1), "`\x1b[2J\udc80`")
+    line = as_text(Outcome(("a.yaml",), (finding,))).splitlines()[0]
+    assert line == r"a.yaml:1:1: warning GW217 open-listener: `\x1b[2J\udc80`"
 
 
 def test_json_is_complete() -> None:

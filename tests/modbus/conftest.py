@@ -55,7 +55,17 @@ class Sketch:
         index = len(self.variables)
         low, high = (-(2**31), 2**31 - 1) if kind is ValueKind.INT else (None, None)
         self.variables.append(
-            Variable(index + 1, name, Direction.INPUT, kind, "in", low=low, high=high, limits=limits, lock=len(self.locks))
+            Variable(
+                index + 1,
+                name,
+                Direction.INPUT,
+                kind,
+                "in",
+                low=low,
+                high=high,
+                limits=limits,
+                lock=len(self.locks),
+            )
         )
         self.locks.append(Lock(name, (index,), owners, takeover=takeover))
         return index
@@ -71,7 +81,14 @@ class Sketch:
         self.placements.append(Placement(variable, area, address, bit, None))
 
     def number(
-        self, variable: int, area: Area, address: int, type_name: str, order: str = "ABCD", scale: float = 1.0
+        self,
+        variable: int,
+        area: Area,
+        address: int,
+        type_name: str,
+        *,
+        order: str = "ABCD",
+        scale: float = 1.0,
     ) -> None:
         kind = self.variables[variable].kind
         low, high = (-(2**31), 2**31 - 1) if kind is ValueKind.INT else (None, None)
@@ -98,7 +115,9 @@ def draw() -> Sketch:
         sketch.number(index, Area.HOLDING, 100 + 2 * register, "int32")
         sketch.number(index, Area.INPUT, 2 * register, "int32")
     for register in range(24):
-        sketch.number(sketch.output(f"real_{register}", ValueKind.FLOAT), Area.HOLDING, 200 + 4 * register, "float64")
+        sketch.number(
+            sketch.output(f"real_{register}", ValueKind.FLOAT), Area.HOLDING, 200 + 4 * register, "float64"
+        )
     for bit in range(32):
         index = sketch.output(f"bit_{bit}", ValueKind.BOOL)
         sketch.bit(index, Area.HOLDING, 500 + bit // 16, bit % 16)
@@ -106,7 +125,7 @@ def draw() -> Sketch:
     fragile = sketch.output("fragile", ValueKind.INT, FallbackKind.EXCEPTION)
     sketch.number(fragile, Area.HOLDING, 300, "uint16")
     sketch.bit(sketch.output("fragile_bit", ValueKind.BOOL, FallbackKind.EXCEPTION), Area.DISCRETE, 40)
-    sketch.number(sketch.output("swapped", ValueKind.FLOAT), Area.HOLDING, 301, "float32", "CDAB")
+    sketch.number(sketch.output("swapped", ValueKind.FLOAT), Area.HOLDING, 301, "float32", order="CDAB")
     sketch.number(sketch.output("clipped", ValueKind.FLOAT), Area.HOLDING, 303, "int16")
     sketch.bit(sketch.output("other_half", ValueKind.BOOL), Area.HOLDING, 20, 1)
     sketch.bit(sketch.output("lamp", ValueKind.BOOL), Area.COIL, 10)
@@ -245,7 +264,9 @@ async def ask(listener: ModbusListener) -> AsyncIterator[Ask]:
 
     async def ask(pdu: str, source: str = "127.0.0.2", unit: int = 1) -> str:
         if source not in streams:
-            streams[source] = await asyncio.open_connection("127.0.0.1", listener.port, local_addr=(source, 0))
+            streams[source] = await asyncio.open_connection(
+                "127.0.0.1", listener.port, local_addr=(source, 0)
+            )
         reader, writer = streams[source]
         body = bytes.fromhex(pdu)
         transaction = next(transactions)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import math
-import struct
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
@@ -16,6 +16,9 @@ from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
 from gatewayd.rtde.codec import ControllerProtocol
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.types import DataType
+
+Connected = Callable[..., AbstractAsyncContextManager[tuple[client.RtdeClient, "Notebook"]]]
+"""Run a client with these settings against the controller for as long as the `async with` lasts."""
 
 E_SERIES = messages.ControllerVersion(5, 12, 0, 1101)
 
@@ -39,6 +42,10 @@ class Script:
     time_zero: float = 100.0
     name_limit: int = 65535
     stop_reading: bool = False
+    spoil: Callable[[bytes], bytes] | None = None
+    """Applied to every package sent."""
+    spoiled: float = 0.0
+    """Share of packages to spoil, for `spoil`."""
 
 
 class Peer:
@@ -57,7 +64,8 @@ class Peer:
         self.step = 0
 
     def say(self, message: messages.ControllerMessage) -> None:
-        self.writer.write(self.protocol.send(message))
+        package = self.protocol.send(message)
+        self.writer.write(self.script.spoil(package) if self.script.spoil is not None else package)
 
     def text(self, words: str = "SafetySetup has not been confirmed yet") -> None:
         self.say(messages.TextMessage(words, "URControl", messages.TextLevel.WARNING))
@@ -103,6 +111,8 @@ class Peer:
         self.say(messages.OutputsSetup(int(good), words))
 
     def setup_inputs(self, names: tuple[str, ...]) -> None:
+        if len(",".join(names)) > self.script.name_limit:
+            return
         words = tuple(self.input_word(name) for name in names)
         good = not messages.ERROR_WORDS.intersection(words)
         number = 0
@@ -225,7 +235,7 @@ async def _until(condition: Callable[[], object], seconds: float = 5.0) -> None:
 
 
 @pytest.fixture
-def until() -> Callable[..., object]:
+def until() -> Callable[..., Awaitable[None]]:
     """Wait until a condition holds, five seconds at most."""
     return _until
 
@@ -240,19 +250,13 @@ async def controller() -> AsyncIterator[Controller]:
 
 
 @pytest.fixture
-def timestamp_package() -> bytes:
-    """A version 2 data package that holds a timestamp."""
-    return struct.pack(">HBBd", 12, 85, 1, 1.0)
-
-
-@pytest.fixture
-def connected(controller: Controller) -> object:
+def connected(controller: Controller) -> Connected:
     """Run a client against the controller for as long as the `async with` lasts."""
 
     @asynccontextmanager
-    async def run(**settings: object) -> AsyncIterator[tuple[client.RtdeClient, Notebook]]:
+    async def run(**settings: Any) -> AsyncIterator[tuple[client.RtdeClient, Notebook]]:
         notebook = Notebook()
-        wanted = client.ClientSettings("127.0.0.1", controller.port, **settings)  # type: ignore[arg-type]
+        wanted = client.ClientSettings(**{"host": "127.0.0.1", "port": controller.port, **settings})
         one = client.RtdeClient(wanted, notebook)
         task = asyncio.create_task(one.run())
         try:

@@ -177,6 +177,16 @@ def test_after_255_recipes_the_connection_is_used_up() -> None:
     assert claims.exhausted
 
 
+def test_a_list_limit_splits_only_what_is_too_long() -> None:
+    claims = Claims((*REGISTERS, "speed_slider_mask"), list_limit=3 * len(REGISTERS[0]) + 2)
+    Controller().converse(claims)
+    assert held(claims) == {
+        REGISTERS_KEY: REGISTERS[:3],
+        f"{REGISTERS_KEY} 2": REGISTERS[3:],
+        "speed_slider": ("speed_slider_mask",),
+    }
+
+
 @pytest.mark.parametrize("words", [(), ("INT32",), ("INT32",) * 3])
 def test_answers_must_have_a_type_for_each_name(words: tuple[str, ...]) -> None:
     claims = Claims(REGISTERS[:2])

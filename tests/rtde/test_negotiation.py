@@ -212,7 +212,7 @@ def test_a_pause_while_starting_and_a_resume_while_pausing_are_kept() -> None:
 def test_a_session_can_begin_paused() -> None:
     negotiation, steps = talk(Wishes(running=False), (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",))))
     assert steps[-1] == (None, Event.STARTED)
-    assert negotiation.settled
+    assert negotiation.state is State.PAUSED
 
 
 def test_inputs_can_be_claimed_while_paused() -> None:
@@ -239,7 +239,7 @@ def test_subscription_has_the_timestamp_first_and_everything_once() -> None:
 
 
 def test_a_shortened_subscription_leaves_out_read_backs_and_says_so() -> None:
-    wishes = Wishes(inputs=("input_int_register_0",), shortened=True)
+    wishes = Wishes(inputs=("input_int_register_0",), short_outputs=True)
     replies = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",)), m.InputsSetup(1, ("INT32",)), m.StartReply(True))
     negotiation, steps = talk(wishes, replies)
     assert steps[2].send == m.SetupOutputs(("timestamp",), 500.0)

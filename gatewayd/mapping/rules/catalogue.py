@@ -56,6 +56,11 @@ Every finding names the rule that it breaks. Ids and names are stable. An error 
 warning does not, unless `--strict` asks for it. `gatewayd check --explain GW214` prints a rule without this page.
 Each rule links to its reason; beside it lie `bad.yaml`, which breaks this rule alone, and `good.yaml`, which passes.
 
+`--format json` writes one document with `version`, `files`, `errors`, `warnings`, `unreadable` and `findings`. A
+finding has `rule`, `slug`, `family`, `severity`, `file`, `line`, `column` (both from 1), `message`, `hint` (or null)
+and `related`, a list of `file`, `line`, `column`, `message`. Keys are only ever added. `--format github` writes
+annotations for GitHub's workflows.
+
 This page is generated: `python -m gatewayd.mapping.rules.catalogue docs/reference`.
 """
 

@@ -10,6 +10,7 @@ from gatewayd.mapping.compile import package_period
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
+from gatewayd.mapping.rules.rtde import LEAST_RATE
 from gatewayd.mapping.rules.wording import number, seconds
 
 __all__: list[str] = []
@@ -194,13 +195,13 @@ def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     """
 Between two packages nothing can be known. With `stale_after` shorter than that, every value would be
 stale before its successor can come, and all fallbacks would act all the time. Leave it out (five periods,
-at least 50ms), or give it several periods.
+at least 100ms), or give it several periods.
 """,
 )
 def stale_too_soon(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`stale_after` below the package period."""
     robot = cell.document.robot
-    if robot is None or robot.spec.stale_after is None:
+    if robot is None or robot.spec.stale_after is None or 0 < robot.spec.frequency < LEAST_RATE:
         return
     period = package_period(robot.spec)
     if robot.spec.stale_after < period:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from ipaddress import ip_address
+from ipaddress import ip_address, ip_network
 
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.document import Part
@@ -16,7 +16,8 @@ __all__: list[str] = []
 
 _MODBUS_PORTS = (502, 802)
 _FIRST_FREE_PORT = 1024
-_SHARED = ("allow", "connections", "idle_timeout")
+_LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
+_SHARED = ("connections", "idle_timeout")
 
 
 @plant_rule(
@@ -71,11 +72,13 @@ def listen_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnost
 @plant_rule(
     "GW208",
     "listener-settings",
-    "cells on one listener disagree about it",
+    "cells on one listener disagree about its connections",
     """
-The access list, the number of connections and the idle time-out belong to the listener, not to the unit:
-they act before a request says which cell it means. Cells that share a listener must say the same.
+The number of connections and the idle time-out belong to the listener, not to the unit: a connection is open before
+a request says which cell it means. Of cells that share a listener the most generous number counts, so the other file
+does not say what happens. (Access lists may differ: each cell answers its own peers.)
 """,
+    Severity.WARNING,
 )
 def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Different settings for equal listen addresses."""
@@ -84,7 +87,10 @@ def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Dia
         other, earlier = first.setdefault(str(modbus.spec.listen), (cell, modbus))
         for key in _SHARED:
             if getattr(modbus.spec, key) != getattr(earlier.spec, key):
-                message = f"`{key}` of {modbus.spec.listen} differs from the cell `{other.document.cell}`"
+                message = (
+                    f"`{key}` of {modbus.spec.listen} differs from the cell `{other.document.cell}`; "
+                    "the most generous counts"
+                )
                 related = (Related(earlier.at(key), f"`{key}` of `{other.document.cell}`"),)
                 hint = f"write the same `{key}` in both files"
                 yield rule.at(modbus.at(key), message, hint=hint, related=related)
@@ -171,7 +177,7 @@ def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     if modbus is None or not ip_address(modbus.spec.listen.host).is_loopback:
         return
     for writer in cell.document.writers.values():
-        if not any(network.network_address.is_loopback for network in writer.spec.modbus):
+        if not any(_meet(network, _LOOPBACK) for network in writer.spec.modbus):
             shown = _shown(writer.spec.modbus[0])
             message = (
                 f"the writer `{writer.name}` ({shown}) cannot reach {modbus.spec.listen}, "

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.document import Document, Part
-from gatewayd.mapping.expand import ConcreteLock, ExpandedCell
+from gatewayd.mapping.expand import ConcreteLock, ConcreteVariable, ExpandedCell
 from gatewayd.mapping.model import ANY, Group, VariableSpec, WriterSpec
 from gatewayd.mapping.plan import Network
 from gatewayd.mapping.rules.registry import cell_rule
@@ -337,14 +337,25 @@ def owner_of_output(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         for key in (*_POLICY, "group"):
             if key in variable.spec.model_fields_set:
                 message = f"`{variable.part.name}` comes from the robot ({variable.target}) and has `{key}`"
-                hint = f"remove `{key}`, or map an input such as {_counterpart(variable.target)}"
+                hint = f"remove `{key}`, or map an input such as {_counterpart(variable)}"
                 yield rule.at(variable.part.key_at(key), message, hint=hint)
 
 
-def _counterpart(target: str) -> str:
-    return (
-        f"input_{target.removeprefix('output_')}" if target.startswith("output_") else "input_int_register_0"
-    )
+_COUNTERPARTS = {
+    "actual_digital_output_bits": "standard_digital_output (with its mask)",
+    "actual_configurable_digital_output_bits": "configurable_digital_output (with its mask)",
+    "standard_analog_output0": "standard_analog_output_0 (with its mask)",
+    "standard_analog_output1": "standard_analog_output_1 (with its mask)",
+    "target_speed_fraction": "speed_slider_fraction (with its mask)",
+}
+"""Outputs that are often taken for the input of nearly the same name."""
+
+
+def _counterpart(variable: ConcreteVariable) -> str:
+    field, target = variable.field.name, variable.target
+    if target.startswith("output_"):
+        return f"input_{target.removeprefix('output_')}"
+    return _COUNTERPARTS.get(field, "input_int_register_0")
 
 
 @cell_rule(

@@ -290,8 +290,7 @@ def register_overlap(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         related = (
             Related(earlier.position, f"`{earlier.variable.name}`, {where(earlier)}, first used here"),
         )
-        free = _first_free(cell, later.area)
-        hint = f"the first free address behind all others is {free} ({later.area.notation(free)})"
+        hint = _room(cell, later)
         yield rule.at(later.position, message, hint=hint, related=related)
 
 
@@ -315,8 +314,7 @@ def bit_in_number(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         related = (
             Related(earlier.position, f"`{earlier.variable.name}`, {where(earlier)}, first used here"),
         )
-        free = _first_free(cell, later.area)
-        hint = f"the first free register behind all others is {free} ({later.area.notation(free)})"
+        hint = _room(cell, later)
         yield rule.at(later.position, message, hint=hint, related=related)
 
 
@@ -360,10 +358,29 @@ def _order(placement: ConcretePlacement) -> tuple[int, int]:
     return placement.position.line, placement.position.column
 
 
-def _first_free(cell: ExpandedCell, area: Area) -> int:
-    used = (item.addresses[-1] + 1 for item in cell.placements if item.area is area and item.problem is None)
-    limit = _LAST_ADDRESS if area.of_bits else FIRST_STATUS_REGISTER - 1
-    return min(max(used, default=0), limit)
+def _room(cell: ExpandedCell, placement: ConcretePlacement) -> str:
+    """Remedy for an overlap: the next addresses of the area where the whole line fits."""
+    area = placement.area
+    here = [item for item in cell.placements if item.area is area and item.problem is None]
+    line = [item for item in here if _line(item) == _line(placement)]
+    start = min(item.address for item in line)
+    length = max(item.addresses[-1] for item in line) + 1 - start
+    end = _LAST_ADDRESS + 1 if area.of_bits else FIRST_STATUS_REGISTER
+    for taken in sorted((item.addresses for item in here if _line(item) != _line(placement)), key=_first):
+        if taken[0] < start + length:
+            start = max(start, taken[-1] + 1)
+        else:
+            break
+    if start + length > end:
+        return "shorten one of the two lines, or use another area"
+    last = start + length - 1
+    if length == 1:
+        return f"the line fits at {start} ({area.notation(start)})"
+    return f"the line fits at {start} to {last} ({area.notation(start)} to {area.notation(last)})"
+
+
+def _first(addresses: range) -> int:
+    return addresses[0]
 
 
 @cell_rule(

@@ -9,13 +9,17 @@ from math import floor, isclose
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.document import Document
-from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell, ReferenceProblem, Unresolved
+from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell, Unresolved
+from gatewayd.mapping.reference import ReferenceProblem
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 from gatewayd.mapping.rules.wording import number
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, REGISTERS, Series, SoftwareVersion, suggest
 from gatewayd.rtde.types import DataType
 
-__all__: list[str] = []
+__all__ = ["LEAST_RATE"]
+
+LEAST_RATE = 0.1
+"""Packages per second below which nobody can mean it; 0 stands for the controller's own rate."""
 
 _SHORT_LISTS = 2048
 _LONG_LISTS_SINCE = SoftwareVersion(5, 17)
@@ -264,7 +268,7 @@ rate, so that the file says what happens.
 def rate_not_a_divisor(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Frequencies between two steps of the controller."""
     robot = cell.document.robot
-    if robot is None or robot.spec.frequency <= 0:
+    if robot is None or robot.spec.frequency < LEAST_RATE:
         return
     series, _ = _controller(cell.document)
     base, wanted = (series or Series.E).base_rate, robot.spec.frequency
@@ -276,6 +280,26 @@ def rate_not_a_divisor(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     below = base / (floor(steps) + 1)
     hint = f"write {real:.4g} or {below:.4g}"
     yield rule.at(robot.at("frequency"), message, hint=hint)
+
+
+@cell_rule(
+    "GW314",
+    "rate-too-low",
+    "a rate of less than one package in ten seconds",
+    """
+With so few packages every value is old before it is read, and `stale_after` would have to be longer still. Most
+likely a period was written in the place of a rate: `frequency` is in Hz, so 20 ms are `frequency: 50`.
+""",
+)
+def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Frequencies below 0.1 Hz that are not 0."""
+    robot = cell.document.robot
+    if robot is not None and 0 < robot.spec.frequency < LEAST_RATE:
+        message = f"{number(robot.spec.frequency)} Hz is less than one package in ten seconds"
+        hint = (
+            f"`frequency` is in Hz: write at least {number(LEAST_RATE)}, or 0 for the controller's own rate"
+        )
+        yield rule.at(robot.at("frequency"), message, hint=hint)
 
 
 @cell_rule(

@@ -1,0 +1,91 @@
+"""`gatewayd show` on the screen and in a pipe."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from gatewayd.cli.show import command
+
+ROOT = Path(__file__).parents[2]
+MAPPINGS = sorted((ROOT / "mappings").glob("*.yaml"))
+FULL = ROOT / "mappings" / "full-image.yaml"
+BROKEN = ROOT / "docs/reference/rules/GW214-register-overlap/bad.yaml"
+
+
+def show(*args: str | Path, content: str | None = None, **environment: str) -> Result:
+    return CliRunner(env=environment).invoke(command, [str(argument) for argument in args], input=content)
+
+
+@pytest.mark.parametrize("path", MAPPINGS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("form", ["table", "csv", "json", "markdown"])
+def test_shipped_mappings_show_in_every_form(path: Path, form: str) -> None:
+    done = show("--format", form, path)
+    assert done.exit_code == 0
+    assert done.output
+
+
+@pytest.mark.parametrize("path", MAPPINGS, ids=lambda path: path.stem)
+def test_the_table_fits_120_columns(path: Path) -> None:
+    """Nothing is cut, and nothing but the notes below is wider."""
+    lines = show(path).output.splitlines()
+    table = lines[: next(n for n, line in enumerate(lines) if line.startswith("writer "))]
+    assert max(map(len, table[1:])) <= 120
+    assert "\u2026" not in "".join(lines)
+
+
+def test_the_table_names_both_kinds_of_address() -> None:
+    output = show(FULL).output
+    assert (
+        "out_doubles[0..23] <- output_double_register_0..23 holding 1200-1295      401201-401296 float64"
+        in output
+    )
+    assert "in_bits[0..63]     -> input_bit_register_0..63     coil 0-63" in output
+    assert "full-image: 224 variables, Modbus TCP 127.0.0.1:1502 unit 1, fingerprint " in output
+
+
+def test_all_shows_every_variable() -> None:
+    output = show("--all", FULL).output
+    assert "in_bits[17]" in output
+    assert "--all shows each variable" not in output
+
+
+def test_brackets_are_not_taken_for_markup() -> None:
+    assert "joints[0..5]" in show(ROOT / "mappings" / "two-plcs.yaml").output
+
+
+def test_a_narrow_terminal_loses_nothing() -> None:
+    """Long texts are folded, never cut."""
+    output = show(FULL, COLUMNS="60").output
+    assert max(len(line) for line in output.splitlines()[1:12]) <= 60
+    assert "\u2026" not in output
+
+
+def test_csv_is_one_row_for_every_place() -> None:
+    read = list(csv.DictReader(show("--format", "csv", FULL).output.splitlines()))
+    assert len(read) == 2 * (64 + 64) + 2 * (24 + 24)
+
+
+def test_json_is_for_programs() -> None:
+    assert json.loads(show("--format", "json", FULL).output)["cell"] == "full-image"
+
+
+def test_standard_input() -> None:
+    assert "full-image:" in show("-", content=FULL.read_text(encoding="utf-8")).output
+
+
+def test_a_broken_file_is_explained() -> None:
+    """Findings go to stderr, so that a pipe gets nothing wrong."""
+    done = show("--format", "csv", BROKEN)
+    assert (done.exit_code, done.stdout) == (1, "")
+    assert "error GW214 register-overlap" in done.stderr
+
+
+def test_an_unreadable_file_is_one_line(tmp_path: Path) -> None:
+    done = show(tmp_path / "gone.yaml")
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert done.stderr == f"{tmp_path}/gone.yaml: cannot be read: No such file or directory\n"

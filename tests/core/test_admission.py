@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import copy
+
+import pytest
+
+from gatewayd.core.admission import Admission, Change, Verdict
+from gatewayd.core.definition import CellDefinition
+from gatewayd.core.image import ProcessImage
+from gatewayd.core.ownership import LockTable, Move
+from gatewayd.core.refusal import Reason, Refusal
+
+PLC, HMI, AUX = range(3)
+START, LAMP, PART, FORCE, SPEED, PATH = range(6)
+MOTION = 4
+
+
+class Desk:
+    """A judge with the table and the image it looks at."""
+
+    def __init__(self, press: CellDefinition) -> None:
+        self.image = ProcessImage(press.variables)
+        self.ownership = LockTable(press.locks)
+        self.admission = Admission(press.variables, self.ownership, self.image)
+
+    def judge(self, writer: int | None, *changes: Change, adopted: bool = True) -> Verdict:
+        before = copy.deepcopy((self.image.values, self.image.quality, self.ownership.owners))
+        verdict = self.admission.judge(writer, changes, adopted=adopted)
+        assert before == (self.image.values, self.image.quality, self.ownership.owners)
+        return verdict
+
+
+@pytest.fixture
+def desk(press: CellDefinition) -> Desk:
+    return Desk(press)
+
+
+def test_members_of_a_group_make_one_move(desk: Desk) -> None:
+    verdict = desk.judge(HMI, Change(SPEED, 0.5), Change(PATH, 3))
+    assert verdict == Verdict(None, [(SPEED, 0.5), (PATH, 3)], {MOTION: Move.ACQUIRE})
+
+
+def test_values_are_clamped_in_the_verdict(desk: Desk) -> None:
+    assert desk.judge(PLC, Change(FORCE, 200.0)).values == [(FORCE, 150.0)]
+
+
+def test_the_gravest_reason_is_told_of_its_first_variable(desk: Desk) -> None:
+    desk.ownership.apply(2, PLC, Move.ACQUIRE, 0.0)
+    desk.image.set_available(FORCE, available=False)
+    held, gone = Change(PART, 1), Change(FORCE, 1.0)
+    wild, foreign = Change(SPEED, 2.0), Change(START, True)
+    assert desk.judge(HMI, held).refusal == Refusal(Reason.HELD, PART, PLC)
+    assert desk.judge(HMI, held, gone).refusal == Refusal(Reason.CLAIMED_ELSEWHERE, FORCE)
+    assert desk.judge(HMI, held, gone, adopted=False).refusal == Refusal(Reason.ROBOT_LOST, PART)
+    assert desk.judge(HMI, held, gone, wild).refusal == Refusal(Reason.OUT_OF_LIMITS, SPEED)
+    assert desk.judge(HMI, held, gone, wild, foreign).refusal == Refusal(Reason.NOT_WRITABLE, START)
+
+
+def test_an_undeclared_peer_is_refused_whatever_it_writes(desk: Desk) -> None:
+    verdict = desk.judge(None, Change(LAMP, False, implied=True), Change(SPEED, 2.0))
+    assert verdict == Verdict(Refusal(Reason.NOT_WRITABLE, LAMP))
+
+
+def test_without_a_robot_only_own_locks_are_renewed(desk: Desk) -> None:
+    desk.ownership.apply(MOTION, AUX, Move.ACQUIRE, 0.0)
+    verdict = desk.judge(AUX, Change(SPEED, 0.5), Change(FORCE, 1.0), adopted=False)
+    assert verdict == Verdict(Refusal(Reason.ROBOT_LOST, SPEED), [], {MOTION: Move.RENEW})
+
+
+@pytest.mark.parametrize("value, accepted", [(False, True), (True, False)])
+def test_an_implied_bit_of_a_higher_owner_passes_only_unchanged(
+    desk: Desk, value: bool, accepted: bool
+) -> None:
+    desk.ownership.apply(1, PLC, Move.ACQUIRE, 0.0)
+    verdict = desk.judge(HMI, Change(LAMP, value, implied=True))
+    assert verdict == Verdict(None if accepted else Refusal(Reason.HELD, LAMP, PLC))
+
+
+@pytest.mark.parametrize("value, moves", [(False, {}), (True, {1: Move.TAKE_OVER})])
+def test_an_implied_bit_of_a_lower_owner_is_taken_over_only_to_change_it(
+    desk: Desk, value: bool, moves: dict[int, Move]
+) -> None:
+    desk.ownership.apply(1, HMI, Move.ACQUIRE, 0.0)
+    assert desk.judge(PLC, Change(LAMP, value, implied=True)).moves == moves
+
+
+def test_an_explicit_bit_takes_over_even_unchanged(desk: Desk) -> None:
+    desk.ownership.apply(1, HMI, Move.ACQUIRE, 0.0)
+    assert desk.judge(PLC, Change(LAMP, False)).moves == {1: Move.TAKE_OVER}

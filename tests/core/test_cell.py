@@ -1,0 +1,535 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from gatewayd.core.cell import HEARTBEAT_PERIOD, Cell, Change
+from gatewayd.core.definition import CellDefinition, Direction, Fallback, FallbackKind, Value
+from gatewayd.core.events import Event, EventKind
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
+from gatewayd.core.refusal import Reason, Refusal
+
+PLC, HMI, AUX = range(3)
+START, LAMP, PART, FORCE, SPEED, PATH, CYCLES, LEVEL, MODE, ALARM = range(10)
+INPUTS = range(START, CYCLES)
+OUTPUTS = range(CYCLES, ALARM + 1)
+Connect = Callable[[Cell, float], None]
+
+
+def told(cell: Cell, kind: EventKind) -> list[Event]:
+    return [event for event in cell.events if event.kind is kind]
+
+
+def owner(cell: Cell, lock: int) -> int | None:
+    return cell.ownership.owners[lock]
+
+
+def quality(cell: Cell, variable: int) -> Quality:
+    return cell.image.quality[variable]
+
+
+def write(cell: Cell, writer: int | None, variable: int, value: Value, now: float) -> Refusal | None:
+    return cell.write(writer, [Change(variable, value)], now)
+
+
+# -- writing -----------------------------------------------------------------------------------------------------
+
+
+def test_a_write_takes_the_lock_and_sets_value_time_and_quality(cell: Cell) -> None:
+    assert write(cell, PLC, PART, 12, 1.5) is None
+    assert (cell.image.values[PART], cell.image.times[PART], cell.image.quality[PART]) == (
+        12,
+        1.5,
+        Quality.GOOD,
+    )
+    assert owner(cell, 2) == PLC
+    assert cell.health.writes_accepted == 1
+
+
+def test_a_refused_request_changes_neither_values_nor_locks(cell: Cell) -> None:
+    before = list(cell.image.values)
+    refusal = cell.write(HMI, [Change(PART, 9), Change(FORCE, 20.0), Change(START, True)], 1.0)
+    assert refusal == Refusal(Reason.NOT_WRITABLE, START)
+    assert cell.image.values == before
+    assert cell.ownership.owners == [None] * 5
+
+
+@pytest.mark.parametrize("changes", [[Change(PART, 1)], [Change(START, False, implied=True)]])
+def test_an_undeclared_peer_may_write_nothing_not_even_what_is_there(
+    cell: Cell, changes: list[Change]
+) -> None:
+    refusal = cell.write(None, changes, 1.0)
+    assert refusal is not None
+    assert refusal.reason is Reason.NOT_WRITABLE
+    assert cell.health.writes_refused == 1
+
+
+def test_an_output_is_writable_by_nobody(cell: Cell) -> None:
+    assert write(cell, PLC, CYCLES, 1, 1.0) == Refusal(Reason.NOT_WRITABLE, CYCLES)
+
+
+def test_the_last_of_two_values_for_one_variable_counts(cell: Cell) -> None:
+    assert cell.write(PLC, [Change(PART, 1), Change(PART, 2)], 1.0) is None
+    assert cell.image.values[PART] == 2
+
+
+def test_a_held_variable_names_its_holder(cell: Cell) -> None:
+    write(cell, HMI, PART, 1, 1.0)
+    assert write(cell, PLC, PART, 2, 1.5) == Refusal(Reason.HELD, PART, HMI)
+
+
+def test_a_lease_ends_exactly_at_its_time_without_a_tick(cell: Cell) -> None:
+    write(cell, HMI, PART, 1, 1.0)
+    assert write(cell, PLC, PART, 2, math.nextafter(3.0, 0)) is not None
+    assert write(cell, PLC, PART, 2, 3.0) is None
+
+
+def test_values_of_one_request_are_told_to_the_listeners_at_once(cell: Cell) -> None:
+    seen: list[tuple[Direction, list[Value]]] = []
+    cell.listeners.append(lambda direction: seen.append((direction, cell.image.values[START:CYCLES])))
+    cell.write(PLC, [Change(START, True), Change(PART, 3), Change(SPEED, 0.5)], 1.0)
+    assert seen == [(Direction.INPUT, [True, False, 3, 0.0, 0.5, 0])]
+
+
+def test_a_nan_passes_only_where_no_limits_are_and_falls_back_like_any_value(
+    press: CellDefinition, connect: Connect
+) -> None:
+    speed = replace(press.variables[SPEED], limits=None)
+    free = Cell(replace(press, variables=(*press.variables[:SPEED], speed, *press.variables[SPEED + 1 :])))
+    connect(free, 0.0)
+    assert write(free, PLC, SPEED, math.nan, 1.0) is None
+    assert write(free, PLC, FORCE, math.nan, 1.0) == Refusal(Reason.OUT_OF_LIMITS, FORCE)
+    free.release(PLC, SPEED, 1.5)
+    assert free.image.values[SPEED] == 0.0
+
+
+def test_a_held_nan_is_no_change(press: CellDefinition, connect: Connect) -> None:
+    speed = replace(press.variables[SPEED], limits=None, on_release=Fallback(FallbackKind.HOLD))
+    free = Cell(replace(press, variables=(*press.variables[:SPEED], speed, *press.variables[SPEED + 1 :])))
+    connect(free, 0.0)
+    write(free, PLC, SPEED, math.nan, 1.0)
+    free.release(PLC, SPEED, 1.5)
+    assert [event.variable for event in told(free, EventKind.FALLBACK)] == [PATH]
+    assert free.image.times[SPEED] == 1.0
+
+
+# -- implied bits ------------------------------------------------------------------------------------------------
+
+
+def test_an_implied_bit_that_is_free_is_taken_and_written(cell: Cell) -> None:
+    assert (
+        cell.write(PLC, [Change(START, True, implied=True), Change(LAMP, False, implied=True)], 1.0) is None
+    )
+    assert cell.ownership.owners[:2] == [PLC, PLC]
+    assert cell.image.values[START] is True
+
+
+def test_an_implied_bit_of_somebody_else_may_pass_unchanged(cell: Cell) -> None:
+    write(cell, PLC, START, True, 1.0)
+    assert cell.write(HMI, [Change(START, True, implied=True), Change(LAMP, True, implied=True)], 1.5) is None
+    assert cell.ownership.owners[:2] == [PLC, HMI]
+    assert cell.image.times[START] == 1.0
+
+
+def test_an_implied_changed_bit_that_the_writer_may_never_write_refuses_all(cell: Cell) -> None:
+    refusal = cell.write(HMI, [Change(START, True, implied=True), Change(LAMP, True, implied=True)], 1.0)
+    assert refusal == Refusal(Reason.NOT_WRITABLE, START)
+    assert cell.image.values[LAMP] is False
+
+
+def test_an_implied_bit_of_a_higher_owner_must_keep_its_value(cell: Cell) -> None:
+    write(cell, PLC, LAMP, True, 1.0)
+    assert cell.write(HMI, [Change(LAMP, True, implied=True)], 1.5) is None
+    assert cell.write(HMI, [Change(LAMP, False, implied=True)], 1.5) == Refusal(Reason.HELD, LAMP, PLC)
+    assert owner(cell, 1) == PLC
+    assert cell.image.values[LAMP] is True
+
+
+def test_an_implied_bit_takes_a_lock_over_only_to_change_it(cell: Cell) -> None:
+    write(cell, HMI, LAMP, True, 1.0)
+    assert cell.write(PLC, [Change(LAMP, True, implied=True)], 1.5) is None
+    assert owner(cell, 1) == HMI
+    assert cell.write(PLC, [Change(LAMP, False, implied=True)], 1.5) is None
+    assert owner(cell, 1) == PLC
+    assert cell.image.values[LAMP] is False
+
+
+def test_an_implied_bit_of_a_robot_output_may_pass_unchanged(cell: Cell) -> None:
+    assert cell.write(PLC, [Change(ALARM, True, implied=True), Change(START, True)], 1.0) is None
+    assert cell.write(PLC, [Change(ALARM, False, implied=True)], 1.0) == Refusal(Reason.NOT_WRITABLE, ALARM)
+
+
+def test_an_implied_unchanged_bit_in_a_register_that_is_gone_is_let_pass(cell: Cell) -> None:
+    cell.set_availability([LAMP], False, "claimed", 1.0)
+    assert (
+        cell.write(PLC, [Change(START, True, implied=True), Change(LAMP, False, implied=True)], 1.0) is None
+    )
+    assert cell.ownership.owners[:2] == [PLC, None]
+
+
+# -- taking over -------------------------------------------------------------------------------------------------
+
+
+def test_a_group_is_taken_over_as_a_whole(cell: Cell) -> None:
+    cell.write(HMI, [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
+    assert write(cell, PLC, PATH, 4, 1.5) is None
+    assert write(cell, HMI, SPEED, 0.1, 1.6) == Refusal(Reason.HELD, SPEED, PLC)
+    assert cell.image.values[SPEED : PATH + 1] == [0.4, 4]
+    (event,) = told(cell, EventKind.TAKEN_OVER)
+    assert (event.lock, event.writer, event.other) == (4, PLC, HMI)
+
+
+def test_a_list_without_takeover_keeps_its_holder(cell: Cell) -> None:
+    cell.request(HMI, PART, 1.0)
+    assert cell.request(PLC, PART, 1.5) == Refusal(Reason.HELD, PART, HMI)
+
+
+# -- refusals for the robot's sake -------------------------------------------------------------------------------
+
+
+def test_a_write_refused_for_the_robots_sake_renews_the_lease(cell: Cell) -> None:
+    write(cell, PLC, PART, 5, 1.0)
+    cell.robot_lost("unplugged", 1.5)
+    assert write(cell, PLC, PART, 6, 2.5) == Refusal(Reason.ROBOT_LOST, PART)
+    cell.tick(3.5)
+    assert owner(cell, 2) == PLC
+    cell.tick(4.5)
+    assert owner(cell, 2) is None
+
+
+def test_a_write_refused_for_the_robots_sake_takes_nothing(cell: Cell) -> None:
+    cell.request(HMI, LAMP, 0.5)
+    cell.robot_lost("unplugged", 1.0)
+    for variable, value in ((LAMP, True), (FORCE, 1.0)):
+        assert write(cell, PLC, variable, value, 1.0) == Refusal(Reason.ROBOT_LOST, variable)
+    assert owner(cell, 1) == HMI
+    assert owner(cell, 3) is None
+
+
+def test_a_write_refused_for_its_value_renews_nothing(cell: Cell) -> None:
+    write(cell, PLC, SPEED, 0.5, 1.0)
+    assert write(cell, PLC, SPEED, 2.0, 2.0) == Refusal(Reason.OUT_OF_LIMITS, SPEED)
+    assert cell.ownership.remaining(4, 2.0) == 1.0
+
+
+def test_a_register_claimed_elsewhere_costs_what_depends_on_it(cell: Cell) -> None:
+    cell.set_availability([PART], False, "claimed", 1.0)
+    assert write(cell, PLC, PART, 1, 1.0) == Refusal(Reason.CLAIMED_ELSEWHERE, PART)
+    assert write(cell, PLC, FORCE, 1.0, 1.0) is None
+
+
+# -- releasing ---------------------------------------------------------------------------------------------------
+
+
+def test_a_release_applies_every_members_policy(cell: Cell) -> None:
+    cell.write(PLC, [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
+    assert cell.release(PLC, SPEED, 1.5) is None
+    assert cell.image.values[SPEED : PATH + 1] == [0.0, 7]
+    assert [(event.variable, event.old, event.new) for event in told(cell, EventKind.FALLBACK)] == [
+        (SPEED, 0.4, 0.0),
+        (PATH, 3, 7),
+    ]
+
+
+def test_hold_keeps_the_value_and_its_time(cell: Cell) -> None:
+    write(cell, PLC, PART, 3, 1.0)
+    cell.release(PLC, PART, 1.5)
+    assert (cell.image.values[PART], cell.image.times[PART]) == (3, 1.0)
+
+
+def test_releasing_what_is_free_does_nothing_and_what_another_holds_is_refused(cell: Cell) -> None:
+    assert cell.release(HMI, LAMP, 1.0) is None
+    write(cell, HMI, LAMP, True, 1.0)
+    assert cell.release(PLC, LAMP, 1.0) == Refusal(Reason.HELD, LAMP, HMI)
+    assert cell.release(HMI, START, 1.0) == Refusal(Reason.NOT_WRITABLE, START)
+    assert cell.release(None, LAMP, 1.0) == Refusal(Reason.NOT_WRITABLE, LAMP)
+
+
+def test_a_release_without_a_robot_falls_back_once_when_it_is_back(cell: Cell) -> None:
+    write(cell, PLC, FORCE, 99.0, 1.0)
+    cell.robot_lost("unplugged", 1.1)
+    cell.release(PLC, FORCE, 1.2)
+    assert cell.image.values[FORCE] == 99.0
+    cell.robot_connected(2.0)
+    cell.adopt({FORCE: 99.0}, 2.0)
+    assert cell.image.values[FORCE] == 10.0
+    write(cell, PLC, FORCE, 50.0, 2.5)
+    cell.adopt({START: False}, 2.6)
+    assert cell.image.values[FORCE] == 50.0
+    assert len(told(cell, EventKind.FALLBACK)) == 1
+
+
+def test_a_due_fallback_comes_even_if_the_lock_was_taken_meanwhile(cell: Cell) -> None:
+    write(cell, PLC, FORCE, 99.0, 1.0)
+    cell.robot_lost("unplugged", 1.1)
+    cell.release(PLC, FORCE, 1.2)
+    cell.request(HMI, FORCE, 1.3)
+    cell.robot_connected(2.0)
+    cell.adopt({FORCE: 99.0}, 2.0)
+    assert cell.image.values[FORCE] == 10.0
+    assert owner(cell, 3) == HMI
+
+
+def test_a_due_fallback_comes_even_if_the_controller_does_not_tell_the_input(cell: Cell) -> None:
+    write(cell, PLC, FORCE, 99.0, 1.0)
+    cell.robot_lost("unplugged", 1.1)
+    cell.release(PLC, FORCE, 1.2)
+    cell.robot_connected(2.0)
+    cell.adopt({}, 2.0)
+    assert (cell.image.values[FORCE], cell.image.quality[FORCE]) == (10.0, Quality.GOOD)
+
+
+def test_a_fallback_waits_for_a_register_that_is_gone(cell: Cell) -> None:
+    write(cell, PLC, FORCE, 99.0, 1.0)
+    cell.set_availability([FORCE], False, "claimed", 1.1)
+    cell.release(PLC, FORCE, 1.2)
+    cell.adopt({}, 1.3)
+    assert cell.image.values[FORCE] == 99.0
+    cell.set_availability([FORCE], True, "freed", 2.0)
+    cell.adopt({FORCE: 42.0}, 2.0)
+    assert cell.image.values[FORCE] == 10.0
+
+
+def test_a_due_fallback_does_not_undo_a_later_write(cell: Cell) -> None:
+    write(cell, PLC, FORCE, 99.0, 1.0)
+    cell.set_availability([FORCE], False, "claimed", 1.1)
+    cell.release(PLC, FORCE, 1.2)
+    cell.set_availability([FORCE], True, "freed", 2.0)
+    assert write(cell, HMI, FORCE, 33.0, 2.1) is None
+    cell.adopt({START: False}, 2.2)
+    assert cell.image.values[FORCE] == 33.0
+
+
+def test_clear_on_connect_spares_what_is_owned(press: CellDefinition) -> None:
+    cell = Cell(replace(press, clear_on_connect=True))
+    cell.request(PLC, PATH, 0.5)
+    cell.robot_connected(0.5)
+    cell.adopt({START: True, PART: 5, PATH: 6}, 0.5)
+    assert cell.image.values[START : PATH + 1] == [False, False, 5, 10.0, 0.0, 6]
+
+
+def test_adopting_takes_over_what_the_controller_holds(press: CellDefinition) -> None:
+    cell = Cell(press)
+    accepts = [cell.accepts_writes]
+    cell.robot_connected(1.0)
+    accepts.append(cell.accepts_writes)
+    cell.adopt({START: True, FORCE: 200.0}, 1.0)
+    assert [*accepts, cell.accepts_writes] == [False, False, True]
+    assert cell.image.values[START] is True
+    assert cell.image.values[FORCE] == 200.0
+    assert cell.image.quality[START : PATH + 1] == [
+        Quality.GOOD, Quality.NEVER, Quality.NEVER, Quality.GOOD, Quality.NEVER, Quality.NEVER,
+    ]  # fmt: skip
+
+
+# -- writers -----------------------------------------------------------------------------------------------------
+
+
+def test_the_last_of_two_connections_releases(cell: Cell) -> None:
+    cell.writer_connected(HMI, 1.0)
+    cell.writer_connected(HMI, 1.0)
+    write(cell, HMI, LAMP, True, 1.0)
+    cell.writer_disconnected(HMI, 1.1, "reset")
+    assert owner(cell, 1) == HMI
+    cell.writer_disconnected(HMI, 1.2, "reset")
+    assert owner(cell, 1) is None
+    assert cell.image.values[LAMP] is False
+    assert len(told(cell, EventKind.WRITER_LOST)) == 1
+
+
+def test_a_silent_writer_loses_its_locks_once_and_may_come_back(cell: Cell) -> None:
+    cell.writer_connected(AUX, 1.0)
+    write(cell, AUX, FORCE, 50.0, 1.0)
+    cell.tick(2.0)
+    assert owner(cell, 3) == AUX
+    cell.tick(2.01)
+    assert owner(cell, 3) is None
+    cell.writer_seen(AUX, 2.5)
+    assert cell.writers.alive[AUX]
+    write(cell, AUX, FORCE, 60.0, 2.5)
+    cell.writer_disconnected(AUX, 2.6, "closed")
+    assert owner(cell, 3) is None
+    assert len(told(cell, EventKind.WRITER_LOST)) == 2
+
+
+@pytest.mark.parametrize("act", ["write", "request"])
+def test_whoever_acts_is_supervised_even_if_no_link_announced_him(cell: Cell, act: str) -> None:
+    if act == "write":
+        write(cell, AUX, FORCE, 50.0, 1.0)
+    else:
+        cell.request(AUX, FORCE, 1.0)
+    cell.tick(2.5)
+    assert owner(cell, 3) is None
+
+
+def test_release_all_leaves_the_locks_of_others(cell: Cell) -> None:
+    write(cell, PLC, START, True, 1.0)
+    write(cell, PLC, PART, 2, 1.0)
+    write(cell, HMI, LAMP, True, 1.0)
+    cell.release_all(PLC, 1.1)
+    assert cell.ownership.owners == [None, HMI, None, None, None]
+    assert cell.image.values[START] is False
+
+
+# -- freshness ---------------------------------------------------------------------------------------------------
+
+
+def silence(cell: Cell) -> None:
+    cell.tick(0.2)
+
+
+def freeze(cell: Cell) -> None:
+    cell.package_arrived(0.0, 0.15)
+    cell.tick(0.2)
+
+
+def lose(cell: Cell) -> None:
+    cell.robot_lost("unplugged", 0.2)
+
+
+@pytest.mark.parametrize("end", [silence, freeze, lose])
+def test_dead_outputs_are_not_good_and_show_their_policies(cell: Cell, end: Callable[[Cell], None]) -> None:
+    assert cell.image.values[CYCLES:] == [5, 2.5, 3, True]
+    assert cell.image.quality[CYCLES:] == [Quality.GOOD] * 4
+    end(cell)
+    assert cell.image.values[CYCLES:] == [0, 2.5, 99, True]
+    assert cell.image.quality[CYCLES:] == [Quality.STALE] * 4
+    assert cell.unreadable == {ALARM}
+
+
+def test_outputs_are_good_only_when_their_values_were_copied(cell: Cell) -> None:
+    cell.tick(0.2)
+    assert cell.package_arrived(0.3, 0.3)
+    assert quality(cell, CYCLES) is Quality.STALE
+    cell.outputs_written(0.3)
+    assert quality(cell, CYCLES) is Quality.GOOD
+    assert cell.unreadable == frozenset()
+
+
+def test_a_package_after_the_session_tells_nothing(cell: Cell) -> None:
+    cell.robot_lost("unplugged", 1.0)
+    packages = cell.health.packages
+    assert not cell.package_arrived(1.1, 1.1)
+    cell.outputs_written(1.1)
+    assert cell.health.packages == packages
+    assert cell.image.output_time == 0.0
+    assert len(told(cell, EventKind.FRESH)) == 1
+
+
+def test_adopting_after_the_session_opens_nothing(cell: Cell) -> None:
+    cell.robot_lost("unplugged", 1.0)
+    cell.adopt({START: True}, 1.1)
+    assert not cell.accepts_writes
+    assert cell.image.values[START] is False
+
+
+def test_a_new_session_ends_the_former_one(cell: Cell) -> None:
+    cell.robot_connected(1.0)
+    assert not cell.accepts_writes
+    assert cell.image.quality == [Quality.STALE] * 10
+    assert cell.freshness.state is Source.WAITING
+
+
+def test_a_controller_that_is_still_frozen_does_not_pass_for_fresh_by_a_new_session(cell: Cell) -> None:
+    freeze(cell)
+    cell.robot_lost("reset", 0.3)
+    cell.robot_connected(0.4)
+    assert not cell.package_arrived(0.0, 0.5)
+    assert cell.freshness.state is Source.FROZEN
+    assert cell.package_arrived(0.002, 0.6)
+
+
+def test_a_lost_robot_makes_inputs_stale_and_refuses_writes(cell: Cell) -> None:
+    cell.robot_lost("unplugged", 1.0)
+    assert cell.image.quality[START:CYCLES] == [Quality.STALE] * 6
+    assert write(cell, PLC, START, True, 1.0) == Refusal(Reason.ROBOT_LOST, START)
+
+
+def test_losing_the_robot_twice_is_one_event(cell: Cell) -> None:
+    cell.robot_lost("unplugged", 1.0)
+    cell.robot_lost("unplugged", 1.1)
+    assert len(told(cell, EventKind.ROBOT_LOST)) == 1
+
+
+def test_a_register_that_comes_is_not_good_before_it_is_told(cell: Cell) -> None:
+    both = [START, MODE]
+    cell.set_availability(both, False, "claimed", 0.05)
+    assert [cell.image.quality[index] for index in both] == [Quality.UNAVAILABLE] * 2
+    assert cell.image.values[MODE] == 99
+    cell.set_availability(both, True, "freed", 0.06)
+    assert [cell.image.quality[index] for index in both] == [Quality.STALE, Quality.NEVER]
+    cell.adopt({START: True}, 0.07)
+    assert cell.package_arrived(0.07, 0.07)
+    cell.outputs_written(0.07)
+    assert [cell.image.quality[index] for index in both] == [Quality.GOOD] * 2
+
+
+def test_availability_before_the_first_session_is_remembered(press: CellDefinition, connect: Connect) -> None:
+    cell = Cell(press)
+    cell.set_availability([PART, ALARM], False, "no such field", 0.0)
+    connect(cell, 0.1)
+    assert not cell.is_available(PART)
+    assert quality(cell, PART) is Quality.UNAVAILABLE
+    assert cell.unreadable == {ALARM}
+    cell.robot_lost("unplugged", 0.2)
+    assert quality(cell, PART) is Quality.UNAVAILABLE
+
+
+def test_saying_the_same_availability_again_is_no_event(cell: Cell) -> None:
+    count = cell.events.count
+    cell.set_availability([START], True, "freed", 1.0)
+    assert cell.events.count == count
+
+
+# -- time --------------------------------------------------------------------------------------------------------
+
+
+def test_the_heartbeat_counts_ten_times_a_second_and_only_in_tick(cell: Cell) -> None:
+    write(cell, PLC, START, True, 0.0)
+    assert cell.health.heartbeat == 0
+    for step in range(51):
+        cell.tick(100 + step * 0.02)
+    assert cell.health.started == 100
+    assert cell.health.heartbeat == pytest.approx(1 / HEARTBEAT_PERIOD, abs=1)
+
+
+def test_a_stalled_process_shows_as_missing_beats(cell: Cell) -> None:
+    cell.tick(0.0)
+    cell.tick(60.0)
+    cell.tick(60.01)
+    assert cell.health.heartbeat <= 3
+
+
+# -- refusals told -----------------------------------------------------------------------------------------------
+
+
+def test_every_refusal_is_counted_and_the_last_one_shown(cell: Cell) -> None:
+    for step in range(100):
+        write(cell, HMI, START, True, 1 + step * 0.01)
+    assert cell.health.writes_refused == 100
+    assert cell.last_refusal is not None
+    assert cell.last_refusal.time == 1.99
+    (event,) = told(cell, EventKind.REFUSED)
+    assert (event.writer, event.variable, event.lock, event.reason) == (HMI, START, 0, Reason.NOT_WRITABLE)
+    assert (event.old, event.new) == (False, True)
+
+
+def test_counted_refusals_are_told_by_the_tick(cell: Cell) -> None:
+    for _ in range(5):
+        write(cell, HMI, START, True, 1.0)
+    cell.tick(10.99)
+    assert len(told(cell, EventKind.REFUSED)) == 1
+    cell.tick(11.0)
+    assert [event.repeats for event in told(cell, EventKind.REFUSED)] == [0, 3]
+
+
+def test_a_refusal_of_a_link_is_recorded_too(cell: Cell) -> None:
+    cell.refuse(None, Refusal(Reason.PARTIAL_VALUE, SPEED), 1.0, 3)
+    (event,) = told(cell, EventKind.REFUSED)
+    assert (event.writer, event.variable, event.new) == (None, SPEED, 3)
+    cell.refuse(PLC, Refusal(Reason.NO_SUCH_ADDRESS), 1.0)
+    assert cell.health.writes_refused == 2

@@ -1,0 +1,673 @@
+"""Any interleaving of what links, writers and time do to a cell, against a second, naive account of the same rules."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from gatewayd.core.cell import Cell, Change
+from gatewayd.core.definition import (
+    CellDefinition,
+    Direction,
+    Fallback,
+    FallbackKind,
+    Limits,
+    Lock,
+    Value,
+    ValueKind,
+    Variable,
+    Writer,
+)
+from gatewayd.core.events import EventKind
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
+from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.status import LENGTH, RELEASE, RELEASE_ALL, REQUEST, StatusBlock
+
+CLEAR, HOLD = Fallback(), Fallback(FallbackKind.HOLD)
+LOW, HIGH = -(2.0**31), 2.0**31 - 1
+
+
+def _bit(number: int, lock: int | None, on_release: Fallback = CLEAR) -> Variable:
+    field = "input_bit_registers0_to_31"
+    return Variable(
+        number,
+        f"bit{number}",
+        Direction.INPUT,
+        ValueKind.BOOL,
+        field,
+        bit=number,
+        on_release=on_release,
+        lock=lock,
+    )
+
+
+def _value(number: int, kind: ValueKind, lock: int, on_release: Fallback, limits: Limits | None) -> Variable:
+    low, high = (LOW, HIGH) if kind is ValueKind.INT else (None, None)
+    return Variable(
+        number,
+        f"value{number}",
+        Direction.INPUT,
+        kind,
+        f"field{number}",
+        low=low,
+        high=high,
+        on_release=on_release,
+        limits=limits,
+        lock=lock,
+    )
+
+
+def _output(number: int, kind: ValueKind, on_stale: Fallback) -> Variable:
+    return Variable(number, f"out{number}", Direction.OUTPUT, kind, f"out{number}", on_stale=on_stale)
+
+
+INT, FLOAT, BOOL = ValueKind.INT, ValueKind.FLOAT, ValueKind.BOOL
+DEFINITION = CellDefinition(
+    name="any",
+    fingerprint=0xDEADBEEF,
+    variables=(
+        _bit(1, 0),
+        _bit(2, 1),
+        _bit(3, 2, HOLD),
+        _bit(4, 3, Fallback(FallbackKind.VALUE, value=True)),
+        _value(5, INT, 4, CLEAR, Limits(-5.5, 10.5, clamp=True)),
+        _value(6, FLOAT, 4, Fallback(FallbackKind.VALUE, 1.5), None),
+        _value(7, FLOAT, 5, HOLD, Limits(-1.0, 1.0)),
+        _value(8, INT, 6, Fallback(FallbackKind.VALUE, 1), None),
+        _output(9, INT, CLEAR),
+        _output(10, FLOAT, HOLD),
+        _output(11, INT, Fallback(FallbackKind.VALUE, -1)),
+        _output(12, BOOL, Fallback(FallbackKind.EXCEPTION)),
+    ),
+    locks=(
+        Lock("fixed", (0,), (0,)),
+        Lock("priority", (1,), (0, 1, 2), takeover=True, lease=0.5),
+        Lock("list", (2,), (1, 0), lease=0.5),
+        Lock("any", (3,), (0, 1, 2, 3), lease=1.0),
+        Lock("group", (4, 5), (2, 1, 0), takeover=True, lease=0.75),
+        Lock("endless", (6,), (3, 2)),
+        Lock("single", (7,), (3,), lease=0.25),
+    ),
+    writers=(Writer("a"), Writer("b", 0.5), Writer("c", 0.25), Writer("d")),
+    stale_after=0.25,
+)
+VARIABLES = DEFINITION.variables
+LOCKS = DEFINITION.locks
+INPUTS = [n for n, one in enumerate(VARIABLES) if one.direction is Direction.INPUT]
+OUTPUTS = [n for n, one in enumerate(VARIABLES) if one.direction is Direction.OUTPUT]
+BITS = [0, 1, 2, 3]
+LOCK_OF = {member: number for number, lock in enumerate(LOCKS) for member in lock.members}
+TELLING_ORDER = [
+    Reason.NOT_WRITABLE,
+    Reason.OUT_OF_LIMITS,
+    Reason.ROBOT_LOST,
+    Reason.CLAIMED_ELSEWHERE,
+    Reason.HELD,
+]
+
+writers = st.integers(0, 3)
+anybody = st.one_of(st.none(), writers)
+steps = st.sampled_from([0.0, 0.125, 0.25, 0.5])
+numbers = st.sampled_from([0, 1, -6, -5, 10, 11, 2**31 - 1, 2**31, True, 1.0, 1.5, math.nan])
+reals = st.sampled_from([0.0, -0.0, 1, True, 1.0, 1.5, -1.0, 1.0000001, math.inf, math.nan])
+VALUES = {BOOL: st.booleans(), INT: numbers, FLOAT: reals}
+HELD_VALUES = {BOOL: st.booleans(), INT: st.integers(-20, 20), FLOAT: st.floats(-2, 2)}
+
+
+@st.composite
+def changes(draw: st.DrawFn) -> list[Change]:
+    """Up to five variables, outputs too; or all bits of the word, implied as by writing its register."""
+    if draw(st.booleans()):
+        return [Change(bit, draw(st.booleans()), implied=True) for bit in BITS]
+    chosen = draw(st.lists(st.integers(0, len(VARIABLES) - 1), min_size=1, max_size=5))
+    return [Change(index, draw(VALUES[VARIABLES[index].kind]), draw(st.booleans())) for index in chosen]
+
+
+def adoptions() -> st.SearchStrategy[dict[int, Value]]:
+    return st.fixed_dictionaries({}, optional={index: HELD_VALUES[VARIABLES[index].kind] for index in INPUTS})
+
+
+def same(left: Value, right: Value) -> bool:
+    """Equal, and of one type: the gateway must not turn True into 1, nor lose a NaN."""
+    return type(left) is type(right) and (left == right or (left != left and right != right))  # noqa: PLR0124
+
+
+def is_int32(value: Value) -> bool:
+    try:
+        struct.pack("i", value if isinstance(value, int) else value.as_integer_ratio()[0])
+    except (struct.error, OverflowError, ValueError):
+        return False
+    return isinstance(value, int) or value.is_integer()
+
+
+class Model:
+    """The same rules, told as plainly as possible: every question is answered by looking at everything."""
+
+    def __init__(self, *, clear_on_connect: bool) -> None:
+        self.clear_on_connect = clear_on_connect
+        self.owner: dict[int, int | None] = dict.fromkeys(range(len(LOCKS)))
+        self.until: dict[int, float] = dict.fromkeys(range(len(LOCKS)), math.inf)
+        self.value: dict[int, Value] = {n: (False, 0, 0.0)[one.kind] for n, one in enumerate(VARIABLES)}
+        self.value[10] = -1
+        self.told: dict[int, float] = dict.fromkeys(range(len(VARIABLES)), -math.inf)
+        self.good: set[int] = set()
+        self.ever: set[int] = set()
+        self.gone: set[int] = set()
+        self.due: set[int] = set()
+        self.connections: Counter[int] = Counter()
+        self.alive: set[int] = set()
+        self.heard: dict[int, float] = {}
+        self.connected = self.adopted = False
+        self.source = Source.LOST
+        self.timestamp: float | None = None
+        self.last_package = self.last_progress = self.shown = -math.inf
+        self.accepted = self.refused = self.packages = self.sessions = 0
+        self.events: Counter[EventKind] = Counter()
+        self.last: tuple[Refusal, int | None, float] | None = None
+
+    # Owners.
+
+    def may(self, writer: int | None, index: int) -> bool:
+        return writer is not None and index in LOCK_OF and writer in LOCKS[LOCK_OF[index]].owners
+
+    def outranks(self, writer: int, lock: int) -> bool:
+        ranking, owner = LOCKS[lock].owners, self.owner[lock]
+        assert owner is not None
+        return LOCKS[lock].takeover and ranking.index(writer) < ranking.index(owner)
+
+    def own(self, lock: int, writer: int, now: float) -> None:
+        former = self.owner[lock]
+        if former is None:
+            self.events[EventKind.ACQUIRED] += 1
+        elif former != writer:
+            self.events[EventKind.TAKEN_OVER] += 1
+        self.owner[lock] = writer
+        lease = LOCKS[lock].lease
+        self.until[lock] = math.inf if lease is None else now + lease
+
+    def free(self, lock: int, now: float) -> None:
+        self.events[EventKind.RELEASED] += 1
+        self.owner[lock], self.until[lock] = None, math.inf
+        for index in LOCKS[lock].members:
+            self.fall_back(index, now)
+
+    def expire(self, now: float) -> None:
+        for lock in range(len(LOCKS)):
+            if self.owner[lock] is not None and now >= self.until[lock]:
+                self.free(lock, now)
+
+    def lose(self, writer: int, now: float) -> None:
+        if writer in self.alive:
+            self.alive.discard(writer)
+            self.events[EventKind.WRITER_LOST] += 1
+            for lock in range(len(LOCKS)):
+                if self.owner[lock] == writer:
+                    self.free(lock, now)
+
+    def hear(self, writer: int | None, now: float) -> None:
+        if writer is not None:
+            self.heard[writer] = now
+            if writer not in self.alive:
+                self.alive.add(writer)
+                self.events[EventKind.WRITER_CONNECTED] += 1
+
+    # Values.
+
+    def put(self, index: int, value: Value, now: float) -> None:
+        self.value[index], self.told[index] = value, now
+        self.ever.add(index)
+        if index not in self.gone:
+            self.good.add(index)
+
+    def fall_back(self, index: int, now: float) -> None:
+        if not self.adopted or index in self.gone:
+            self.due.add(index)
+            return
+        self.due.discard(index)
+        policy = VARIABLES[index].on_release
+        if policy.kind is FallbackKind.HOLD:
+            return
+        new = (False, 0, 0.0)[VARIABLES[index].kind] if policy.kind is FallbackKind.CLEAR else policy.value
+        assert new is not None
+        if self.value[index] != new:
+            self.events[EventKind.FALLBACK] += 1
+        self.put(index, new, now)
+
+    def fits(self, index: int, value: Value) -> Value | None:
+        if index == 4:
+            return min(max(int(value), -5), 10) if is_int32(value) else None
+        if index == 6:
+            return value if -1 <= value <= 1 else None
+        if index == 7:
+            return int(value) if is_int32(value) else None
+        return value
+
+    def judge(self, writer: int | None, change: Change) -> Refusal | None:
+        """None if nothing about this one change stands in the way."""
+        index = change.variable
+        if writer is None:
+            return Refusal(Reason.NOT_WRITABLE, index)
+        if self.passes(writer, change):
+            return None
+        if not self.may(writer, index):
+            return Refusal(Reason.NOT_WRITABLE, index)
+        if self.fits(index, change.value) is None:
+            return Refusal(Reason.OUT_OF_LIMITS, index)
+        if not self.adopted:
+            return Refusal(Reason.ROBOT_LOST, index)
+        if index in self.gone:
+            return None if self.untouched(change) else Refusal(Reason.CLAIMED_ELSEWHERE, index)
+        lock = LOCK_OF[index]
+        holder = self.owner[lock]
+        if holder in (None, writer) or self.outranks(writer, lock):
+            return None
+        return Refusal(Reason.HELD, index, holder)
+
+    def untouched(self, change: Change) -> bool:
+        return change.implied and change.value == self.value[change.variable]
+
+    def passes(self, writer: int, change: Change) -> bool:
+        """An implied bit of somebody else that keeps its value."""
+        index = change.variable
+        own_or_free = self.may(writer, index) and self.owner[LOCK_OF[index]] in (None, writer)
+        return self.untouched(change) and not own_or_free
+
+    def write(self, writer: int | None, request: list[Change], now: float) -> Refusal | None:
+        self.expire(now)
+        self.hear(writer, now)
+        refusals = [refusal for change in request if (refusal := self.judge(writer, change)) is not None]
+        if refusals:
+            refusal = min(refusals, key=lambda one: TELLING_ORDER.index(one.reason))
+            if refusal.reason is Reason.ROBOT_LOST and writer is not None:
+                for change in request:
+                    lock = LOCK_OF.get(change.variable)
+                    if lock is not None and self.owner[lock] == writer:
+                        self.own(lock, writer, now)
+            return self.refuse(writer, refusal, now)
+        assert writer is not None
+        written = [change for change in request if not self.passes(writer, change)]
+        for change in written:
+            lock = LOCK_OF[change.variable]
+            if change.variable not in self.gone or self.owner[lock] == writer:
+                self.own(lock, writer, now)
+        for change in written:
+            if change.variable not in self.gone:
+                value = self.fits(change.variable, change.value)
+                assert value is not None
+                self.due.discard(change.variable)
+                self.put(change.variable, value, now)
+        self.accepted += 1
+        return None
+
+    def refuse(self, writer: int | None, refusal: Refusal, now: float) -> Refusal:
+        self.refused += 1
+        self.last = (refusal, writer, now)
+        return refusal
+
+    def act(self, writer: int | None, index: int, now: float, *, take: bool) -> Refusal | None:
+        self.expire(now)
+        self.hear(writer, now)
+        if writer is None or not self.may(writer, index):
+            return self.refuse(writer, Refusal(Reason.NOT_WRITABLE, index), now)
+        lock = LOCK_OF[index]
+        holder = self.owner[lock]
+        if holder in (None, writer) or (take and self.outranks(writer, lock)):
+            if take:
+                self.own(lock, writer, now)
+            elif holder == writer:
+                self.free(lock, now)
+            return None
+        return self.refuse(writer, Refusal(Reason.HELD, index, holder), now)
+
+    # The robot.
+
+    def dim(self) -> None:
+        """The outputs are dead."""
+        for index in OUTPUTS:
+            self.good.discard(index)
+            self.show_policy(index)
+
+    def show_policy(self, index: int) -> None:
+        if index in (8, 10):
+            self.value[index] = {8: 0, 10: -1}[index]
+
+    def connect(self, now: float) -> None:
+        self.disconnect(now)
+        self.connected, self.source = True, Source.WAITING
+        self.sessions += 1
+        self.events[EventKind.ROBOT_CONNECTED] += 1
+
+    def disconnect(self, now: float) -> None:
+        if self.connected:
+            self.connected = self.adopted = False
+            self.source = Source.LOST
+            self.good -= set(INPUTS)
+            self.dim()
+            self.events[EventKind.ROBOT_LOST] += 1
+
+    def package(self, timestamp: float, now: float) -> bool:
+        if not self.connected:
+            return False
+        self.packages += 1
+        self.last_package = now
+        if timestamp == self.timestamp:
+            if self.source is Source.WAITING:
+                self.source = Source.FROZEN
+            return False
+        self.timestamp, self.last_progress = timestamp, now
+        if self.source is not Source.FRESH:
+            self.source = Source.FRESH
+            self.events[EventKind.FRESH] += 1
+        return True
+
+    def show(self, values: dict[int, Value], now: float) -> None:
+        self.value.update(values)
+        self.shown = now
+        self.good.update(set(OUTPUTS) - self.gone)
+        self.ever.update(set(OUTPUTS) - self.gone)
+
+    def adopt(self, held: dict[int, Value], now: float) -> None:
+        if not self.connected:
+            return
+        first, self.adopted = not self.adopted, True
+        for index, value in held.items():
+            self.put(index, value, now)
+        self.events[EventKind.INPUTS_ADOPTED] += first
+        for index in INPUTS:
+            ownerless = self.owner[LOCK_OF[index]] is None and index not in self.gone
+            if index in self.due or (self.clear_on_connect and ownerless and (first or index in held)):
+                self.fall_back(index, now)
+
+    def set_gone(self, index: int, *, gone: bool) -> None:
+        if gone == (index in self.gone):
+            return
+        self.events[EventKind.UNAVAILABLE if gone else EventKind.AVAILABLE] += 1
+        self.gone ^= {index}
+        if gone:
+            self.good.discard(index)
+        if index in OUTPUTS:
+            self.ever.discard(index)
+            self.show_policy(index)
+
+    def tick(self, now: float) -> None:
+        self.expire(now)
+        for writer in sorted(self.alive):
+            timeout = DEFINITION.writers[writer].timeout
+            if timeout is not None and now - self.heard[writer] > timeout:
+                self.lose(writer, now)
+        if self.source not in (Source.LOST, Source.WAITING) and now - self.last_progress > 0.25:
+            if self.source is Source.FRESH:
+                self.events[EventKind.STALE] += 1
+            self.dim()
+            self.source = Source.SILENT if now - self.last_package > 0.25 else Source.FROZEN
+
+    def quality(self, index: int) -> Quality:
+        if index in self.gone:
+            return Quality.UNAVAILABLE
+        if index in self.good:
+            return Quality.GOOD
+        return Quality.STALE if index in self.ever else Quality.NEVER
+
+    def time_of(self, index: int) -> float:
+        if index in INPUTS:
+            return self.told[index]
+        return self.shown if index in self.ever and index not in self.gone else -math.inf
+
+
+class CellMachine(RuleBasedStateMachine):
+    """Drives a cell and its model alike; every rule is one thing that a link, a writer or the clock can do."""
+
+    @initialize(clear=st.booleans(), up=st.booleans())
+    def begin(self, clear: bool, up: bool) -> None:
+        self.cell = Cell(replace(DEFINITION, clear_on_connect=clear))
+        self.model = Model(clear_on_connect=clear)
+        self.status = StatusBlock(self.cell)
+        self.now = 1000.0
+        self.timestamp = 0.0
+        self.beats_due = self.ticked = 0
+        if up:
+            self.robot_connects()
+            self.robot_adopts({})
+
+    def both(self, act: Callable[[Cell], object], told: Callable[[Model], object]) -> None:
+        assert act(self.cell) == told(self.model)
+
+    # Time.
+
+    @rule(step=steps)
+    def time_passes(self, step: float) -> None:
+        self.now += step
+
+    @rule()
+    def tick(self) -> None:
+        before = self.cell.health.heartbeat
+        self.cell.tick(self.now)
+        self.model.tick(self.now)
+        assert before <= self.cell.health.heartbeat <= before + 1
+        self.ticked += self.cell.health.heartbeat - before
+        assert not self.ended_leases()
+
+    # Writers.
+
+    @rule(writer=anybody, request=changes())
+    def write(self, writer: int | None, request: list[Change]) -> None:
+        self.both(lambda c: c.write(writer, request, self.now), lambda m: m.write(writer, request, self.now))
+        assert not self.ended_leases()
+
+    @rule(data=st.data(), index=st.sampled_from(INPUTS), value=st.sampled_from([0, 1]), implied=st.booleans())
+    def write_what_fits(self, data: st.DataObject, index: int, value: int, implied: bool) -> None:
+        """Owners on one variable, so that they meet."""
+        kind = (bool, int, float)[VARIABLES[index].kind]
+        self.write(
+            data.draw(st.sampled_from(LOCKS[LOCK_OF[index]].owners)), [Change(index, kind(value), implied)]
+        )
+
+    @rule(writer=anybody, index=st.integers(0, len(VARIABLES) - 1), take=st.booleans(), by_word=st.booleans())
+    def ask(self, writer: int | None, index: int, take: bool, by_word: bool) -> None:
+        """Directly, or through the words of the status block."""
+        if by_word and writer is not None:
+            refusal = self.status.write(writer, REQUEST if take else RELEASE, [index + 1], self.now)
+        else:
+            refusal = (self.cell.request if take else self.cell.release)(writer, index, self.now)
+        assert refusal == self.model.act(writer, index, self.now, take=take)
+
+    @rule(writer=writers)
+    def release_all(self, writer: int) -> None:
+        assert self.status.write(writer, RELEASE, [RELEASE_ALL], self.now) is None
+        for lock in range(len(LOCKS)):
+            if self.model.owner[lock] == writer:
+                self.model.free(lock, self.now)
+        assert writer not in self.cell.ownership.owners
+
+    @rule(writer=anybody, index=st.integers(0, len(VARIABLES) - 1))
+    def link_refuses(self, writer: int | None, index: int) -> None:
+        refusal = Refusal(Reason.PARTIAL_VALUE, index)
+        self.cell.refuse(writer, refusal, self.now, 1)
+        self.model.refuse(writer, refusal, self.now)
+
+    @rule(writer=writers)
+    def connect(self, writer: int) -> None:
+        self.cell.writer_connected(writer, self.now)
+        self.model.connections[writer] += 1
+        self.model.hear(writer, self.now)
+
+    @rule(writer=writers)
+    def seen(self, writer: int) -> None:
+        self.cell.writer_seen(writer, self.now)
+        self.model.hear(writer, self.now)
+
+    @rule(writer=writers)
+    def disconnect(self, writer: int) -> None:
+        self.cell.writer_disconnected(writer, self.now, "closed")
+        self.model.connections[writer] = max(0, self.model.connections[writer] - 1)
+        if not self.model.connections[writer]:
+            self.model.lose(writer, self.now)
+            assert writer not in self.cell.ownership.owners
+
+    # The robot.
+
+    @precondition(lambda self: self.now % 0.5 == 0)
+    @rule()
+    def robot_connects(self) -> None:
+        self.cell.robot_connected(self.now)
+        self.model.connect(self.now)
+
+    @precondition(lambda self: self.now % 0.5 == 0)
+    @rule()
+    def robot_is_lost(self) -> None:
+        self.cell.robot_lost("gone", self.now)
+        self.model.disconnect(self.now)
+
+    @rule(held=adoptions())
+    def robot_adopts(self, held: dict[int, Value]) -> None:
+        self.cell.adopt(held, self.now)
+        self.model.adopt(held, self.now)
+
+    @precondition(lambda self: self.model.connected)
+    @rule(frozen=st.booleans(), number=st.integers(1, 9), flag=st.booleans())
+    def package(self, frozen: bool, number: int, flag: bool) -> None:
+        self.timestamp += 0 if frozen else 1
+        news = self.cell.package_arrived(self.timestamp, self.now)
+        assert news == self.model.package(self.timestamp, self.now)
+        if news:
+            values: dict[int, Value] = {8: number, 9: number / 4, 10: -number, 11: flag}
+            values = {index: value for index, value in values.items() if index not in self.model.gone}
+            for index, value in values.items():
+                self.cell.image.values[index] = value
+            self.cell.outputs_written(self.now)
+            self.model.show(values, self.now)
+
+    @precondition(lambda self: not self.model.connected)
+    @rule()
+    def robot_comes_up(self) -> None:
+        self.robot_connects()
+        self.package(frozen=False, number=3, flag=True)
+        self.robot_adopts({})
+
+    @precondition(lambda self: not self.model.connected)
+    @rule()
+    def late_package(self) -> None:
+        self.timestamp += 1
+        assert not self.cell.package_arrived(self.timestamp, self.now)
+        self.cell.outputs_written(self.now)
+
+    @rule(chosen=st.lists(st.integers(0, len(VARIABLES) - 1), min_size=1, max_size=4), gone=st.booleans())
+    def availability(self, chosen: list[int], gone: bool) -> None:
+        self.cell.set_availability(chosen, not gone, "as it pleases", self.now)
+        for index in chosen:
+            self.model.set_gone(index, gone=gone)
+
+    # What must hold whatever happened.
+
+    @invariant()
+    def every_value_is_what_somebody_declared_or_wrote(self) -> None:
+        image = self.cell.image
+        for index in range(len(VARIABLES)):
+            assert same(image.values[index], self.model.value[index]), VARIABLES[index].name
+            assert image.quality[index] is self.model.quality(index), VARIABLES[index].name
+            assert image.time_of(index) == self.model.time_of(index), VARIABLES[index].name
+
+    @invariant()
+    def every_lock_has_the_one_owner_it_should(self) -> None:
+        table = self.cell.ownership
+        for lock, declared in enumerate(LOCKS):
+            owner = table.owners[lock]
+            assert owner == self.model.owner[lock], declared.name
+            assert owner is None or owner in declared.owners
+            assert table.expires[lock] == self.model.until[lock], declared.name
+            assert owner is None or self.cell.writers.alive[owner]
+
+    @invariant()
+    def stale_never_looks_fresh(self) -> None:
+        assert self.cell.freshness.state is self.model.source
+        assert self.cell.accepts_writes is self.model.adopted
+        for index in OUTPUTS:
+            good = self.cell.image.quality[index] is Quality.GOOD
+            assert not good or self.model.source is Source.FRESH
+            assert good or index != 8 or self.cell.image.values[index] == 0
+            assert good or index != 10 or self.cell.image.values[index] == -1
+        assert (11 in self.cell.unreadable) == (11 not in self.model.good)
+
+    @invariant()
+    def every_refusal_is_counted_and_shown(self) -> None:
+        assert self.cell.health.writes_accepted == self.model.accepted
+        assert self.cell.health.writes_refused == self.model.refused
+        last = self.cell.last_refusal
+        assert (None if last is None else (last.refusal, last.writer, last.time)) == self.model.last
+
+    @invariant()
+    def writers_are_alive_as_heard(self) -> None:
+        assert {number for number, alive in enumerate(self.cell.writers.alive) if alive} == self.model.alive
+
+    @invariant()
+    def only_the_tick_counts_the_heartbeat(self) -> None:
+        assert self.cell.health.heartbeat == self.ticked
+
+    @invariant()
+    def everything_that_happened_is_an_event(self) -> None:
+        if self.cell.events.count == len(self.cell.events):
+            counted = Counter(event.kind for event in self.cell.events)
+            del counted[EventKind.REFUSED]
+            assert counted == +self.model.events
+
+    @invariant()
+    def the_status_block_says_the_same(self) -> None:
+        words = struct.unpack(f">{LENGTH}H", self.status.read(0, LENGTH, self.now))
+        model = self.model
+        assert words[2:4] == (0xDEAD, 0xBEEF)
+        good = {index for index in range(len(VARIABLES)) if index in model.good}
+        owned = any(owner is not None for owner in model.owner.values())
+        assert words[1] == sum(
+            flag << bit
+            for bit, flag in enumerate(
+                [model.source is Source.FRESH, model.adopted, len(good) == 12, owned, model.refused > 0]
+            )
+        )
+        assert words[4] == self.ticked
+        assert words[7] == model.source
+        assert words[13:16] == (model.sessions, 0, model.packages)
+        assert words[20:24] == (0, model.accepted, 0, model.refused)
+        if model.last is not None:
+            refusal, writer, time = model.last
+            numbers = (refusal.variable, writer, refusal.holder)
+            assert words[30] == refusal.reason
+            assert words[31:34] == tuple(0 if number is None else number + 1 for number in numbers)
+            assert words[35] == int((self.now - time) * 1000) & 0xFFFF
+        assert words[64] == sum(1 << index for index in good)
+        assert words[128:132] == tuple(int(number in model.alive) for number in range(4))
+        for index in range(len(VARIABLES)):
+            owner = model.owner[LOCK_OF[index]] if index in LOCK_OF else None
+            assert words[192 + index] == (0 if owner is None else owner + 1)
+            left = 0.0 if owner is None else max(0.0, model.until[LOCK_OF[index]] - self.now)
+            assert words[1216 + index] == min(left * 1000, 0xFFFF) // 1
+            assert words[2240 + index] == min((self.now - model.time_of(index)) * 1000, 0xFFFF) // 1
+            assert words[3264 + index] == model.quality(index)
+
+    def ended_leases(self) -> list[str]:
+        table = self.cell.ownership
+        return [LOCKS[lock].name for lock, until in enumerate(table.expires) if until <= self.now]
+
+    def teardown(self) -> None:
+        """Every refusal is told in the end, one by one or as a count; and all that is owned can be released."""
+        if not hasattr(self, "cell") or self.cell.events.count > len(self.cell.events):
+            return
+        for _ in range(2):
+            self.now += 10.0
+            self.tick()
+        told = sum(1 + event.repeats for event in self.cell.events if event.kind is EventKind.REFUSED)
+        assert told == self.model.refused
+        for writer in range(4):
+            self.release_all(writer)
+        assert self.cell.ownership.owners == [None] * len(LOCKS)
+
+
+TestAnyInterleaving = CellMachine.TestCase
+TestAnyInterleaving.settings = settings(max_examples=200, stateful_step_count=50, deadline=None)

@@ -1,0 +1,181 @@
+from __future__ import annotations
+
+import struct
+from itertools import pairwise
+
+import pytest
+
+from gatewayd.core.cell import Cell, Change
+from gatewayd.core.definition import CellDefinition
+from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.status import (
+    FIELDS,
+    HEADER_WORDS,
+    LENGTH,
+    RELEASE,
+    RELEASE_ALL,
+    REQUEST,
+    TABLES,
+    StatusBlock,
+    StatusField,
+    StatusTable,
+)
+
+PLC, HMI, AUX = range(3)
+START, LAMP, PART, FORCE, SPEED, PATH, CYCLES = range(7)
+ENTRIES: list[StatusField | StatusTable] = [*FIELDS, *TABLES]
+OFFSETS = {entry.name: entry.offset for entry in ENTRIES}
+
+
+@pytest.fixture
+def status(cell: Cell) -> StatusBlock:
+    return StatusBlock(cell)
+
+
+def words(status: StatusBlock, name: str, now: float, count: int = 1) -> tuple[int, ...]:
+    return struct.unpack(f">{count}H", status.read(OFFSETS[name], count, now))
+
+
+def long(status: StatusBlock, name: str, now: float) -> int:
+    (number,) = struct.unpack(">I", status.read(OFFSETS[name], 2, now))
+    assert isinstance(number, int)
+    return number
+
+
+def test_fields_and_tables_lie_one_after_the_other() -> None:
+    assert all(one.offset + one.words <= next_one.offset for one, next_one in pairwise(ENTRIES))
+    assert FIELDS[-1].offset < HEADER_WORDS == TABLES[0].offset
+    assert TABLES[-1].offset + TABLES[-1].words == LENGTH
+
+
+def test_any_part_is_a_slice_of_the_whole(cell: Cell, status: StatusBlock) -> None:
+    cell.write(HMI, [Change(SPEED, 0.5)], 0.5)
+    whole = status.read(0, LENGTH, 1.0)
+    for first, count in (
+        (0, 64),
+        (3, 2),
+        (30, 70),
+        (63, 1),
+        (64, 1),
+        (190, 10),
+        (1215, 2),
+        (3300, 125),
+        (4287, 1),
+    ):
+        assert status.read(first, count, 1.0) == whole[2 * first : 2 * (first + count)]
+
+
+def test_the_header_tells_the_state(cell: Cell, status: StatusBlock) -> None:
+    for now in (0.0, 0.05, 0.1):
+        cell.tick(now)
+    cell.health.frequency = 499.96
+    assert words(status, "layout", 0.1) == (1,)
+    assert long(status, "fingerprint", 0.1) == 0xC0FFEE42
+    assert words(status, "heartbeat", 0.1, 4) == (2, 10, 3, 2)
+    assert long(status, "robot_age", 0.1) == 100
+    assert words(status, "frequency", 0.1) == (5000,)
+    assert words(status, "sessions", 0.1) == (1,)
+
+
+def test_flags_follow_the_state_bit_by_bit(cell: Cell, status: StatusBlock) -> None:
+    assert words(status, "flags", 0.0) == (0b111,)
+    cell.write(PLC, [Change(START, True)], 0.0)
+    assert words(status, "flags", 0.0) == (0b1111,)
+    cell.write(HMI, [Change(START, True)], 0.0)
+    cell.health.read_back_mismatches = 1
+    cell.health.watchdog_fed = True
+    assert words(status, "flags", 0.0) == (0b1111111,)
+    cell.robot_lost("unplugged", 0.0)
+    assert words(status, "flags", 0.0) == (0b1111000,)
+
+
+def test_before_anything_happened_ages_are_endless_and_nothing_was_refused(press: CellDefinition) -> None:
+    status = StatusBlock(Cell(press))
+    assert long(status, "robot_age", 1e6) == 0xFFFF_FFFF
+    assert long(status, "uptime", 1e6) == 0
+    assert words(status, "refusal_reason", 1e6, 6) == (0, 0, 0, 0, 0xFFFF, 0xFFFF)
+    assert words(status, "age", 1e6, 10) == (0xFFFF,) * 10
+    assert words(status, "quality", 1e6, 10) == (3,) * 10
+
+
+def test_long_times_saturate_and_counters_wrap(cell: Cell, status: StatusBlock) -> None:
+    cell.tick(0.0)
+    cell.write(PLC, [Change(START, True)], 0.0)
+    cell.health.packages = 2**32 + 5
+    cell.health.sessions = 2**16 + 1
+    assert long(status, "robot_age", 1e10) == 0xFFFF_FFFF
+    assert words(status, "age", 100.0) == (0xFFFF,)
+    assert long(status, "packages", 0.0) == 5
+    assert words(status, "sessions", 0.0) == (1,)
+
+
+def test_the_last_refusal_names_everybody_from_one(cell: Cell, status: StatusBlock) -> None:
+    cell.write(HMI, [Change(PART, 1)], 1.0)
+    cell.write(PLC, [Change(PART, 2)], 1.0)
+    assert words(status, "refusal_reason", 1.25, 6) == (3, PART + 1, PLC + 1, HMI + 1, 0, 250)
+    cell.refuse(None, Refusal(Reason.NO_SUCH_ADDRESS), 1.0)
+    assert words(status, "refusal_reason", 1.25, 4) == (1, 0, 0, 0)
+
+
+def test_owners_and_leases_stand_at_every_variable_of_a_group(cell: Cell, status: StatusBlock) -> None:
+    cell.write(HMI, [Change(PATH, 1)], 1.0)
+    cell.write(PLC, [Change(START, True)], 1.0)
+    assert words(status, "owner", 1.5, 8) == (1, 0, 0, 0, 2, 2, 0, 0)
+    assert words(status, "lease", 1.5, 8) == (0xFFFF, 0, 0, 0, 1500, 1500, 0, 0)
+
+
+def test_good_bits_count_from_the_least_significant(cell: Cell, status: StatusBlock) -> None:
+    cell.set_availability([START, CYCLES], False, "gone", 0.0)
+    assert words(status, "good", 0.0, 2) == (0b11_1011_1110, 0)
+    assert words(status, "quality", 0.0, 7) == (2, 0, 0, 0, 0, 0, 2)
+
+
+def test_writers_alive(cell: Cell, status: StatusBlock) -> None:
+    cell.writer_connected(HMI, 0.0)
+    assert words(status, "writers_alive", 0.0, 4) == (0, 1, 0, 0)
+
+
+def test_a_lock_is_taken_and_given_back_by_the_number_of_its_variable(status: StatusBlock) -> None:
+    assert status.write(HMI, REQUEST, [SPEED + 1], 1.0) is None
+    assert words(status, "owner", 1.0, 6)[4:] == (2, 2)
+    assert status.write(HMI, REQUEST, [0, PATH + 1], 1.0) is None
+    assert words(status, "owner", 1.0, 6)[4:] == (0, 0)
+    assert words(status, "request", 1.0, 2) == (0, 0)
+
+
+def test_release_all_gives_back_what_is_mine(cell: Cell, status: StatusBlock) -> None:
+    cell.write(HMI, [Change(PART, 1), Change(SPEED, 0.5)], 1.0)
+    cell.write(PLC, [Change(START, True)], 1.0)
+    assert status.write(HMI, RELEASE, [RELEASE_ALL], 1.0) is None
+    assert words(status, "owner", 1.0, 6) == (1, 0, 0, 0, 0, 0)
+
+
+def test_zeros_ask_for_nothing(cell: Cell, status: StatusBlock) -> None:
+    assert status.write(HMI, REQUEST, [0, 0], 1.0) is None
+    assert cell.health.writes_refused == 0
+
+
+@pytest.mark.parametrize(
+    "writer, first, request_words, reason",
+    [
+        (None, REQUEST, [1], Reason.NOT_WRITABLE),
+        (HMI, REQUEST - 1, [1], Reason.NOT_WRITABLE),
+        (HMI, RELEASE, [1, 1], Reason.NOT_WRITABLE),
+        (HMI, 0, [1], Reason.NOT_WRITABLE),
+        (HMI, REQUEST, [11], Reason.OUT_OF_LIMITS),
+        (HMI, REQUEST, [RELEASE_ALL], Reason.OUT_OF_LIMITS),
+        (HMI, REQUEST, [3, 3], Reason.OUT_OF_LIMITS),
+        (HMI, REQUEST, [3, RELEASE_ALL], Reason.OUT_OF_LIMITS),
+        (HMI, REQUEST, [START + 1], Reason.NOT_WRITABLE),
+        (HMI, REQUEST, [CYCLES + 1], Reason.NOT_WRITABLE),
+        (HMI, RELEASE, [CYCLES + 1], Reason.NOT_WRITABLE),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_counted_and_changes_nothing(
+    cell: Cell, writer: int | None, first: int, request_words: list[int], reason: Reason
+) -> None:
+    refusal = StatusBlock(cell).write(writer, first, request_words, 1.0)
+    assert refusal is not None
+    assert refusal.reason is reason
+    assert cell.health.writes_refused == 1
+    assert cell.ownership.owners == [None] * 5

@@ -1,0 +1,342 @@
+"""Every rule by its examples: the bad one breaks it and it alone, the good one passes; then the finer points."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from gatewayd.core import status
+from gatewayd.mapping.diagnostics import Diagnostic, Rule
+from gatewayd.mapping.loader import load, load_together
+from gatewayd.mapping.rules import bounds, catalogue, places
+from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
+
+REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
+RULES = catalogue.complete()
+
+HEAD = """\
+gatewayd: 1
+cell: press-3
+robot: {host: 192.168.1.10}
+modbus: {listen: '192.168.1.2:1502'}
+writers:
+  plc: {modbus: 192.168.1.20, timeout: 1s}
+  hmi: {modbus: 192.168.1.21, timeout: 1s}
+variables:
+  keep: {robot: input_bit_register_63, modbus: 999.15, owner: [plc, hmi]}
+"""
+
+
+def examples(rule: Rule, kind: str) -> list[Path]:
+    """The files of an example; rules about several cells have `bad.yaml` and `bad-2.yaml`."""
+    return sorted(
+        (REFERENCE / "rules" / catalogue.folder(rule)).glob(f"{kind}*.yaml"), key=lambda path: path.stem
+    )
+
+
+def check(paths: Sequence[Path]) -> list[Diagnostic]:
+    loaded = load_together([(path.name, path.read_bytes()) for path in paths])
+    return [finding for one in loaded for finding in one.diagnostics]
+
+
+def findings(lines: str, head: str = HEAD) -> list[tuple[str, int]]:
+    """Rule and line, counted from the first of `lines`, of all that is found."""
+    found = load((head + lines).encode(), "cell.yaml").diagnostics
+    return [(finding.rule.id, finding.position.line - head.count("\n")) for finding in found]
+
+
+@pytest.mark.parametrize("rule", RULES, ids=catalogue.folder)
+def test_bad_example_breaks_this_rule_alone(rule: Rule) -> None:
+    """One finding, of this rule, at the line that the example says, with a hint."""
+    paths = examples(rule, "bad")
+    found = check(paths)
+    assert [finding.rule.id for finding in found] == [rule.id]
+    position = found[0].position
+    text = next(path for path in paths if path.name == position.file).read_text("utf-8", "replace")
+    lines = text.splitlines()
+    stated = re.match(rf"# {rule.id} at line (\d+)", lines[0])
+    line = int(stated[1]) if stated else next(n for n, t in enumerate(lines, 1) if f"{rule.id} is here" in t)
+    assert position.line == line
+    assert position.column >= 1
+    assert found[0].hint
+
+
+@pytest.mark.parametrize("rule", RULES, ids=catalogue.folder)
+def test_good_example_passes(rule: Rule) -> None:
+    """No finding at all."""
+    paths = examples(rule, "good")
+    assert paths
+    assert [(str(finding.position), finding.message) for finding in check(paths)] == []
+
+
+def test_pages_are_current() -> None:
+    """Run `python -m gatewayd.mapping.rules.catalogue docs/reference` after a change of a rule's words."""
+    for path, text in catalogue.pages(RULES).items():
+        assert (REFERENCE / path).read_text(encoding="utf-8") == text, path
+
+
+def test_every_folder_belongs_to_a_rule() -> None:
+    """A renamed rule leaves no page behind."""
+    folders = {path.name for path in (REFERENCE / "rules").iterdir()}
+    assert folders == {catalogue.folder(rule) for rule in RULES}
+
+
+def test_a_rule_says_what_and_why() -> None:
+    """Summaries fit a table, reasons are more than the summary."""
+    for rule in RULES:
+        assert 10 < len(rule.summary) <= 80, rule.id
+        assert not rule.summary.endswith("."), rule.id
+        assert len(rule.why) > len(rule.summary), rule.id
+
+
+def test_every_check_has_its_own_rule() -> None:
+    """Nothing is entered twice."""
+    entered = [rule.id for rule, _ in [*CELL_CHECKS, *PLANT_CHECKS]]
+    assert len(entered) == len(set(entered))
+
+
+def test_bounds_are_those_of_the_status_block() -> None:
+    """Said twice, so that a check need not import the running core."""
+    assert places.FIRST_STATUS_REGISTER == status.BASE
+    assert (bounds.MAXIMUM_VARIABLES, bounds.MAXIMUM_WRITERS) == (status.MAX_VARIABLES, status.MAX_WRITERS)
+
+
+def test_related_place_is_the_first_use() -> None:
+    """An overlap names the later line and points to the earlier one."""
+    text = HEAD + (
+        "  a: {robot: output_int_register_0, modbus: 101}\n  b: {robot: output_int_register_1, modbus: 100}\n"
+    )
+    (found,) = load(text.encode(), "cell.yaml").diagnostics
+    base = HEAD.count("\n")
+    assert (found.position.line, found.position.column) == (base + 2, 45)
+    assert [(item.position.line, item.position.column) for item in found.related] == [(base + 1, 45)]
+    assert "100 to 101 (400101 to 400102)" in found.message
+    assert found.hint == "the line fits at 103 to 104 (400104 to 400105)"
+
+
+ROOM = {
+    "behind the other": ("a: {robot: output_int_register_0, modbus: 100}", "101", "102 to 103 (400103 to 400104)"),
+    "between two others": (
+        "a: {robot: output_int_register_0, modbus: [100, 104, 110]}", "101", "102 to 103 (400103 to 400104)",
+    ),
+    "behind a gap that is too small": (
+        "a: {robot: output_int_register_0, modbus: [100, 103, 110]}", "101", "105 to 106 (400106 to 400107)",
+    ),
+    "nowhere": ("a: {robot: output_int_register_0, modbus: 59998}", "59998", ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("other,address,room", ROOM.values(), ids=ROOM.keys())
+def test_the_remedy_of_an_overlap_is_a_place_that_fits(other: str, address: str, room: str) -> None:
+    """The next room behind the place that was meant, or none."""
+    text = f"{HEAD}  {other}\n  b: {{robot: output_int_register_1, modbus: {address}}}\n"
+    (found,) = load(text.encode(), "cell.yaml").diagnostics
+    expected = f"the line fits at {room}" if room else "shorten one of the two lines, or use another area"
+    assert found.hint == expected
+
+
+OVERLAPS = {
+    "areas count each for itself": (
+        (
+            "  a: {robot: output_bit_register_0, modbus: {coil: 5}}\n"
+            "  b: {robot: output_bit_register_1, modbus: {discrete: 5}}\n"
+            "  c: {robot: output_int_register_0, modbus: {holding: 5}}\n"
+            "  d: {robot: output_int_register_1, modbus: {input: 5}}\n"
+        ),
+        [],
+    ),
+    "bits side by side": (
+        "  a: {robot: output_bit_register_0, modbus: 5.0}\n  b: {robot: output_bit_register_1, modbus: 5.1}\n",
+        [],
+    ),
+    "the same bit": (
+        "  a: {robot: output_bit_register_0, modbus: 5.3}\n  b: {robot: output_bit_register_1, modbus: 5.3}\n",
+        [("GW214", 2)],
+    ),
+    "the same coil": (
+        (
+            "  a: {robot: output_bit_register_0, modbus: {coil: 5}}\n"
+            "  b: {robot: output_bit_register_1, modbus: {coil: 5}}\n"
+        ),
+        [("GW214", 2)],
+    ),
+    "two places of one variable": ("  a: {robot: output_int_register_0, modbus: [5, 6]}\n", [("GW214", 1)]),
+    "a family over a family is one finding": (
+        "  a: {robot: output_int_register_0..9, modbus: 0}\n  b: {robot: output_double_register_0..9, modbus: 10}\n",
+        [("GW214", 2)],
+    ),
+    "a bit behind a long number": (
+        "  a: {robot: output_double_register_0, modbus: 5}\n  b: {robot: output_bit_register_0, modbus: 8.0}\n",
+        [("GW215", 2)],
+    ),
+    "one number over three others": (
+        (
+            "  a: {robot: output_int_register_0, modbus: {holding: 4, type: int16}, limits: [0, 9]}\n"
+            "  b: {robot: output_double_register_0, modbus: 3}\n"
+            "  c: {robot: output_int_register_1, modbus: {holding: 6, type: int16}, limits: [0, 9]}\n"
+        ),
+        [("GW214", 2), ("GW214", 3)],
+    ),
+}
+
+
+@pytest.mark.parametrize("lines,expected", OVERLAPS.values(), ids=OVERLAPS.keys())
+def test_overlaps(lines: str, expected: list[tuple[str, int]]) -> None:
+    assert findings(lines) == expected
+
+
+FINER_POINTS = {
+    "a mirror of an input in a read-only area is fine": (
+        "  a: {robot: input_int_register_0, modbus: [10, {input: 10}], owner: plc}\n",
+        [],
+    ),
+    "the word and one of its bits": (
+        (
+            "  a: {robot: input_bit_registers0_to_31, modbus: 10, owner: plc}\n"
+            "  b: {robot: input_bit_register_3, modbus: 12.0, owner: plc}\n"
+        ),
+        [("GW305", 2)],
+    ),
+    "a bit and then its word": (
+        (
+            "  b: {robot: input_bit_register_3, modbus: 12.0, owner: plc}\n"
+            "  a: {robot: input_bit_registers0_to_31, modbus: 10, owner: plc}\n"
+        ),
+        [("GW305", 2)],
+    ),
+    "the same output twice is fine": (
+        "  a: {robot: output_int_register_0, modbus: 10}\n  b: {robot: output_int_register_0, modbus: 12}\n",
+        [],
+    ),
+    "a broken line may be the mask": (
+        (
+            "  a: {robot: speed_slider_fraction, modbus: 10, owner: plc}\n"
+            "  b: {robot: speed_slider_mask, modbus: 1O, owner: plc}\n"
+        ),
+        [("GW115", 2)],
+    ),
+    "an address of the manual in its own area only": (
+        (
+            "  a: {robot: output_bit_register_0, modbus: {coil: 40001}}\n"
+            "  b: {robot: output_int_register_0, modbus: {input: 30001}}\n"
+        ),
+        [("GW204", 2)],
+    ),
+    "numbers across a block of 125": (
+        "  a: {robot: output_double_register_0..47, modbus: 0}\n",
+        [("GW212", 1)],
+    ),
+    "a block that ends in time": (
+        (
+            "  a: {robot: output_double_register_0..30, modbus: 0}\n"
+            "  b: {robot: output_double_register_31..47, modbus: 125}\n"
+        ),
+        [],
+    ),
+    "inputs across a block of 123": (
+        (
+            "  a: {robot: output_bit_register_0, modbus: 5.0}\n"
+            "  b: {robot: input_double_register_0..23, modbus: 6, owner: plc}\n"
+            "  c: {robot: input_int_register_0..15, modbus: 102, owner: plc}\n"
+        ),
+        [("GW212", 3)],
+    ),
+    "small enumerations fit a small type": (
+        "  a: {robot: robot_mode, modbus: {holding: 10, type: int16}}\n",
+        [],
+    ),
+    "stated limits make a small type fit": (
+        "  a: {robot: output_int_register_0, modbus: {holding: 10, type: int16}, limits: [0, 999]}\n",
+        [],
+    ),
+    "an inverse scale comes out even": (
+        "  a: {robot: output_int_register_0, modbus: {holding: 10, type: int64, scale: 0.1}}\n",
+        [],
+    ),
+    "true is no number": (
+        "  a: {robot: output_int_register_0, modbus: 10, on_stale: true}\n",
+        [("GW602", 1)],
+    ),
+    "1 is a bit": ("  a: {robot: output_bit_register_0, modbus: 10.0, on_stale: 1}\n", []),
+    "a fallback beyond the type": (
+        "  a: {robot: input_int_register_0, modbus: 10, owner: plc, on_release: 3000000000}\n",
+        [("GW602", 1)],
+    ),
+    "a family with one mistake is one finding": (
+        "  a: {robot: output_int_register_0..23, modbus: {holding: 10, type: int16}, owner: plc, on_stale: 0.5}\n",
+        [("GW703", 1), ("GW513", 1), ("GW602", 1)],
+    ),
+}
+
+
+@pytest.mark.parametrize("lines,expected", FINER_POINTS.values(), ids=FINER_POINTS.keys())
+def test_finer_points(lines: str, expected: list[tuple[str, int]]) -> None:
+    assert findings(lines) == expected
+
+
+def test_wildcards_of_both_ip_versions_clash() -> None:
+    """`::` takes the port of 0.0.0.0 too."""
+    first = HEAD.replace("'192.168.1.2:1502'", "'[::]:1502', allow: [192.168.1.0/24]")
+    second = first.replace("[::]", "0.0.0.0").replace("press-3", "press-4").replace("1.10}", "1.11}")
+    loaded = load_together([("a.yaml", first.encode()), ("b.yaml", second.encode())])
+    assert [finding.rule.id for one in loaded for finding in one.diagnostics] == ["GW207"]
+
+
+def test_cells_on_different_ports_do_not_clash() -> None:
+    """Nothing is shared, nothing is found."""
+    other = HEAD.replace("press-3", "press-4").replace("1.10}", "1.11}").replace("1502", "1503")
+    loaded = load_together([("a.yaml", HEAD.encode()), ("b.yaml", other.encode())])
+    assert [finding for one in loaded for finding in one.diagnostics] == []
+
+
+def test_an_owner_of_an_output_is_told_the_input() -> None:
+    """Outputs that are easily taken for inputs have their counterpart in the hint."""
+    hints = []
+    for field in ("output_int_register_3", "actual_digital_output_bits", "target_speed_fraction"):
+        text = HEAD + f"  a: {{robot: {field}, modbus: 10, owner: plc}}\n"
+        hints += [finding.hint for finding in load(text.encode(), "cell.yaml").diagnostics]
+    assert hints == [
+        "remove `owner`, or map an input such as input_int_register_3",
+        "remove `owner`, or map an input such as standard_digital_output (with its mask)",
+        "remove `owner`, or map an input such as speed_slider_fraction (with its mask)",
+    ]
+
+
+@pytest.mark.parametrize("peer", ["127.0.0.1", "127.0.0.40", "::1", "0.0.0.0/0"])
+def test_writers_on_this_machine_reach_a_loopback_listener(peer: str) -> None:
+    """So do networks that hold it."""
+    head = (
+        HEAD.replace("192.168.1.2:", "127.0.0.1:")
+        .replace("192.168.1.20", f"'{peer}'")
+        .replace("1.21", "1.22")
+    )
+    found = load(head.encode(), "cell.yaml").diagnostics
+    assert [
+        (finding.rule.id, "`hmi`" in finding.message) for finding in found if finding.rule.id == "GW219"
+    ] == [("GW219", True)]
+
+
+def test_mistakes_of_all_families_come_in_one_pass() -> None:
+    """No finding hides another."""
+    lines = (
+        "  a: {robot: input_int_register_0, modbus: 60000, owner: nobody, lease: 5}\n"
+        "  b: {robot: actual_TCP_poze, modbus: 0}\n"
+        "  c: {robot: input_double_register_0, modbus: {holding: 20, type: int16}, owner: plc, limits: [5, 1]}\n"
+        "  d: {robot: output_int_register_1, modbus: 20, on_release: hold}\n"
+    )
+    assert {rule for rule, _ in findings(lines)} == {"GW112", "GW301", "GW608", "GW702", "GW214", "GW605"}
+
+
+def test_the_largest_cell_is_judged_in_bounded_time() -> None:
+    """A thousand overlapping variables cost no more than their sorting."""
+    lines = "".join(
+        f"  v{n}: {{robot: output_double_register_{n % 48}, modbus: {n % 40}}}\n" for n in range(1000)
+    )
+    started = time.perf_counter()
+    found = findings(lines)
+    assert time.perf_counter() - started < 10
+    assert {rule for rule, _ in found} == {"GW214"}

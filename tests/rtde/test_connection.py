@@ -1,0 +1,250 @@
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from gatewayd.rtde import messages
+from gatewayd.rtde.client import ClientSettings, LossReason, RtdeClient
+
+if TYPE_CHECKING:
+    from tests.rtde.conftest import Connected, Controller
+
+Until = Callable[..., Awaitable[None]]
+DOUBLES = tuple(f"input_double_register_{number}" for number in range(24))
+
+
+async def test_small_writes_are_not_delayed_and_dead_peers_are_noticed(
+    connected: Connected, until: Until
+) -> None:
+    async with connected() as (client, seen):
+        await until(lambda: seen.packages)
+        assert client._connection is not None
+        assert client._connection._transport is not None
+        own: Any = client._connection._transport.get_extra_info("socket")
+        assert own.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+        assert own.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+
+
+async def test_only_the_newest_of_waiting_packages_is_handed_on(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.sends_data = False
+    async with connected() as (client, seen):
+        await until(lambda: seen.sessions)
+        protocol, peer = controller.peer.protocol, controller.peer
+        layout = seen.sessions[0].outputs
+        stream = b"".join(
+            protocol.send(messages.DataPackage(1, layout.pack((float(step),)))) for step in range(1, 6)
+        )
+        peer.writer.write(stream)
+        await until(lambda: seen.packages)
+        assert seen.packages == [(5.0,)]
+        assert (client.statistics.packages, client.statistics.overtaken) == (5, 4)
+
+
+async def test_skipped_packages_are_counted(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.sends_data = False
+    async with connected() as (client, seen):
+        await until(lambda: seen.sessions)
+        controller.peer.package()
+        controller.peer.package(4)
+        await until(lambda: client.statistics.packages == 2)
+        assert client.statistics.skipped == 3
+
+
+async def test_data_that_comes_before_the_answer_to_the_start_counts(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.data_before_start_reply = True
+    async with connected() as (_, seen):
+        await until(lambda: len(seen.packages) > 2)
+        assert len(seen.sessions) == 1
+        assert not seen.losses
+
+
+@pytest.mark.parametrize(
+    "request_type, words",
+    [
+        (messages.RequestProtocolVersion, "the answer to protocol version 2"),
+        (messages.GetControllerVersion, "the controller version"),
+        (messages.SetupOutputs, "the answer to the output recipe"),
+        (messages.SetupInputs, "the answer to an input recipe"),
+    ],
+)
+async def test_a_request_that_is_not_answered_ends_the_connection(
+    request_type: type, words: str, controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.mute = {request_type}
+    async with connected(inputs=("input_int_register_0",), handshake_timeout=0.05) as (_, seen):
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.UNANSWERED
+        assert f"{words} did not come within 0.05 s" in seen.losses[0].text
+        controller.script.mute.clear()
+        await until(lambda: seen.packages)
+
+
+async def test_a_refused_start_is_told_and_tried_again(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.accept_start = False
+    async with connected() as (_, seen):
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.HANDSHAKE
+        assert not seen.sessions
+        controller.script.accept_start = True
+        await until(lambda: seen.packages)
+
+
+async def test_silence_ends_the_connection(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected(data_timeout=0.1) as (_, seen):
+        await until(lambda: seen.packages)
+        controller.peer.stop()
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.SILENT
+        await until(lambda: len(seen.sessions) == 2)
+
+
+async def test_slow_packages_are_no_silence(connected: Connected, until: Until) -> None:
+    async with connected(frequency=10.0, data_timeout=0.02) as (_, seen):
+        await until(lambda: len(seen.packages) > 3)
+        assert not seen.losses
+
+
+async def test_the_first_package_may_take_longer(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    """A controller whose safety set-up is not confirmed accepts the start and sends nothing."""
+    controller.script.sends_data = False
+    async with connected(data_timeout=0.05, first_data_timeout=0.4) as (_, seen):
+        await until(lambda: seen.sessions)
+        await asyncio.sleep(0.2)
+        assert not seen.losses
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.SILENT
+        assert "safety set-up confirmed" in seen.losses[0].text
+
+
+async def test_the_boot_restart_of_a_controller_is_only_a_new_connection(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected() as (_, seen):
+        await until(lambda: seen.packages)
+        controller.script.time_zero = 0.0
+        await until(lambda: len(seen.sessions) == 2)
+        assert seen.losses[0].reason is LossReason.RESTARTED
+        assert "its RTDE service has restarted" in seen.losses[0].text
+
+
+@pytest.mark.parametrize(
+    "garbage, words",
+    [
+        (bytes(4), "package size 0 is less"),
+        (b"\x00\x05\xff\x00\x00", "unknown package type 255"),
+        (b"\x00\x05\x55\x01\x00", "1 bytes of values where the recipe has 8"),
+    ],
+    ids=["size", "type", "length"],
+)
+async def test_bytes_that_are_not_rtde_end_the_connection(
+    garbage: bytes, words: str, controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected() as (_, seen):
+        await until(lambda: seen.packages)
+        controller.peer.stop()
+        controller.peer.writer.write(garbage)
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.PROTOCOL
+        assert words in seen.losses[0].text
+        await until(lambda: len(seen.sessions) == 2)
+
+
+async def test_what_came_before_an_error_is_still_handed_on(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.sends_data = False
+    async with connected() as (_, seen):
+        await until(lambda: seen.sessions)
+        good = seen.sessions[0].outputs.pack((1.0,))
+        controller.peer.writer.write(controller.peer.protocol.send(messages.DataPackage(1, good)) + bytes(3))
+        await until(lambda: seen.losses)
+        assert seen.packages == [(1.0,)]
+
+
+async def test_a_controller_that_does_not_read_is_given_up_and_no_write_waits(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected(inputs=DOUBLES, data_timeout=5.0) as (client, seen):
+        await until(lambda: seen.packages)
+        controller.script.stop_reading = True
+        sent = 0
+        while client.send("registers", [0.0] * 24):
+            sent += 1
+            assert sent < 200_000
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.CONGESTED
+
+
+async def test_used_up_recipe_ids_cost_a_new_connection(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.in_use = {DOUBLES[0]}
+    async with connected(inputs=DOUBLES, claim_retry=0.02) as (client, seen):
+        await until(lambda: seen.packages)
+        assert client._connection is not None
+        client._connection._negotiation.claims._used = 255
+        controller.script.in_use = set()
+        await until(lambda: len(seen.sessions) == 2)
+        assert seen.losses[0].reason is LossReason.RECIPES
+        assert seen.sessions[1].unavailable == ()
+
+
+async def test_what_was_sent_before_the_end_arrives(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected(inputs=DOUBLES) as (client, seen):
+        await until(lambda: seen.packages)
+        client.send("registers", [1.5] * 24)
+    await until(lambda: controller.peer.written.get(DOUBLES[23]) == 1.5)
+
+
+async def test_after_the_end_no_handler_is_called(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected() as (_, seen):
+        await until(lambda: seen.packages)
+    count = len(seen.packages)
+    await asyncio.sleep(0.05)
+    assert len(seen.packages) == count
+    assert not seen.losses
+    assert controller.peer.writer.is_closing()
+
+
+@pytest.mark.parametrize("error", [LookupError("a bug"), OSError("a bug")], ids=["lookup", "os"])
+async def test_an_exception_of_a_handler_ends_the_client(error: Exception, controller: Controller) -> None:
+    class Failing:
+        def session_started(self, session: object) -> None:
+            raise error
+
+        values = inputs_changed = session_lost = text = session_started
+
+    handler: Any = Failing()
+    with pytest.raises(type(error), match="a bug"):
+        await RtdeClient(ClientSettings("127.0.0.1", controller.port), handler).run()
+
+
+async def test_pausing_ends_with_the_connection(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected(handshake_timeout=0.05) as (client, seen):
+        await until(lambda: seen.packages)
+        controller.script.mute = {messages.Pause}
+        await client.pause()
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.UNANSWERED

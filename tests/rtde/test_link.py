@@ -1,0 +1,341 @@
+"""The link between a cell and a simulated controller: adoption, sending, checking, and what a loss leaves."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from dataclasses import dataclass
+
+import pytest
+
+from gatewayd.core.cell import Cell, Change
+from gatewayd.core.definition import Direction
+from gatewayd.core.events import EventKind
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
+from gatewayd.mapping.loader import load
+from gatewayd.rtde import link as link_module
+from gatewayd.rtde.link import RobotLink
+from gatewayd.simulator.controller import Controller
+from gatewayd.simulator.program import DEMO, parse
+from gatewayd.simulator.server import SimulatedController
+
+Until = Callable[..., Awaitable[None]]
+PLC, HMI = 0, 1
+
+HEAD = """\
+gatewayd: 1
+cell: link
+robot: {{host: 127.0.0.1, port: {port}, stale_after: 5s{options}}}
+writers: {{plc: {{modbus: 127.0.0.2}}, hmi: {{modbus: 127.0.0.3}}}}
+modbus: {{listen: '127.0.0.1:1502'}}
+variables:
+"""
+REGISTERS = """\
+  bit:    {robot: input_bit_register_3,    modbus: 0.3}
+  number: {robot: input_int_register_0,    modbus: 1}
+  real:   {robot: input_double_register_0, modbus: 3, on_release: hold}
+  echo:   {robot: output_int_register_0,   modbus: 100}
+  lamp:   {robot: output_bit_register_3,   modbus: 102.3}
+"""
+BIT, NUMBER, REAL, ECHO, LAMP = range(5)
+
+
+class Defect(Exception):
+    pass
+
+
+@dataclass
+class Rig:
+    robot: SimulatedController
+    cell: Cell
+    link: RobotLink
+
+    def write(self, *changes: tuple[int, bool | int | float], writer: int = PLC) -> None:
+        """Apply a write request that must be accepted."""
+        refusal = self.cell.write(writer, [Change(*one) for one in changes], time.monotonic())
+        assert refusal is None, refusal
+
+    def get(self, field: str) -> object:
+        return self.robot.get(field)
+
+    def events(self, kind: EventKind) -> list[str]:
+        return [event.detail for event in self.cell.events if event.kind is kind]
+
+
+Rigged = Callable[..., AbstractAsyncContextManager[Rig]]
+
+
+@pytest.fixture
+def rigged() -> Rigged:
+    """A controller that echoes its registers, a cell for the variables given, and their link, running."""
+
+    @asynccontextmanager
+    async def run(
+        variables: str = REGISTERS,
+        options: str = "",
+        prepare: Callable[[SimulatedController], None] | None = None,
+    ) -> AsyncIterator[Rig]:
+        async with SimulatedController(Controller(program=parse(DEMO))) as robot:
+            if prepare is not None:
+                prepare(robot)
+            loaded = load((HEAD.format(port=robot.port, options=options) + variables).encode(), "link.yaml")
+            assert loaded.plan is not None, loaded.diagnostics
+            cell = Cell(loaded.plan.cell)
+            link = RobotLink(loaded.plan.robot, cell)
+            task = asyncio.create_task(link.run())
+            try:
+                yield Rig(robot, cell, link)
+            finally:
+                task.cancel()
+                with suppress(asyncio.CancelledError, Defect):
+                    await task
+
+    return run
+
+
+async def test_what_the_controller_holds_is_adopted_and_not_overwritten(rigged: Rigged, until: Until) -> None:
+    def prepare(robot: SimulatedController) -> None:
+        robot.set("input_bit_registers0_to_31", 0x80000009)
+        robot.set("input_int_register_0", -5)
+        robot.set("input_double_register_0", 2.5)
+
+    async with rigged(prepare=prepare) as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        assert rig.cell.image.values[:3] == [True, -5, 2.5]
+        assert rig.cell.image.quality[:3] == [Quality.GOOD] * 3
+        rig.write((BIT, False))
+        await until(lambda: rig.get("input_bit_registers0_to_31") == 0x80000001)
+        assert (rig.get("input_int_register_0"), rig.get("input_double_register_0")) == (-5, 2.5)
+
+
+async def test_nothing_is_sent_before_something_is_written(rigged: Rigged, until: Until) -> None:
+    """Another tool may set a register between the adoption and the first write: it stays."""
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.robot.set("input_int_register_0", 99)
+        await until(lambda: rig.cell.health.packages > 20)
+        assert rig.get("input_int_register_0") == 99
+
+
+async def test_outputs_are_copied_bits_and_numbers(rigged: Rigged, until: Until) -> None:
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.write((BIT, True), (NUMBER, -(2**31)))
+        await until(lambda: rig.cell.image.values[ECHO] == -(2**31))
+        assert rig.cell.image.values[LAMP] is True
+        rig.write((BIT, False))
+        await until(lambda: rig.cell.image.values[LAMP] is False)
+
+
+async def test_values_of_one_request_arrive_in_one_package(rigged: Rigged, until: Until) -> None:
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        torn: list[tuple[object, object]] = []
+        seen: set[object] = set()
+
+        def look(_direction: Direction) -> None:
+            number, real = rig.get("input_int_register_0"), rig.get("input_double_register_0")
+            seen.add(number)
+            if number != real:
+                torn.append((number, real))
+
+        rig.cell.listeners.append(look)
+        for number in range(200):
+            rig.write((NUMBER, number), (REAL, float(number)))
+            if number % 3 == 0:
+                await asyncio.sleep(0.001)
+        await until(lambda: rig.get("input_int_register_0") == 199)
+        assert not torn
+        assert len(seen) > 10
+
+
+async def test_at_most_one_package_per_controller_cycle(rigged: Rigged, until: Until) -> None:
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        before, start = rig.link._client.statistics.writes, time.monotonic()
+        for number in range(1000):
+            rig.write((NUMBER, number))
+        await until(lambda: rig.get("input_int_register_0") == 999)
+        sent = rig.link._client.statistics.writes - before
+        assert 2 <= sent <= 2 + (time.monotonic() - start) / 0.002
+
+
+async def test_an_equal_value_written_again_is_sent_again(rigged: Rigged, until: Until) -> None:
+    """The writer means it: what the robot holds may have been changed by somebody else."""
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.write((NUMBER, 7))
+        await until(lambda: rig.get("input_int_register_0") == 7)
+        rig.robot.set("input_int_register_0", 1)
+        rig.write((NUMBER, 7))
+        await until(lambda: rig.get("input_int_register_0") == 7)
+
+
+@pytest.mark.parametrize("value", [math.inf, -0.0, math.nan, 5e-324])
+async def test_doubles_keep_every_bit(rigged: Rigged, until: Until, value: float) -> None:
+    def held(rig: Rig) -> str:
+        return repr(rig.get("input_double_register_0"))
+
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.write((REAL, value))
+        await until(lambda: held(rig) == repr(value))
+        await asyncio.sleep(0)
+        assert not rig.events(EventKind.READ_BACK_DIFFERS)
+
+
+CYCLIC = pytest.mark.parametrize("cyclic", [False, True], ids=["written once", "written in every PLC cycle"])
+
+
+@CYCLIC
+async def test_a_value_that_does_not_arrive_is_told_once(
+    rigged: Rigged, until: Until, monkeypatch: pytest.MonkeyPatch, cyclic: bool
+) -> None:
+    """Also while the PLC writes another variable, or the same value, again and again."""
+    monkeypatch.setattr(link_module, "VERIFY_AFTER", 0.1)
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.write((NUMBER, 7), (REAL, 1.0))
+        await until(lambda: rig.get("input_int_register_0") == 7)
+        _make_stubborn(rig.robot)
+        end = time.monotonic() + 0.6
+        real = 1.0
+        while time.monotonic() < end:
+            if cyclic:
+                real += 1
+                rig.write((NUMBER, 7), (REAL, real))
+            await asyncio.sleep(0.01)
+        told = rig.events(EventKind.READ_BACK_DIFFERS)
+        assert told == ["input_int_register_0: sent 7, the controller holds 8"]
+        assert rig.cell.health.read_back_mismatches == 1
+
+
+def _make_stubborn(robot: SimulatedController) -> None:
+    """From now on something in the controller puts 8 into the register in every cycle."""
+    advance = robot.controller.advance
+
+    def altered(cycles: int = 1) -> None:
+        robot.set("input_int_register_0", 8)
+        advance(cycles)
+
+    robot.controller.advance = altered  # type: ignore[method-assign]
+
+
+IO = """\
+  slider:  {robot: speed_slider_fraction, modbus: {holding: 0, type: float32}, on_release: hold, limits: [0.1, 1]}
+  mask:    {robot: speed_slider_mask,     modbus: 2, on_release: hold}
+  number:  {robot: input_int_register_0,  modbus: 4}
+"""
+
+
+async def test_an_input_that_the_controller_does_not_tell_is_not_good_before_it_is_written(
+    rigged: Rigged, until: Until
+) -> None:
+    async with rigged(IO) as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        assert rig.cell.image.quality == [Quality.NEVER, Quality.NEVER, Quality.GOOD]
+        rig.write((0, 0.5), (1, 1))
+        assert rig.cell.image.quality == [Quality.GOOD] * 3
+        await until(lambda: rig.get("target_speed_fraction") == 0.5)
+
+
+async def test_a_new_session_sends_nothing_that_nobody_wrote_in_it(rigged: Rigged, until: Until) -> None:
+    """What cannot be read back would else be sent as it was before the loss, over what was set meanwhile."""
+    async with rigged(IO) as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.write((0, 0.5), (1, 1))
+        await until(lambda: rig.get("target_speed_fraction") == 0.5)
+        sessions, writes = rig.cell.health.sessions, rig.link._client.statistics.writes
+        rig.robot.drop_clients()
+        rig.robot.set("target_speed_fraction", 0.75)
+        await until(lambda: rig.cell.health.sessions > sessions and rig.cell.accepts_writes)
+        packages = rig.cell.health.packages
+        await until(lambda: rig.cell.health.packages > packages + 5)
+        assert rig.link._client.statistics.writes == writes
+        assert rig.get("target_speed_fraction") == 0.75
+        assert rig.cell.image.quality == [Quality.STALE, Quality.STALE, Quality.GOOD]
+
+
+async def test_registers_freed_later_are_adopted_and_lose_no_write(rigged: Rigged, until: Until) -> None:
+    """Writes to the others go on meanwhile; the freed one is taken over as it is."""
+
+    def prepare(robot: SimulatedController) -> None:
+        robot.hold("input_double_register_0")
+        robot.set("input_double_register_0", 4.5)
+
+    async with rigged(prepare=prepare) as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        assert not rig.cell.is_available(REAL)
+        rig.robot.free("input_double_register_0")
+        number = 0
+        while not rig.cell.is_available(REAL):
+            number += 1
+            rig.write((NUMBER, number))
+            await asyncio.sleep(0)
+        rig.write((NUMBER, number + 1))
+        assert rig.cell.image.values[REAL] == 4.5
+        await until(lambda: rig.get("input_int_register_0") == number + 1)
+        assert rig.get("input_double_register_0") == 4.5
+        rig.write((REAL, 1.5))
+        await until(lambda: rig.get("input_double_register_0") == 1.5)
+
+
+async def test_a_defect_behind_a_callback_counts_as_a_loss(rigged: Rigged, until: Until) -> None:
+    """Nobody may believe in a robot whose link has ended."""
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+
+        def fail(_direction: Direction) -> None:
+            raise Defect
+
+        rig.cell.listeners.insert(0, fail)
+        await until(lambda: rig.cell.freshness.state is not Source.FRESH)
+        assert not rig.cell.accepts_writes
+        assert rig.cell.freshness.state is Source.LOST
+
+
+async def test_the_same_failure_is_told_once(
+    rigged: Rigged, until: Until, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        await rig.robot.stop()
+        await until(lambda: rig.cell.freshness.state is Source.LOST)
+        await until(lambda: len([r for r in caplog.records if r.message == "no robot"]) == 1)
+        await asyncio.sleep(0.3)
+        assert len([r for r in caplog.records if r.message == "no robot"]) == 1
+        await rig.robot.start()
+        await until(lambda: rig.cell.accepts_writes)
+
+
+async def test_what_is_due_is_sent_before_the_end(rigged: Rigged, until: Until) -> None:
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        for number in range(50):
+            rig.write((NUMBER, number))
+        await rig.link.close()
+        robot = rig.robot
+        await until(lambda: robot.get("input_int_register_0") == 49)
+
+
+WATCHDOG = ", watchdog: {field: input_int_register_9, frequency: 50, requires: [plc]}"
+
+
+async def test_the_watchdog_is_fed_for_living_writers_only(rigged: Rigged, until: Until) -> None:
+    async with rigged(options=WATCHDOG) as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        now = time.monotonic
+        rig.cell.writer_connected(HMI, now())
+        await asyncio.sleep(0.1)
+        assert not rig.cell.health.watchdog_fed
+        rig.cell.writer_connected(PLC, now())
+        await until(lambda: rig.cell.health.watchdog_fed)
+        fed = int(str(rig.get("input_int_register_9")))
+        await until(lambda: int(str(rig.get("input_int_register_9"))) > fed + 3)
+        rig.cell.writer_disconnected(PLC, now(), "gone")
+        await until(lambda: not rig.cell.health.watchdog_fed)
+        await rig.link.close()

@@ -1,0 +1,99 @@
+"""Commands from standard input: one line in, one line out."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gatewayd.simulator.control import Control
+from gatewayd.simulator.server import SimulatedController
+
+
+@pytest.fixture
+def control(simulator: SimulatedController) -> Control:
+    return Control(simulator)
+
+
+@pytest.mark.parametrize(
+    "line,answer",
+    [
+        ("get robot_mode", "ok 7"),
+        ("get payload_cog", "ok 0.0,0.0,0.06"),
+        ("get output_bit_register_64", "ok false"),
+        ("clients", "ok 0"),
+        ("  drop-clients  ", "ok 0"),
+        ("text hello there", "ok"),
+        ("freeze on", "ok"),
+        ("silence off", "ok"),
+        ("freeze maybe", "error on or off, not 'maybe'"),
+        ("set timestamp 1", "error timestamp follows the controller's cycles; use freeze to stop it"),
+        ("set output_int_register_0 2147483648", "error 2147483648 is not within -2147483648..2147483647"),
+        ("set output_int_register_0 x", "error invalid literal for int() with base 0: 'x'"),
+        ("set payload_cog 1", "error payload_cog takes 3 values, not 1"),
+        ("get robot_mod", "error no field 'robot_mod'; did you mean robot_mode?"),
+        ("hold", "error which field?"),
+        ("hold nothing", "error no such input: nothing"),
+        ("free input_int_register_0", "error input_int_register_0 is not held"),
+    ],
+)
+async def test_an_answer(control: Control, line: str, answer: str) -> None:
+    assert await control.execute(line) == answer
+
+
+@pytest.mark.parametrize(
+    "field,value,shown",
+    [
+        ("output_int_register_0", "-5", "-5"),
+        ("output_bit_registers0_to_31", "0xF0", "240"),
+        ("output_bit_register_64", "true", "true"),
+        ("output_double_register_0", "0.25", "0.25"),
+        ("actual_q", "1, 2,3 ,4,5,6", "1.0,2.0,3.0,4.0,5.0,6.0"),
+    ],
+)
+async def test_what_is_set_is_got(control: Control, field: str, value: str, shown: str) -> None:
+    assert await control.execute(f"set {field} {value}") == "ok"
+    assert await control.execute(f"get {field}") == f"ok {shown}"
+
+
+async def test_hold_and_free_several(control: Control, simulator: SimulatedController) -> None:
+    assert await control.execute("hold input_int_register_1,input_int_register_2") == "ok"
+    assert simulator.controller.claims.owner("input_int_register_2") is not None
+    assert await control.execute("free input_int_register_1, input_int_register_2") == "ok"
+    assert simulator.controller.claims.owner("input_int_register_2") is None
+
+
+async def test_switches(control: Control, simulator: SimulatedController) -> None:
+    await control.execute("freeze on")
+    assert (simulator.faults.freeze, simulator.faults.silence) == (True, False)
+
+
+async def test_an_unknown_command_names_the_known_ones(control: Control) -> None:
+    answer = await control.execute("jump")
+    assert answer.startswith("error unknown command 'jump'; there are: get, set, hold, free")
+
+
+async def test_quit(control: Control) -> None:
+    assert not control.quit
+    assert await control.execute("quit") == "ok"
+    assert control.quit
+
+
+async def test_a_restart_is_answered_when_it_is_over(
+    control: Control, simulator: SimulatedController
+) -> None:
+    simulator.set("output_int_register_0", 1)
+    assert await control.execute("restart") == "ok"
+    assert simulator.get("output_int_register_0") == 0
+
+
+WORDS = st.sampled_from(
+    ["get", "set", "hold", "free", "freeze", "text", "clients", "actual_q", "timestamp", "1", ","]
+)
+
+
+@given(st.one_of(st.text(max_size=40), st.lists(WORDS, max_size=4).map(" ".join)))
+async def test_any_line_has_one_line_of_answer(line: str) -> None:
+    answer = await Control(SimulatedController()).execute(line)
+    assert answer.split(" ")[0] in ("ok", "error")
+    assert len(answer.splitlines()) == 1

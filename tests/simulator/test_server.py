@@ -1,0 +1,227 @@
+"""The simulated controller over real sockets."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import struct
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import pytest
+
+from gatewayd.rtde.messages import (
+    DataPackage,
+    InputsSetup,
+    ProtocolVersionReply,
+    RequestProtocolVersion,
+    SetupInputs,
+    TextMessage,
+)
+from gatewayd.simulator.controller import Controller
+from gatewayd.simulator.faults import Faults
+from gatewayd.simulator.program import DEMO, parse
+from gatewayd.simulator.server import SimulatedController
+
+if TYPE_CHECKING:
+    from tests.simulator.conftest import Client
+
+INT = "input_int_register_{}".format
+
+
+def served(faults: Faults | None = None, program: str = "", connections: int = 16) -> SimulatedController:
+    return SimulatedController(Controller(program=parse(program), faults=faults), connections=connections)
+
+
+async def alone(simulator: SimulatedController) -> None:
+    """Returns when the controller has noticed that one client is left."""
+    async with asyncio.timeout(10):
+        while simulator.clients > 1:  # noqa: ASYNC110 - the simulator announces it to nobody
+            await asyncio.sleep(0.005)
+
+
+async def test_timestamps_step_by_one_period(simulator: SimulatedController, client: type[Client]) -> None:
+    async with client(simulator.port) as one:
+        await one.stream("timestamp", frequency=125)
+        stamps = [float((await one.package())[0]) for _ in range(50)]
+    steps = [(b - a) / 0.008 for a, b in pairwise(stamps)]
+    assert all(abs(step - round(step)) < 1e-6 and round(step) >= 1 for step in steps)
+    assert sorted(steps)[len(steps) // 2] == pytest.approx(1)
+
+
+async def test_two_clients_see_each_others_inputs_and_the_programs_answer(client: type[Client]) -> None:
+    async with (
+        served(program=DEMO) as simulator,
+        client(simulator.port) as reader,
+        client(simulator.port) as writer,
+    ):
+        await reader.stream("timestamp", INT(3), "output_int_register_3")
+        assert await writer.negotiate()
+        assert (await writer.inputs(INT(3))).recipe == 1
+        writer.send(DataPackage(1, struct.pack(">i", -77)))
+        assert (await reader.until(lambda values: values[2] == -77))[1] == -77
+
+
+async def test_a_closed_connection_frees_its_claims(
+    simulator: SimulatedController, client: type[Client]
+) -> None:
+    async with client(simulator.port) as other:
+        async with client(simulator.port) as one:
+            assert (await one.inputs(INT(0))).recipe == 1
+            assert (await other.inputs(INT(0))).types == ("IN_USE",)
+        await alone(simulator)
+        assert (await other.inputs(INT(0))).recipe == 1
+
+
+async def test_claims_may_linger(client: type[Client]) -> None:
+    async with served(Faults(linger=0.15)) as simulator, client(simulator.port) as other:
+        async with client(simulator.port) as one:
+            await one.inputs(INT(0))
+        await alone(simulator)
+        assert (await other.inputs(INT(0))).types == ("IN_USE",)
+        await asyncio.sleep(0.3)
+        assert (await other.inputs(INT(0))).recipe == 1
+
+
+async def test_malformed_bytes_cost_only_their_own_connection(
+    simulator: SimulatedController, client: type[Client], caplog: pytest.LogCaptureFixture
+) -> None:
+    async with client(simulator.port) as good, client(simulator.port) as bad:
+        await good.stream("timestamp")
+        bad.writer.write(b"\0\0\0\0")
+        await bad.ended()
+        await good.package()
+    assert simulator.malformed == 1
+    assert "package size 0 is less than its own header" in caplog.text
+
+
+async def test_too_many_clients_are_turned_away(client: type[Client]) -> None:
+    async with served(connections=1) as simulator, client(simulator.port) as one:
+        assert await one.negotiate()
+        async with client(simulator.port) as two:
+            await two.ended()
+        assert (simulator.clients, simulator.refused) == (1, 1)
+        assert await one.negotiate()
+
+
+async def test_a_client_that_does_not_read_is_dropped(client: type[Client]) -> None:
+    async with served(Faults(overflow_close=0.1)) as simulator, client(simulator.port) as reader:
+        await reader.stream("timestamp")
+        loop = asyncio.get_running_loop()
+        with socket.socket() as deaf:
+            deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            deaf.setblocking(False)
+            await loop.sock_connect(deaf, ("127.0.0.1", simulator.port))
+            fields = b"actual_q," * 1000
+            requests = struct.pack(">HBH", 5, ord("V"), 2)
+            requests += struct.pack(">HBd", 11 + len(fields), ord("O"), 500.0) + fields
+            await loop.sock_sendall(deaf, requests + struct.pack(">HB", 3, ord("S")))
+            async with asyncio.timeout(10):
+                while not simulator.overflowed:
+                    await reader.package()
+        assert simulator.clients == 1
+        await reader.package()
+
+
+async def test_a_greeting_precedes_every_answer(client: type[Client]) -> None:
+    async with served(Faults(text_on_connect="not confirmed")) as simulator, client(simulator.port) as one:
+        assert (await one.receive(TextMessage)).message == "not confirmed"
+        one.send(RequestProtocolVersion(2))
+        assert (await one.receive(ProtocolVersionReply)).accepted
+
+
+async def test_the_boot_restart_begins_again_on_the_same_port(client: type[Client]) -> None:
+    async with served(Faults(boot_restart=0.3)) as simulator:
+        port = simulator.port
+        async with client(port) as one:
+            await one.stream("timestamp")
+            assert float((await one.package())[0]) < 1
+            await one.ended()
+        for _ in range(100):
+            try:
+                async with client(port) as again:
+                    await again.stream("timestamp")
+                    assert float((await again.package())[0]) < 0.3
+                break
+            except ConnectionError:
+                await asyncio.sleep(0.05)
+        else:
+            pytest.fail("never came back")
+
+
+async def test_freeze_and_silence_can_be_thrown_at_run_time(
+    simulator: SimulatedController, client: type[Client]
+) -> None:
+    async with client(simulator.port) as one:
+        await one.stream("timestamp")
+        simulator.faults.freeze = True
+        stamp = (await one.package())[0]
+        repeated = await one.until(lambda values: values[0] == simulator.get("timestamp"))
+        assert float(repeated[0]) >= float(stamp)
+        assert await one.package() == repeated
+        simulator.faults.freeze = False
+        await one.until(lambda values: values != repeated)
+        simulator.faults.silence = True
+        assert await one.negotiate()  # what was under way is read
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(one.package(), 0.15)
+        assert await one.negotiate()
+
+
+@pytest.mark.parametrize("fault", ["drop", "duplicate", "split"])
+async def test_mangled_streams_stay_readable(client: type[Client], fault: str) -> None:
+    faults = Faults(seed=4)
+    setattr(faults, fault, 0.4)
+    async with served(faults) as simulator, client(simulator.port) as one:
+        await one.stream("timestamp", "actual_q")
+        stamps = [float((await one.package())[0]) for _ in range(60)]
+    steps = [round((b - a) * 500) for a, b in pairwise(stamps)]
+    assert min(steps) >= (0 if fault == "duplicate" else 1)
+    if fault == "drop":
+        assert max(steps) > 1
+    if fault == "duplicate":
+        assert 0 in steps
+
+
+async def test_hold_and_free_at_run_time(simulator: SimulatedController, client: type[Client]) -> None:
+    async with client(simulator.port) as one:
+        simulator.hold(INT(3))
+        assert (await one.inputs(INT(2), INT(3))).types == ("INT32", "IN_USE")
+        simulator.free(INT(3))
+        assert (await one.inputs(INT(2), INT(3))).recipe == 1
+        with pytest.raises(ValueError, match=r"input_int_register_3 is in use by client 1 \(127.0.0.1:"):
+            simulator.hold(INT(3))
+
+
+async def test_values_are_at_hand(simulator: SimulatedController) -> None:
+    simulator.set("output_double_register_3", 1.5)
+    assert simulator.get("output_double_register_3") == 1.5
+    assert simulator.get("payload_cog") == (0.0, 0.0, 0.06)
+    with pytest.raises(KeyError):
+        simulator.get("nothing")
+
+
+async def test_a_split_request_is_put_together(simulator: SimulatedController, client: type[Client]) -> None:
+    async with client(simulator.port) as one:
+        for byte in one.protocol.send(SetupInputs((INT(0),))):
+            one.writer.write(bytes([byte]))
+            await asyncio.sleep(0.002)
+        assert (await one.receive(InputsSetup)).recipe == 1
+
+
+async def test_stop_and_start_keep_port_and_values(
+    simulator: SimulatedController, client: type[Client]
+) -> None:
+    simulator.set(INT(0), 5)
+    port = simulator.port
+    async with client(port) as one:
+        await one.stream("timestamp")
+        await simulator.stop()
+        await one.ended()
+    await simulator.start()
+    assert (simulator.port, simulator.get(INT(0)), simulator.clients) == (port, 5, 0)
+
+
+async def test_a_port_in_use_is_an_error(simulator: SimulatedController) -> None:
+    with pytest.raises(OSError, match="address already in use"):
+        await SimulatedController(port=simulator.port).start()
