@@ -298,7 +298,9 @@ class PythonCanBus:
                 f"python-can cannot use the interface {self._interface}: {error}; "
                 "install what it needs, or name another one (`python3 -m can.viewer --help` lists them)"
             ) from error
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, can.CanInitializationError) as error:
+            if isinstance(error, can.CanError) and not isinstance(error.__cause__, ValueError):
+                raise
             raise BusError(
                 f"{self._interface} refuses channel {self._channel} at {self._bitrate} bit/s: {error}"
             ) from error
