@@ -23,6 +23,8 @@ class Recorder:
         self.states: list[BusState] = []
         self.reasons: list[str] = []
         self.writable = 0
+        self.room: Callable[[], None] = lambda: None
+        """What to do when there is room again."""
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
         self.frames += frames
@@ -40,6 +42,7 @@ class Recorder:
 
     def on_writable(self, now: float) -> None:
         self.writable += 1
+        self.room()
 
 
 async def until(condition: Callable[[], object], seconds: float = 5.0) -> None:
