@@ -57,6 +57,7 @@ class AbortCode(IntEnum):
     CANNOT_STORE = 0x0800_0020
     LOCAL_CONTROL = 0x0800_0021
     DEVICE_STATE = 0x0800_0022
+    NO_DATA = 0x0800_0024
 
 
 class Abort(Exception):
