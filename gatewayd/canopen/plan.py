@@ -45,11 +45,13 @@ class PdoPlan:
     transmission: int
     """0, 1-240, 254 or 255 (CiA 301, 7.5.2.36)."""
     inhibit: int
-    """Least distance of two transmissions in 100 us; 0: none."""
+    """Least distance of two transmissions in 100 us; 0: none. RPDO: what its producer keeps, for the bus load."""
     event: int
     """TPDO: longest distance of two transmissions; RPDO: deadline; in ms; 0: none."""
     entries: tuple[PdoEntry, ...]
     sync_start: int = 0
+    name: str = ""
+    """As the mapping calls it; empty for a PDO of the automatic layout."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -372,7 +372,7 @@ lease, or the writer a timeout.
 def endless_lock(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Shared locks without a lease whose owners are not all supervised."""
     for lock in _distinct(cell.locks):
-        silent = [name for name in lock.owners if cell.document.writers[name].spec.timeout is None]
+        silent = [name for name in lock.owners if not cell.document.writers[name].spec.is_supervised]
         if len(lock.owners) > 1 and lock.lease is None and silent:
             writer = cell.document.writers[silent[0]]
             message = f"`{lock.name}` has no lease, and its owner `{silent[0]}` no timeout"
@@ -398,7 +398,7 @@ def unsupervised_watchdog(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
         return
     for index, name in enumerate(robot.spec.watchdog.requires or ()):
         writer = cell.document.writers.get(name)
-        if writer is not None and writer.spec.timeout is None:
+        if writer is not None and not writer.spec.is_supervised:
             message = f"the watchdog requires `{name}`, which has no timeout"
             related = (Related(writer.key, f"`{name}` is here"),)
             hint = f"add `timeout: 1s` to `{name}`"
