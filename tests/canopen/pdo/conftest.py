@@ -172,7 +172,7 @@ class Bench:
         plan = PdoPlan(
             number=number,
             direction=direction,
-            cob_id=more.pop("cob_id", 0),
+            cob_id=0,
             predefined="cob_id" not in more and number <= 4,
             transmission=255,
             inhibit=0,
@@ -247,10 +247,16 @@ def make_bench(**changes: object) -> Bench:
     return Bench(variables, objects, cell)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def new_bench() -> Callable[..., Bench]:
     """Makes benches; see `make_bench`."""
     return make_bench
+
+
+@pytest.fixture(scope="session")
+def shared_bench() -> Bench:
+    """For properties that make tables of their own on it again and again."""
+    return make_bench()
 
 
 @pytest.fixture
