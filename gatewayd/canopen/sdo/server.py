@@ -24,12 +24,14 @@ from gatewayd.canopen.sdo.transfers import (
     Upload,
 )
 
-__all__ = ["LONGEST_DOWNLOAD", "SUB_BLOCK_TIMEOUT", "TIMEOUT", "SdoServer", "State"]
+__all__ = ["LONGEST_DOWNLOAD", "SLOWEST_FRAME", "SUB_BLOCK_TIMEOUT", "TIMEOUT", "SdoServer", "State"]
 
 TIMEOUT = 1.0
 """Seconds without a frame after which a transfer is aborted."""
 SUB_BLOCK_TIMEOUT = 0.25
 """Seconds without a segment after which an unfinished sub-block is acknowledged: its last segment was lost."""
+SLOWEST_FRAME = 0.0135
+"""Seconds that a frame takes at 10 kbit/s, the slowest bit rate: a whole sub-block is longer than `TIMEOUT`."""
 LONGEST_DOWNLOAD = 4096
 """Bytes; far beyond the longest object."""
 
@@ -117,8 +119,10 @@ class SdoServer:
         """When `tick` will have something to do; infinity without a transfer."""
         if self.state is State.IDLE:
             return math.inf
-        block = self._block_download
-        return self._heard + (SUB_BLOCK_TIMEOUT if block is not None and block.pending else TIMEOUT)
+        download, upload = self._block_download, self._block_upload
+        if download is not None and download.pending:
+            return self._heard + SUB_BLOCK_TIMEOUT
+        return self._heard + TIMEOUT + (upload.sent * SLOWEST_FRAME if upload is not None else 0.0)
 
     # -- beginning and ending ------------------------------------------------------------------------------------
 

@@ -133,14 +133,15 @@ class BlockDownload:
 class BlockUpload:
     """Hands out data sub-block by sub-block."""
 
-    __slots__ = ("_acknowledged", "_checked", "_data", "_segments", "_sent")
+    __slots__ = ("_acknowledged", "_checked", "_data", "_segments", "sent")
 
     def __init__(self, data: bytes, segments: int, *, checked: bool) -> None:
         """`segments`: how many the first sub-block may have; `checked`: the client wants a CRC. Raises Abort."""
         self._data = data
         self._checked = checked
         self._acknowledged = 0
-        self._sent = 0
+        self.sent = 0
+        """Segments of the present sub-block."""
         self._segments = _sub_block(segments)
 
     @property
@@ -155,9 +156,9 @@ class BlockUpload:
     def sub_block(self) -> list[bytes]:
         """The frames from the first segment on that was not acknowledged."""
         first = self._acknowledged
-        self._sent = min(self._segments, self._total - first)
+        self.sent = min(self._segments, self._total - first)
         frames = []
-        for number in range(1, self._sent + 1):
+        for number in range(1, self.sent + 1):
             start = (first + number - 1) * SEGMENT
             last = _LAST if first + number == self._total else 0
             data = self._data[start : start + SEGMENT]
@@ -166,7 +167,7 @@ class BlockUpload:
 
     def acknowledge(self, taken: int, segments: int) -> None:
         """The client took so many segments of the sub-block; the next may have `segments`. Raises Abort."""
-        if taken > self._sent:
+        if taken > self.sent:
             raise Abort(AbortCode.SEQUENCE_NUMBER)
         self._acknowledged += taken
         if not self.done:

@@ -12,7 +12,14 @@ from hypothesis import strategies as st
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import AbortCode, Access, Dictionary, Entry, variable
-from gatewayd.canopen.sdo.server import LONGEST_DOWNLOAD, SUB_BLOCK_TIMEOUT, TIMEOUT, SdoServer, State
+from gatewayd.canopen.sdo.server import (
+    LONGEST_DOWNLOAD,
+    SLOWEST_FRAME,
+    SUB_BLOCK_TIMEOUT,
+    TIMEOUT,
+    SdoServer,
+    State,
+)
 
 ABORT = b"\x80\x05\x20\x00" + struct.pack("<I", AbortCode.GENERAL)
 """The client's abort of a transfer of 2005h."""
@@ -388,14 +395,17 @@ def reach(server: SdoServer, state: State) -> None:
 
 
 @every_state
-def test_silence_of_a_second_aborts(server: SdoServer, state: State) -> None:
+def test_silence_aborts(server: SdoServer, state: State) -> None:
+    """After a second, and the time that the frames of a sub-block may need to reach the client."""
     reach(server, state)
     multiplexer = server._multiplexer.hex()
-    assert server.next_deadline(0.0) == TIMEOUT
-    assert server.tick(TIMEOUT - 0.001) == []
-    assert [frame.hex() for frame in server.tick(TIMEOUT)] == [abort(multiplexer, AbortCode.TIMED_OUT)]
+    uploading = state in (State.BLOCK_UPLOAD, State.BLOCK_UPLOAD_END)
+    deadline = TIMEOUT + (2 * SLOWEST_FRAME if uploading else 0.0)
+    assert server.next_deadline(0.0) == deadline
+    assert server.tick(deadline - 0.001) == []
+    assert [frame.hex() for frame in server.tick(deadline)] == [abort(multiplexer, AbortCode.TIMED_OUT)]
     assert server.state is State.IDLE
-    assert server.next_deadline(TIMEOUT) == math.inf
+    assert server.next_deadline(deadline) == math.inf
     assert server.tick(10.0) == []
 
 
@@ -447,6 +457,79 @@ def test_block_download_that_never_ends_is_bounded(server: SdoServer) -> None:
             server._block_download is None or len(server._block_download._download._data) <= LONGEST_DOWNLOAD
         )
     assert server._block_download is None
+
+
+# -- every entry (OD 01 to 09) -------------------------------------------------------------------------------------
+
+
+def upload(server: SdoServer, index: int, subindex: int) -> bytes | int:
+    """What an SDO client reads; the code of an abort as a number."""
+    answer = server.receive(struct.pack("<BHB4x", 0x40, index, subindex), 0.0)[0]
+    if answer[0] == 0x80:
+        return int.from_bytes(answer[4:], "little")
+    if answer[0] & 0x02:
+        return answer[4 : 8 - (answer[0] >> 2 & 3)]
+    data, toggle = b"", 0
+    while True:
+        segment = server.receive(bytes((0x60 | toggle,)) + bytes(7), 0.0)[0]
+        data += segment[1 : 8 - (segment[0] >> 1 & 7)]
+        toggle ^= 0x10
+        if segment[0] & 1:
+            return data
+
+
+def download(server: SdoServer, index: int, subindex: int, data: bytes) -> int:
+    """0, or the code of an abort; segmented, so that any length goes."""
+    answer = server.receive(struct.pack("<BHBI", 0x21, index, subindex, len(data)), 0.0)[0]
+    for start in range(0, max(1, len(data)), 7):
+        if answer[0] == 0x80:
+            break
+        part = data[start : start + 7]
+        command = (start // 7 % 2) << 4 | (7 - len(part)) << 1 | (start + 7 >= len(data))
+        answer = server.receive(bytes((command,)) + part.ljust(7, b"\0"), 0.0)[0]
+    return int.from_bytes(answer[4:], "little") if answer[0] == 0x80 else 0
+
+
+def test_od_01_to_04_every_entry_is_read_with_its_default_and_its_length(
+    server: SdoServer, dictionary: Dictionary
+) -> None:
+    for one in dictionary:
+        for entry in one.entries:
+            expected = entry.default if entry.access.readable else AbortCode.WRITE_ONLY
+            assert upload(server, one.index, entry.subindex) == expected
+            assert entry.type.size in (None, len(entry.default))
+
+
+def test_od_05_to_07_every_entry_takes_or_refuses_what_it_holds(
+    server: SdoServer, dictionary: Dictionary
+) -> None:
+    for one in dictionary:
+        for entry in one.entries:
+            data = entry.type.pack(entry.low or 0) if entry.low is not None else entry.default
+            code = download(server, one.index, entry.subindex, data)
+            assert code == (0 if entry.access.writable else AbortCode.READ_ONLY)
+            if entry.access.writable and entry.type.size is not None:
+                assert download(server, one.index, entry.subindex, data + b"\0") == AbortCode.TOO_LONG
+                assert download(server, one.index, entry.subindex, data[1:]) == AbortCode.TOO_SHORT
+
+
+def test_od_08_and_09_limits_are_the_last_values_that_are_taken(
+    server: SdoServer, dictionary: Dictionary
+) -> None:
+    checked = 0
+    for one in dictionary:
+        for entry in one.entries:
+            for limit, step, code in (
+                (entry.low, -1, AbortCode.VALUE_TOO_LOW),
+                (entry.high, 1, AbortCode.VALUE_TOO_HIGH),
+            ):
+                if limit is not None:
+                    within, beyond = entry.type.pack(limit), entry.type.pack(limit + step)
+                    assert download(server, one.index, entry.subindex, within) == 0
+                    assert download(server, one.index, entry.subindex, beyond) == code
+                    assert upload(server, one.index, entry.subindex) == within
+                    checked += 1
+    assert checked == 3
 
 
 # -- any frame --------------------------------------------------------------------------------------------------------
