@@ -45,6 +45,7 @@ class ErrorCode(IntEnum):
     WRITE_OUT_OF_LIMITS = 0xFF02
     WRITE_ROBOT_LOST = 0xFF03
     WRITE_CLAIMED_ELSEWHERE = 0xFF04
+    WRITE_NEVER = 0xFF05
 
 
 class Register(IntFlag):

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, Object, array
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, Object, Pdo, array
 from gatewayd.canopen.nmt import NmtCommand
 
 __all__ = [
@@ -47,7 +47,8 @@ GROUPS: Mapping[int, tuple[str, range]] = {
     4: ("manufacturer parameters", range(0x2000, 0x6000)),
 }
 """Sub-indices of 1010h and 1011h."""
-_BOUND_TO_LAYOUT = (range(0x1400, 0x1C00), range(0x2000, 0x1_0000))
+_PDOS = range(0x1400, 0x1C00)
+_BOUND_TO_LAYOUT = (_PDOS, range(0x2000, 0x1_0000))
 _SAVE = b"save"
 _LOAD = b"load"
 _ON_COMMAND = 1
@@ -146,7 +147,7 @@ class JsonStore:
 
 
 def layout_of(dictionary: Iterable[Object], node: int) -> int:
-    """32 bits that change when the defaults of a PDO or an object that it may carry change.
+    """32 bits that change when the defaults of a PDO change, or an object that it may carry, or one that is stored.
 
     Defaults that contain the node-ID count without it: another node-ID is not another layout.
     """
@@ -155,6 +156,8 @@ def layout_of(dictionary: Iterable[Object], node: int) -> int:
         if not _is_bound(one.index):
             continue
         for entry in one.entries:
+            if not entry.stored and entry.pdo is Pdo.NONE:
+                continue
             default = _rebased(entry, node, 0) if entry.plus_node else entry.default
             text = f"{one.index:x}:{entry.subindex:x} {entry.type.name} {entry.name} {entry.pdo.name} "
             kept = default.hex() if entry.stored else ""
@@ -163,10 +166,10 @@ def layout_of(dictionary: Iterable[Object], node: int) -> int:
 
 
 class Parameters:
-    """1010h, 1011h and the power-on values of all entries.
+    """1010h, 1011h and the power-on values of all entries. Reads the store when it is made.
 
-    `ready()` tells whether the node may wait for a disk now; `report(text)` is called for what could not be taken
-    over and `failed(whether)` when reading the store failed or a save has put that right.
+    `node` is the node-ID of the mapping. `ready()` tells whether the node may wait for a disk now; `report(text)` is
+    called for what could not be taken over, `failed(whether)` when reading the store failed or a save put that right.
     """
 
     def __init__(
@@ -182,10 +185,16 @@ class Parameters:
         self._ready = ready
         self._report = report
         self._failed = failed
-        self._node = node
+        self._planned = node
         self._dictionary: Dictionary | None = None
         self._layout = 0
-        self._saved = Saved()
+        self._saved = self._load()
+        self._node = self.lss.node if self.lss is not None else node
+
+    @property
+    def node(self) -> int:
+        """The node-ID that the defaults contain now; at first the one to start with."""
+        return self._node
 
     @property
     def lss(self) -> LssSettings | None:
@@ -196,14 +205,6 @@ class Parameters:
         """1010h and 1011h."""
         yield array(0x1010, "Store parameters", self._entries("Save", self._save))
         yield array(0x1011, "Restore default parameters", self._entries("Restore", self._restore))
-
-    def load(self) -> None:
-        """Read the store, once, before `bind`. A damaged one means defaults."""
-        try:
-            self._saved = self._store.load()
-        except StoreError as error:
-            self._report(str(error))
-            self._failed(True)
 
     def bind(self, dictionary: Dictionary) -> None:
         """Take the dictionary whose entries are kept, and drop what no longer fits it."""
@@ -218,20 +219,39 @@ class Parameters:
         self._saved = replace(self._saved, values=kept, layout=self._layout)
 
     def apply(self, command: NmtCommand, node: int) -> None:
-        """Give the entries their power-on values: after "reset communication" those of communication alone."""
+        """Give the entries their power-on values: after "reset communication" those of communication alone.
+
+        Defaults follow `node` before. Those of PDOs are their table's own affair, which has to have followed already.
+        """
         assert self._dictionary is not None
         indices = _COMMUNICATION if command is NmtCommand.RESET_COMMUNICATION else ALL
         for one in self._dictionary:
             for entry in one.entries:
-                if entry.plus_node:
+                if entry.plus_node and one.index not in _PDOS:
                     entry.default = _rebased(entry, self._node, node)
                 if one.index in indices:
                     entry.value = self._saved.values.get((one.index, entry.subindex), entry.default)
         self._node = node
 
-    def save_lss(self, settings: LssSettings) -> None:
+    def save_lss(self, node: int, bitrate: int | None) -> None:
         """Keep what an LSS master stores. Raises StoreError."""
-        self._replace(replace(self._saved, lss=settings))
+        self._replace(replace(self._saved, lss=LssSettings(node, self._planned, bitrate)))
+
+    def _load(self) -> Saved:
+        try:
+            saved = self._store.load()
+        except StoreError as error:
+            self._report(str(error))
+            self._failed(True)
+            return Saved()
+        lss = saved.lss
+        if lss is None or lss.replaces == self._planned:
+            return saved
+        self._report(
+            f"node-ID {lss.node} was stored by LSS in place of {lss.replaces}; "
+            f"the mapping names {self._planned} now, which is used"
+        )
+        return replace(saved, lss=None)
 
     def _entries(self, verb: str, act: Callable[[range, bytes], None]) -> Iterable[Entry]:
         for number, (name, indices) in GROUPS.items():

@@ -27,11 +27,13 @@ U32 = CanType.UNSIGNED32
 
 def _objects(name: str = "force") -> list[Object]:
     period = Entry(0, "Producer heartbeat time", CanType.UNSIGNED16, Access.RW, b"\xe8\3", stored=True)
+    emcy = Entry(0, "COB-ID EMCY", U32, Access.RW, U32.pack(0x85), plus_node=True, stored=True)
     cob_id = Entry(1, "COB-ID", U32, Access.RW, U32.pack(0x185), plus_node=True, stored=True)
     value = Entry(1, name, U32, Access.RW, bytes(4), stored=True)
     loose = Entry(0, "Synchronous window length", U32, Access.RW, bytes(4))
     return [
         variable(0x1007, loose),
+        variable(0x1014, emcy),
         variable(0x1017, period),
         record(0x1800, "TPDO 1", (cob_id,)),
         record(0x2000, "Values", (value,)),
@@ -54,9 +56,8 @@ class Kept:
             failed=self.failures.append,
         )
         self.client = Client([*(objects or _objects()), *self.service.objects()])
-        self.service.load()
         self.service.bind(self.client.dictionary)
-        self.service.apply(NmtCommand.RESET_NODE, node)
+        self.service.apply(NmtCommand.RESET_NODE, self.service.node)
 
     def signed(self, index: int, subindex: int, signature: bytes) -> None:
         self.client.dictionary.write(index, subindex, signature)
@@ -136,11 +137,12 @@ def test_what_is_not_marked_is_not_stored() -> None:
 def test_defaults_follow_the_node_id_and_saved_values_do_not() -> None:
     kept = Kept(MemoryStore())
     kept.service.apply(NmtCommand.RESET_COMMUNICATION, 9)
-    assert kept.client.read(0x1800, 1) == 0x189
-    kept.client.write(0x1800, 1, 0x1A0)
+    assert kept.client.read(0x1014) == 0x89
+    kept.client.write(0x1014, 0, 0x1A0)
     kept.signed(0x1010, 2, b"save")
     kept.service.apply(NmtCommand.RESET_COMMUNICATION, 5)
-    assert kept.client.read(0x1800, 1) == 0x1A0
+    assert kept.client.read(0x1014) == 0x1A0
+    assert kept.client.read(0x1800, 1) == 0x185, "the table of PDOs moves these"
 
 
 def test_pdo_and_manufacturer_values_do_not_outlive_their_layout() -> None:
@@ -159,7 +161,7 @@ def test_pdo_and_manufacturer_values_do_not_outlive_their_layout() -> None:
 
 def test_another_node_id_is_not_another_layout() -> None:
     moved = _objects()
-    moved[2].entries[1].default = U32.pack(0x189)
+    moved[3].entries[1].default = U32.pack(0x189)
     assert layout_of(_objects(), 5) == layout_of(moved, 9) != layout_of(moved, 5)
 
 
@@ -184,12 +186,21 @@ def test_a_disk_that_fails_is_told_and_nothing_changes(tmp_path: Path) -> None:
 
 def test_lss_settings_and_parameters_share_the_file(path: Path) -> None:
     kept = Kept(JsonStore(path))
-    kept.service.save_lss(LssSettings(node=9, replaces=5, bitrate=250_000))
+    kept.service.save_lss(9, 250_000)
     kept.client.write(0x1017, 0, 50)
     kept.signed(0x1010, 1, b"save")
     kept.signed(0x1011, 1, b"load")
     assert Kept(JsonStore(path)).service.lss == LssSettings(9, 5, 250_000)
+    assert Kept(JsonStore(path)).service.node == 9
     assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_mapping_with_another_node_id_wins_over_lss() -> None:
+    store = MemoryStore()
+    store.save(Saved(lss=LssSettings(9, 5)))
+    kept = Kept(store, node=6)
+    assert (kept.service.node, kept.service.lss) == (6, None)
+    assert "node-ID 9 was stored by LSS" in kept.reports[0]
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "{}", "null", "\xff", '{"format": 1}'])

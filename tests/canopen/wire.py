@@ -17,11 +17,12 @@ class Wire:
 
     def __init__(self) -> None:
         self.frames: list[Frame] = []
-        self.priorities: list[Priority] = []
+        self.sent: list[tuple[Frame, Priority]] = []
+        """Everything, whether it was taken or not."""
 
     def send(self, frame: Frame, priority: Priority) -> None:
         self.frames.append(frame)
-        self.priorities.append(priority)
+        self.sent.append((frame, priority))
 
     def take(self) -> list[Frame]:
         frames, self.frames = self.frames, []
