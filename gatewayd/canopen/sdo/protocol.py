@@ -20,6 +20,7 @@ __all__ = [
     "block_upload_initiated",
     "download_initiated",
     "download_segment_taken",
+    "is_expedited",
     "upload_initiated",
     "upload_segment",
 ]
