@@ -32,15 +32,15 @@ RETRY = 0.001
 _FRAME = struct.Struct("=IB3x8s")
 """struct can_frame: identifier with flags, length, eight bytes."""
 _FILTER = struct.Struct("=II")
-_COUNT = struct.Struct("=I")
+_MEMORY_INFO = struct.Struct("=9I")
+"""SO_MEMINFO, whose last word is the count of dropped frames (linux/sock_diag.h)."""
 _EXTENDED, _REMOTE, _ERROR = 0x8000_0000, 0x4000_0000, 0x2000_0000
 _BASIC = 0x7FF
 _EXACT = _BASIC | _EXTENDED | _REMOTE
 """Mask of a filter for one identifier and data frames; the kernel finds the socket for it by a table."""
 _GREATEST_FILTERS = 512
-_SO_RXQ_OVFL, _CAN_RAW_ERR_FILTER = 40, 2
+_SO_MEMINFO, _CAN_RAW_ERR_FILTER = 55, 2
 _EVERY_ERROR = 0x1FFF_FFFF
-_ANCILLARY = socket.CMSG_SPACE(_COUNT.size)
 _NO_ROOM = (errno.ENOBUFS, errno.EAGAIN)
 
 _unpack = _FRAME.unpack
@@ -194,8 +194,14 @@ class SocketCanBus:
         frames: list[Frame] = []
         errors: list[ErrorFrame] = []
         failure: OSError | None = None
+        receive, append = self._socket.recv, frames.append
         try:
-            self._drain(self._socket, frames, errors, now)
+            for _ in range(DRAIN):
+                parts = can_id, length, data = _unpack(receive(_FRAME.size))
+                if can_id <= _BASIC:
+                    append(_new_frame(Frame, (can_id, data[:length], False, 0)))
+                else:
+                    _take_other(parts, frames, errors)
         except BlockingIOError:
             pass
         except OSError as error:
@@ -208,22 +214,12 @@ class SocketCanBus:
         if failure is not None:
             self._failed(failure)
 
-    def _drain(self, raw: socket.socket, frames: list[Frame], errors: list[ErrorFrame], now: float) -> None:
-        """Read up to DRAIN frames; BlockingIOError at the last of fewer."""
-        # The kernel attaches its count of lost frames to every frame: asking once per batch is enough.
-        first, ancillary, _, _ = raw.recvmsg(_FRAME.size, _ANCILLARY)
-        if ancillary:
-            self._count_lost(_COUNT.unpack(ancillary[0][2])[0], now)
-        _take(_unpack(first), frames, errors)
-        receive, append = raw.recv, frames.append
-        for _ in range(DRAIN - 1):
-            parts = can_id, length, data = _unpack(receive(_FRAME.size))
-            if can_id <= _BASIC:
-                append(_new_frame(Frame, (can_id, data[:length], False, 0)))
-            else:
-                _take(parts, frames, errors)
+    def _count_lost(self, raw: socket.socket, now: float) -> None:
+        """Ask the kernel for its count of frames that found no room, the one that SO_RXQ_OVFL attaches to frames.
 
-    def _count_lost(self, total: int, now: float) -> None:
+        Asked for with each look it costs nothing per frame, and tells of the last frames too, which none follows.
+        """
+        total = _MEMORY_INFO.unpack(raw.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMORY_INFO.size))[-1]
         lost = (total - self._lost) & 0xFFFF_FFFF
         if lost:
             self._lost = total
@@ -265,6 +261,8 @@ class SocketCanBus:
                 self.counters.tx_errors, self.counters.rx_errors = found.tx_errors, found.rx_errors
             if self._socket is None and not self._acquire(found, now):
                 return
+            assert self._socket is not None
+            self._count_lost(self._socket, now)
         self._feed(seen(found), now, self._explain(found))
 
     def _feed(self, event: Event, now: float, reason: str) -> None:
@@ -325,7 +323,6 @@ class SocketCanBus:
             raw.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, _EVERY_ERROR)
             raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
             raw.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
-            raw.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
             self.counters.receive_buffer = raw.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
             raw.bind((self._channel,))
         except OSError:
@@ -344,12 +341,10 @@ class SocketCanBus:
         self._index = 0
 
 
-def _take(parts: tuple[int, int, bytes], frames: list[Frame], errors: list[ErrorFrame]) -> None:
-    """Put a frame of any kind where it belongs; those with 29-bit identifiers are nobody's."""
+def _take_other(parts: tuple[int, int, bytes], frames: list[Frame], errors: list[ErrorFrame]) -> None:
+    """What is no data frame of ours; frames with 29-bit identifiers are nobody's."""
     can_id, length, data = parts
-    if can_id <= _BASIC:
-        frames.append(Frame(can_id, data[:length]))
-    elif can_id & _ERROR:
+    if can_id & _ERROR:
         errors.append(decode(can_id, data[:length]))
     elif not can_id & _EXTENDED:
         frames.append(Frame(can_id & _BASIC, b"", remote=True, length=length))

@@ -49,6 +49,7 @@ mount -t devtmpfs dev /dev 2>/dev/null; mkdir -p /dev/pts /dev/shm; mount -t dev
 cd {tree} || halt -f
 for module in {modules}; do insmod "/usr/lib/uml/modules/$(uname -r)/kernel/$module.ko" || {insert} "$module"; done
 ip link set lo up
+echo 4194304 >/proc/sys/net/core/rmem_max
 {python} -m pytest -p no:xdist -p no:cacheprovider --basetemp=/run/pytest {tests}
 sync
 halt -f || poweroff -f || {python} -c 'import os; os.sync(); import ctypes; ctypes.CDLL(None).reboot(0x4321fedc)'
