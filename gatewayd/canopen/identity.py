@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -28,8 +29,9 @@ PRODUCT_CODE = 0x4757_4401
 
 def revision(version: str = __version__) -> int:
     """Revision number of a release: major in the high word, minor in the low one."""
-    major, minor = (int(part) for part in version.split(".")[:2])
-    return major << 16 | minor
+    numbers = re.match(r"(\d+)\.(\d+)", version)
+    assert numbers is not None
+    return int(numbers[1]) << 16 | int(numbers[2])
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,6 +60,9 @@ __all__ = ["OVERRUN_TIME", "Node", "NodeCounters", "Observer"]
 OVERRUN_TIME: Final = 1.0
 """Seconds without a lost frame after which the overrun is over."""
 
+SDO_LENGTH: Final = 8
+"""Bytes of every SDO frame."""
+
 Handler = Callable[[Frame, float], None]
 
 
@@ -328,7 +331,7 @@ class Node:
         self.receive_pdos.receive(frame.can_id, frame.data, now)
 
     def _receive_sdo(self, frame: Frame, now: float) -> None:
-        if not frame.remote:
+        if not frame.remote and len(frame.data) == SDO_LENGTH:
             self._peers.heard(self.plan.sdo_writer, "SDO", now)
             self._answer(self.sdo.receive(frame.data, now))
 

@@ -43,7 +43,7 @@ def test_cct_sdo_03_writing_the_device_type_is_refused(dictionary: Dictionary) -
 
 
 def test_revision_has_major_and_minor() -> None:
-    assert revision("3.17.2") == 0x0003_0011
+    assert revision("3.17.2") == revision("3.17rc1") == 0x0003_0011
 
 
 @pytest.mark.parametrize(
