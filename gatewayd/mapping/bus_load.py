@@ -19,6 +19,7 @@ from typing import Final
 
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.can_expand import CanopenCell, ConcretePdo
+from gatewayd.mapping.expand import ExpandedCell
 from gatewayd.mapping.model import Robot, WriterSpec
 from gatewayd.rtde.catalogue import Series
 
@@ -34,6 +35,7 @@ __all__ = [
     "package_rate",
     "pdo_bits",
     "pdo_rate",
+    "station_of",
 ]
 
 BIT_RATES: Final = (10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
@@ -80,6 +82,13 @@ class Station:
     rate: float
     """Packages of the robot per second at most."""
     writers: tuple[WriterSpec, ...]
+
+
+def station_of(cell: ExpandedCell, node: CanopenCell) -> Station:
+    """What a cell means for the bus that its node is on."""
+    robot = cell.document.robot.spec if cell.document.robot is not None else Robot(host="unknown")
+    writers = tuple(part.spec for part in cell.document.writers.values())
+    return Station(node, package_rate(robot), writers)
 
 
 def package_rate(robot: Robot) -> float:

@@ -53,8 +53,8 @@ def examine(data: bytes) -> Loaded:
     if loaded.plan is not None:
         table = rows(loaded.cell)
         assert as_csv(table)
-        assert as_markdown(loaded.plan, table)
-        assert table_as_json(loaded.plan, table)
+        assert as_markdown(loaded.plan, loaded.cell, table)
+        assert table_as_json(loaded.plan, loaded.cell, table)
     assert time.perf_counter() - started < SLOW
     return loaded
 

@@ -14,18 +14,17 @@ from gatewayd.mapping.bus_load import (
     Station,
     bus_shares,
     load,
-    package_rate,
     pdo_bits,
+    station_of,
 )
 from gatewayd.mapping.can_expand import CanopenCell
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expand import ExpandedCell
-from gatewayd.mapping.model import Robot
 from gatewayd.mapping.rules.pdos import cob_id_place
 from gatewayd.mapping.rules.registry import plant_rule
 from gatewayd.mapping.rules.wording import cob
 
-__all__ = ["stations"]
+__all__: list[str] = []
 
 _FIRST_EVENT_TYPE = 254
 
@@ -164,23 +163,12 @@ def bus_load_too_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Dia
     yield from _loaded(rule, cells, lambda share: share > ERROR_ABOVE)
 
 
-def stations(cells: Sequence[ExpandedCell]) -> Iterator[tuple[Station, ...]]:
-    """The cells on each bus."""
-    by_node = {id(cell.canopen): cell for cell in cells if cell.canopen is not None}
-    for nodes in _buses(cells):
-        yield tuple(_station(by_node[id(node)], node) for node in nodes)
-
-
-def _station(cell: ExpandedCell, node: CanopenCell) -> Station:
-    robot = cell.document.robot.spec if cell.document.robot is not None else Robot(host="unknown")
-    writers = tuple(part.spec for part in cell.document.writers.values())
-    return Station(node, package_rate(robot), writers)
-
-
 def _loaded(
     rule: Rule, cells: Sequence[ExpandedCell], is_meant: Callable[[float], bool]
 ) -> Iterator[Diagnostic]:
-    for bus in stations(cells):
+    by_node = {id(cell.canopen): cell for cell in cells}
+    for nodes in _buses(cells):
+        bus = [station_of(by_node[id(node)], node) for node in nodes]
         shares = bus_shares(bus)
         spec = bus[0].node.part.spec
         share = load(shares, spec.bitrate)
