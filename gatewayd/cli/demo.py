@@ -97,7 +97,7 @@ async def _play(console: Console, port: int, told: str, seconds: float | None, *
     from gatewayd.demo.summary import summary
 
     stop = asyncio.Event()
-    _stop_on_signals(stop)
+    _stop_on_signals(stop, console)
     scene = Scene(port)
     scene.listen_to_logs()
     async with scene.playing():
@@ -115,9 +115,10 @@ async def _play(console: Console, port: int, told: str, seconds: float | None, *
     return 0 if passed else FAILED
 
 
-def _stop_on_signals(stop: asyncio.Event) -> None:
+def _stop_on_signals(stop: asyncio.Event, console: Console) -> None:
     def on_signal() -> None:
         if stop.is_set():
+            console.show_cursor()
             os._exit(FORCED)
         stop.set()
 
