@@ -79,7 +79,6 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "cli": "tests/cli/test_main.py",
     "cli.completion": "tests/cli/test_main.py",
     "core": "a docstring",
-    "demo": "a docstring",
     "mapping": "a docstring",
     "mapping.plan": "records; tests/mapping/test_compile.py pins their content",
     "modbus": "a docstring",
