@@ -20,7 +20,7 @@ from gatewayd.logs import fields
 from gatewayd.mapping.plan import ModbusPlan, Plan
 from gatewayd.modbus.peers import PeerEvent, PeerEventKind
 from gatewayd.modbus.server import ListenError, ModbusListener
-from gatewayd.rtde.link import RobotLink
+from gatewayd.robot.link import RobotLink
 
 __all__ = ["CLOSING_TIME", "RETRY_PERIOD", "TICK", "Daemon", "Station"]
 

@@ -1,8 +1,14 @@
-"""Tells the core's events to the log: names instead of indices, one line for each event."""
+"""Tells the core's events to the log: names instead of indices, one line for each event.
+
+What befalls many variables alike at one moment, say all bits of a word that another client has claimed, is one line.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import re
+from collections.abc import Iterable, Sequence
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import Event, EventKind
@@ -24,26 +30,60 @@ LEVELS = {
 }
 """Kinds that are not told at INFO. Locks come and go with every lease, so they are for debugging and for the ring."""
 
+_ELEMENT = re.compile(r"(.*)\[(\d+)\]")
+
+
+_Story = tuple[EventKind, dict[str, object]]
+"""An event without its variable."""
+
 
 class EventLog:
-    """A listener for one cell's event ring."""
+    """A listener for one cell's event ring.
+
+    In a running event loop an event of a variable is told in the loop's next turn, together with those that follow it
+    and differ in the variable alone. Events are told in their order.
+    """
 
     def __init__(self, cell: Cell) -> None:
         self._definition = cell.definition
         self._log = logging.getLogger("gatewayd.cell")
+        self._waiting: _Story | None = None
+        self._names: list[str] = []
+        """Variables that the waiting event befell."""
 
     def __call__(self, event: Event) -> None:
         """Log the event."""
-        level = LEVELS.get(event.kind, logging.INFO)
-        if self._log.isEnabledFor(level):
-            self._log.log(level, event.kind.value, extra=fields(**self._fields(event)))
+        if not self._log.isEnabledFor(LEVELS.get(event.kind, logging.INFO)):
+            return
+        story = event.kind, self._fields(event)
+        if story != self._waiting:
+            self._flush()
+            self._waiting = story
+        if event.variable is not None:
+            self._names.append(self._definition.variables[event.variable].name)
+        if event.variable is None or not self._flush_soon():
+            self._flush()
+
+    def _flush_soon(self) -> bool:
+        try:
+            asyncio.get_running_loop().call_soon(self._flush)
+        except RuntimeError:
+            return False
+        return True
+
+    def _flush(self) -> None:
+        if self._waiting is None:
+            return
+        (kind, found), names = self._waiting, self._names
+        self._waiting, self._names = None, []
+        subject = {"variable" if len(names) == 1 else "variables": _ranges(names)} if names else {}
+        told = {"cell": self._definition.name, **subject, **found}
+        self._log.log(LEVELS.get(kind, logging.INFO), kind.value, extra=fields(**told))
 
     def _fields(self, event: Event) -> dict[str, object]:
         definition = self._definition
         variable = definition.variables[event.variable] if event.variable is not None else None
         found: dict[str, object | None] = {
-            "cell": definition.name,
-            "variable": variable.name if variable is not None else None,
             "field": variable.field if variable is not None else None,
             "lock": definition.locks[event.lock].name
             if event.lock is not None and variable is None
@@ -62,3 +102,22 @@ class EventLog:
         if index is None:
             return "undeclared" if unknown else None
         return self._definition.writers[index].name
+
+
+def _ranges(names: Iterable[str]) -> str:
+    """The names, elements that follow each other as `name[first..last]`."""
+    runs: list[tuple[str, list[int]]] = []
+    for name in names:
+        element = _ELEMENT.fullmatch(name)
+        base, numbers = (element[1], [int(element[2])]) if element else (name, [])
+        if numbers and runs and runs[-1][0] == base and runs[-1][1][-1:] == [numbers[0] - 1]:
+            runs[-1][1].extend(numbers)
+        else:
+            runs.append((base, numbers))
+    return " ".join(base + _span(numbers) for base, numbers in runs)
+
+
+def _span(numbers: Sequence[int]) -> str:
+    if not numbers:
+        return ""
+    return f"[{numbers[0]}]" if len(numbers) == 1 else f"[{numbers[0]}..{numbers[-1]}]"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 
 import pytest
@@ -100,3 +101,65 @@ def test_locks_that_come_and_go_are_for_debugging(cell: Cell, caplog: pytest.Log
     cell.events.append(Event(1.0, EventKind.ACQUIRED, lock=0, writer=0))
     cell.events.append(Event(1.0, EventKind.RELEASED, lock=0, writer=0))
     assert not caplog.records
+
+
+WORD = "input_bit_registers0_to_31"
+
+
+@pytest.fixture
+def word() -> Cell:
+    """A word of bits in two ranges, and a number."""
+    names = [*(f"bits[{n}]" for n in range(12)), "start", *(f"lamp[{n}]" for n in range(2))]
+    variables = [
+        Variable(n + 1, name, Direction.INPUT, ValueKind.BOOL, WORD, n, lock=0)
+        for n, name in enumerate(names)
+    ]
+    number = Variable(
+        len(names) + 1, "number", Direction.INPUT, ValueKind.INT, "input_int_register_0", lock=0
+    )
+    one = Cell(
+        CellDefinition(
+            name="press",
+            fingerprint=1,
+            variables=(*variables, number),
+            locks=(Lock("all", tuple(range(len(names) + 1)), (0,)),),
+            writers=(Writer("plc"),),
+            stale_after=1,
+        )
+    )
+    one.events.listeners.append(EventLog(one))
+    return one
+
+
+def lines(caplog: pytest.LogCaptureFixture) -> list[tuple[str, object]]:
+    found = [(record.getMessage(), record.__dict__["fields"]) for record in caplog.records]
+    return [(text, fields.get("variables", fields.get("variable"))) for text, fields in found]
+
+
+async def test_what_befalls_many_variables_alike_is_one_line(
+    word: Cell, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A word of 32 bits that is claimed elsewhere is one misfortune, not 32."""
+    for index in (*range(10), 11, 12, 13, 14, 15):
+        word.events.append(Event(1.0, EventKind.UNAVAILABLE, variable=index, detail="IN_USE"))
+    await asyncio.sleep(0)
+    assert lines(caplog) == [
+        ("register unavailable", "bits[0..9] bits[11] start lamp[0..1]"),
+        ("register unavailable", "number"),
+    ]
+    assert caplog.records[0].__dict__["fields"]["field"] == WORD
+
+
+async def test_what_differs_is_told_apart_and_in_order(word: Cell, caplog: pytest.LogCaptureFixture) -> None:
+    for index, old in enumerate((True, True, False, True)):
+        word.events.append(Event(1.0, EventKind.FALLBACK, variable=index, old=old, new=False))
+    word.events.append(Event(1.0, EventKind.WRITER_LOST, writer=0))
+    word.events.append(Event(1.0, EventKind.FALLBACK, variable=4, old=True, new=False))
+    await asyncio.sleep(0)
+    assert lines(caplog) == [
+        ("fallback applied", "bits[0..1]"),
+        ("fallback applied", "bits[2]"),
+        ("fallback applied", "bits[3]"),
+        ("writer lost", None),
+        ("fallback applied", "bits[4]"),
+    ]

@@ -35,6 +35,8 @@ def _main() -> None:
     unknown = set(options.subjects) - set(SUBJECTS)
     if unknown:
         parser.error(f"no subject is called {', '.join(sorted(unknown))}")
+    # Installed packages are compiled; where this variable is set, gatewayd would be compiled anew at each start.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     print(
         f"{platform.python_implementation()} {platform.python_version()}, {os.cpu_count()} cores, {platform.machine()}"
     )

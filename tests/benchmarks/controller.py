@@ -34,7 +34,7 @@ from gatewayd.rtde.types import DataType
 
 __all__ = ["Controller"]
 
-VERSION = ControllerVersion(5, 12, 0, 0)
+VERSION = ControllerVersion(5, 23, 0, 0)
 Values = dict[str, tuple[Scalar, ...]]
 
 

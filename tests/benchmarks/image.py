@@ -43,7 +43,7 @@ def full_image(robot: int, modbus: int, frequency: float = 500, writer: str = "1
     lines = [
         "gatewayd: 1",
         "cell: benchmark",
-        f"robot: {{host: 127.0.0.1, port: {robot}, series: e, version: 5.12, frequency: {frequency:g}}}",
+        f"robot: {{host: 127.0.0.1, port: {robot}, series: e, version: 5.23, frequency: {frequency:g}}}",
         f"modbus: {{listen: '127.0.0.1:{modbus}', gaps: zero}}",
         f"writers: {{plc: {{modbus: {writer}}}}}",
         "variables:",

@@ -18,6 +18,8 @@ __all__ = ["PERIOD", "Stream", "pace", "run", "stream"]
 
 PERIOD = 0.002
 """Seconds between packages: 500 Hz."""
+PATIENCE = 2.0
+"""Seconds after which a value that is not seen will never be."""
 DOUBLES = tuple(f"output_double_register_{number}" for number in range(24))
 WORDS = 4
 """Registers of one double."""
@@ -71,6 +73,8 @@ def stream(
             _send(controller, number)
             unseen.append((number, clock()))
             due += PERIOD
+        if unseen and clock() - unseen[0][1] > PATIENCE:
+            raise TimeoutError(f"a package was not seen within {PATIENCE:g} s")
         if unseen or hammer:
             values = layout.unpack(plc.read(first, WORDS * count))
             now = clock()
@@ -136,9 +140,9 @@ def _inward(controller: Controller, plc: Plc, seconds: float) -> list[float]:
         begin = time.perf_counter()
         plc.post(INTEGERS_IN, struct.pack(">i", number))
         while controller.values.get("input_int_register_0") != (number,):
-            controller.pump(1.0)
-            if time.perf_counter() - begin > 1.0:
-                raise TimeoutError("a written value did not reach the controller within a second")
+            controller.pump(PATIENCE)
+            if time.perf_counter() - begin > PATIENCE:
+                raise TimeoutError(f"a written value did not reach the controller within {PATIENCE:g} s")
         times.append(time.perf_counter() - begin)
         plc.answer()
     return times

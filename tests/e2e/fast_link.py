@@ -14,7 +14,7 @@ from pathlib import Path
 from gatewayd.core.cell import Cell
 from gatewayd.mapping.loader import load
 from gatewayd.rtde.client import ClientSettings, Loss, RtdeClient
-from gatewayd.rtde.link import RobotLink
+from gatewayd.robot.link import RobotLink
 
 __all__ = ["resident_kilobytes"]
 

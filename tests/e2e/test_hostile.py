@@ -1,6 +1,6 @@
 """Bytes that nobody should send: the process lives, the others are served, memory does not grow.
 
-GATEWAYD_FUZZ_CASES scales it: Modbus cases of each of two attackers, and RTDE connections.
+GATEWAYD_FUZZ_CASES scales it: cases for Modbus, and as many or more for RTDE.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def test_fuzzed_modbus(plant: Plant) -> None:
 
     for third in range(3):
         attackers = [
-            plant.start("modbus_fuzzer", HOST, plant.modbus, source, CASES // 3 + 1, 2 * third + seed)
+            plant.start("modbus_fuzzer", HOST, plant.modbus, source, CASES // 6 + 1, 2 * third + seed)
             for seed, source in enumerate((HMI, STRANGER))
         ]
         number = 1000 * third
@@ -110,9 +110,9 @@ def test_hostile_controllers_beside_a_good_one(plant: Plant) -> None:
         number += 1
         assert plc.write_integers(0, number) == 0
         assert plc.integers(0) == [number]
-        return time.monotonic() - start > 4
+        return time.monotonic() - start > 3
 
-    wait_for(enough, "four seconds of rubbish")
+    wait_for(enough, "three seconds of rubbish")
     sizes.append(daemon.resident_kilobytes())
     cases, connections = cases_of(madmen)
     told = (plc.status(15) - packages) % 65536
@@ -131,7 +131,7 @@ def test_fuzzed_rtde_in_many_connections(plant: Plant) -> None:
     """A connection for every case, with no pause in between: the link goes on, and takes no memory for good."""
     madman = plant.start("hostile_controller", HOST, 1, 2)
     mapping = plant.mapping(ROBOT, int(madman.answer()))
-    connections = max(300, CASES // 10)
+    connections = max(300, CASES // 20)
     link = plant.start("fast_link", str(mapping), connections)
     answer = link.answer()
     assert answer, link.text()

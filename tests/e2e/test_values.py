@@ -88,35 +88,28 @@ def test_every_bit_is_a_bit_of_its_own(plant: Plant) -> None:
     assert simulator.integer("input_bit_registers0_to_31") == 0
 
 
-@pytest.mark.parametrize("order", ["ABCD", "CDAB", "BADC", "DCBA"])
-def test_order_type_and_scale_on_the_wire(plant: Plant, order: str) -> None:
-    """The four orders, and a scaled 16-bit view of a double; out of its type is 03."""
-    swap = {"ABCD": ">i", "DCBA": "<i"}
+ORDERS = {"ABCD": "01020304", "CDAB": "03040102", "BADC": "02010403", "DCBA": "04030201"}
+"""0x01020304 on the wire."""
+
+
+def test_order_type_and_scale_on_the_wire(plant: Plant) -> None:
+    """The four orders, and a scaled 16-bit view of a double; out of its type or limits is 03."""
     simulator = plant.simulator()
+    numbers = "".join(
+        f"  {order.lower()}: {{robot: input_int_register_{n}, modbus: {{holding: {2 * n}, order: {order}}}}}\n"
+        for n, order in enumerate(ORDERS)
+    )
+    placed = "modbus: {holding: 10, type: int16, scale: 0.1}"
+    force = f"  force: {{robot: input_double_register_3, {placed}, limits: [0, 150]}}"
     plant.daemon(
-        plant.mapping(
-            f"""\
-writers: {{plc: {{modbus: {PLC}}}}}
-variables:
-  number: {{robot: input_int_register_3, modbus: {{holding: 0, order: {order}}}}}
-  force:  {{robot: input_double_register_3, modbus: {{holding: 10, type: int16, scale: 0.1}}, limits: [0, 150]}}
-""",
-            simulator.port,
-        )
+        plant.mapping(f"writers: {{plc: {{modbus: {PLC}}}}}\nvariables:\n{numbers}{force}\n", simulator.port)
     )
     plc = plant.ready_plc()
 
-    data = {
-        "ABCD": bytes.fromhex("01020304"),
-        "CDAB": bytes.fromhex("03040102"),
-        "BADC": bytes.fromhex("02010403"),
-        "DCBA": bytes.fromhex("04030201"),
-    }[order]
-    assert order not in swap or struct.unpack(swap[order], data)[0] == 0x01020304
-    assert plc.write(0, list(struct.unpack(">2H", data))) == 0
+    assert plc.write(0, list(struct.unpack(">8H", bytes.fromhex("".join(ORDERS.values()))))) == 0
     assert plc.write_one(10, 1234) == 0
     wait_for(lambda: simulator.number("input_double_register_3") != 0, "the scaled value")
-    assert simulator.integer("input_int_register_3") == 0x01020304
+    assert [simulator.integer(f"input_int_register_{n}") for n in range(4)] == [0x01020304] * 4
     assert simulator.number("input_double_register_3") == pytest.approx(123.4)
     assert plc.write_one(10, 1501) == NO_VALUE
     assert plc.write_one(10, 0xFFFF) == NO_VALUE

@@ -6,27 +6,27 @@ both in the tuple and in the image are moved as one slice; bits of a word are sp
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import pairwise
 
 from gatewayd.core.definition import Direction, Value, Variable
 
-__all__ = ["InputTransfer", "OutputTransfer", "read_back"]
+__all__ = ["InputTransfer", "OutputTransfer", "Slots", "read_back"]
 
 Slots = Mapping[str, slice]
 """Where each field of a recipe lies in its flat tuple."""
 
 
 class OutputTransfer:
-    """From a package into the image, for the output variables whose fields the recipe has."""
+    """From a package into the image, for the output variables whose fields the recipe has, `without` some."""
 
     __slots__ = ("_moves", "_seen", "_words")
 
-    def __init__(self, variables: Sequence[Variable], slots: Slots) -> None:
+    def __init__(self, variables: Sequence[Variable], slots: Slots, without: Container[int] = ()) -> None:
         singles: list[tuple[int, int]] = []
         words: dict[int, list[tuple[int, int]]] = {}
         for index, variable in enumerate(variables):
-            if variable.direction is Direction.INPUT or variable.field not in slots:
+            if variable.direction is Direction.INPUT or variable.field not in slots or index in without:
                 continue
             slot = slots[variable.field].start + (variable.element or 0)
             if variable.bit is None:
@@ -63,13 +63,15 @@ class InputTransfer:
 
     __slots__ = ("_bits", "_singles", "base", "fields", "members", "slots")
 
-    def __init__(self, variables: Sequence[Variable], fields: Sequence[str], slots: Slots) -> None:
+    def __init__(
+        self, variables: Sequence[Variable], fields: Sequence[str], slots: Slots, without: Container[int] = ()
+    ) -> None:
         self.fields = tuple(fields)
         self.slots = dict(slots)
         wanted = [
             (index, variable)
             for index, variable in enumerate(variables)
-            if variable.direction is Direction.INPUT and variable.field in slots
+            if variable.direction is Direction.INPUT and variable.field in slots and index not in without
         ]
         self.members = tuple(index for index, _variable in wanted)
         """Indices of the variables that the recipe carries."""

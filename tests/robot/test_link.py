@@ -16,9 +16,11 @@ from gatewayd.core.definition import Direction
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
+from gatewayd.core.refusal import Reason
 from gatewayd.mapping.loader import load
-from gatewayd.rtde import link as link_module
-from gatewayd.rtde.link import RobotLink
+from gatewayd.robot import inputs as inputs_module
+from gatewayd.robot.link import RobotLink
+from gatewayd.rtde.catalogue import SoftwareVersion
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import DEMO, parse
 from gatewayd.simulator.server import SimulatedController
@@ -78,8 +80,9 @@ def rigged() -> Rigged:
         variables: str = REGISTERS,
         options: str = "",
         prepare: Callable[[SimulatedController], None] | None = None,
+        version: SoftwareVersion | None = None,
     ) -> AsyncIterator[Rig]:
-        async with SimulatedController(Controller(program=parse(DEMO))) as robot:
+        async with SimulatedController(Controller(version=version, program=parse(DEMO))) as robot:
             if prepare is not None:
                 prepare(robot)
             loaded = load((HEAD.format(port=robot.port, options=options) + variables).encode(), "link.yaml")
@@ -196,7 +199,7 @@ async def test_a_value_that_does_not_arrive_is_told_once(
     rigged: Rigged, until: Until, monkeypatch: pytest.MonkeyPatch, cyclic: bool
 ) -> None:
     """Also while the PLC writes another variable, or the same value, again and again."""
-    monkeypatch.setattr(link_module, "VERIFY_AFTER", 0.1)
+    monkeypatch.setattr(inputs_module, "VERIFY_AFTER", 0.1)
     async with rigged() as rig:
         await until(lambda: rig.cell.accepts_writes)
         rig.write((NUMBER, 7), (REAL, 1.0))
@@ -282,6 +285,47 @@ async def test_registers_freed_later_are_adopted_and_lose_no_write(rigged: Rigge
         assert rig.get("input_double_register_0") == 4.5
         rig.write((REAL, 1.5))
         await until(lambda: rig.get("input_double_register_0") == 1.5)
+
+
+OLD = """\
+  number: {robot: input_int_register_0,   modbus: 0}
+  upper:  {robot: input_int_register_24,  modbus: 2}
+  echo:   {robot: output_int_register_0,  modbus: 100}
+  late:   {robot: output_int_register_24, modbus: 102, on_stale: -1}
+"""
+
+
+async def test_what_an_old_controller_lacks_costs_only_itself(rigged: Rigged, until: Until) -> None:
+    """Registers from 24 on came with 5.3; the reason is the controller's word."""
+    async with rigged(OLD, version=SoftwareVersion(5, 1, 0)) as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        assert rig.cell.image.quality == [
+            Quality.GOOD,
+            Quality.UNAVAILABLE,
+            Quality.GOOD,
+            Quality.UNAVAILABLE,
+        ]
+        rig.write((0, 5))
+        await until(lambda: rig.cell.image.values == [5, 0, 5, -1])
+        refusal = rig.cell.write(PLC, [Change(1, 5)], time.monotonic())
+        assert refusal is not None
+        assert refusal.reason is Reason.CLAIMED_ELSEWHERE
+        told = rig.events(EventKind.UNAVAILABLE)
+        assert len(told) == 2
+        assert all(line.startswith("NOT_FOUND: ") for line in told)
+
+
+async def test_checking_can_be_switched_off(
+    rigged: Rigged, until: Until, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inputs_module, "VERIFY_AFTER", 0.0)
+    async with rigged(options=", verify: false") as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        _make_stubborn(rig.robot)
+        rig.write((NUMBER, 7))
+        packages = rig.cell.health.packages
+        await until(lambda: rig.cell.health.packages > packages + 20)
+        assert not rig.events(EventKind.READ_BACK_DIFFERS)
 
 
 async def test_a_defect_behind_a_callback_counts_as_a_loss(rigged: Rigged, until: Until) -> None:

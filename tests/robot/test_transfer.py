@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.core.definition import Direction, Value, ValueKind, Variable
+from gatewayd.robot.transfer import InputTransfer, OutputTransfer, read_back
 from gatewayd.rtde.recipe import Recipe
-from gatewayd.rtde.transfer import InputTransfer, OutputTransfer, read_back
 from gatewayd.rtde.types import DataType
 
 LAYOUT = Recipe(

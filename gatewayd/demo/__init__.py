@@ -1,0 +1,1 @@
+"""The demonstration: a simulated robot, the gateway and a small PLC program in one process, over real sockets."""

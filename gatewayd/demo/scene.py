@@ -1,0 +1,110 @@
+"""Everything that `gatewayd demo` runs: a simulated controller, the gateway and a PLC, on loopback ports."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import time
+from collections import deque
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
+from importlib.resources import files
+
+from gatewayd.core.cell import Cell
+from gatewayd.daemon import Daemon
+from gatewayd.demo.plc import FORCE_SHARE, Plc
+from gatewayd.mapping.loader import load
+from gatewayd.mapping.table import Row, rows
+from gatewayd.simulator.controller import Controller
+from gatewayd.simulator.program import parse
+from gatewayd.simulator.server import SimulatedController
+
+__all__ = ["HOST", "MAPPING", "PLC_ADDRESS", "PORT", "Scene", "free_port"]
+
+HOST = "127.0.0.1"
+PORT = 1502
+"""The gateway's port, if it is free."""
+PLC_ADDRESS = "127.0.0.2"
+"""Where the PLC's connection comes from, so that the gateway can tell it from whatever else this machine starts."""
+MAPPING = "demo.yaml"
+
+ROBOT_PROGRAM = f"""\
+output_bit_register_0 = input_bit_register_0 for 400ms        # busy
+output_bit_register_1 = input_bit_register_0 after 400ms      # done
+output_int_register_0 = input_int_register_0 after 300ms      # the part made
+output_int_register_1 = count input_bit_register_0            # cycles
+output_double_register_0 = input_double_register_0 * {FORCE_SHARE} after 200ms
+output_double_register_1 = input_double_register_1 after 200ms
+"""
+_FULL_SPEED = 100.0
+_PROBLEMS = 4
+
+
+class Scene:
+    """The three parties and what can be seen of them. `port` 0 takes a free one."""
+
+    def __init__(self, port: int) -> None:
+        loaded = load(files(__package__).joinpath(MAPPING).read_bytes(), MAPPING)
+        assert loaded.plan is not None
+        assert loaded.plan.modbus is not None
+        self.rows: tuple[Row, ...] = rows(loaded.cell)
+        self.port = port or free_port(HOST)
+        self.started = time.monotonic()
+        self.problems: deque[str] = deque(maxlen=_PROBLEMS)
+        """Errors that the parties have logged, which no demonstration should have."""
+        self.robot = SimulatedController(Controller(program=parse(ROBOT_PROGRAM, "robot program")), host=HOST)
+        self.robot.set("input_double_register_1", _FULL_SPEED)
+        self.plc = Plc(HOST, self.port, PLC_ADDRESS)
+        self._plan = replace(loaded.plan, modbus=replace(loaded.plan.modbus, host=HOST, port=self.port))
+        self._daemon: Daemon | None = None
+
+    @property
+    def cell(self) -> Cell:
+        """The gateway's cell."""
+        assert self._daemon is not None
+        return self._daemon.stations[0].cell
+
+    @asynccontextmanager
+    async def playing(self) -> AsyncIterator[None]:
+        """Everything runs inside the block. What follows it sees the parties as they ended."""
+        stop = asyncio.Event()
+        async with self.robot:
+            robot = replace(self._plan.robot, host=HOST, port=self.robot.port)
+            self._daemon = Daemon([replace(self._plan, robot=robot)])
+            gateway = asyncio.create_task(self._daemon.run(stop))
+            plc = asyncio.create_task(self.plc.run())
+            try:
+                yield
+            finally:
+                self.plc.stop()
+                plc.cancel()
+                with suppress(asyncio.CancelledError):
+                    await plc
+                stop.set()
+                await gateway
+
+    def listen_to_logs(self) -> None:
+        """Keep the log off the screen; errors go to `problems`."""
+        logging.getLogger().handlers[:] = [_Collector(self.problems)]
+
+
+class _Collector(logging.Handler):
+    """Keeps the texts of errors."""
+
+    def __init__(self, problems: deque[str]) -> None:
+        super().__init__(logging.ERROR)
+        self._problems = problems
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._problems.append(record.getMessage())
+
+
+def free_port(host: str, wanted: int = 0) -> int:
+    """`wanted` if it can be listened on, or any free port for 0. OSError if it cannot be had."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((host, wanted))
+        port: int = probe.getsockname()[1]
+        return port

@@ -1,0 +1,212 @@
+"""What can be seen of the demonstration at one moment, as texts: the rows of the table, the links, the events."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from gatewayd.core.cell import Cell
+from gatewayd.core.definition import Direction, Value
+from gatewayd.core.events import Event, EventKind
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
+from gatewayd.core.refusal import Reason
+from gatewayd.demo.scene import Scene
+from gatewayd.mapping.table import Row
+
+__all__ = ["REFUSAL_SHOWN", "Happening", "Line", "Snapshot", "describe", "number", "snapshot"]
+
+REFUSAL_SHOWN = 5.0
+"""Seconds for which a refusal stands beside its variable."""
+EVENTS_KEPT = 8
+ROBOT = "robot"
+"""Who owns an output."""
+
+_EXCEPTIONS = {
+    Reason.NO_SUCH_ADDRESS: "02",
+    Reason.NOT_WRITABLE: "02",
+    Reason.HELD: "06",
+    Reason.OUT_OF_LIMITS: "03",
+    Reason.PARTIAL_VALUE: "03",
+    Reason.ROBOT_LOST: "0B",
+    Reason.CLAIMED_ELSEWHERE: "0A",
+}
+_SOURCES = {
+    Source.LOST: "not connected",
+    Source.WAITING: "connected",
+    Source.FRESH: "fresh",
+    Source.SILENT: "silent",
+    Source.FROZEN: "frozen",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One row of the table."""
+
+    row: Row
+    address: str
+    value: str
+    quality: Quality
+    age: str
+    owner: str
+    lease: str
+    """What is left of the owner's lease; empty without one."""
+    refused: str
+    """Who was refused here lately, and with which exception."""
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """One event in words."""
+
+    clock: str
+    text: str
+    bad: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Everything at one moment."""
+
+    elapsed: float
+    robot: str
+    """State of the robot link in one word."""
+    fresh: bool
+    frequency: float
+    packages: int
+    skipped: int
+    plc: str
+    """What the PLC program does."""
+    plc_connected: bool
+    handshakes: int
+    verified: int
+    wrong: int
+    accepted: int
+    refused: int
+    lines: tuple[Line, ...]
+    happenings: tuple[Happening, ...]
+    """The latest last."""
+
+
+def snapshot(scene: Scene, now: float) -> Snapshot:
+    """All that is shown, at monotonic time `now`."""
+    cell, plc = scene.cell, scene.plc
+    health, program = cell.health, plc.program
+    events = [event for event in cell.events if event.kind not in _UNTOLD][-EVENTS_KEPT:]
+    started_at = time.time() - now
+    happenings = [
+        Happening(_clock(started_at + event.time), describe(event, cell), event.kind in _BAD)
+        for event in events
+    ]
+    happenings += [Happening(_clock(started_at + now), problem, bad=True) for problem in scene.problems]
+    return Snapshot(
+        elapsed=now - scene.started,
+        robot=_SOURCES[cell.freshness.state],
+        fresh=cell.freshness.state is Source.FRESH,
+        frequency=health.frequency,
+        packages=health.packages,
+        skipped=health.skipped,
+        plc=program.phase.value,
+        plc_connected=plc.connected,
+        handshakes=program.handshakes,
+        verified=program.verified,
+        wrong=len(program.wrong),
+        accepted=health.writes_accepted,
+        refused=health.writes_refused,
+        lines=tuple(_line(cell, row, now) for row in scene.rows),
+        happenings=tuple(happenings),
+    )
+
+
+def describe(event: Event, cell: Cell) -> str:
+    """The event in words: `you wrote part_number = 7: refused with exception 06, held by plc`."""
+    return " ".join(_words(event, cell))
+
+
+def number(value: Value, unit: str = "") -> str:
+    """A value for people: at most three decimals, and its unit."""
+    if isinstance(value, bool):
+        return "1" if value else "0"
+    text = f"{value:.3f}".rstrip("0").rstrip(".") if isinstance(value, float) else str(value)
+    return f"{text} {unit}".rstrip()
+
+
+_UNTOLD = {EventKind.AVAILABLE}
+_BAD = {
+    EventKind.ROBOT_LOST,
+    EventKind.STALE,
+    EventKind.UNAVAILABLE,
+    EventKind.READ_BACK_DIFFERS,
+    EventKind.REFUSED,
+}
+
+
+def _words(event: Event, cell: Cell) -> Iterator[str]:
+    definition = cell.definition
+    variable = definition.variables[event.variable] if event.variable is not None else None
+    writer = definition.writers[event.writer].name if event.writer is not None else "a stranger"
+    other = definition.writers[event.other].name if event.other is not None else ""
+    lock = definition.locks[event.lock].name if event.lock is not None else ""
+    unit = variable.unit if variable is not None else ""
+    if event.kind is EventKind.REFUSED and event.reason is not None:
+        yield f"{writer} wrote {variable.name if variable else 'an address'}"
+        if event.new is not None:
+            yield f"= {number(event.new, unit)}:"
+        yield f"refused with exception {_EXCEPTIONS[event.reason]},"
+        yield f"held by {other}" if other else event.reason.text
+        yield f"({event.repeats + 1} times)" if event.repeats else ""
+    elif event.kind is EventKind.FALLBACK and variable is not None:
+        yield f"{variable.name} fell back to {number(event.new or 0, unit)}"
+    elif event.kind is EventKind.ACQUIRED:
+        yield f"{writer} took {lock}"
+    elif event.kind is EventKind.TAKEN_OVER:
+        yield f"{writer} took {lock} over from {other}"
+    elif event.kind is EventKind.RELEASED:
+        yield f"{lock} is free again: {event.detail}"
+    elif event.kind in (EventKind.WRITER_CONNECTED, EventKind.WRITER_LOST):
+        yield f"{writer} {'came' if event.kind is EventKind.WRITER_CONNECTED else 'left'}: {event.detail}"
+    else:
+        yield event.kind.value + (f": {event.detail}" if event.detail else "")
+
+
+def _line(cell: Cell, row: Row, now: float) -> Line:
+    index = row.number - 1
+    variable = cell.definition.variables[index]
+    owner, lease = ROBOT if variable.direction is Direction.OUTPUT else "", ""
+    if variable.lock is not None:
+        holder = cell.ownership.owners[variable.lock]
+        if holder is not None:
+            owner = cell.definition.writers[holder].name
+            left = cell.ownership.remaining(variable.lock, now)
+            lease = f"{left:.1f} s" if left < math.inf else ""
+    return Line(
+        row=row,
+        address=f"{row.address}" if row.bit is None else f"{row.address}.{row.bit}",
+        value=number(cell.image.values[index], row.unit),
+        quality=cell.image.quality[index],
+        age=_age(cell.image.age(index, now)),
+        owner=owner,
+        lease=lease,
+        refused=_refused(cell, index, now),
+    )
+
+
+def _refused(cell: Cell, index: int, now: float) -> str:
+    last = cell.last_refusal
+    if last is None or last.refusal.variable != index or now - last.time > REFUSAL_SHOWN:
+        return ""
+    writer = cell.definition.writers[last.writer].name if last.writer is not None else "a stranger"
+    return f"{writer} refused: {_EXCEPTIONS[last.refusal.reason]}"
+
+
+def _age(seconds: float) -> str:
+    if seconds == math.inf:
+        return "-"
+    return f"{max(0.0, seconds) * 1000:.0f} ms" if seconds < 1 else f"{seconds:.1f} s"
+
+
+def _clock(at: float) -> str:
+    return time.strftime("%H:%M:%S", time.localtime(at))

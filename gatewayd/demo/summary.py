@@ -1,0 +1,33 @@
+"""What the demonstration says at its end, and whether it has shown what it is for."""
+
+from __future__ import annotations
+
+from gatewayd.demo.plc import CHECKS_PER_HANDSHAKE
+from gatewayd.demo.scene import Scene
+
+__all__ = ["summary"]
+
+
+def summary(scene: Scene, *, asked_for: bool) -> tuple[bool, str]:
+    """Whether the main job worked, and the closing words.
+
+    A demonstration whose length was asked for must have seen a handshake; one that was broken off need not.
+    """
+    program, health = scene.plc.program, scene.cell.health
+    counts = (
+        f"{health.packages} packages from the robot ({health.skipped} skipped), "
+        f"{program.handshakes} handshakes, {program.verified} values checked both ways, "
+        f"{health.writes_refused} writes refused."
+    )
+    if program.wrong or scene.problems:
+        reasons = "; ".join([*program.wrong, *scene.problems])
+        return False, f"{counts}\nThat is not how it should be: {reasons}"
+    if program.handshakes == 0 or program.verified < CHECKS_PER_HANDSHAKE:
+        what = "The PLC and the robot never shook hands" + ("." if asked_for else ": it was over too soon.")
+        return not asked_for, f"{counts}\n{what}"
+    parts = program.handshakes
+    made = "1 part ordered, 1 part made" if parts == 1 else f"{parts} parts ordered, {parts} parts made"
+    return True, (
+        f"{counts}\n{made}, 0 excuses. The robot counted the same as the PLC.\n"
+        "Next: docs/tutorial leads from here to your own robot."
+    )

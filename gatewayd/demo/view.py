@@ -1,0 +1,154 @@
+"""How the demonstration looks: a table that follows a terminal, or plain lines for everything else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from gatewayd.core.image import Quality
+from gatewayd.demo.snapshot import Line, Snapshot
+
+__all__ = ["Poke", "commands", "plain", "screen"]
+
+Poke = tuple[str, str]
+"""What a command shows, and the command."""
+
+_QUALITY_STYLES = {
+    Quality.GOOD: "green",
+    Quality.STALE: "yellow",
+    Quality.UNAVAILABLE: "red",
+    Quality.NEVER: "dim",
+}
+_WIDE = 97
+"""Columns of a terminal that has room for the 4xxxxx form too."""
+_SPACIOUS = 110
+_LEAST_EVENTS, _MOST_EVENTS = 3, 8
+_FRAME_OF_TABLE = 5
+"""Lines of the table that are no variables: title, rules and blank ones."""
+_FRAME_OF_POKES = 2
+_ABOVE = 4
+"""Lines that are left to what was printed before."""
+
+
+def commands(port: int, python: str) -> tuple[list[Poke], Poke]:
+    """What to type in another terminal, with mbpoll and with nothing but this Python."""
+    mbpoll = f"mbpoll -0 -p {port}"
+    script = (
+        f"import time, pymodbus.client as m; c = m.ModbusTcpClient('127.0.0.1', port={port}); c.connect(); "
+        "print(c.write_register(10, 50)); time.sleep(8)"
+    )
+    return [
+        ("watch part_done and cycles; let it run", f"{mbpoll} -t 4:int -B -r 101 -c 2 127.0.0.1"),
+        ("meanwhile: half speed, yours for 5 s", f"{mbpoll} -r 10 127.0.0.1 50"),
+        ("meddle with the order: refused, 06", f"{mbpoll} -r 1 127.0.0.1 7"),
+    ], ("Half speed for 5 s without mbpoll", f'{python} -c "{script}"')
+
+
+def screen(shot: Snapshot, before: Snapshot | None, pokes: Sequence[Poke], width: int, height: int) -> Group:
+    """One picture of at most `height` lines; values that differ from `before` are bright."""
+    old = {line.row.number: line.value for line in before.lines} if before is not None else {}
+    table = _table(shot.lines, old, wide=width >= _WIDE, gap=2 if width >= _SPACIOUS else 0)
+    fixed = 1 + _FRAME_OF_TABLE + len(shot.lines)
+    shown = list(pokes) if height >= fixed + _LEAST_EVENTS + len(pokes) + _FRAME_OF_POKES else []
+    room = height - fixed - (len(shown) + _FRAME_OF_POKES if shown else 0) - _ABOVE
+    events = min(max(room, _LEAST_EVENTS), _MOST_EVENTS)
+    parts: list[RenderableType] = [_links(shot, wide=width >= _SPACIOUS), table, *_events(shot, events)]
+    if shown:
+        parts.extend(_hints(shown))
+    return Group(*parts)
+
+
+def plain(shot: Snapshot) -> str:
+    """One block of lines."""
+    links = (
+        f"{shot.elapsed:6.1f} s  robot {shot.robot}, {shot.frequency:.1f} Hz, {shot.packages} packages, "
+        f"{shot.skipped} skipped | plc {shot.plc}, {shot.handshakes} handshakes, {shot.verified} values verified | "
+        f"writes {shot.accepted} accepted, {shot.refused} refused"
+    )
+    lines = [
+        f"  {'->' if line.row.direction == 'input' else '<-'} {line.row.name:<12} {line.row.robot:<25} "
+        f"{line.address:>6} {line.row.notation:<9} {line.value:>9}  {line.quality.name.lower():<12}"
+        f"{line.age:>7}  {_owner(line)}".rstrip()
+        for line in shot.lines
+    ]
+    return "\n".join([links, *lines, *(f"  {one.clock} {one.text}" for one in shot.happenings[-3:]), ""])
+
+
+def _links(shot: Snapshot, *, wide: bool) -> Text:
+    text = Text(no_wrap=True, overflow="ellipsis")
+    text.append(" ● ", "green" if shot.fresh else "red").append("robot ", "bold")
+    text.append(f"{shot.frequency:.1f} Hz" if shot.fresh else shot.robot)
+    text.append(f", {shot.packages} packages, {shot.skipped} skipped")
+    text.append("   ● ", "green" if shot.plc_connected else "red").append("PLC ", "bold")
+    text.append(f"{shot.handshakes} handshakes, {shot.verified} values right")
+    if shot.wrong:
+        text.append(f", {shot.wrong} wrong", "bold red")
+    text.append(f"   {shot.accepted} writes, " if wide else "   ")
+    return text.append(f"{shot.refused} refused", "bold red" if shot.refused else "")
+
+
+def _table(lines: Sequence[Line], old: dict[int, str], *, wide: bool, gap: int) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, gap, 0, 0), pad_edge=False)
+    table.add_column("   variable", no_wrap=True, min_width=14)
+    table.add_column("robot register", no_wrap=True, max_width=None if wide else 20)
+    table.add_column("Modbus", justify="right", no_wrap=True, min_width=6)
+    if wide:
+        table.add_column("4xxxxx", no_wrap=True)
+    table.add_column("value", justify="right", no_wrap=True, min_width=8)
+    table.add_column("quality", no_wrap=True, min_width=7)
+    table.add_column("age", justify="right", no_wrap=True, min_width=6)
+    table.add_column("owner", no_wrap=True, min_width=16)
+    previous = lines[0].row.direction if lines else ""
+    for line in lines:
+        if line.row.direction != previous:
+            table.add_section()
+            previous = line.row.direction
+        table.add_row(*_cells(line, changed=old.get(line.row.number, line.value) != line.value, wide=wide))
+    return table
+
+
+def _cells(line: Line, *, changed: bool, wide: bool) -> Iterator[Text]:
+    towards = line.row.direction == "input"
+    colour = "cyan" if towards else "green"
+    yield Text(" → " if towards else " ← ", f"bold {colour}").append(line.row.name, "bold default")
+    yield Text(line.row.robot, colour)
+    yield Text(line.address)
+    if wide:
+        yield Text(line.row.notation, "dim")
+    yield Text(line.value, "bold yellow" if changed and line.row.name != "tool_height" else "bold")
+    yield Text(line.quality.name.lower(), _QUALITY_STYLES[line.quality])
+    yield Text(line.age, "dim")
+    if line.refused:
+        yield Text(line.refused, "bold red")
+    else:
+        yield Text(_owner(line), "yellow" if line.lease else "" if towards else "dim")
+
+
+def _owner(line: Line) -> str:
+    if line.refused:
+        return f"{line.owner} ({line.refused})"
+    return f"{line.owner}, {line.lease} left" if line.lease else line.owner or "free"
+
+
+def _events(shot: Snapshot, count: int) -> Iterator[Text]:
+    """`count` lines, empty ones above, so that the picture keeps its height."""
+    latest = (
+        shot.happenings[len(shot.happenings) - count :] if count < len(shot.happenings) else shot.happenings
+    )
+    for one in latest:
+        text = Text(f" {one.clock} ", "dim", no_wrap=True, overflow="ellipsis")
+        yield text.append(one.text, "bold red" if one.bad else "default")
+    yield from (Text("") for _ in range(count - len(latest)))
+
+
+def _hints(pokes: Sequence[Poke]) -> Iterator[Text]:
+    yield Text("")
+    yield Text(" From another terminal (mbpoll: apt install mbpoll), Ctrl-C ends:", "dim")
+    wide = max(len(meaning) for meaning, _ in pokes)
+    for meaning, command in pokes:
+        text = Text(f" {meaning:<{wide}}  ", no_wrap=True, overflow="ellipsis")
+        yield text.append(command, "bold cyan")

@@ -1,0 +1,1 @@
+"""The robot side of a cell: its RTDE client and its part of the process image."""

@@ -1,0 +1,382 @@
+"""The parts of docs/ that are made from the code, and how they get into their pages.
+
+A page holds a part between `<!-- generated: NAME -->` and `<!-- end -->`. `python -m tests.docs` renews all of them;
+tests/docs/test_generated.py fails while one is not current.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib import import_module
+from pathlib import Path
+from textwrap import indent
+from typing import Any
+
+import click
+from click.testing import CliRunner
+
+from gatewayd.cli import COMMANDS
+from gatewayd.cli import command as root
+from gatewayd.core.events import EventKind
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
+from gatewayd.core.refusal import PRECEDENCE, Reason
+from gatewayd.core.status import BASE, FIELDS, TABLES
+from gatewayd.eventlog import LEVELS
+from gatewayd.logs import LEVELS as LEVEL_NAMES
+from gatewayd.mapping.plan import Area
+from gatewayd.mapping.schema import mapping_schema
+from gatewayd.modbus.functions import EXCEPTION_OF, ExceptionCode
+from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series
+
+__all__ = ["DOCS", "PARTS", "ROOT", "pages", "renewed"]
+
+ROOT = Path(__file__).parent.parent.parent
+DOCS = ROOT / "docs"
+HELP_WIDTH = 100
+
+_PART = re.compile(r"(<!-- generated: ([\w-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+def pages() -> list[Path]:
+    """The pages with generated parts."""
+    return [page for page in sorted(DOCS.rglob("*.md")) if _PART.search(page.read_text())]
+
+
+def renewed(text: str) -> str:
+    """The text of a page with its generated parts made anew."""
+    return _PART.sub(lambda found: f"{found[1]}\n{PARTS[found[2]]().strip()}\n\n{found[4]}", text)
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    lines = ["| " + " | ".join(head) + " |"]
+    lines.append("|" + "---|" * len(lines[0].split(" | ")))
+    lines += ["| " + " | ".join(_cell(value) for value in row) + " |" for row in rows]
+    return "\n".join(lines)
+
+
+def _cell(value: object) -> str:
+    return str(value).replace("|", "\\|")
+
+
+# -- mapping file -----------------------------------------------------------------------------------------------------
+
+_SECTIONS = {
+    "": "The file",
+    "Robot": "`robot:`",
+    "Watchdog": "`robot: watchdog:`",
+    "Modbus": "`modbus:`",
+    "WriterSpec": "`writers:` NAME`:`",
+    "Group": "`groups:` NAME`:`",
+    "VariableSpec": "`variables:` NAME`:`",
+    "PlacementSpec": "`variables:` NAME`: modbus:`",
+}
+_DURATION = re.compile(r"ms\|s\|min\|h")
+
+
+def mapping_keys() -> str:
+    """Every key of the mapping file with type, default and meaning."""
+    schema = mapping_schema()
+    parts = []
+    sections = {"": schema, **schema["$defs"]}
+    for name, title in _SECTIONS.items():
+        section = sections.pop(name)
+        rows = [
+            (
+                f"`{key}`",
+                _type(value),
+                _default(key, value, section.get("required", ())),
+                value["description"],
+            )
+            for key, value in section["properties"].items()
+        ]
+        parts.append(f"### {title}\n\n" + _table(("key", "type", "default", "meaning"), rows))
+    assert not sections, f"no title for {list(sections)}"
+    return "\n\n".join(parts)
+
+
+def _type(schema: Mapping[str, Any]) -> str:
+    return " or ".join(dict.fromkeys(_types(schema)))
+
+
+def _types(schema: Mapping[str, Any]) -> Iterator[str]:
+    if "anyOf" in schema:
+        for choice in schema["anyOf"]:
+            yield from _types(choice)
+    elif "enum" in schema or "const" in schema:
+        yield from (f"`{word}`" for word in schema.get("enum", [schema.get("const")]))
+    elif _DURATION.search(schema.get("pattern", "")):
+        yield "duration"
+        if "none" in schema["pattern"]:
+            yield "`none`"
+    elif "prefixItems" in schema:
+        yield "two numbers"
+    else:
+        yield _TYPES[schema.get("type", "object")] + _range(schema)
+
+
+_TYPES = {
+    "array": "list",
+    "boolean": "`true`, `false`",
+    "integer": "whole number",
+    "number": "number",
+    "object": "table",
+    "string": "text",
+}
+
+
+def _range(schema: Mapping[str, Any]) -> str:
+    low, high = schema.get("minimum", schema.get("exclusiveMinimum")), schema.get("maximum")
+    if high is not None:
+        return f" {low} to {high}"
+    return f" from {low}" if low is not None else ""
+
+
+def _default(key: str, schema: Mapping[str, Any], required: Iterable[str]) -> str:
+    if key in required:
+        return "required"
+    value = schema.get("default")
+    if value in (None, "", [], {}):
+        return ""
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if "duration" in _type(schema):
+        return f"`{value:g}s`"
+    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+
+
+# -- command line -----------------------------------------------------------------------------------------------------
+
+
+def help_text(name: str) -> str:
+    """What `gatewayd NAME --help` prints; `gatewayd --help` for an empty name."""
+    arguments = [name, "--help"] if name else ["--help"]
+    result = CliRunner().invoke(root, arguments, prog_name="gatewayd", terminal_width=HELP_WIDTH)
+    assert result.exit_code == 0
+    return result.output.rstrip()
+
+
+def command_line() -> str:
+    """The help of every command."""
+    parts = [
+        f"## gatewayd {name}".rstrip() + "\n\n" + indent(help_text(name), "    ") for name in ("", *COMMANDS)
+    ]
+    return "\n\n".join(parts)
+
+
+def exit_codes() -> str:
+    """What each command says about its exit codes, in one table."""
+    rows = []
+    for name in ("", *COMMANDS):
+        command = root if not name else import_module(f"gatewayd.cli.{name}").command
+        assert isinstance(command, click.Command)
+        told = (command.epilog or "").partition("Exit codes:\n")[2]
+        rows += [
+            (f"`gatewayd {name}`" if name else "any command", found[1], found[2])
+            for found in re.finditer(r"^ +(\d+) +(.+)$", told, re.MULTILINE)
+        ]
+    return _table(("command", "code", "meaning"), rows)
+
+
+# -- what can be seen on the bus --------------------------------------------------------------------------------------
+
+
+def _places(offset: int, words: int) -> tuple[str, str]:
+    first, last = BASE + offset, BASE + offset + words - 1
+    if first == last:
+        return str(first), Area.HOLDING.notation(first)
+    return f"{first}-{last}", f"{Area.HOLDING.notation(first)}-{Area.HOLDING.notation(last)}"
+
+
+def status_header() -> str:
+    """The numbers of the status block."""
+    rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in FIELDS]
+    return _table(("address", "4xxxxx", "name", "meaning"), rows)
+
+
+def status_tables() -> str:
+    """The tables of the status block."""
+    rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in TABLES]
+    return _table(("address", "4xxxxx", "name", "meaning"), rows)
+
+
+_QUALITIES = {
+    Quality.GOOD: "the value is what its source told last, and the source is alive",
+    Quality.STALE: "the source has stopped telling; outputs show `on_stale`",
+    Quality.UNAVAILABLE: "the controller does not have the field, or gave the register to another client",
+    Quality.NEVER: "nothing has been told yet",
+}
+_SOURCES = {
+    Source.LOST: "no connection to the controller",
+    Source.WAITING: "connected, no package yet",
+    Source.FRESH: "packages come and tell something new",
+    Source.SILENT: "connected, but no package for longer than `stale_after`",
+    Source.FROZEN: "packages come, but the controller's own time stands still",
+}
+
+
+def qualities() -> str:
+    """The qualities by number."""
+    rows = [(quality.value, f"`{quality.name.lower()}`", _QUALITIES[quality]) for quality in Quality]
+    return _table(("number", "quality", "meaning"), rows)
+
+
+def sources() -> str:
+    """The states of the robot by number."""
+    rows = [(source.value, f"`{source.name.lower()}`", _SOURCES[source]) for source in Source]
+    return _table(("number", "robot_state", "meaning"), rows)
+
+
+def refusals() -> str:
+    """The reasons of refusals, with the exception codes that tell them."""
+    rows = [
+        (reason.value, reason.text, f"{EXCEPTION_OF[reason]:02X}", PRECEDENCE[reason] + 1)
+        for reason in Reason
+    ]
+    return _table(("reason", "in words", "exception", "told first"), rows)
+
+
+_EXCEPTIONS = {
+    ExceptionCode.ILLEGAL_FUNCTION: "a function code that is not served",
+    ExceptionCode.ILLEGAL_ADDRESS: "nothing is mapped there, or this peer may never write it",
+    ExceptionCode.ILLEGAL_VALUE: "a malformed request, a value out of limits, or a part of a value",
+    ExceptionCode.BUSY: "another writer owns it now: try again later",
+    ExceptionCode.PATH_UNAVAILABLE: "the controller gave the register to another client, or does not have it",
+    ExceptionCode.TARGET_FAILED: (
+        "the robot is not connected, its inputs were not adopted yet, the output is stale and its policy is "
+        "`exception`, or no such unit is served"
+    ),
+}
+
+
+def exceptions() -> str:
+    """The exception codes in use."""
+    rows = [(f"{code:02X}", code.name.lower().replace("_", " "), _EXCEPTIONS[code]) for code in ExceptionCode]
+    return _table(("code", "name", "when"), rows)
+
+
+def events() -> str:
+    """The events of a cell, with the level that the log gives them."""
+    rows = [(f"`{kind.value}`", _level(kind)) for kind in EventKind]
+    return _table(("event", "level"), rows)
+
+
+def _level(kind: EventKind) -> str:
+    level = LEVELS.get(kind)
+    return "info" if level is None else LEVEL_NAMES[level][0]
+
+
+# -- RTDE -------------------------------------------------------------------------------------------------------------
+
+
+def rtde_inputs() -> str:
+    """What can be written to a controller."""
+    return _fields(INPUTS)
+
+
+def rtde_outputs() -> str:
+    """What a controller tells."""
+    return _fields(OUTPUTS)
+
+
+_NUMBERED = re.compile(r"(.*?_)(\d+)")
+
+
+def _fields(fields: Mapping[str, Field]) -> str:
+    rows: list[list[str]] = []
+    ranges: list[tuple[str, int, int]] = []
+    for name, field in fields.items():
+        facts = [field.type.name, field.unit, *(_since(field, series) for series in Series), field.comment]
+        numbered = _NUMBERED.fullmatch(name)
+        stem, number = (numbered[1], int(numbered[2])) if numbered else (name, -1)
+        same = (
+            rows
+            and numbered
+            and rows[-1][1:] == facts
+            and ranges[-1][0] == stem
+            and ranges[-1][2] + 1 == number
+        )
+        if same:
+            ranges[-1] = (stem, ranges[-1][1], number)
+            rows[-1][0] = f"`{stem}{ranges[-1][1]}..{number}`"
+        else:
+            ranges.append((stem, number, number))
+            rows.append([f"`{name}`", *facts])
+    return _table(("field", "type", "unit", *(series.word for series in Series), "meaning"), rows)
+
+
+def _since(field: Field, series: Series) -> str:
+    if not field.exists(series):
+        return "-"
+    first = field.first_version(series)
+    return "yes" if first is None else str(first)
+
+
+# -- architecture -----------------------------------------------------------------------------------------------------
+
+
+_FOLDERS = ("core", "rtde", "robot", "simulator", "mapping", "mapping/rules", "modbus", "demo", "cli")
+"""Packages in the order in which a reader meets them; others follow by name."""
+
+
+def modules() -> str:
+    """Every module with the first sentence of its docstring, by package."""
+    parts = []
+    package = ROOT / "gatewayd"
+    folders = {path.parent.relative_to(package).as_posix() for path in package.rglob("__init__.py")} - {"."}
+    known = [name for name in _FOLDERS if name in folders]
+    for folder in ["", *known, *sorted(folders.difference(known))]:
+        rows = [(f"`{path.stem}`", _subject(path)) for path in sorted((package / folder).glob("[!_]*.py"))]
+        title = (
+            f"`gatewayd/{folder}/`: {_subject(package / folder / '__init__.py')}" if folder else "`gatewayd/`"
+        )
+        parts.append(f"### {title}\n\n" + _table(("module", "subject"), rows))
+    return "\n\n".join(parts)
+
+
+def _subject(path: Path) -> str:
+    text = ast.get_docstring(ast.parse(path.read_text())) or ""
+    return " ".join(text.split("\n\n")[0].split()).removesuffix(".")
+
+
+def layers() -> str:
+    """Who may import whom."""
+    table = import_module("tests.test_architecture").LAYERS
+    rows = [
+        (f"`{name}`", ", ".join(f"`{one}`" for one in sorted(may - {name})) or "nothing of ours")
+        for name, may in table.items()
+        if name != "gatewayd"
+    ]
+    return _table(("what", "may import"), rows)
+
+
+# -- shipped files ----------------------------------------------------------------------------------------------------
+
+
+def simulator_control() -> str:
+    """The commands of the simulator's standard input."""
+    text = import_module("gatewayd.simulator.control").__doc__ or ""
+    lines = [line.strip() for line in text.splitlines() if line.startswith("    ")]
+    return "```text\n" + "\n".join(lines) + "\n```"
+
+
+PARTS: dict[str, Callable[[], str]] = {
+    "mapping-keys": mapping_keys,
+    "command-line": command_line,
+    "exit-codes": exit_codes,
+    "status-header": status_header,
+    "status-tables": status_tables,
+    "qualities": qualities,
+    "robot-states": sources,
+    "refusals": refusals,
+    "exceptions": exceptions,
+    "events": events,
+    "rtde-inputs": rtde_inputs,
+    "rtde-outputs": rtde_outputs,
+    "modules": modules,
+    "layers": layers,
+    "simulator-control": simulator_control,
+}
+"""Name of a part -> what makes it."""

@@ -1,0 +1,131 @@
+"""The commands of tutorial and guides: each is known here, and what can be run is run."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.docs.generated import DOCS
+
+PAGES = sorted([*DOCS.glob("tutorial/*.md"), *DOCS.glob("howto/*.md")])
+BLOCK = re.compile(r"^```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)
+FILE = re.compile(r"<!-- file: (\S+) -->\n```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+ELSEWHERE = {
+    r'export PATH="\$PWD/\.venv/bin:\$PATH"': "the shell's own",
+    r"gatewayd demo": "tests/cli/test_demo.py",
+    r"gatewayd run .*": "tests/docs/test_tutorial.py, tests/e2e",
+    r"gatewayd simulate .*": "test_simulator_takes_the_options_of_the_guides below, tests/cli/test_simulate.py",
+    r"mbpoll -0 -p 1502 -t 4:int -B -r 101 -c 2 127\.0\.0\.1": "tests/demo/test_view.py: the demonstration's own",
+    r"mbpoll -0 .*": "tests/docs/test_tutorial.py, with another Modbus client",
+    r"make (bench|demo)\b.*": "the Makefile; tests/test_docs.py knows its targets",
+    r"apt install .*|apt-get install .*": "the system's",
+}
+"""Command (the whole line) -> what else tests it."""
+
+RUN = re.compile(r"gatewayd (check|show) .*")
+"""What test_command_works runs."""
+
+
+def commands(page: Path) -> Iterator[str]:
+    """The lines of the page's shell blocks, without comments."""
+    for block in BLOCK.findall(page.read_text()):
+        for line in block.splitlines():
+            command = re.sub(r"\s+#.*", "", line).strip()
+            if command:
+                yield command
+
+
+ALL = [(page, command) for page in PAGES for command in commands(page)]
+
+
+def test_every_command_is_known() -> None:
+    unknown = [
+        f"{page.name}: {command}"
+        for page, command in ALL
+        if not RUN.fullmatch(command) and not any(re.fullmatch(known, command) for known in ELSEWHERE)
+    ]
+    assert not unknown
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """A directory with every file that the pages show."""
+    for page in PAGES:
+        for name, text in FILE.findall(page.read_text()):
+            (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def gatewayd(arguments: str, directory: Path) -> subprocess.CompletedProcess[str]:
+    """Run `gatewayd ARGUMENTS` there."""
+    return subprocess.run(
+        [sys.executable, "-m", "gatewayd", *shlex.split(arguments)],
+        cwd=directory,
+        env={"PYTHONPATH": str(DOCS.parent), "COLUMNS": "110"},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+
+
+def test_commands_work(files: Path) -> None:
+    runnable = {command for _, command in ALL if RUN.fullmatch(command)}
+    assert runnable
+    for command in sorted(runnable):
+        done = gatewayd(command.removeprefix("gatewayd ").partition(" > ")[0], files)
+        assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
+
+
+def test_files_of_the_pages_have_no_findings(files: Path) -> None:
+    names = sorted(path.name for path in files.glob("*.yaml"))
+    assert "my-cell.yaml" in names
+    done = gatewayd("check --strict --separately " + " ".join(names), files)
+    assert "no findings" in done.stdout, done.stdout
+
+
+def test_mistakes_of_the_tutorial_are_found_as_it_says(files: Path) -> None:
+    page = (DOCS / "tutorial" / "2-own-mapping.md").read_text()
+    text = (files / "my-cell.yaml").read_text()
+    broken = text.replace("modbus: 0.0, owner: plc", "modbus: 0.0, owner: plv").replace(
+        "output_int_register_0, modbus: 101", "output_int_register_0, modbus: 100"
+    )
+    (files / "my-cell.yaml").write_text(broken)
+    done = gatewayd("check my-cell.yaml", files)
+    assert done.returncode == 1
+    for line in done.stdout.splitlines():
+        if (
+            re.search(r"\berror\b|first used", line)
+            and "files checked" not in line
+            and "checked:" not in line
+        ):
+            assert line in page
+
+
+def test_table_of_the_tutorial_is_the_real_one(files: Path) -> None:
+    page = (DOCS / "tutorial" / "2-own-mapping.md").read_text()
+    shown = gatewayd("show my-cell.yaml", files).stdout
+    for line in filter(None, map(str.strip, shown.splitlines()[:10])):
+        assert line in page
+
+
+OPTIONS = {
+    option
+    for page in PAGES
+    for line in re.findall(r"`(--[^`]+)`|gatewayd simulate (.*)", page.read_text())
+    if page.name == "simulate-faults.md"
+    for option in re.findall(r"--[a-z0-9-]+", " ".join(line))
+}
+
+
+def test_simulator_takes_the_options_of_the_guides() -> None:
+    told = gatewayd("simulate --help", DOCS.parent).stdout
+    assert OPTIONS
+    assert {option for option in OPTIONS if option not in told} == set()

@@ -1,0 +1,46 @@
+"""What docs/ says of the code is what the code says: generated parts are current and all in use."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.docs.generated import DOCS, PARTS, pages, renewed
+
+every_page = pytest.mark.parametrize("page", pages(), ids=lambda page: page.relative_to(DOCS).as_posix())
+
+
+@every_page
+def test_page_is_current(page: Path) -> None:
+    text = page.read_text()
+    assert text == renewed(text), "run: python -m tests.docs"
+
+
+def test_every_part_has_its_page() -> None:
+    used = [
+        name for page in pages() for name in re.findall(r"<!-- generated: ([\w-]+) -->", page.read_text())
+    ]
+    assert sorted(used) == sorted(PARTS)
+
+
+def test_numbers_of_variables_in_the_guide_are_those_of_the_block() -> None:
+    """The guide for PLC programmers repeats addresses; they come from the same tables."""
+    reference = (DOCS / "reference" / "status-block.md").read_text()
+    guide = (DOCS / "howto" / "status-block.md").read_text()
+    for address in re.findall(r"\b6[0-4]\d{3}\b", guide):
+        assert address in reference, f"{address} is no word of the status block"
+
+
+def test_every_page_is_found_from_the_index() -> None:
+    linked = {DOCS / "README.md"}
+    waiting = [DOCS / "README.md"]
+    while waiting:
+        page = waiting.pop()
+        for link in re.findall(r"\]\(([^)#\s]+\.md)", page.read_text()):
+            target = (page.parent / link).resolve()
+            if target.is_relative_to(DOCS) and target.exists() and target not in linked:
+                linked.add(target)
+                waiting.append(target)
+    assert {page for page in DOCS.rglob("*.md") if "rules" not in page.parent.parts} - linked == set()
