@@ -13,6 +13,8 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
 from gatewayd.core.cell import Cell
 from gatewayd.eventlog import EventLog
@@ -22,7 +24,11 @@ from gatewayd.modbus.peers import PeerEvent, PeerEventKind
 from gatewayd.modbus.server import ListenError, ModbusListener
 from gatewayd.robot.link import RobotLink
 
-__all__ = ["CLOSING_TIME", "RETRY_PERIOD", "TICK", "Daemon", "Station"]
+if TYPE_CHECKING:
+    from gatewayd.canopen.link import CanLink
+    from gatewayd.canopen.plan import CanopenPlan
+
+__all__ = ["CLOSING_TIME", "RETRY_PERIOD", "TICK", "Daemon", "Link", "Station"]
 
 TICK = 0.02
 """Seconds between two looks at leases, time-outs and staleness."""
@@ -42,20 +48,45 @@ class Station:
     """One cell with its links."""
 
     plan: Plan
+    state: Path
+    """Directory of what the cell keeps across restarts."""
     cell: Cell = field(init=False)
     robot: RobotLink = field(init=False)
+    can: CanLink | None = field(init=False)
 
     def __post_init__(self) -> None:
         self.cell = Cell(self.plan.cell)
         self.cell.events.listeners.append(EventLog(self.cell))
         self.robot = RobotLink(self.plan.robot, self.cell)
+        self.can = self._can_link(self.plan.canopen) if self.plan.canopen is not None else None
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """What is to be run."""
+        return (self.robot,) if self.can is None else (self.robot, self.can)
+
+    def _can_link(self, plan: CanopenPlan) -> CanLink:
+        from gatewayd.canopen.link import CanLink  # most cells have no CAN, and start sooner without it
+        from gatewayd.canopen.storage import JsonStore
+
+        return CanLink(plan, self.cell, JsonStore(self.state / f"{self.plan.cell.name}.canopen.json"))
+
+
+class Link(Protocol):
+    """One connection to the outside."""
+
+    async def run(self) -> None:
+        """Work until cancelled."""
+
+    async def close(self) -> None:
+        """Send what is still due; `run` is cancelled afterwards."""
 
 
 class Daemon:
-    """Runs the cells of `plans` until told to stop."""
+    """Runs the cells of `plans` until told to stop; `state` is the directory of what is kept across restarts."""
 
-    def __init__(self, plans: Sequence[Plan]) -> None:
-        self.stations = [Station(plan) for plan in plans]
+    def __init__(self, plans: Sequence[Plan], state: Path) -> None:
+        self.stations = [Station(plan, state) for plan in plans]
         units: dict[Address, list[tuple[ModbusPlan, Cell]]] = {}
         for station in self.stations:
             modbus = station.plan.modbus
@@ -70,10 +101,10 @@ class Daemon:
     async def run(self, stop: asyncio.Event) -> None:
         """Serve until `stop` is set; then release every lock, give the robots the fallbacks, and close."""
         clocks = [_keep_running(partial(_tick, station.cell)) for station in self.stations]
-        robots = [_keep_running(station.robot.run) for station in self.stations]
+        links = [_keep_running(link.run) for station in self.stations for link in station.links]
         listeners = [_open(listener) for listener in self.listeners]
         async with asyncio.TaskGroup() as group:
-            tasks = [group.create_task(work) for work in (*clocks, *listeners, *robots)]
+            tasks = [group.create_task(work) for work in (*clocks, *listeners, *links)]
             await stop.wait()
             await self._close()
             for task in tasks:
@@ -89,7 +120,7 @@ class Daemon:
                 station.cell.release_all(writer, now, "the gateway stops")
         with suppress(TimeoutError):
             async with asyncio.timeout(CLOSING_TIME):
-                await asyncio.gather(*(station.robot.close() for station in self.stations))
+                await asyncio.gather(*(link.close() for station in self.stations for link in station.links))
 
 
 async def _tick(cell: Cell) -> None:

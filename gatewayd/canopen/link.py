@@ -52,9 +52,17 @@ class CanLink(Observer):
         self._offset = math.inf
         self._switching: asyncio.TimerHandle | None = None
         # The kernel's interfaces are set by whoever administers them; python-can opens its own with a bit rate.
-        self._bit_rates = () if plan.interface == "socketcan" else BIT_RATES
+        self._bit_rates = (
+            () if plan.interface == "socketcan" else tuple(rate for rate in BIT_RATES if rate is not None)
+        )
         self.node = Node(
-            plan, cell, self._transmitter.send, store, self._core_lives, observer=self, bit_rates=self._bit_rates
+            plan,
+            cell,
+            self._transmitter.send,
+            store,
+            self._core_lives,
+            observer=self,
+            bit_rates=self._bit_rates,
         )
         cell.listeners.append(self._on_image)
 
@@ -94,7 +102,12 @@ class CanLink(Observer):
     def on_state(self, state: BusState, reason: str, now: float) -> None:
         """The bus is in another state."""
         level = logging.INFO if state is BusState.ACTIVE else logging.WARNING
-        log.log(level, "CAN bus %s", state.name.lower().replace("_", "-"), extra=fields(**self._names(), reason=reason))
+        log.log(
+            level,
+            "CAN bus %s",
+            state.name.lower().replace("_", "-"),
+            extra=fields(**self._names(), reason=reason),
+        )
         self._cell.health.can_bus = state + 1
         if state.carries:
             self._transmitter.open()
@@ -128,7 +141,9 @@ class CanLink(Observer):
         offset = moment.timestamp() - now
         if abs(offset - self._offset) > CLOCK_STEP:
             self._offset = offset
-            log.info("network time", extra=fields(**self._names(), time=moment.isoformat(timespec="milliseconds")))
+            log.info(
+                "network time", extra=fields(**self._names(), time=moment.isoformat(timespec="milliseconds"))
+            )
 
     def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
         """An LSS master activates a bit rate: be silent, switch, be silent for as long again (CiA 305)."""
@@ -206,5 +221,5 @@ class CanLink(Observer):
         return {
             "cell": self._cell.definition.name,
             "bus": f"{self._plan.interface}:{self._plan.channel}",
-            "node": self.node.node_id if hasattr(self, "node") else self._plan.node,
+            "node": self._plan.node,
         }

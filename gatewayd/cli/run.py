@@ -52,8 +52,15 @@ Exit codes:
     show_default=True,
     help="Least severity told; debug also tells every lock taken and released.",
 )
+@click.option(
+    "--state",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Directory of what CANopen masters have stored; default: $STATE_DIRECTORY, else ~/.local/state/gatewayd.",
+)
 @click.option("--strict", is_flag=True, help="Start only if every file can be served.")
-def command(files: tuple[Path, ...], log_format: str, log_level: str, *, strict: bool) -> int:
+def command(
+    files: tuple[Path, ...], log_format: str, log_level: str, state: Path | None, *, strict: bool
+) -> int:
     """Serve the robot cells of mapping FILES until stopped.
 
     A FILE may also be a directory: all its *.yaml files are meant. Cells with the same `modbus: listen:` share one
@@ -61,7 +68,7 @@ def command(files: tuple[Path, ...], log_format: str, log_level: str, *, strict:
     """
     from gatewayd.daemon import Daemon
     from gatewayd.logs import Format, configure
-    from gatewayd.startup import load_plans
+    from gatewayd.startup import load_plans, state_directory
 
     configure(Format(log_format), logging.getLevelNamesMapping()[log_level.upper()])
     found = load_plans(files)
@@ -69,7 +76,7 @@ def command(files: tuple[Path, ...], log_format: str, log_level: str, *, strict:
         return UNREADABLE
     if not found.plans or (strict and (found.broken or found.unreadable)):
         return NOTHING_TO_RUN
-    asyncio.run(_serve(Daemon(found.plans)))
+    asyncio.run(_serve(Daemon(found.plans, state or state_directory(os.environ))))
     return 0
 
 
