@@ -6,6 +6,7 @@ import asyncio
 import errno
 import math
 import os
+import shlex
 import signal
 import sys
 import time
@@ -172,4 +173,5 @@ async def _wait(scene: Scene, stop: asyncio.Event, pause: float, seconds: float 
 def _python() -> str:
     """The name of this interpreter, as short as it can be typed here."""
     path = Path(sys.executable)
-    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
+    here = Path.cwd()
+    return shlex.quote(str(path.relative_to(here) if path.is_relative_to(here) else path))

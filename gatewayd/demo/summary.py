@@ -17,7 +17,7 @@ def summary(scene: Scene, *, asked_for: bool) -> tuple[bool, str]:
     counts = (
         f"{health.packages} packages from the robot ({health.skipped} skipped), "
         f"{program.handshakes} handshakes, {program.verified} values checked both ways, "
-        f"{health.writes_refused} writes refused."
+        f"{health.writes_refused} {'write' if health.writes_refused == 1 else 'writes'} refused."
     )
     if program.wrong or scene.problems:
         reasons = "; ".join([*program.wrong, *scene.problems])
