@@ -74,6 +74,7 @@ class Boot:
         assert not any(character.isspace() for character in str(directory))
         self._directory = directory
         self._tree = tree
+        self._init = f"init={directory / 'init'}"
         self._process: subprocess.Popen[bytes] | None = None
 
     @staticmethod
@@ -108,7 +109,7 @@ class Boot:
             )
         )
         init.chmod(0o755)
-        kernel = ["linux.uml", f"mem={MEMORY >> 20}M", "rootfstype=hostfs", "rw", f"init={init}"]
+        kernel = ["linux.uml", f"mem={MEMORY >> 20}M", "rootfstype=hostfs", "rw", self._init]
         kernel += ["con=null", "con0=null,fd:1", "quiet"]
         # The shell outlives the kernel, whatever becomes of that, and says so.
         script = f'timeout -k 2 {LIMIT} "$@" >"$0/kernel.log" 2>&1 </dev/null; echo $? >"$0/{_ENDED}"'
@@ -150,9 +151,17 @@ class Boot:
         if self._process is None:
             return
         if now:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(self._process.pid, signal.SIGKILL)
+            _kill_all_with(self._init)
         self._process.wait()
+        _kill_all_with(self._init)  # the kernel's processes outlive a kernel that was killed
+
+
+def _kill_all_with(argument: str) -> None:
+    """End every process that was started with this argument, which names one boot: the kernel leaves its session."""
+    for entry in Path("/proc").iterdir():
+        with contextlib.suppress(ValueError, OSError):
+            if argument.encode() in (entry / "cmdline").read_bytes().split(b"\0"):
+                os.kill(int(entry.name), signal.SIGKILL)
 
 
 def _place_of_memory() -> str:
