@@ -66,8 +66,9 @@ class Station:
         return (self.robot,) if self.can is None else (self.robot, self.can)
 
     def _can_link(self, plan: CanopenPlan) -> CanLink:
-        from gatewayd.canopen.link import CanLink  # most cells have no CAN, and start sooner without it
-        from gatewayd.canopen.storage import JsonStore
+        # Most cells have no CAN, and start sooner without it.
+        from gatewayd.canopen.link import CanLink  # noqa: PLC0415
+        from gatewayd.canopen.storage import JsonStore  # noqa: PLC0415
 
         return CanLink(plan, self.cell, JsonStore(self.state / f"{self.plan.cell.name}.canopen.json"))
 

@@ -11,6 +11,8 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from gatewayd.core.cell import Cell
 from gatewayd.daemon import Daemon
@@ -59,6 +61,7 @@ class Scene:
         self.plc = Plc(HOST, self.port, PLC_ADDRESS)
         self._plan = replace(loaded.plan, modbus=replace(loaded.plan.modbus, host=HOST, port=self.port))
         self._daemon: Daemon | None = None
+        self._state = TemporaryDirectory(prefix="gatewayd-demo-")
 
     @property
     def cell(self) -> Cell:
@@ -72,7 +75,7 @@ class Scene:
         stop = asyncio.Event()
         async with self.robot:
             robot = replace(self._plan.robot, host=HOST, port=self.robot.port)
-            self._daemon = Daemon([replace(self._plan, robot=robot)])
+            self._daemon = Daemon([replace(self._plan, robot=robot)], Path(self._state.name))
             gateway = asyncio.create_task(self._daemon.run(stop))
             plc = asyncio.create_task(self.plc.run())
             try:
