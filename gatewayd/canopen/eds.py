@@ -14,6 +14,7 @@ from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Dictionary, Entry, Object, ObjectCode, Pdo
+from gatewayd.canopen.frame import Frame, Priority
 from gatewayd.canopen.node import Node
 from gatewayd.canopen.plan import CanopenPlan
 from gatewayd.canopen.storage import MemoryStore
@@ -59,8 +60,15 @@ class Commissioning:
 
 def objects_of(plan: CanopenPlan, definition: CellDefinition) -> Dictionary:
     """The object dictionary of the node of a cell, as it is after its first power-on."""
-    node = Node(plan, Cell(definition), lambda frame, priority: None, MemoryStore(), lambda now: True)
-    return node.dictionary
+    return Node(plan, Cell(definition), _send_nowhere, MemoryStore(), _lives).dictionary
+
+
+def _send_nowhere(_frame: Frame, _priority: Priority) -> None:
+    """Nobody is on the bus."""
+
+
+def _lives(_now: float) -> bool:
+    return True
 
 
 def sheet_of(plan: CanopenPlan, definition: CellDefinition, suffix: str = "eds") -> Sheet:

@@ -15,6 +15,7 @@ COMMANDS = {
     "demo": "Simulator, gateway and a small PLC program in one terminal.",
     "check": "Find every mistake of mapping files, without a robot.",
     "show": "Print the register table of a mapping file.",
+    "export": "Write the EDS, the DCF or robot program lines of a mapping file.",
     "simulate": "Be a robot controller to connect to.",
     "run": "Serve the cells of mapping files: the daemon.",
     "completion": "Print the completion script of a shell.",
