@@ -12,7 +12,7 @@ COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate
 SOURCES = gatewayd tests
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test install dev lint format types check docs-check ci bench lock install-hook clean
+.PHONY: help demo test install dev lint format types check docs-check generated ci bench lock install-hook clean
 
 help: ## Show this list
 	@echo "make TARGET, where TARGET is one of:"
@@ -41,8 +41,13 @@ types: $(VENV)/.dev ## Check the types (mypy, strict)
 check: $(VENV)/.runtime ## Check the shipped mappings
 	$(PY) -m gatewayd check --strict mappings/*.yaml
 
-docs-check: $(VENV)/.dev ## Check that generated pages and links of docs/ are right
-	$(PY) -m pytest tests/test_docs.py $(ARGS)
+docs-check: $(VENV)/.dev ## Check links, commands and generated parts of docs/
+	$(PY) -m pytest tests/test_docs.py tests/docs $(ARGS)
+
+generated: $(VENV)/.dev ## Make what is generated anew: schema, rule catalogue, parts of docs/
+	$(PY) -m gatewayd.mapping.schema > mappings/schema.json.new && mv mappings/schema.json.new mappings/schema.json
+	$(PY) -m gatewayd.mapping.rules.catalogue docs/reference
+	$(PY) -m tests.docs
 
 ci: ## Everything the project asks of a commit, in a clean clone of HEAD
 	.ci/run
