@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -115,7 +116,8 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
     console.print(_table(entries, wide=console.width >= _WIDE))
     if loaded.cell.canopen is not None:
         console.print(_pdo_table(loaded))
-        console.print(_loads(loaded), soft_wrap=True)
+        for line in _loads(loaded):
+            console.print(line, soft_wrap=True)
     for line in _notes(loaded, plan, shortened=any(first is not last for first, last in entries)):
         console.print(line, style="dim", soft_wrap=True)
 
@@ -150,6 +152,8 @@ def _notes(loaded: Loaded, plan: Plan, *, shortened: bool) -> list[str]:
     notes.append("-> towards the robot, <- from the robot; addresses from 0; bit 0 is the least significant")
     if plan.modbus is not None:
         notes.append("status of the gateway: holding and input registers from 60000 (460001, 360001)")
+    if plan.canopen is not None:
+        notes.append("status of the gateway: objects from 5F00h")
     if shortened:
         notes.append("ranges on one line of the file are one row here; --all shows each variable")
     return notes
@@ -236,12 +240,15 @@ def _pdo_table(loaded: Loaded) -> Table:
 _PDO_COLUMNS = ("PDO", "COB-ID", "transmission", "inhibit", "event", "bits", "variables", "object", "type")
 
 
-def _loads(loaded: Loaded) -> str:
-    """The share of the bus in the worst case for each bit-rate."""
-    from gatewayd.mapping.pdo_table import load_by_bit_rate
+def _loads(loaded: Loaded) -> Iterator[str]:
+    """What no PDO carries, and the share of the bus in the worst case for each bit-rate."""
+    from gatewayd.mapping.pdo_table import by_sdo_only, load_by_bit_rate
 
+    objects = by_sdo_only(loaded.cell)
+    if objects:
+        yield f"by SDO only: {', '.join(objects)}"
     shares = [f"{rate // 1000}k {share:.0%}" for rate, share in load_by_bit_rate(loaded.cell).items()]
-    return f"worst-case bus load by bit-rate: {', '.join(reversed(shares))}"
+    yield f"worst-case bus load by bit-rate: {', '.join(reversed(shares))}"
 
 
 def _objects(first: str, last: str) -> str:

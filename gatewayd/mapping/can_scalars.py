@@ -93,7 +93,7 @@ def _cob_id(value: object) -> int:
     match = _COB_ID.fullmatch(text)
     if match is None:
         if text.isascii() and text.isdigit() and int(text) <= _GREATEST_COB_ID:
-            hint = f"COB-IDs are hexadecimal here: {int(text):#05x}, or 0x{text} if {text} was meant so"
+            hint = f"COB-IDs are hexadecimal here: 0x{int(text):03X}, or 0x{text} if {text} was meant so"
         refuse(syntax.BAD_COB_ID, f"`{text}` is not a COB-ID", hint)
     number = int(match[1], 16)
     if number > _GREATEST_COB_ID:

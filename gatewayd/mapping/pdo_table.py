@@ -14,6 +14,7 @@ __all__ = [
     "PdoRow",
     "Run",
     "as_document",
+    "by_sdo_only",
     "load_by_bit_rate",
     "object_place",
     "pdo_rows",
@@ -97,6 +98,18 @@ def pdo_rows(cell: ExpandedCell) -> tuple[PdoRow, ...]:
             )
         )
     return tuple(found)
+
+
+def by_sdo_only(cell: ExpandedCell) -> tuple[str, ...]:
+    """Variables that are objects and in no PDO, each with its place: `recipe[3] 2020h:04`."""
+    if cell.canopen is None:
+        return ()
+    carried = {entry.variable for pdo in cell.canopen.pdos for entry in pdo.entries}
+    return tuple(
+        f"{cell.variables[one.variable].name} {object_place(one)}"
+        for one in cell.canopen.objects
+        if one.variable not in carried
+    )
 
 
 def load_by_bit_rate(cell: ExpandedCell) -> dict[int, float]:
