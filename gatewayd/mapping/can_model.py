@@ -149,7 +149,6 @@ class Canopen(Section):
     heartbeat: MillisecondTime = Field(
         default=0.5,
         description="time between two heartbeats; none: no heartbeat",
-        json_schema_extra={"default": "500ms"},
     )
     sync: Sync = Field(default=Sync(), description="SYNC", json_schema_extra={"default": {}})
     pdo: PdoDefaults = Field(

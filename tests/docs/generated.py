@@ -68,10 +68,16 @@ _SECTIONS = {
     "Robot": "`robot:`",
     "Watchdog": "`robot: watchdog:`",
     "Modbus": "`modbus:`",
+    "Canopen": "`canopen:`",
+    "Sync": "`canopen: sync:`",
+    "PdoDefaults": "`canopen: pdo:`",
+    "CobIdPool": "`canopen: cob_ids:`",
+    "PdoSpec": "`canopen: pdos:` NAME`:`",
     "WriterSpec": "`writers:` NAME`:`",
     "Group": "`groups:` NAME`:`",
     "VariableSpec": "`variables:` NAME`:`",
     "PlacementSpec": "`variables:` NAME`: modbus:`",
+    "CanopenPlace": "`variables:` NAME`: canopen:`",
 }
 _DURATION = re.compile(r"ms\|s\|min\|h")
 
@@ -150,9 +156,20 @@ def _default(key: str, schema: Mapping[str, Any], required: Iterable[str]) -> st
 # -- command line -----------------------------------------------------------------------------------------------------
 
 
+def command_names() -> list[str]:
+    """Every command as it is typed after `gatewayd`; the empty one first, groups before what is in them."""
+    names = [""]
+    for name in COMMANDS:
+        command = import_module(f"gatewayd.cli.{name}").command
+        names.append(name)
+        if isinstance(command, click.Group):
+            names += [f"{name} {inner}" for inner in command.commands]
+    return names
+
+
 def help_text(name: str) -> str:
     """What `gatewayd NAME --help` prints; `gatewayd --help` for an empty name."""
-    arguments = [name, "--help"] if name else ["--help"]
+    arguments = [*name.split(), "--help"]
     result = CliRunner().invoke(root, arguments, prog_name="gatewayd", terminal_width=HELP_WIDTH)
     assert result.exit_code == 0
     return result.output.rstrip()
@@ -161,7 +178,7 @@ def help_text(name: str) -> str:
 def command_line() -> str:
     """The help of every command."""
     parts = [
-        f"## gatewayd {name}".rstrip() + "\n\n" + indent(help_text(name), "    ") for name in ("", *COMMANDS)
+        f"## gatewayd {name}".rstrip() + "\n\n" + indent(help_text(name), "    ") for name in command_names()
     ]
     return "\n\n".join(parts)
 
@@ -169,10 +186,8 @@ def command_line() -> str:
 def exit_codes() -> str:
     """What each command says about its exit codes, in one table."""
     rows = []
-    for name in ("", *COMMANDS):
-        command = root if not name else import_module(f"gatewayd.cli.{name}").command
-        assert isinstance(command, click.Command)
-        told = (command.epilog or "").partition("Exit codes:\n")[2]
+    for name in command_names():
+        told = help_text(name).partition("Exit codes:\n")[2]
         rows += [
             (f"`gatewayd {name}`" if name else "any command", found[1], found[2])
             for found in re.finditer(r"^ +(\d+) +(.+)$", told, re.MULTILINE)
