@@ -47,6 +47,7 @@ from gatewayd.canopen.pdo.transmit import TransmitEngine
 from gatewayd.canopen.peers import Peers
 from gatewayd.canopen.plan import CanopenPlan
 from gatewayd.canopen.sdo import SdoServer
+from gatewayd.canopen.sdo.parameters import server_parameter
 from gatewayd.canopen.status_objects import StatusObjects
 from gatewayd.canopen.storage import Parameters, Store, StoreError
 from gatewayd.canopen.sync import Sync
@@ -477,6 +478,7 @@ class Node:
     def _objects(self, identity: Identity) -> Iterable[Object]:
         status = StatusBlock(self.cell)
         yield from identity_objects(identity, lambda: int.from_bytes(status.read(1, 1, self._now), "big"))
+        yield from server_parameter(self.parameters.node)
         for service in (
             self.emergency,
             self.sync,

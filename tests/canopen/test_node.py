@@ -726,3 +726,12 @@ def test_pdos_may_be_replaced_while_they_wait_and_nothing_else() -> None:
     sent = plant.wire.sent
     assert {frame.can_id for frame, _ in sent} == {0x705, 0x185, 0x285, 0x585, 0x085}
     assert {frame.can_id for frame, priority in sent if priority is Priority.PDO} == {0x185, 0x285}
+
+
+def test_sdo_server_tells_its_cob_ids_whatever_the_node_id() -> None:
+    plant = Plant().power_on()
+    assert (plant.read(0x1200, 1), plant.read(0x1200, 2)) == (0x605, 0x585)
+    _lss(plant, 0x04, 1)
+    _lss(plant, 0x11, 9)
+    plant.hear(0, RESET_COMMUNICATION)
+    assert (plant.read(0x1200, 1, node=9), plant.read(0x1200, 2, node=9)) == (0x609, 0x589)
