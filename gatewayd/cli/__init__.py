@@ -23,8 +23,9 @@ COMMANDS = {
 """Name -> what the list of commands says. Module `gatewayd.cli.NAME` has the click command as `command`."""
 
 HELP = """\
-gatewayd puts the fieldbus registers of a Universal Robots controller, and any other RTDE field, on Modbus TCP, in both
-directions, with one owner per variable. What lies where is declared in one mapping file per robot cell.
+gatewayd puts the fieldbus registers of a Universal Robots controller, and any other RTDE field, on Modbus TCP and
+on CANopen, in both directions, with one owner per variable. What lies where is declared in one mapping file per robot
+cell.
 
 \b
 Five commands from nothing to a running cell:

@@ -475,7 +475,7 @@ def test_every_input_lies_where_an_owner_can_write(
         "  line: {canopen: rpdo, timeout: 1s}\n"
         "  hmi: {canopen: sdo, timeout: 1s}\n"
         "variables:\n"
-        "  keep: {robot: input_int_register_9, modbus: 90, canopen: auto, owner: any, lease: 2s}\n"
+        "  keep: {robot: input_bit_register_9, modbus: 90.0, canopen: auto, owner: any, lease: 2s}\n"
         f"  a: {{robot: input_int_register_0, owner: {owner}{places}}}\n"
     )
     assert [one.rule.id for one in found] == rules
@@ -503,3 +503,21 @@ def test_a_growing_real_is_never_enough_in_a_real32() -> None:
     """Even where the line says REAL32 itself."""
     (found,) = on_can("variables: {t: {robot: timestamp, canopen: {type: REAL32}}}\n")
     assert (found.rule.id, found.hint) == ("GW414", "write `canopen: {type: REAL64}`")
+
+
+def test_bits_of_several_owners_may_share_a_pdo() -> None:
+    """A bit that the PDO does not change stops nothing, so packing them is no risk."""
+    found = on_can(
+        "modbus: {listen: '192.168.1.2:1502'}\n"
+        "writers:\n"
+        "  plc: {modbus: 192.168.1.20, timeout: 1s}\n"
+        "  line: {canopen: rpdo, timeout: 1s}\n"
+        "variables:\n"
+        "  a: {robot: input_bit_register_0..7, modbus: 0.0, canopen: auto, owner: [plc, line]}\n"
+    )
+    assert found == []
+
+
+def test_a_file_without_writers_is_told_how_its_bus_knows_them() -> None:
+    (found,) = on_can("variables: {a: {robot: input_int_register_0, canopen: auto}}\n")
+    assert (found.rule.id, found.hint) == ("GW501", "add `writers: {plc: {canopen: rpdo, timeout: 1s}}`")
