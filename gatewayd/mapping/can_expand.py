@@ -37,6 +37,8 @@ _DEFAULT_TYPES: Final = {
     DataType.UINT64: CanType.UNSIGNED64,
     DataType.INT32: CanType.INTEGER32,
 }
+_MANY: Final = 2048
+"""So many variables that a PDO does not get are enough to be told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,6 +202,8 @@ class _Layout:
         for name, pdo in self.part.spec.pdos.items():
             for number, member in enumerate(pdo.variables):
                 position = self.part.at("pdos", name, "variables", number)
+                if len(self._misnamed) > _MANY:
+                    break
                 found = self._find(member.name, member.members)
                 if found is None:
                     self._misnamed.append(Misnamed(name, member.text, MemberProblem.UNKNOWN, position))
@@ -215,6 +219,8 @@ class _Layout:
         family = self._lines.get(name)
         if family is None or members is None:
             return family
+        if len(members) > len(family):
+            return None
         by_member = {candidate.member: candidate for candidate in family}
         found = [by_member[number] for number in members if number in by_member]
         return found if len(found) == len(members) else None

@@ -45,6 +45,9 @@ _WHOLE = re.compile(r"0|[1-9][0-9]{0,8}")
 _TRANSMISSIONS: Final = {"event": EVENT, "sync": 1}
 _LAST_SYNCHRONOUS: Final = 240
 _EVENT_DRIVEN: Final = (254, 255)
+_MOST_RANGES: Final = 256
+_MOST_MEMBERS: Final = 64
+"""Entries of a PDO."""
 
 
 def _timer(value: object, unit: float, ticks: str) -> float | None:
@@ -129,7 +132,7 @@ CobIdRanges = Annotated[
         ...,
     ],
     BeforeValidator(one_or_many, json_schema_input_type=_COB_IDS_SCHEMA | list[_COB_IDS_SCHEMA]),
-    Field(strict=False),
+    Field(strict=False, max_length=_MOST_RANGES),
 ]
 """Identifiers and ranges of them, or a single one."""
 
@@ -189,6 +192,6 @@ Members = Annotated[
         Annotated[InstanceOf[Member], BeforeValidator(_member, json_schema_input_type=_MEMBER_SCHEMA)], ...
     ],
     BeforeValidator(one_or_many, json_schema_input_type=_MEMBER_SCHEMA | list[_MEMBER_SCHEMA]),
-    Field(strict=False),
+    Field(strict=False, max_length=_MOST_MEMBERS),
 ]
 """Variables by name, or a single one."""

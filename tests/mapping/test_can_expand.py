@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.can_expand import CanopenCell, ConcretePdo, MemberProblem
@@ -160,3 +162,12 @@ def test_a_cell_that_cannot_be_laid_out_is_not_complete() -> None:
     assert not expanded(long, "  d: {robot: output_double_register_0..1}\n").is_complete
     mixed = "  o: {robot: output_bit_register_0}\n  i: {robot: input_bit_register_0, owner: line}\n"
     assert not expanded("  pdos: {p: {variables: [o, i]}}\n", mixed).is_complete
+
+
+def test_no_file_can_make_it_work_for_long() -> None:
+    """Hundreds of PDOs that all want the same thousand variables."""
+    pdos = "".join(f"    p{number}: {{variables: [{', '.join(['d'] * 64)}]}}\n" for number in range(400))
+    started = time.perf_counter()
+    found = node(f"  pdos:\n{pdos}", "  d: {robot: output_bit_register_0..127}\n")
+    assert time.perf_counter() - started < 10
+    assert 2000 < len(found.misnamed) < 4000

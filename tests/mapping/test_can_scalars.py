@@ -110,3 +110,11 @@ def test_members() -> None:
     assert refused(Members, "'recipe[7..0]'")[0] == "bad-range"
     assert refused(Members, "recipe.3")[0] == "bad-name"
     assert refused(Members, "[]")[0] == "wrong-type"
+
+
+def test_lists_have_an_end() -> None:
+    """A PDO has 64 entries at most."""
+    for kind, item, most in ((Members, "a", 64), (CobIdRanges, "0x680", 256)):
+        TypeAdapter(kind).validate_python(yaml(f"[{', '.join([item] * most)}]"))
+        with pytest.raises(ValidationError):
+            TypeAdapter(kind).validate_python(yaml(f"[{', '.join([item] * (most + 1))}]"))
