@@ -19,7 +19,9 @@ BROKEN = ROOT / "docs/reference/rules/GW214-register-overlap/bad.yaml"
 
 def show(*args: str | Path, content: str | None = None, **environment: str) -> Result:
     unset: dict[str, str | None] = {"COLUMNS": None}  # test runners set it for their own sake
-    return CliRunner(env=unset | environment).invoke(command, [str(argument) for argument in args], input=content)
+    return CliRunner(env=unset | environment).invoke(
+        command, [str(argument) for argument in args], input=content
+    )
 
 
 @pytest.mark.parametrize("path", MAPPINGS, ids=lambda path: path.stem)
