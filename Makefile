@@ -13,7 +13,7 @@ COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate
 SOURCES = gatewayd tests
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test install dev lint format types check docs-check generated ci bench lock install-hook clean
+.PHONY: help demo test install dev lint format types check docs-check generated ci bench fuzz lock install-hook clean
 
 help: ## Show this list
 	@echo "make TARGET, where TARGET is one of:"
