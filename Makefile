@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 JOBS   ?= auto
 UV     ?= uv
+CASES  ?= 100000
 
 PY      = $(VENV)/bin/python
 INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --no-input
@@ -12,7 +13,7 @@ COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate
 SOURCES = gatewayd tests
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test install dev lint format types check docs-check generated ci bench lock install-hook clean
+.PHONY: help demo test install dev lint format types check docs-check generated ci bench fuzz lock install-hook clean
 
 help: ## Show this list
 	@echo "make TARGET, where TARGET is one of:"
@@ -54,6 +55,9 @@ ci: ## Everything the project asks of a commit, in a clean clone of HEAD
 
 bench: $(VENV)/.dev ## Measure, and print the figures as ratios (ARGS="modbus latency")
 	$(PY) -m tests.benchmarks $(ARGS)
+
+fuzz: $(VENV)/.dev ## Try the parsers and the running daemon with 100,000 hostile cases (CASES=1000000)
+	GATEWAYD_FUZZ_CASES=$(CASES) $(PY) -m pytest --timeout 1800 tests/e2e/test_hostile.py tests/modbus/test_fuzz.py tests/rtde $(ARGS)
 
 lock: ## Pin and hash the newest packages that pyproject.toml allows (needs uv)
 	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --group build -o requirements.lock

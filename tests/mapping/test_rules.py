@@ -342,6 +342,15 @@ def test_the_largest_cell_is_judged_in_bounded_time() -> None:
     assert {rule for rule, _ in found} == {"GW214"}
 
 
+@pytest.mark.parametrize("side", ["input", "output"])
+def test_a_misspelt_reserved_bit_is_recognised(side: str) -> None:
+    """The gateway's own names for bits 0 to 63 are no RTDE fields, and what people mean first."""
+    text = f"gatewayd: 1\ncell: c\nrobot: {{host: r}}\nvariables: {{a: {{robot: {side}_bit_regster_7}}}}"
+    (finding,) = [one for one in load(text.encode(), "c.yaml").diagnostics if one.rule.id == "GW301"]
+    assert finding.hint is not None
+    assert finding.hint.startswith(f"did you mean `{side}_bit_register_7`")
+
+
 CAN_HEAD = """\
 gatewayd: 1
 cell: press-3
