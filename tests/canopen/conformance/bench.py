@@ -29,7 +29,7 @@ from gatewayd.core.definition import Direction, Value
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["NODE", "Device", "LinkDevice", "Tester", "WireDevice", "compiled", "little"]
+__all__ = ["NODE", "Device", "LinkDevice", "Tester", "WireDevice", "compiled", "little", "powered"]
 
 NODE = 5
 MAPPING = """\
@@ -382,17 +382,22 @@ class Tester:
     def reset(self, command: int = 129) -> None:
         """Reset, and wait for the boot-up."""
         self.nmt(command)
-        assert self.expect(0x700 + self.node) == b"\0"
+        self.reaches(0)
 
     def heartbeats(self, milliseconds: int = 20) -> None:
         """Let the node tell its state."""
         self.set(0x1017, 0, milliseconds, 2)
 
-    def state(self) -> int:
-        """The NMT state of the second of two heartbeats: the first may have been under way."""
-        self._heard = deque(one for one in self._heard if one[1].can_id != 0x700 + self.node)
-        self.expect(0x700 + self.node)
-        return self.expect(0x700 + self.node)[0]
+    def reaches(self, state: int) -> None:
+        """Heartbeats of the former state are followed by one of this one; 0 is the boot-up."""
+        deadline = self.device.now + PATIENCE
+        while (told := self.expect(0x700 + self.node)) != bytes([state]):
+            assert self.device.now < deadline, f"the node is in state {told.hex()}"
+
+    def stays(self, state: int) -> None:
+        """What was sent so far has not changed the state."""
+        self.flush()
+        assert self.expect(0x700 + self.node) == bytes([state])
 
     # -- PDO -----------------------------------------------------------------------------------------------------
 
@@ -455,12 +460,12 @@ class Tester:
         return f"{stem}[{member}]" if member else stem
 
 
-def testers(device: Device) -> Iterator[Tester]:
+def powered(device: Device) -> Iterator[Tester]:
     """The device, switched on and waiting in PRE-OPERATIONAL; switched off at the end."""
     device.power_on()
     tester = Tester(device)
     try:
-        assert tester.expect(0x700 + NODE) == b"\0"
+        tester.reaches(0)
         yield tester
     finally:
         device.power_off()

@@ -6,22 +6,22 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.canopen.conformance.bench import LinkDevice, Tester, WireDevice, testers
+from tests.canopen.conformance.bench import LinkDevice, Tester, WireDevice, powered
 
 
 @pytest.fixture(params=[WireDevice, LinkDevice], ids=["wire", "link"])
 def dut(request: pytest.FixtureRequest) -> Iterator[Tester]:
     """Twice: on the wire, and in a link."""
-    yield from testers(request.param())
+    yield from powered(request.param())
 
 
 @pytest.fixture
 def exact() -> Iterator[Tester]:
     """On the wire alone, for what is a matter of milliseconds or of minutes."""
-    yield from testers(WireDevice())
+    yield from powered(WireDevice())
 
 
 @pytest.fixture
 def linked() -> Iterator[Tester]:
     """In a link alone."""
-    yield from testers(LinkDevice())
+    yield from powered(LinkDevice())
