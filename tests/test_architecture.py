@@ -43,7 +43,7 @@ LAYERS: dict[str, set[str]] = {
     "canopen.frame": set(),
     "canopen.link": {"canopen", "core", "logs"},
     "canopen.plan": {"canopen.datatypes", "core.definition"},
-    "canopen.sdo": {"canopen.dictionary", "canopen.sdo"},
+    "canopen.sdo": {"canopen.cob_ids", "canopen.datatypes", "canopen.dictionary", "canopen.sdo"},
     "logs": set(),
     "eventlog": {"core", "logs"},
     "startup": {"logs", "mapping"},
