@@ -26,6 +26,7 @@ from gatewayd.rtde.catalogue import Series
 __all__ = [
     "BIT_RATES",
     "ERROR_ABOVE",
+    "FIRST_EVENT_TYPE",
     "WARNING_ABOVE",
     "Share",
     "Station",
@@ -44,8 +45,9 @@ WARNING_ABOVE: Final = 0.4
 """Share of the bus above which SDO and other nodes become slow."""
 ERROR_ABOVE: Final = 0.7
 """Share of the bus above which low-priority frames may wait for ever."""
+FIRST_EVENT_TYPE: Final = 254
+"""Transmission types below are synchronous."""
 
-_FIRST_EVENT_TYPE: Final = 254
 _STUFFED: Final = 34
 """Bits of a frame that are stuffed, without the data: start, identifier, control, CRC (ISO 11898-1)."""
 _OVERHEAD: Final = 47
@@ -110,7 +112,7 @@ def pdo_bits(pdo: ConcretePdo) -> int:
 
 def pdo_rate(pdo: ConcretePdo, rate: float, sync_period: float | None) -> float:
     """Frames per second in the worst case; `rate` is that of the robot's packages."""
-    if pdo.transmission < _FIRST_EVENT_TYPE:
+    if pdo.transmission < FIRST_EVENT_TYPE:
         syncs = rate if sync_period is None else 1 / sync_period
         if pdo.transmission == 0:
             return min(syncs, rate)

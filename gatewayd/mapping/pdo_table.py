@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gatewayd.core.definition import Direction
-from gatewayd.mapping.bus_load import BIT_RATES, bus_shares, load, pdo_rate, station_of
+from gatewayd.mapping.bus_load import BIT_RATES, FIRST_EVENT_TYPE, bus_shares, load, pdo_rate, station_of
 from gatewayd.mapping.can_expand import ConcretePdo, MappedObject
 from gatewayd.mapping.expand import ExpandedCell
 
@@ -20,8 +20,6 @@ __all__ = [
     "pdo_rows",
     "transmission_words",
 ]
-
-_FIRST_EVENT_TYPE = 254
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +65,7 @@ def object_place(one: MappedObject) -> str:
 
 def transmission_words(transmission: int) -> str:
     """A transmission type in words and as a number."""
-    if transmission >= _FIRST_EVENT_TYPE:
+    if transmission >= FIRST_EVENT_TYPE:
         return f"event ({transmission})"
     if transmission == 0:
         return "sync, on change (0)"
@@ -83,7 +81,7 @@ def pdo_rows(cell: ExpandedCell) -> tuple[PdoRow, ...]:
     found = []
     for pdo in node.pdos:
         assert pdo.slot.cob_id is not None
-        event_driven = pdo.transmission >= _FIRST_EVENT_TYPE
+        event_driven = pdo.transmission >= FIRST_EVENT_TYPE
         found.append(
             PdoRow(
                 pdo.label,

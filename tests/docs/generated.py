@@ -20,7 +20,6 @@ from typing import Any
 import click
 
 from gatewayd.cli import COMMANDS
-from gatewayd.cli import command as root
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality

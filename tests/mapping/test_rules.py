@@ -370,7 +370,7 @@ def test_the_number_of_missing_cob_ids_comes_with_free_ones() -> None:
     """Those of both directions do not meet, and what is declared already stays."""
     found = on_can(
         "  cob_ids: {tpdo: [0x680, 0x1C0]}\n"
-        "writers: {plc: {canopen: rpdo, timeout: 1s}}\n"
+        "writers: {plc: {canopen: rpdo, node: 1, heartbeat: 1s}}\n"
         "variables:\n"
         "  a: {robot: output_double_register_0..9, canopen: auto}\n"
         "  b: {robot: input_double_register_0..4, canopen: auto}\n"
@@ -481,8 +481,8 @@ def test_every_input_lies_where_an_owner_can_write(
         "modbus: {listen: '192.168.1.2:1502'}\n"
         "writers:\n"
         "  plc: {modbus: 192.168.1.20, timeout: 1s}\n"
-        "  line: {canopen: rpdo, timeout: 1s}\n"
-        "  hmi: {canopen: sdo, timeout: 1s}\n"
+        "  line: {canopen: rpdo, node: 1, heartbeat: 1s}\n"
+        "  hmi: {canopen: sdo, node: 2, heartbeat: 1s}\n"
         "variables:\n"
         "  keep: {robot: input_bit_register_9, modbus: 90.0, canopen: auto, owner: any, lease: 2s}\n"
         f"  a: {{robot: input_int_register_0, owner: {owner}{places}}}\n"
@@ -520,7 +520,7 @@ def test_bits_of_several_owners_may_share_a_pdo() -> None:
         "modbus: {listen: '192.168.1.2:1502'}\n"
         "writers:\n"
         "  plc: {modbus: 192.168.1.20, timeout: 1s}\n"
-        "  line: {canopen: rpdo, timeout: 1s}\n"
+        "  line: {canopen: rpdo, node: 1, heartbeat: 1s}\n"
         "variables:\n"
         "  a: {robot: input_bit_register_0..7, modbus: 0.0, canopen: auto, owner: [plc, line]}\n"
     )
@@ -529,4 +529,7 @@ def test_bits_of_several_owners_may_share_a_pdo() -> None:
 
 def test_a_file_without_writers_is_told_how_its_bus_knows_them() -> None:
     (found,) = on_can("variables: {a: {robot: input_int_register_0, canopen: auto}}\n")
-    assert (found.rule.id, found.hint) == ("GW501", "add `writers: {plc: {canopen: rpdo, timeout: 1s}}`")
+    assert (found.rule.id, found.hint) == (
+        "GW501",
+        "add `writers: {plc: {canopen: rpdo, node: 1, heartbeat: 1s}}`",
+    )

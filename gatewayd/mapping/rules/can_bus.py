@@ -9,6 +9,7 @@ from gatewayd.canopen.cob_ids import Function, is_restricted
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.bus_load import (
     ERROR_ABOVE,
+    FIRST_EVENT_TYPE,
     WARNING_ABOVE,
     Share,
     Station,
@@ -25,8 +26,6 @@ from gatewayd.mapping.rules.registry import plant_rule
 from gatewayd.mapping.rules.wording import cob
 
 __all__: list[str] = []
-
-_FIRST_EVENT_TYPE = 254
 
 
 @plant_rule(
@@ -189,7 +188,7 @@ def _remedy(bus: Sequence[Station], shares: Sequence[Share], bit_rate: int) -> s
         f"node {station.node.part.spec.node}: {pdo.label}": pdo_bits(pdo)
         for station in bus
         for pdo in station.node.pdos
-        if pdo.transmission >= _FIRST_EVENT_TYPE
+        if pdo.transmission >= FIRST_EVENT_TYPE
     }
     rest = load([share for share in shares if share.what not in events], bit_rate)
     room = (WARNING_ABOVE - rest) * bit_rate

@@ -1,4 +1,4 @@
-"""Rules GW401, GW413 to GW415, GW420 to GW425 and GW432: the node, its number types, and who writes by CANopen."""
+"""Rules GW401, GW413 to GW415, GW420 to GW425, GW432, GW435: the node, number types, who writes by CANopen."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction, ValueKind
-from gatewayd.mapping.bus_load import BIT_RATES
+from gatewayd.mapping.bus_load import BIT_RATES, FIRST_EVENT_TYPE
 from gatewayd.mapping.can_expand import MappedObject
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
 from gatewayd.mapping.model import WriterSpec
 from gatewayd.mapping.rules.conversion import GROWING, range_of
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import number, one_and_more
+from gatewayd.mapping.rules.wording import number, one_and_more, seconds
 
 __all__: list[str] = []
 
@@ -359,6 +359,35 @@ def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 else "add `node: 1`, the node-ID of the writer"
             )
             yield rule.at(writer.key_at(given[0]), message, hint=hint)
+
+
+@cell_rule(
+    "GW435",
+    "timeout-of-silence",
+    "a timeout for a CANopen writer that may be silent for good reason",
+    """
+`timeout` is the time without any PDO or SDO request after which a writer counts as lost. A master that sends its
+PDOs when a value changes says nothing while nothing changes, and would lose its variables over and over. Watch its
+heartbeat (`node` and `heartbeat`) in place of the timeout. Where the master sends in any case, say so: with a
+`deadline` for its PDOs, or with a synchronous type.
+""",
+    Severity.WARNING,
+)
+def timeout_of_silence(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`timeout` of RPDO writers without a heartbeat where no RPDO has to come."""
+    if cell.canopen is None:
+        return
+    received = [pdo for pdo in cell.canopen.pdos if pdo.direction is Direction.INPUT]
+    if not received or any(pdo.event is not None or pdo.transmission < FIRST_EVENT_TYPE for pdo in received):
+        return
+    for writer in cell.document.writers.values():
+        spec = writer.spec
+        if spec.by_rpdo and not spec.modbus and spec.timeout is not None and spec.heartbeat is None:
+            message = (
+                f"`{writer.name}` is lost after {seconds(spec.timeout)} without a PDO, and none has to come"
+            )
+            hint = "write `node: 1, heartbeat: 1s` in place of `timeout`, or give the PDOs a `deadline`"
+            yield rule.at(writer.at("timeout"), message, hint=hint)
 
 
 def _lines(cell: ExpandedCell) -> Iterator[tuple[ConcreteVariable, MappedObject]]:

@@ -36,10 +36,9 @@ def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     if inputs:
         more = f" and {len(inputs) - 1} more inputs" if len(inputs) > 1 else ""
         message = f"nobody can write `{inputs[0].name}`{more}: the file declares no writers"
-        known_by = (
-            "canopen: rpdo" if cell.document.modbus is None and cell.canopen else "modbus: 192.168.1.20"
-        )
-        hint = f"add `writers: {{plc: {{{known_by}, timeout: 1s}}}}`"
+        on_can = cell.document.modbus is None and cell.canopen is not None
+        known_by = "canopen: rpdo, node: 1, heartbeat: 1s" if on_can else "modbus: 192.168.1.20, timeout: 1s"
+        hint = f"add `writers: {{plc: {{{known_by}}}}}`"
         yield rule.at(inputs[0].position, message, hint=hint)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from gatewayd.canopen.cob_ids import Function, is_restricted
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction
-from gatewayd.mapping.bus_load import pdo_bits
+from gatewayd.mapping.bus_load import FIRST_EVENT_TYPE, pdo_bits
 from gatewayd.mapping.can_expand import CanopenCell, ConcretePdo, MemberProblem, Misnamed
 from gatewayd.mapping.can_model import AUTO, NO_PDO
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
@@ -19,7 +19,6 @@ from gatewayd.mapping.rules.wording import cob, did_you_mean, number, seconds
 
 __all__ = ["cob_id_place"]
 
-_FIRST_EVENT_TYPE = 254
 _UNUSED = range(0x680, 0x6E0)
 """Identifiers that no predefined service of any node has."""
 _HIGH_NODES = (range(0x1C0, 0x200), range(0x2C0, 0x300), range(0x3C0, 0x400), range(0x4C0, 0x500))
@@ -368,7 +367,7 @@ def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
                 message = f"the PDO `{pdo.name}` comes {_WORDS[pdo.direction]} and has `{wrong}`"
             place = cell.canopen.part.key_at("pdos", pdo.name, wrong)
             yield rule.at(place, message, hint=f"write `{right}`, or remove it")
-        if "sync_start" in written and (receives or not 0 < pdo.transmission < _FIRST_EVENT_TYPE):
+        if "sync_start" in written and (receives or not 0 < pdo.transmission < FIRST_EVENT_TYPE):
             message = f"the PDO `{pdo.name}` has `sync_start` and is not sent with every n-th SYNC"
             place = cell.canopen.part.key_at("pdos", pdo.name, "sync_start")
             yield rule.at(place, message, hint="remove `sync_start`, or write `transmission: sync`")
@@ -390,7 +389,7 @@ def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     node = cell.canopen
     if node is None or node.part.spec.sync.period is not None:
         return
-    pdo = next((pdo for pdo in node.pdos if pdo.transmission < _FIRST_EVENT_TYPE), None)
+    pdo = next((pdo for pdo in node.pdos if pdo.transmission < FIRST_EVENT_TYPE), None)
     if pdo is not None:
         message = f"{pdo.label} is synchronous (type {pdo.transmission}), and the period of SYNC is not known"
         hint = "add `sync: {period: 10ms}`, with `producer: true` if no other node sends SYNC"
@@ -432,7 +431,7 @@ def inhibit_below_frame_time(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnos
     reported: set[Position] = set()
     for pdo in node.pdos:
         duration = pdo_bits(pdo) / node.part.spec.bitrate
-        if pdo.transmission < _FIRST_EVENT_TYPE or pdo.inhibit is None or pdo.inhibit >= duration:
+        if pdo.transmission < FIRST_EVENT_TYPE or pdo.inhibit is None or pdo.inhibit >= duration:
             continue
         place = _key_place(node, pdo, "inhibit")
         if place not in reported:
@@ -462,7 +461,7 @@ def event_below_inhibit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         return
     reported: set[Position] = set()
     for pdo in node.pdos:
-        if pdo.direction is Direction.INPUT or pdo.transmission < _FIRST_EVENT_TYPE:
+        if pdo.direction is Direction.INPUT or pdo.transmission < FIRST_EVENT_TYPE:
             continue
         if pdo.event is None or pdo.inhibit is None or pdo.event >= pdo.inhibit:
             continue
