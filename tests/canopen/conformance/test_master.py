@@ -39,10 +39,11 @@ class Master:
         sheet.name = "dut.eds"
         self.node: Any = self.network.add_node(canopen.RemoteNode(NODE, canopen.import_od(sheet, NODE)))
         self.node.sdo.RESPONSE_TIMEOUT = SECONDS
+        self.boots = 0
+        self.network.subscribe(0x700 + NODE, self._error_control)
 
-    def state(self, name: str) -> None:
-        self.node.nmt.state = name
-        self.until(lambda: self.node.nmt.state == name)
+    def _error_control(self, _can_id: int, data: bytearray, _time: float) -> None:
+        self.boots += data == b"\0"
 
     def heartbeat_tells(self, state: NmtState) -> None:
         self.until(lambda: self.node.nmt._state_received == state)
@@ -72,7 +73,7 @@ def master() -> Iterator[Master]:
     made = Master(device)
     device.power_on()
     try:
-        made.node.nmt.wait_for_bootup(SECONDS)
+        made.until(lambda: made.boots)
         yield made
     finally:
         made.network.disconnect()
@@ -90,7 +91,7 @@ def test_master_commands_every_state_and_hears_it(master: Master) -> None:
         master.node.nmt.state = name
         master.heartbeat_tells(state)
     master.node.nmt.state = "RESET"
-    master.node.nmt.wait_for_bootup(SECONDS)
+    master.until(lambda: master.boots == 2)
 
 
 def test_master_configures_pdos_and_exchanges_all_of_them(master: Master) -> None:
@@ -138,10 +139,8 @@ def test_master_remaps_a_pdo(master: Master) -> None:
     node.tpdo[1].trans_type = 255
     node.tpdo[1].save()
     node.nmt.state = "OPERATIONAL"
-    assert node.tpdo[1].wait_for_reception(SECONDS) is not None
     master.robot(real_out=8.25)
-    assert node.tpdo[1].wait_for_reception(SECONDS) is not None
-    assert node.tpdo[1].map[0].raw == 8.25
+    master.until(lambda: node.tpdo[1].map[0].raw == 8.25)
 
 
 def test_sdo_of_every_kind(master: Master) -> None:
@@ -170,11 +169,10 @@ def test_emergencies_reach_the_master(master: Master) -> None:
     node = master.node
     node.nmt.state = "OPERATIONAL"
     master.network.send_message(0x305, b"\1")
-    error = node.emcy.wait(timeout=SECONDS)
-    assert (error.code, error.register) == (0x8210, 0x11)
+    master.until(lambda: node.emcy.log)
+    assert (node.emcy.log[0].code, node.emcy.log[0].register) == (0x8210, 0x11)
     master.network.send_message(0x305, bytes(8))
-    assert node.emcy.wait(0x0000, SECONDS).code == 0
-    assert node.emcy.active == []
+    master.until(lambda: not node.emcy.active)
 
 
 def test_heartbeat_of_the_master_is_watched(master: Master) -> None:
@@ -189,8 +187,8 @@ def test_heartbeat_of_the_master_is_watched(master: Master) -> None:
     time.sleep(0.2)
     assert node.emcy.log == []
     beat.stop()
-    error = node.emcy.wait(timeout=SECONDS)
-    assert (error.code, error.data[0]) == (0x8130, 1)
+    master.until(lambda: node.emcy.log)
+    assert (node.emcy.log[0].code, node.emcy.log[0].data[0]) == (0x8130, 1)
 
 
 def test_lss_master_finds_and_configures_a_node_without_node_id() -> None:
