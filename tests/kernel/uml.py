@@ -33,6 +33,7 @@ _STARTED, _ENDED, _REPORTS, _CONSOLE = "started", "ended", "reports.jsonl", "con
 _MODULES = (
     "net/can/can",
     "net/can/can-raw",
+    "net/can/can-bcm",
     "drivers/net/can/dev/can-dev",
     "drivers/net/can/vcan",
     "drivers/net/can/slcan/slcan",
