@@ -31,6 +31,8 @@ from gatewayd.mapping.plan import Area
 from gatewayd.mapping.schema import mapping_schema
 from gatewayd.modbus.functions import EXCEPTION_OF, ExceptionCode
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series
+from tests.docs import canopen
+from tests.docs.canopen import table
 
 __all__ = ["DOCS", "PARTS", "ROOT", "pages", "renewed"]
 
@@ -49,17 +51,6 @@ def pages() -> list[Path]:
 def renewed(text: str) -> str:
     """The text of a page with its generated parts made anew."""
     return _PART.sub(lambda found: f"{found[1]}\n{PARTS[found[2]]().strip()}\n\n{found[4]}", text)
-
-
-def _table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    lines = ["| " + " | ".join(head) + " |"]
-    lines.append("|" + "---|" * len(lines[0].split(" | ")))
-    lines += ["| " + " | ".join(_cell(value) for value in row) + " |" for row in rows]
-    return "\n".join(lines)
-
-
-def _cell(value: object) -> str:
-    return str(value).replace("|", "\\|")
 
 
 # -- mapping file -----------------------------------------------------------------------------------------------------
@@ -99,7 +90,7 @@ def mapping_keys() -> str:
             )
             for key, value in section["properties"].items()
         ]
-        parts.append(f"### {title}\n\n" + _table(("key", "type", "default", "meaning"), rows))
+        parts.append(f"### {title}\n\n" + table(("key", "type", "default", "meaning"), rows))
     assert not sections, f"no title for {list(sections)}"
     return "\n\n".join(parts)
 
@@ -198,7 +189,7 @@ def exit_codes() -> str:
             (f"`gatewayd {name}`" if name else "any command", found[1], found[2])
             for found in re.finditer(r"^ +(\d+) +(.+)$", told, re.MULTILINE)
         ]
-    return _table(("command", "code", "meaning"), rows)
+    return table(("command", "code", "meaning"), rows)
 
 
 # -- what can be seen on the bus --------------------------------------------------------------------------------------
@@ -214,13 +205,13 @@ def _places(offset: int, words: int) -> tuple[str, str]:
 def status_header() -> str:
     """The numbers of the status block."""
     rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in FIELDS]
-    return _table(("address", "4xxxxx", "name", "meaning"), rows)
+    return table(("address", "4xxxxx", "name", "meaning"), rows)
 
 
 def status_tables() -> str:
     """The tables of the status block."""
     rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in TABLES]
-    return _table(("address", "4xxxxx", "name", "meaning"), rows)
+    return table(("address", "4xxxxx", "name", "meaning"), rows)
 
 
 _QUALITIES = {
@@ -241,13 +232,13 @@ _SOURCES = {
 def qualities() -> str:
     """The qualities by number."""
     rows = [(quality.value, f"`{quality.name.lower()}`", _QUALITIES[quality]) for quality in Quality]
-    return _table(("number", "quality", "meaning"), rows)
+    return table(("number", "quality", "meaning"), rows)
 
 
 def sources() -> str:
     """The states of the robot by number."""
     rows = [(source.value, f"`{source.name.lower()}`", _SOURCES[source]) for source in Source]
-    return _table(("number", "robot_state", "meaning"), rows)
+    return table(("number", "robot_state", "meaning"), rows)
 
 
 def refusals() -> str:
@@ -256,7 +247,7 @@ def refusals() -> str:
         (reason.value, reason.text, f"{EXCEPTION_OF[reason]:02X}", PRECEDENCE[reason] + 1)
         for reason in Reason
     ]
-    return _table(("reason", "in words", "exception", "told first"), rows)
+    return table(("reason", "in words", "exception", "told first"), rows)
 
 
 _EXCEPTIONS = {
@@ -275,13 +266,13 @@ _EXCEPTIONS = {
 def exceptions() -> str:
     """The exception codes in use."""
     rows = [(f"{code:02X}", code.name.lower().replace("_", " "), _EXCEPTIONS[code]) for code in ExceptionCode]
-    return _table(("code", "name", "when"), rows)
+    return table(("code", "name", "when"), rows)
 
 
 def events() -> str:
     """The events of a cell, with the level that the log gives them."""
     rows = [(f"`{kind.value}`", _level(kind)) for kind in EventKind]
-    return _table(("event", "level"), rows)
+    return table(("event", "level"), rows)
 
 
 def _level(kind: EventKind) -> str:
@@ -325,7 +316,7 @@ def _fields(fields: Mapping[str, Field]) -> str:
         else:
             ranges.append((stem, number, number))
             rows.append([f"`{name}`", *facts])
-    return _table(("field", "type", "unit", *(series.word for series in Series), "meaning"), rows)
+    return table(("field", "type", "unit", *(series.word for series in Series), "meaning"), rows)
 
 
 def _since(field: Field, series: Series) -> str:
@@ -338,7 +329,20 @@ def _since(field: Field, series: Series) -> str:
 # -- architecture -----------------------------------------------------------------------------------------------------
 
 
-_FOLDERS = ("core", "rtde", "robot", "simulator", "mapping", "mapping/rules", "modbus", "demo", "cli")
+_FOLDERS = (
+    "core",
+    "rtde",
+    "robot",
+    "simulator",
+    "mapping",
+    "mapping/rules",
+    "modbus",
+    "canopen",
+    "canopen/sdo",
+    "canopen/pdo",
+    "demo",
+    "cli",
+)
 """Packages in the order in which a reader meets them; others follow by name."""
 
 
@@ -353,7 +357,7 @@ def modules() -> str:
         title = (
             f"`gatewayd/{folder}/`: {_subject(package / folder / '__init__.py')}" if folder else "`gatewayd/`"
         )
-        parts.append(f"### {title}\n\n" + _table(("module", "subject"), rows))
+        parts.append(f"### {title}\n\n" + table(("module", "subject"), rows))
     return "\n\n".join(parts)
 
 
@@ -364,13 +368,13 @@ def _subject(path: Path) -> str:
 
 def layers() -> str:
     """Who may import whom."""
-    table = import_module("tests.test_architecture").LAYERS
+    allowed = import_module("tests.test_architecture").LAYERS
     rows = [
         (f"`{name}`", ", ".join(f"`{one}`" for one in sorted(may - {name})) or "nothing of ours")
-        for name, may in table.items()
+        for name, may in allowed.items()
         if name != "gatewayd"
     ]
-    return _table(("what", "may import"), rows)
+    return table(("what", "may import"), rows)
 
 
 # -- shipped files ----------------------------------------------------------------------------------------------------
@@ -399,5 +403,6 @@ PARTS: dict[str, Callable[[], str]] = {
     "modules": modules,
     "layers": layers,
     "simulator-control": simulator_control,
+    **canopen.PARTS,
 }
 """Name of a part -> what makes it."""
