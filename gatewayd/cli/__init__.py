@@ -12,7 +12,7 @@ from gatewayd import __version__
 __all__ = ["COMMANDS", "command"]
 
 COMMANDS = {
-    "demo": "Simulator, gateway and a small PLC program in one terminal.",
+    "demo": "Simulator, gateway, a PLC and a CANopen master in one terminal.",
     "check": "Find every mistake of mapping files, without a robot.",
     "show": "Print the register table of a mapping file.",
     "export": "Write the EDS, the DCF or robot program lines of a mapping file.",

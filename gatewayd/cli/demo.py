@@ -1,4 +1,4 @@
-"""`gatewayd demo`: simulator, gateway and a small PLC program in one terminal."""
+"""`gatewayd demo`: simulator, gateway, a small PLC program and a CANopen master in one terminal."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ Examples:
 
 \b
 Exit codes:
-  0    the PLC and the robot have shaken hands and every value came back right (or Ctrl-C before the first time)
+  0    PLC and robot have shaken hands, the CANopen master has driven its node, and every value came back right
+       (or Ctrl-C before the first time)
   1    they have not, or the port cannot be had
   130  forced by a second Ctrl-C
 """,
@@ -59,10 +60,10 @@ Exit codes:
     help="Modbus TCP port; 0 takes a free one. Default: 1502 if it is free, else a free one.",
 )
 def command(seconds: float | None, port: int | None) -> int:
-    """See it work: a simulated robot, the gateway and a small PLC program, no robot needed.
+    """See it work: a simulated robot, the gateway, a small PLC program and a CANopen master, no robot needed.
 
-    The three talk to each other over real sockets of this machine. The table shows what the gateway knows: every
-    variable with its registers, value, quality, age and owner. From another terminal you can take part.
+    They talk to each other over real sockets and a CAN bus of this process. The table shows what the gateway knows:
+    every variable with its registers, objects, value, quality, age and owner. From another terminal you can take part.
     """
     from rich.console import Console
 
