@@ -42,9 +42,8 @@ Examples:
 
 \b
 Exit codes:
-  0    PLC and robot have shaken hands, the CANopen master has driven its node, and every value came back right
-       (or Ctrl-C before the first time)
-  1    they have not, or the port cannot be had
+  0    parts were made, and every value came back right on both buses (or Ctrl-C before the first time)
+  1    that was not so, or the port cannot be had
   130  forced by a second Ctrl-C
 """,
 )

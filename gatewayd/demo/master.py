@@ -69,8 +69,8 @@ _RETRY = 1.0
 """Seconds between two RPDOs while they are refused."""
 _STAY = 4.0
 """Seconds for which one feed is asked for."""
-_PATIENCE = 3.0
-"""Seconds after which what was asked for must have come back."""
+_PATIENCE = 15
+"""Requests, 3 s of them, by which what was asked for must have come back; a process that was stopped sends none."""
 _WRONG_KEPT = 3
 
 
@@ -88,12 +88,14 @@ class Feeder:
     held: bool = False
     """The node refuses the feed now."""
     _since: float = math.inf
+    _asked: int = 0
     _came_back: bool = False
     _cycles: int | None = None
 
     def restart(self) -> None:
         """The node has booted: nothing of before counts."""
-        self.held, self._since, self._came_back, self._cycles = False, math.inf, False, None
+        self.held, self._cycles = False, None
+        self._begin(math.inf)
 
     def ask(self, now: float) -> float:
         """The feed to send now; a new one when the last one came back and had its time."""
@@ -101,10 +103,12 @@ class Feeder:
             self._since = now
         if self._came_back and now - self._since >= _STAY:
             self.wanted = FEEDS[(FEEDS.index(self.wanted) + 1) % len(FEEDS)]
-            self._since, self._came_back = now, False
-        elif not self._came_back and not self.held and now - self._since > _PATIENCE:
-            self._complain(f"the feed never became {self.wanted:g} %")
-            self._since = now
+            self._begin(now)
+        elif not self._came_back and not self.held:
+            self._asked += 1
+            if self._asked > _PATIENCE:
+                self._complain(f"the feed never became {self.wanted:g} %")
+                self._begin(now)
         return self.wanted
 
     def emergency(self, code: int, now: float) -> None:
@@ -113,7 +117,8 @@ class Feeder:
             self.held, self._came_back = True, False
             self.refusals += 1
         elif code == 0 and self.held:
-            self.held, self._since = False, now
+            self.held = False
+            self._begin(now)
 
     def measured(self, feed: float) -> None:
         """The feed that the robot has."""
@@ -130,6 +135,9 @@ class Feeder:
             self.verified += 1
         else:
             self._complain(f"cycles went from {before} to {cycles}")
+
+    def _begin(self, now: float) -> None:
+        self._since, self._asked, self._came_back = now, 0, False
 
     def _complain(self, what: str) -> None:
         if len(self.wrong) < _WRONG_KEPT:

@@ -8,6 +8,9 @@ from gatewayd.demo.scene import Scene
 
 __all__ = ["summary"]
 
+_LONG_ENOUGH = 3
+"""Handshakes within which the CANopen side must have come to work."""
+
 
 def summary(scene: Scene, *, asked_for: bool) -> tuple[bool, str]:
     """Whether the main job worked, and the closing words.
@@ -37,7 +40,7 @@ def summary(scene: Scene, *, asked_for: bool) -> tuple[bool, str]:
         what = "The CANopen master and the node never agreed" + (
             "." if asked_for else ": it was over too soon."
         )
-        return not asked_for, f"{counts}\n{what}"
+        return not (asked_for or program.handshakes >= _LONG_ENOUGH), f"{counts}\n{what}"
     parts = program.handshakes
     made = "1 part ordered, 1 part made" if parts == 1 else f"{parts} parts ordered, {parts} parts made"
     return True, (

@@ -36,11 +36,11 @@ def test_feeds_go_round() -> None:
 
 def test_feed_that_never_comes_back_is_told() -> None:
     feeder = Feeder()
-    feeder.ask(0.0)
-    feeder.measured(20.0)
-    feeder.ask(2.9)
+    for number in range(15):
+        feeder.ask(0.2 * number)
+        feeder.measured(20.0)
     assert feeder.wrong == []
-    feeder.ask(3.1)
+    feeder.ask(3.0)
     assert feeder.wrong == ["the feed never became 60 %"]
 
 
@@ -51,9 +51,10 @@ def test_refused_feed_is_no_wrong_one_and_counts_anew_afterwards() -> None:
     feeder.emergency(HELD, 1.0)
     feeder.measured(FEEDS[0])
     assert (feeder.held, feeder.refusals, feeder.verified) == (True, 1, 1)
-    feeder.ask(60.0)
-    feeder.emergency(0, 60.0)
-    feeder.ask(62.0)
+    for number in range(30):
+        feeder.ask(60.0 + number)
+    feeder.emergency(0, 90.0)
+    feeder.ask(91.0)
     assert feeder.wrong == []
     feeder.measured(FEEDS[0])
     assert (feeder.held, feeder.verified) == (False, 2)
