@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 JOBS   ?= auto
 UV     ?= uv
+CASES  ?= 100000
 
 PY      = $(VENV)/bin/python
 INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --no-input
@@ -12,7 +13,8 @@ COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate
 SOURCES = gatewayd tests
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test setup dev lint format types check docs-check unit-checks ci bench deb install lock install-hook clean
+.PHONY: help demo test setup dev lint format types check docs-check generated unit-checks ci bench fuzz deb install lock \
+	install-hook clean
 
 help: ## Show this list
 	@echo "make TARGET, where TARGET is one of:"
@@ -41,8 +43,13 @@ types: $(VENV)/.dev ## Check the types (mypy, strict)
 check: $(VENV)/.runtime ## Check the shipped mappings
 	$(PY) -m gatewayd check --strict mappings/*.yaml
 
-docs-check: $(VENV)/.dev ## Check that generated pages and links of docs/ are right
-	$(PY) -m pytest tests/test_docs.py $(ARGS)
+docs-check: $(VENV)/.dev ## Check links, commands and generated parts of docs/
+	$(PY) -m pytest tests/test_docs.py tests/docs $(ARGS)
+
+generated: $(VENV)/.dev ## Make what is generated anew: schema, rule catalogue, parts of docs/
+	$(PY) -m gatewayd.mapping.schema > mappings/schema.json.new && mv mappings/schema.json.new mappings/schema.json
+	$(PY) -m gatewayd.mapping.rules.catalogue docs/reference
+	$(PY) -m tests.docs
 
 unit-checks: $(VENV)/.dev ## Let systemd judge the units: no mistake, and little that the service may do
 	$(PY) -m pytest tests/systemd/test_units.py $(ARGS)
@@ -58,6 +65,9 @@ deb: $(VENV)/.made ## Build the Debian package of this tree into dist/
 
 install: $(VENV)/.made ## Install as the package would, below DESTDIR (as root; see docs/howto/install.md)
 	packaging/install "$(DESTDIR)" $(PY)
+
+fuzz: $(VENV)/.dev ## Try the parsers and the running daemon with 100,000 hostile cases (CASES=1000000)
+	GATEWAYD_FUZZ_CASES=$(CASES) $(PY) -m pytest --timeout 1800 tests/e2e/test_hostile.py tests/modbus/test_fuzz.py tests/rtde $(ARGS)
 
 lock: ## Pin and hash the newest packages that pyproject.toml allows (needs uv)
 	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --group build -o requirements.lock

@@ -11,20 +11,18 @@ import logging
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import zip_longest
+from pathlib import Path
 
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import CellDefinition
-from gatewayd.core.succession import Succession, succeed
-from gatewayd.eventlog import EventLog
 from gatewayd.logs import fields
 from gatewayd.mapping.plan import ModbusPlan, Plan
 from gatewayd.modbus.peers import PeerEvent, PeerEventKind
 from gatewayd.modbus.server import ListenError, ModbusListener
-from gatewayd.robot.link import RobotLink
+from gatewayd.station import Station
 
-__all__ = ["CLOSING_TIME", "RETRY_PERIOD", "TICK", "Daemon", "Station"]
+__all__ = ["CLOSING_TIME", "RETRY_PERIOD", "TICK", "Daemon"]
 
 TICK = 0.02
 """Seconds between two looks at leases, time-outs and staleness."""
@@ -39,56 +37,16 @@ Address = tuple[str, int]
 """Host and port of a listener."""
 
 
-@dataclass(eq=False)
-class Station:
-    """One cell with its links. A reload puts other ones in their place."""
-
-    plan: Plan
-    cell: Cell = field(init=False)
-    robot: RobotLink = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._furnish(Cell(self.plan.cell))
-        self.robot = RobotLink(self.plan.robot, self.cell)
-
-    def succeed(self, plan: Plan, now: float) -> tuple[str, ...]:
-        """Go on with another plan, by the same robot link if that can be; names of inputs left as they were."""
-        succession = self._hand_over(plan.cell, now)
-        self.plan = plan
-        self._furnish(succession.cell)
-        if not self.robot.rebind(plan.robot, self.cell, now):
-            self.cell.robot_lost("the new mapping needs another session", now)
-            self.robot = RobotLink(plan.robot, self.cell, self.robot)
-        return succession.stranded
-
-    def retire(self, now: float) -> tuple[str, ...]:
-        """Release everything for good; names of inputs left as they were."""
-        return self._hand_over(replace(self.plan.cell, variables=(), locks=(), writers=()), now).stranded
-
-    def _hand_over(self, definition: CellDefinition, now: float) -> Succession:
-        """End the cell: the robot is given what falls due by that, and nobody listens to it any more."""
-        former = self.cell
-        succession = succeed(former, definition, now)
-        self.robot.flush(now)
-        former.listeners.clear()
-        former.events.listeners.clear()
-        former.write_listeners.clear()
-        return succession
-
-    def _furnish(self, cell: Cell) -> None:
-        self.cell = cell
-        cell.events.listeners.append(EventLog(cell))
-
-
 class Daemon:
-    """Runs the cells of `plans` until told to stop."""
+    """Runs the cells of `plans` until told to stop; `state` is the directory of what is kept across restarts."""
 
-    def __init__(self, plans: Sequence[Plan]) -> None:
-        self.stations = [Station(plan) for plan in plans]
+    def __init__(self, plans: Sequence[Plan], state: Path) -> None:
+        self._state = state
+        self.stations = [Station(plan, state) for plan in plans]
         self.listeners: list[ModbusListener] = []
         self._group: asyncio.TaskGroup | None = None
         self._tasks: dict[object, asyncio.Task[None]] = {}
-        """Of stations (their clocks), robot links and listeners."""
+        """Of stations (their clocks), links and listeners."""
         self._observers: list[Callable[[Cell], None]] = []
         self._serve({})
 
@@ -174,8 +132,8 @@ class Daemon:
             stations = [self._station_for(plan, former, now, successors, stranded) for plan in plans]
             for station in former.values():
                 stranded += [f"{station.plan.cell.name}: {name}" for name in station.retire(now)]
-                self._end(station)
-                self._end(station.robot)
+                for part in (station, *station.links):
+                    self._end(part)
             self.stations = stations
         finally:
             self._serve(successors)
@@ -191,7 +149,7 @@ class Daemon:
     ) -> Station:
         station = former.pop(plan.cell.name, None)
         if station is None:
-            station = Station(plan)
+            station = Station(plan, self._state)
             self._show(station.cell)
             self._begin_station(station)
         elif station.plan != plan:
@@ -199,13 +157,16 @@ class Daemon:
         return station
 
     def _replace(self, station: Station, plan: Plan, now: float, successors: dict[Cell, Cell]) -> list[str]:
-        cell, robot = station.cell, station.robot
+        cell, links = station.cell, station.links
         stranded = station.succeed(plan, now)
         self._show(station.cell)
         station.cell.health.modbus_connections = 0
         successors[cell] = station.cell
-        if station.robot is not robot:
-            self._begin(station.robot, partial(_keep_running, station.robot.run), self._end(robot))
+        for link, former in zip_longest(station.links, links):
+            if link is not former:
+                ended = self._end(former) if former is not None else None
+                if link is not None:
+                    self._begin(link, partial(_keep_running, link.run), ended)
         return [f"{plan.cell.name}: {name}" for name in stranded]
 
     def _show(self, cell: Cell) -> None:
@@ -233,7 +194,8 @@ class Daemon:
 
     def _begin_station(self, station: Station) -> None:
         self._begin(station, partial(_keep_running, partial(_tick, station)))
-        self._begin(station.robot, partial(_keep_running, station.robot.run))
+        for link in station.links:
+            self._begin(link, partial(_keep_running, link.run))
 
     def _begin(
         self, part: object, work: Callable[[], Awaitable[None]], former: asyncio.Task[None] | None = None
@@ -262,7 +224,7 @@ class Daemon:
             station.cell.stop(now, "the gateway stops")
         with suppress(TimeoutError):
             async with asyncio.timeout(CLOSING_TIME):
-                await asyncio.gather(*(station.robot.close() for station in self.stations))
+                await asyncio.gather(*(link.close() for station in self.stations for link in station.links))
 
 
 async def _tick(station: Station) -> None:

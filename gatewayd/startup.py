@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os.path import isdir
 from pathlib import Path
@@ -13,12 +13,21 @@ from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load_together, read_bytes
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["PATTERN", "Startup", "load_plans", "mapping_files"]
+__all__ = ["PATTERN", "Startup", "load_plans", "mapping_files", "state_directory"]
 
 PATTERN = "*.yaml"
 """The files of a configuration directory."""
 
 log = logging.getLogger("gatewayd.startup")
+
+
+def state_directory(environment: Mapping[str, str]) -> Path:
+    """Where to keep what survives a restart: what systemd gives (STATE_DIRECTORY), else the user's own (XDG)."""
+    given = environment.get("STATE_DIRECTORY")
+    if given:
+        return Path(given.partition(":")[0])
+    base = environment.get("XDG_STATE_HOME")
+    return (Path(base) if base else Path.home() / ".local" / "state") / "gatewayd"
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ import asyncio
 import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from pathlib import Path
 
 import pytest
 
@@ -15,6 +16,8 @@ from gatewayd.daemon import Daemon
 from gatewayd.mapping.loader import load_together
 from gatewayd.mapping.plan import Plan
 from gatewayd.simulator.server import SimulatedController
+
+STATE = Path("/nonexistent/gatewayd")  # nothing here keeps anything
 
 CELL = """\
 gatewayd: 1
@@ -70,7 +73,7 @@ async def until(condition: Callable[[], object]) -> None:
 
 
 def test_cells_share_a_listener_by_address() -> None:
-    daemon = Daemon(plans((1, 31001, 1502), (2, 31002, 1502), (3, 31003, 1503)))
+    daemon = Daemon(plans((1, 31001, 1502), (2, 31002, 1502), (3, 31003, 1503)), STATE)
     assert len(daemon.stations) == 3
     assert [listener.name for listener in daemon.listeners] == ["127.0.0.1:1502", "127.0.0.1:1503"]
 
@@ -79,7 +82,7 @@ def test_a_cell_without_modbus_has_no_listener() -> None:
     text = "gatewayd: 1\ncell: a\nrobot: {host: 127.0.0.1}\nvariables: {x: {robot: output_int_register_0}}\n"
     (loaded,) = load_together([("a.yaml", text.encode())])
     assert loaded.plan is not None, loaded.diagnostics
-    assert Daemon([loaded.plan]).listeners == []
+    assert Daemon([loaded.plan], STATE).listeners == []
 
 
 async def test_a_defect_in_one_cell_costs_neither_the_others_nor_the_process(
@@ -87,7 +90,7 @@ async def test_a_defect_in_one_cell_costs_neither_the_others_nor_the_process(
 ) -> None:
     """Whatever raises in the clock tick of a cell is logged; the next tick comes."""
     async with SimulatedController() as robot:
-        daemon = Daemon(plans((1, robot.port, free_port()), (2, free_port(), free_port())))
+        daemon = Daemon(plans((1, robot.port, free_port()), (2, free_port(), free_port())), STATE)
         good, bad = daemon.stations
 
         def fail(_now: float) -> None:
@@ -107,7 +110,7 @@ async def test_a_link_that_ends_by_a_defect_is_started_again(
 ) -> None:
     monkeypatch.setattr(daemon_module, "RETRY_PERIOD", 0.1)
     async with SimulatedController() as robot:
-        daemon = Daemon(plans((1, robot.port, free_port())))
+        daemon = Daemon(plans((1, robot.port, free_port())), STATE)
         (station,) = daemon.stations
         original = station.cell.package_arrived
         failures = 2
@@ -128,7 +131,7 @@ async def test_a_link_that_ends_by_a_defect_is_started_again(
 
 def test_an_observer_sees_every_cell_that_a_reload_brings_before_it_is_served() -> None:
     first, second = plans((1, 8, 9), (2, 9, 9))
-    daemon = Daemon([first])
+    daemon = Daemon([first], STATE)
     seen: list[str] = []
     daemon.observe(lambda cell: seen.append(cell.definition.name))
     daemon.swap([first, second], 1.0)

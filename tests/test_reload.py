@@ -18,12 +18,13 @@ from gatewayd import reload as reload_module
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
-from gatewayd.daemon import Daemon, Station
+from gatewayd.daemon import Daemon
 from gatewayd.reload import Outcome, Reloader, Result
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import DEMO, parse
 from gatewayd.simulator.server import SimulatedController
 from gatewayd.startup import load_plans
+from gatewayd.station import Station
 
 HEAD = """\
 gatewayd: 1
@@ -123,9 +124,9 @@ def rigged(tmp_path: Path) -> Rigged:
     async def run() -> AsyncIterator[Rig]:
         async with SimulatedController(Controller(program=parse(DEMO))) as robot:
             outcomes: list[Outcome] = []
-            rig = Rig(robot, Daemon([]), None, tmp_path, free_port(), outcomes)  # type: ignore[arg-type]
+            rig = Rig(robot, Daemon([], tmp_path), None, tmp_path, free_port(), outcomes)  # type: ignore[arg-type]
             rig.write()
-            rig.daemon = Daemon(load_plans([tmp_path]).plans)
+            rig.daemon = Daemon(load_plans([tmp_path]).plans, tmp_path)
             rig.reloader = Reloader(rig.daemon, [tmp_path], ended=outcomes.append)
             stop = asyncio.Event()
             running = asyncio.create_task(rig.daemon.run(stop))

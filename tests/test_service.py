@@ -178,7 +178,7 @@ def free_port() -> int:
 def daemon(robot: int, port: int) -> Daemon:
     (loaded,) = load_together([("press-3.yaml", MAPPING.format(robot=robot, port=port).encode())])
     assert loaded.plan is not None
-    return Daemon([loaded.plan])
+    return Daemon([loaded.plan], Path("/nonexistent"))
 
 
 async def test_a_real_daemon_is_ready_without_its_robot_and_its_port(

@@ -12,10 +12,11 @@ from gatewayd import __version__
 __all__ = ["COMMANDS", "command"]
 
 COMMANDS = {
-    "demo": "Simulator, gateway and a small PLC program in one terminal.",
+    "demo": "Simulator, gateway, a PLC and a CANopen master in one terminal.",
     "check": "Find every mistake of mapping files, without a robot.",
     "diff": "Tell what a new mapping file changes of an old one.",
     "show": "Print the register table of a mapping file.",
+    "export": "Write the EDS, the DCF or robot program lines of a mapping file.",
     "simulate": "Be a robot controller to connect to.",
     "run": "Serve the cells of mapping files: the daemon.",
     "reload": "Have the running gateway read its mapping files again.",
@@ -30,8 +31,9 @@ COMMANDS = {
 """Name -> what the list of commands says. Module `gatewayd.cli.NAME` has the click command as `command`."""
 
 HELP = """\
-gatewayd puts the fieldbus registers of a Universal Robots controller, and any other RTDE field, on Modbus TCP, in both
-directions, with one owner per variable. What lies where is declared in one mapping file per robot cell.
+gatewayd puts the fieldbus registers of a Universal Robots controller, and any other RTDE field, on Modbus TCP and
+on CANopen, in both directions, with one owner per variable. What lies where is declared in one mapping file per robot
+cell.
 
 \b
 Five commands from nothing to a running cell:

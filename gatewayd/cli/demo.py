@@ -1,4 +1,4 @@
-"""`gatewayd demo`: simulator, gateway and a small PLC program in one terminal."""
+"""`gatewayd demo`: simulator, gateway, a small PLC program and a CANopen master in one terminal."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import asyncio
 import errno
 import math
 import os
+import shlex
 import signal
 import sys
 import time
@@ -41,8 +42,8 @@ Examples:
 
 \b
 Exit codes:
-  0    the PLC and the robot have shaken hands and every value came back right (or Ctrl-C before the first time)
-  1    they have not, or the port cannot be had
+  0    parts were made, and every value came back right on both buses (or Ctrl-C before the first time)
+  1    that was not so, or the port cannot be had
   130  forced by a second Ctrl-C
 """,
 )
@@ -58,10 +59,10 @@ Exit codes:
     help="Modbus TCP port; 0 takes a free one. Default: 1502 if it is free, else a free one.",
 )
 def command(seconds: float | None, port: int | None) -> int:
-    """See it work: a simulated robot, the gateway and a small PLC program, no robot needed.
+    """See it work: a simulated robot, the gateway, a small PLC program and a CANopen master, no robot needed.
 
-    The three talk to each other over real sockets of this machine. The table shows what the gateway knows: every
-    variable with its registers, value, quality, age and owner. From another terminal you can take part.
+    They talk to each other over real sockets and a CAN bus of this process. The table shows what the gateway knows:
+    every variable with its registers, objects, value, quality, age and owner. From another terminal you can take part.
     """
     from rich.console import Console
 
@@ -97,7 +98,7 @@ async def _play(console: Console, port: int, told: str, seconds: float | None, *
     from gatewayd.demo.summary import summary
 
     stop = asyncio.Event()
-    _stop_on_signals(stop)
+    _stop_on_signals(stop, console)
     scene = Scene(port)
     scene.listen_to_logs()
     async with scene.playing():
@@ -115,9 +116,10 @@ async def _play(console: Console, port: int, told: str, seconds: float | None, *
     return 0 if passed else FAILED
 
 
-def _stop_on_signals(stop: asyncio.Event) -> None:
+def _stop_on_signals(stop: asyncio.Event, console: Console) -> None:
     def on_signal() -> None:
         if stop.is_set():
+            console.show_cursor()
             os._exit(FORCED)
         stop.set()
 
@@ -171,4 +173,5 @@ async def _wait(scene: Scene, stop: asyncio.Event, pause: float, seconds: float 
 def _python() -> str:
     """The name of this interpreter, as short as it can be typed here."""
     path = Path(sys.executable)
-    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
+    here = Path.cwd()
+    return shlex.quote(str(path.relative_to(here) if path.is_relative_to(here) else path))

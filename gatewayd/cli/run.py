@@ -55,6 +55,11 @@ Exit codes:
     show_default=True,
     help="Least severity told; debug also tells every lock taken and released.",
 )
+@click.option(
+    "--state",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Directory of what CANopen masters have stored; default: $STATE_DIRECTORY, else ~/.local/state/gatewayd.",
+)
 @click.option("--strict", is_flag=True, help="Start only if every file can be served.")
 @click.option(
     "--control",
@@ -86,6 +91,7 @@ def command(
     *,
     log_format: str,
     log_level: str,
+    state: Path | None,
     control: Path | None,
     audit: Path | None,
     status: str | None,
@@ -99,7 +105,7 @@ def command(
     """
     from gatewayd.daemon import Daemon
     from gatewayd.logs import Format, configure
-    from gatewayd.startup import load_plans
+    from gatewayd.startup import load_plans, state_directory
     from gatewayd.status.launch import Settings, SettingsError
 
     try:
@@ -112,9 +118,8 @@ def command(
         return UNREADABLE
     if not found.plans or (strict and (found.broken or found.unreadable)):
         return NOTHING_TO_RUN
-    asyncio.run(
-        _serve(Daemon(found.plans), files, _notes(found), page=page, control=_socket(control), audit=audit)
-    )
+    daemon = Daemon(found.plans, state or state_directory(os.environ))
+    asyncio.run(_serve(daemon, files, _notes(found), page=page, control=_socket(control), audit=audit))
     return 0
 
 

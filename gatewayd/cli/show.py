@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -70,8 +71,8 @@ def command(context: click.Context, file: str, form: str, *, every: bool) -> Non
     table = rows(loaded.cell)
     written = {
         "csv": lambda: as_csv(table),
-        "json": lambda: as_json(plan, table),
-        "markdown": lambda: as_markdown(plan, table),
+        "json": lambda: as_json(plan, loaded.cell, table),
+        "markdown": lambda: as_markdown(plan, loaded.cell, table),
     }
     click.echo(written[form](), nl=False)
 
@@ -113,6 +114,10 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
     console = Console(width=None if known else PIPE_WIDTH, markup=False, highlight=False)
     console.print(_heading(plan), style="bold")
     console.print(_table(entries, wide=console.width >= _WIDE))
+    if loaded.cell.canopen is not None:
+        console.print(_pdo_table(loaded))
+        for line in _loads(loaded):
+            console.print(line, soft_wrap=True)
     for line in _notes(loaded, plan, shortened=any(first is not last for first, last in entries)):
         console.print(line, style="dim", soft_wrap=True)
 
@@ -123,6 +128,8 @@ def _heading(plan: Plan) -> str:
     if plan.modbus is not None:
         host = f"[{plan.modbus.host}]" if ":" in plan.modbus.host else plan.modbus.host
         parts.append(f"Modbus TCP {host}:{plan.modbus.port} unit {plan.modbus.unit}")
+    if plan.canopen is not None:
+        parts.append(f"CANopen {plan.canopen.channel} node {plan.canopen.node}")
     parts.append(f"fingerprint {plan.cell.fingerprint:08X}")
     return ", ".join(parts)
 
@@ -130,15 +137,23 @@ def _heading(plan: Plan) -> str:
 def _notes(loaded: Loaded, plan: Plan, *, shortened: bool) -> list[str]:
     notes = []
     for part, writer in zip(loaded.cell.document.writers.values(), plan.cell.writers, strict=True):
-        peers = ", ".join(
+        spec = part.spec
+        known = [
             str(network.network_address) if network.num_addresses == 1 else str(network)
-            for network in part.spec.modbus
-        )
-        watch = "no timeout" if writer.timeout is None else f"lost after {writer.timeout:.6g}s of silence"
+            for network in spec.modbus
+        ]
+        if spec.canopen is not None:
+            services = "RPDO and SDO" if spec.canopen == "any" else spec.canopen.upper()
+            known.append(services if spec.node is None else f"{services}, heartbeat of node {spec.node}")
+        peers = ", ".join(known)
+        silence = writer.timeout if writer.timeout is not None else spec.heartbeat
+        watch = "no timeout" if silence is None else f"lost after {silence:.6g}s of silence"
         notes.append(f"writer {writer.name}: {peers}, {watch}")
     notes.append("-> towards the robot, <- from the robot; addresses from 0; bit 0 is the least significant")
     if plan.modbus is not None:
         notes.append("status of the gateway: holding and input registers from 60000 (460001, 360001)")
+    if plan.canopen is not None:
+        notes.append("status of the gateway: objects from 5F00h")
     if shortened:
         notes.append("ranges on one line of the file are one row here; --all shows each variable")
     return notes
@@ -169,6 +184,9 @@ def _table(entries: list[tuple[Row, Row]], *, wide: bool) -> Table:
             previous = first.direction
         towards = first.direction == "input"
         type_name = first.type if first.order in ("", "ABCD") else f"{first.type} {first.order}"
+        place = f"{first.area} {_addresses(first, last)}".strip()
+        if not place and first.object:
+            place, type_name = f"object {_objects(first.object, last.object)}", first.can_type
         texts = (
             Text(str(first.number), "dim"),
             Text(_range(first.name, last.name), "bold"),
@@ -176,7 +194,7 @@ def _table(entries: list[tuple[Row, Row]], *, wide: bool) -> Table:
                 f"{'->' if towards else '<-'} {_range(first.robot, last.robot)}",
                 "cyan" if towards else "green",
             ),
-            Text(f"{first.area} {_addresses(first, last)}".strip()),
+            Text(place),
             Text(_notations(first, last)),
             Text(type_name),
             Text(", ".join(filter(None, (formula(first), limits(first))))),
@@ -185,6 +203,59 @@ def _table(entries: list[tuple[Row, Row]], *, wide: bool) -> Table:
         )
         table.add_row(*texts)
     return table
+
+
+def _pdo_table(loaded: Loaded) -> Table:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from gatewayd.core.definition import Direction
+    from gatewayd.mapping.pdo_table import pdo_rows
+    from gatewayd.mapping.rules.wording import seconds
+
+    table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False)
+    for title in _PDO_COLUMNS:
+        table.add_column(title, overflow="fold")
+    for row in pdo_rows(loaded.cell):
+        receives = row.direction is Direction.INPUT
+        for number, run in enumerate(row.runs):
+            own = (
+                Text(row.pdo, "bold"),
+                Text(row.cob_id),
+                Text(row.transmission),
+                Text("" if row.inhibit is None else seconds(row.inhibit)),
+                Text("" if row.event is None else seconds(row.event)),
+            )
+            table.add_row(
+                *(own if number == 0 else [Text()] * len(own)),
+                Text(_span(str(run.bit), str(run.bit + run.bits - 1))),
+                Text(f"{'->' if receives else '<-'} {run.names}", "cyan" if receives else "green"),
+                Text(run.objects),
+                Text(run.type),
+            )
+    return table
+
+
+_PDO_COLUMNS = ("PDO", "COB-ID", "transmission", "inhibit", "event", "bits", "variables", "object", "type")
+
+
+def _loads(loaded: Loaded) -> Iterator[str]:
+    """What no PDO carries, and the share of the bus in the worst case for each bit-rate."""
+    from gatewayd.mapping.pdo_table import by_sdo_only, load_by_bit_rate
+
+    objects = by_sdo_only(loaded.cell)
+    if objects:
+        yield f"by SDO only: {', '.join(objects)}"
+    shares = [f"{rate // 1000}k {share:.0%}" for rate, share in load_by_bit_rate(loaded.cell).items()]
+    yield f"worst-case bus load by bit-rate: {', '.join(reversed(shares))}"
+
+
+def _objects(first: str, last: str) -> str:
+    """`2000h:01-40`; both in full where the index changes."""
+    if first.partition(":")[0] == last.partition(":")[0] and first != last:
+        return f"{first}-{last.partition(':')[2]}"
+    return _span(first, last)
 
 
 _COLUMNS = {

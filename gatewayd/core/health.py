@@ -29,3 +29,7 @@ class Health:
     writes_accepted: int = 0
     writes_refused: int = 0
     modbus_connections: int = 0
+    can_bus: int = 0
+    """0: the cell has no CANopen side; else 1 absent, 2 down, 3 bus-off, 4 passive, 5 warning, 6 active."""
+    nmt_state: int = 0
+    """As in the heartbeat: 0 initialising, 4 stopped, 5 operational, 127 pre-operational."""

@@ -93,6 +93,10 @@ FIELDS = (
     StatusField(22, 2, "refused", "requests refused"),
     StatusField(24, 2, "mismatches", "inputs whose read-back differed from what was written"),
     StatusField(26, 1, "modbus_connections", "open Modbus connections to this unit's listener"),
+    StatusField(
+        27, 1, "can_bus", "0 no CANopen, 1 absent, 2 down, 3 bus-off, 4 passive, 5 warning, 6 active"
+    ),
+    StatusField(28, 1, "nmt_state", "0 initialising, 4 stopped, 5 operational, 127 pre-operational"),
     StatusField(30, 1, "refusal_reason", "last refusal: " + ", ".join(f"{r.value} {r.text}" for r in Reason)),
     StatusField(31, 1, "refusal_variable", "number of the variable in the last refusal"),
     StatusField(
@@ -134,7 +138,7 @@ TABLES = (
 LENGTH = 4288
 """Words of the whole block."""
 
-_HEADER = struct.Struct(">HHIHHHHIIHHIIIIIIH6xHHHHI")
+_HEADER = struct.Struct(">HHIHHHHIIHHIIIIIIHHH2xHHHHI")
 
 
 _Entries = Callable[[range, float], Iterable[int]]
@@ -222,6 +226,8 @@ class StatusBlock:
             health.writes_refused & _U32,
             health.read_back_mismatches & _U32,
             min(_U16, health.modbus_connections),
+            health.can_bus,
+            health.nmt_state,
             refusal.reason if refusal is not None else 0,
             _number(refusal.variable) if refusal is not None else 0,
             _number(last.writer) if last is not None else 0,

@@ -18,6 +18,7 @@ from pymodbus.exceptions import ModbusException
 __all__ = [
     "CHECKS_PER_HANDSHAKE",
     "FORCE_SHARE",
+    "SLOW_FEED",
     "TRANSITIONS",
     "Answers",
     "Order",
@@ -31,6 +32,8 @@ SCAN = 0.05
 """Seconds from one scan to the next."""
 FORCE_SHARE = 0.9
 """What the robot program makes of the force limit: it presses with 90 % of it."""
+SLOW_FEED = 20
+"""Percent: the feed that the PLC sets for every tenth part, whatever the line has asked for."""
 CHECKS_PER_HANDSHAKE = 3
 """Values compared at the end of each handshake: part number, force, cycle counter."""
 
@@ -38,12 +41,14 @@ _STATUS = 60000
 _FRESH_AND_WRITABLE = 0b11
 _ANSWERS = 100
 _ORDER = 0
+_FEED = 12
 _LAYOUT = struct.Struct(">Hiif")
 """Registers 100 to 106: bits, part_done, cycles, force."""
 _TIMEOUT = 1.0
 _PAUSE = 0.2
 """Seconds before the next attempt to connect."""
 _FIRST_PART, _PARTS = 101, 800
+_SLOW_EVERY, _SLOW_FIRST = 10, 2
 _LEAST_FORCE, _FORCE_STEP, _FORCES = 40.0, 7.5, 12
 
 
@@ -104,6 +109,8 @@ class Order:
     start: bool = False
     part_number: int = 0
     force_limit: float = 0.0
+    slow: bool = False
+    """The part needs a slow feed: the PLC sets it as long as `start` is given."""
 
     @property
     def words(self) -> list[int]:
@@ -142,7 +149,12 @@ class Program:
 
     def _next_order(self) -> Order:
         number = self.handshakes
-        return Order(True, _FIRST_PART + number % _PARTS, _LEAST_FORCE + _FORCE_STEP * (number % _FORCES))
+        return Order(
+            True,
+            _FIRST_PART + number % _PARTS,
+            _LEAST_FORCE + _FORCE_STEP * (number % _FORCES),
+            slow=number % _SLOW_EVERY == _SLOW_FIRST,
+        )
 
     def _verify(self, answers: Answers) -> None:
         force = self.order.force_limit * FORCE_SHARE
@@ -202,6 +214,9 @@ class Plc:
         if answers.alive:
             reply = await self._client.write_registers(_ORDER, order.words)
             self.refused += reply.isError()
+            if order.slow:
+                reply = await self._client.write_register(_FEED, SLOW_FEED)
+                self.refused += reply.isError()
 
     async def _read(self) -> Answers:
         status = await self._registers(_STATUS, 2)

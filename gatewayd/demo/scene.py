@@ -1,4 +1,4 @@
-"""Everything that `gatewayd demo` runs: a simulated controller, the gateway and a PLC, on loopback ports."""
+"""Everything that `gatewayd demo` runs: a simulated controller, the gateway, a PLC on loopback and a CANopen master."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from gatewayd.core.cell import Cell
 from gatewayd.daemon import Daemon
+from gatewayd.demo.master import Master
 from gatewayd.demo.plc import FORCE_SHARE, Plc
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.table import Row, rows
@@ -37,18 +40,20 @@ output_int_register_0 = input_int_register_0 after 300ms      # the part made
 output_int_register_1 = count input_bit_register_0            # cycles
 output_double_register_0 = input_double_register_0 * {FORCE_SHARE} after 200ms
 output_double_register_1 = input_double_register_1 after 200ms
+output_double_register_2 = input_double_register_2 after 200ms
 """
 _FULL_SPEED = 100.0
 _PROBLEMS = 4
 
 
 class Scene:
-    """The three parties and what can be seen of them. `port` 0 takes a free one."""
+    """The four parties and what can be seen of them. `port` 0 takes a free one."""
 
     def __init__(self, port: int) -> None:
         loaded = load(files(__package__).joinpath(MAPPING).read_bytes(), MAPPING)
         assert loaded.plan is not None
         assert loaded.plan.modbus is not None
+        assert loaded.plan.canopen is not None
         self.rows: tuple[Row, ...] = rows(loaded.cell)
         self.port = port or free_port(HOST)
         self.started = time.monotonic()
@@ -57,8 +62,12 @@ class Scene:
         self.robot = SimulatedController(Controller(program=parse(ROBOT_PROGRAM, "robot program")), host=HOST)
         self.robot.set("input_double_register_1", _FULL_SPEED)
         self.plc = Plc(HOST, self.port, PLC_ADDRESS)
+        self.master = Master(loaded.plan.canopen.channel)
+        self.can_writer = loaded.plan.canopen.rpdo_writer
+        """Index of the writer that the master is."""
         self._plan = replace(loaded.plan, modbus=replace(loaded.plan.modbus, host=HOST, port=self.port))
         self._daemon: Daemon | None = None
+        self._state = TemporaryDirectory(prefix="gatewayd-demo-")
 
     @property
     def cell(self) -> Cell:
@@ -72,7 +81,8 @@ class Scene:
         stop = asyncio.Event()
         async with self.robot:
             robot = replace(self._plan.robot, host=HOST, port=self.robot.port)
-            self._daemon = Daemon([replace(self._plan, robot=robot)])
+            self._daemon = Daemon([replace(self._plan, robot=robot)], Path(self._state.name))
+            line = asyncio.create_task(self.master.run())
             gateway = asyncio.create_task(self._daemon.run(stop))
             plc = asyncio.create_task(self.plc.run())
             try:
@@ -84,6 +94,9 @@ class Scene:
                     await plc
                 stop.set()
                 await gateway
+                line.cancel()
+                with suppress(asyncio.CancelledError):
+                    await line
 
     def listen_to_logs(self) -> None:
         """Keep the log off the screen; errors go to `problems`."""

@@ -16,10 +16,21 @@ from gatewayd.core.refusal import Reason
 from gatewayd.demo.scene import Scene
 from gatewayd.mapping.table import Row
 
-__all__ = ["REFUSAL_SHOWN", "Happening", "Line", "Snapshot", "describe", "number", "snapshot"]
+__all__ = [
+    "PDO_REFUSAL_SHOWN",
+    "REFUSAL_SHOWN",
+    "Happening",
+    "Line",
+    "Snapshot",
+    "describe",
+    "number",
+    "snapshot",
+]
 
 REFUSAL_SHOWN = 5.0
-"""Seconds for which a refusal stands beside its variable."""
+"""Seconds for which a refusal of a Modbus client stands beside its variable."""
+PDO_REFUSAL_SHOWN = 1.5
+"""The same for a refused PDO, which its sender repeats by itself."""
 EVENTS_KEPT = 8
 ROBOT = "robot"
 """Who owns an output."""
@@ -32,6 +43,20 @@ _EXCEPTIONS = {
     Reason.PARTIAL_VALUE: "03",
     Reason.ROBOT_LOST: "0B",
     Reason.CLAIMED_ELSEWHERE: "0A",
+}
+_EMERGENCIES = {
+    Reason.NOT_WRITABLE: "FF05h",
+    Reason.HELD: "FF01h",
+    Reason.OUT_OF_LIMITS: "FF02h",
+    Reason.ROBOT_LOST: "FF03h",
+    Reason.CLAIMED_ELSEWHERE: "FF04h",
+}
+_STATES = {
+    None: "not heard yet",
+    0: "booting",
+    4: "stopped",
+    5: "operational",
+    127: "pre-operational",
 }
 _SOURCES = {
     Source.LOST: "not connected",
@@ -48,6 +73,10 @@ class Line:
 
     row: Row
     address: str
+    object: str
+    """CANopen object; empty where the variable is on Modbus alone."""
+    cob_id: str
+    """COB-ID of the PDO that carries it; empty where none does."""
     value: str
     quality: Quality
     age: str
@@ -55,7 +84,7 @@ class Line:
     lease: str
     """What is left of the owner's lease; empty without one."""
     refused: str
-    """Who was refused here lately, and with which exception."""
+    """Who was refused here lately, and with which exception or EMCY."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +113,18 @@ class Snapshot:
     handshakes: int
     verified: int
     wrong: int
+    node: str
+    """NMT state of the node as the CANopen master hears it."""
+    operational: bool
+    heartbeats: int
+    pdo_rate: int
+    """PDOs per second from the node."""
+    rpdos: int
+    """PDOs to the node since the start."""
+    emergencies: int
+    line_verified: int
+    """Values that the master has compared."""
+    line_wrong: int
     accepted: int
     refused: int
     lines: tuple[Line, ...]
@@ -93,12 +134,14 @@ class Snapshot:
 
 def snapshot(scene: Scene, now: float) -> Snapshot:
     """All that is shown, at monotonic time `now`."""
-    cell, plc = scene.cell, scene.plc
+    cell, plc, master = scene.cell, scene.plc, scene.master
     health, program = cell.health, plc.program
     events = [event for event in cell.events if event.kind not in _UNTOLD][-EVENTS_KEPT:]
     started_at = time.time() - now
     happenings = [
-        Happening(_clock(started_at + event.time), describe(event, cell), event.kind in _BAD)
+        Happening(
+            _clock(started_at + event.time), describe(event, cell, scene.can_writer), event.kind in _BAD
+        )
         for event in events
     ]
     happenings += [Happening(_clock(started_at + now), problem, bad=True) for problem in scene.problems]
@@ -114,16 +157,27 @@ def snapshot(scene: Scene, now: float) -> Snapshot:
         handshakes=program.handshakes,
         verified=program.verified,
         wrong=len(program.wrong),
+        node=_STATES.get(master.state, "unknown") if master.state is None or master.lives(now) else "lost",
+        operational=master.operational(now),
+        heartbeats=master.heartbeats,
+        pdo_rate=master.rate(now),
+        rpdos=master.sent,
+        emergencies=master.emergencies,
+        line_verified=master.feeder.verified,
+        line_wrong=len(master.feeder.wrong),
         accepted=health.writes_accepted,
         refused=health.writes_refused,
-        lines=tuple(_line(cell, row, now) for row in scene.rows),
+        lines=tuple(_line(cell, row, scene.can_writer, now) for row in scene.rows),
         happenings=tuple(happenings),
     )
 
 
-def describe(event: Event, cell: Cell) -> str:
-    """The event in words: `you wrote part_number = 7: refused with exception 06, held by plc`."""
-    return " ".join(_words(event, cell))
+def describe(event: Event, cell: Cell, can_writer: int | None = None) -> str:
+    """The event in words: `you wrote part_number = 7: refused with exception 06, held by plc`.
+
+    `can_writer` is told of refusals by EMCY, everybody else by exceptions.
+    """
+    return " ".join(_words(event, cell, can_writer))
 
 
 def number(value: Value, unit: str = "") -> str:
@@ -144,7 +198,7 @@ _BAD = {
 }
 
 
-def _words(event: Event, cell: Cell) -> Iterator[str]:
+def _words(event: Event, cell: Cell, can_writer: int | None) -> Iterator[str]:
     definition = cell.definition
     variable = definition.variables[event.variable] if event.variable is not None else None
     writer = definition.writer_name(event.writer) if event.writer is not None else "a stranger"
@@ -155,7 +209,7 @@ def _words(event: Event, cell: Cell) -> Iterator[str]:
         yield f"{writer} wrote {variable.name if variable else 'an address'}"
         if event.new is not None:
             yield f"= {number(event.new, unit)}:"
-        yield f"refused with exception {_EXCEPTIONS[event.reason]},"
+        yield f"refused with {_answer(event.reason, event.writer, can_writer)},"
         yield f"held by {other}" if other else event.reason.text
         yield f"({event.repeats + 1} times)" if event.repeats else ""
     elif event.kind is EventKind.FALLBACK and variable is not None:
@@ -172,7 +226,13 @@ def _words(event: Event, cell: Cell) -> Iterator[str]:
         yield event.kind.value + (f": {event.detail}" if event.detail else "")
 
 
-def _line(cell: Cell, row: Row, now: float) -> Line:
+def _answer(reason: Reason, writer: int | None, can_writer: int | None) -> str:
+    if writer is not None and writer == can_writer:
+        return f"EMCY {_EMERGENCIES.get(reason, '')}".rstrip()
+    return f"exception {_EXCEPTIONS[reason]}"
+
+
+def _line(cell: Cell, row: Row, can_writer: int | None, now: float) -> Line:
     index = row.number - 1
     variable = cell.definition.variables[index]
     owner, lease = ROBOT if variable.direction is Direction.OUTPUT else "", ""
@@ -185,20 +245,27 @@ def _line(cell: Cell, row: Row, now: float) -> Line:
     return Line(
         row=row,
         address=f"{row.address}" if row.bit is None else f"{row.address}.{row.bit}",
+        object=row.object,
+        cob_id=row.cob_id,
         value=number(cell.image.values[index], row.unit),
         quality=cell.image.quality[index],
         age=_age(cell.image.age(index, now)),
         owner=owner,
         lease=lease,
-        refused=_refused(cell, index, now),
+        refused=_refused(cell, index, can_writer, now),
     )
 
 
-def _refused(cell: Cell, index: int, now: float) -> str:
+def _refused(cell: Cell, index: int, can_writer: int | None, now: float) -> str:
     last = cell.last_refusal
-    if last is None or last.refusal.variable != index or now - last.time > REFUSAL_SHOWN:
+    if last is None or last.refusal.variable != index:
+        return ""
+    by_pdo = last.writer is not None and last.writer == can_writer
+    if now - last.time > (PDO_REFUSAL_SHOWN if by_pdo else REFUSAL_SHOWN):
         return ""
     writer = cell.definition.writer_name(last.writer) if last.writer is not None else "a stranger"
+    if by_pdo:
+        return f"{writer}: {_EMERGENCIES.get(last.refusal.reason, 'refused')}"
     return f"{writer} refused: {_EXCEPTIONS[last.refusal.reason]}"
 
 

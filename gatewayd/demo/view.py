@@ -24,10 +24,12 @@ _QUALITY_STYLES = {
     Quality.NEVER: "dim",
     Quality.FORCED: "magenta",
 }
-_WIDE = 97
-"""Columns of a terminal that has room for the 4xxxxx form too."""
-_SPACIOUS = 110
+_WIDE = 98
+"""Columns of a terminal that has room for the CANopen side too."""
+_SPACIOUS = 115
+"""Columns of one that has room for everything, the 4xxxxx form among it."""
 _LEAST_EVENTS, _MOST_EVENTS = 3, 8
+_LINES_OF_LINKS = 2
 _FRAME_OF_TABLE = 5
 """Lines of the table that are no variables: title, rules and blank ones."""
 _FRAME_OF_POKES = 2
@@ -52,12 +54,14 @@ def commands(port: int, python: str) -> tuple[list[Poke], Poke]:
 def screen(shot: Snapshot, before: Snapshot | None, pokes: Sequence[Poke], width: int, height: int) -> Group:
     """One picture of at most `height` lines; values that differ from `before` are bright."""
     old = {line.row.number: line.value for line in before.lines} if before is not None else {}
-    table = _table(shot.lines, old, wide=width >= _WIDE, gap=2 if width >= _SPACIOUS else 0)
-    fixed = 1 + _FRAME_OF_TABLE + len(shot.lines)
+    wide, spacious = width >= _WIDE, width >= _SPACIOUS
+    table = _table(shot.lines, old, wide=wide, spacious=spacious)
+    fixed = _LINES_OF_LINKS + _FRAME_OF_TABLE + len(shot.lines)
     shown = list(pokes) if height >= fixed + _LEAST_EVENTS + len(pokes) + _FRAME_OF_POKES else []
     room = height - fixed - (len(shown) + _FRAME_OF_POKES if shown else 0) - _ABOVE
     events = min(max(room, _LEAST_EVENTS), _MOST_EVENTS)
-    parts: list[RenderableType] = [_links(shot, wide=width >= _SPACIOUS), table, *_events(shot, events)]
+    links = _links(shot, wide=spacious), _canopen(shot)
+    parts: list[RenderableType] = [*links, table, *_events(shot, events)]
     if shown:
         parts.extend(_hints(shown))
     return Group(*parts)
@@ -68,11 +72,14 @@ def plain(shot: Snapshot) -> str:
     links = (
         f"{shot.elapsed:6.1f} s  robot {shot.robot}, {shot.frequency:.1f} Hz, {shot.packages} packages, "
         f"{shot.skipped} skipped | plc {shot.plc}, {shot.handshakes} handshakes, {shot.verified} values verified | "
-        f"writes {shot.accepted} accepted, {shot.refused} refused"
+        f"writes {shot.accepted} accepted, {shot.refused} refused\n"
+        f"          node {shot.node}, {shot.heartbeats} heartbeats, {shot.pdo_rate} PDOs/s | "
+        f"line {shot.rpdos} RPDOs, {shot.line_verified} values verified, {shot.emergencies} EMCY"
     )
     lines = [
         f"  {'->' if line.row.direction == 'input' else '<-'} {line.row.name:<12} {line.row.robot:<25} "
-        f"{line.address:>6} {line.row.notation:<9} {line.value:>9}  {line.quality.name.lower():<12}"
+        f"{line.address:>6} {line.row.notation:<9} {line.object:<8} {line.cob_id:<5}"
+        f"{line.value:>9}  {line.quality.name.lower():<12}"
         f"{line.age:>7}  {_owner(line)}".rstrip()
         for line in shot.lines
     ]
@@ -92,15 +99,29 @@ def _links(shot: Snapshot, *, wide: bool) -> Text:
     return text.append(f"{shot.refused} refused", "bold red" if shot.refused else "")
 
 
-def _table(lines: Sequence[Line], old: dict[int, str], *, wide: bool, gap: int) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, gap, 0, 0), pad_edge=False)
+def _canopen(shot: Snapshot) -> Text:
+    text = Text(no_wrap=True, overflow="ellipsis")
+    text.append(" ● ", "green" if shot.operational else "red").append("CANopen ", "bold")
+    text.append(f"{shot.node}, {shot.heartbeats} heartbeats, {shot.pdo_rate} PDOs/s")
+    text.append("   ● ", "green" if shot.operational and not shot.line_wrong else "red")
+    text.append("line ", "bold").append(f"{shot.rpdos} RPDOs, {shot.line_verified} values right")
+    if shot.line_wrong:
+        text.append(f", {shot.line_wrong} wrong", "bold red")
+    return text.append("   ").append(f"{shot.emergencies} EMCY", "bold red" if shot.emergencies else "")
+
+
+def _table(lines: Sequence[Line], old: dict[int, str], *, wide: bool, spacious: bool) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, int(spacious), 0, 0), pad_edge=False)
     table.add_column("   variable", no_wrap=True, min_width=14)
-    table.add_column("robot register", no_wrap=True, max_width=None if wide else 20)
+    table.add_column("robot register", no_wrap=True, max_width=None if wide else 18)
     table.add_column("Modbus", justify="right", no_wrap=True, min_width=6)
-    if wide:
+    if spacious:
         table.add_column("4xxxxx", no_wrap=True)
+    if wide:
+        table.add_column("CANopen", no_wrap=True)
+        table.add_column("PDO", no_wrap=True)
     table.add_column("value", justify="right", no_wrap=True, min_width=8)
-    table.add_column("quality", no_wrap=True, min_width=7)
+    table.add_column("quality" if spacious else "state", no_wrap=True, min_width=5)
     table.add_column("age", justify="right", no_wrap=True, min_width=6)
     table.add_column("owner", no_wrap=True, min_width=16)
     previous = lines[0].row.direction if lines else ""
@@ -108,18 +129,22 @@ def _table(lines: Sequence[Line], old: dict[int, str], *, wide: bool, gap: int) 
         if line.row.direction != previous:
             table.add_section()
             previous = line.row.direction
-        table.add_row(*_cells(line, changed=old.get(line.row.number, line.value) != line.value, wide=wide))
+        changed = old.get(line.row.number, line.value) != line.value
+        table.add_row(*_cells(line, changed=changed, wide=wide, spacious=spacious))
     return table
 
 
-def _cells(line: Line, *, changed: bool, wide: bool) -> Iterator[Text]:
+def _cells(line: Line, *, changed: bool, wide: bool, spacious: bool) -> Iterator[Text]:
     towards = line.row.direction == "input"
     colour = "cyan" if towards else "green"
     yield Text(" → " if towards else " ← ", f"bold {colour}").append(line.row.name, "bold default")
     yield Text(line.row.robot, colour)
     yield Text(line.address)
-    if wide:
+    if spacious:
         yield Text(line.row.notation, "dim")
+    if wide:
+        yield Text(line.object)
+        yield Text(line.cob_id or ("SDO" if line.object else ""), "dim")
     yield Text(line.value, "bold yellow" if changed and line.row.name != "tool_height" else "bold")
     yield Text(line.quality.name.lower(), _QUALITY_STYLES[line.quality])
     yield Text(line.age, "dim")

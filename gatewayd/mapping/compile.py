@@ -13,6 +13,7 @@ from enum import Enum
 from ipaddress import IPv4Network, IPv6Network
 from typing import Any, Final
 
+from gatewayd.canopen.plan import CanopenPlan, Consumer, PdoEntry, PdoPlan, SyncPlan
 from gatewayd.core.definition import (
     CellDefinition,
     Direction,
@@ -25,6 +26,7 @@ from gatewayd.core.definition import (
     Variable,
     Writer,
 )
+from gatewayd.mapping.can_expand import CanopenCell, ConcretePdo
 from gatewayd.mapping.codec import Codec
 from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
 from gatewayd.mapping.model import Modbus, Robot
@@ -69,7 +71,8 @@ def compile_plan(cell: ExpandedCell) -> Plan:
         clear_on_connect=robot.on_connect == "fallback",
     )
     modbus = _modbus(cell, document.modbus.spec) if document.modbus is not None else None
-    plan = Plan(document.source.name, definition, _robot(cell, robot, writers), modbus)
+    canopen = _canopen(cell, cell.canopen) if cell.canopen is not None else None
+    plan = Plan(document.source.name, definition, _robot(cell, robot, writers), modbus, canopen)
     return dataclasses.replace(plan, cell=dataclasses.replace(definition, fingerprint=fingerprint(plan)))
 
 
@@ -164,6 +167,55 @@ def _modbus(cell: ExpandedCell, modbus: Modbus) -> ModbusPlan:
 
 def _host_bits(network: Network) -> int:
     return network.max_prefixlen - network.prefixlen
+
+
+def _canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
+    spec = node.part.spec
+    writers = [part.spec for part in cell.document.writers.values()]
+    return CanopenPlan(
+        interface=spec.interface,
+        channel=spec.channel,
+        bitrate=spec.bitrate,
+        node=spec.node,
+        autostart=spec.autostart,
+        heartbeat=_ticks(spec.heartbeat, 1000),
+        sync=SyncPlan(
+            spec.sync.cob_id, spec.sync.producer, _ticks(spec.sync.period, 1_000_000), spec.sync.counter
+        ),
+        consumers=tuple(
+            Consumer(writer.node, _ticks(writer.heartbeat, 1000), index)
+            for index, writer in enumerate(writers)
+            if writer.node is not None and writer.heartbeat is not None
+        ),
+        objects=tuple(one.plan for one in node.objects),
+        pdos=tuple(_pdo(pdo) for pdo in node.pdos),
+        rpdo_writer=next((index for index, writer in enumerate(writers) if writer.by_rpdo), None),
+        sdo_writer=next((index for index, writer in enumerate(writers) if writer.by_sdo), None),
+    )
+
+
+def _pdo(pdo: ConcretePdo) -> PdoPlan:
+    assert pdo.slot.cob_id is not None
+    return PdoPlan(
+        number=pdo.slot.number,
+        direction=pdo.direction,
+        cob_id=pdo.slot.cob_id,
+        predefined=pdo.slot.predefined,
+        transmission=pdo.transmission,
+        inhibit=_ticks(pdo.inhibit, 10_000),
+        event=_ticks(pdo.event, 1000),
+        entries=tuple(
+            PdoEntry(one.variable, one.plan.index, one.plan.subindex, one.plan.type.bits)
+            for one in pdo.entries
+        ),
+        sync_start=pdo.sync_start,
+        name=pdo.name,
+    )
+
+
+def _ticks(seconds: float | None, per_second: int) -> int:
+    """A time as CANopen counts it; 0 for none."""
+    return 0 if seconds is None else round(seconds * per_second)
 
 
 _FOR_PEOPLE: Final = frozenset({"comment", "source", "fingerprint"})

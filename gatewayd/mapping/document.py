@@ -14,6 +14,16 @@ from typing import Any, Generic, TypeVar
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
+from gatewayd.mapping.can_model import (
+    AUTO,
+    NO_PDO,
+    Canopen,
+    CanopenPlace,
+    CobIdPool,
+    PdoDefaults,
+    PdoSpec,
+    Sync,
+)
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule
 from gatewayd.mapping.model import (
     ANY,
@@ -67,6 +77,7 @@ class Document:
     """Name of the cell; empty when it is missing or wrong."""
     robot: Part[Robot] | None = None
     modbus: Part[Modbus] | None = None
+    canopen: Part[Canopen] | None = None
     writers: Mapping[str, Part[WriterSpec]] = field(default_factory=dict)
     groups: Mapping[str, Part[Group]] = field(default_factory=dict)
     variables: Mapping[str, Part[VariableSpec]] = field(default_factory=dict)
@@ -131,7 +142,16 @@ def _node_at(node: Node, path: tuple[Step, ...]) -> Node:
     return node
 
 
-_NESTED: dict[str, type[Section]] = {"watchdog": Watchdog, "modbus": PlacementSpec}
+_NESTED: dict[tuple[type[Section], str], type[Section]] = {
+    (Robot, "watchdog"): Watchdog,
+    (VariableSpec, "modbus"): PlacementSpec,
+    (VariableSpec, "canopen"): CanopenPlace,
+    (Canopen, "sync"): Sync,
+    (Canopen, "pdo"): PdoDefaults,
+    (Canopen, "cob_ids"): CobIdPool,
+    (Canopen, "pdos"): PdoSpec,
+}
+"""Sections inside sections, by the first step of the path that leads there."""
 _ARTICLE: dict[type[Section], str] = {
     MappingFile: "the file",
     Robot: "the section `robot`",
@@ -141,6 +161,12 @@ _ARTICLE: dict[type[Section], str] = {
     VariableSpec: "a variable",
     PlacementSpec: "a placement in `modbus`",
     Watchdog: "the watchdog",
+    Canopen: "the section `canopen`",
+    CanopenPlace: "`canopen` of a variable",
+    Sync: "the table `sync`",
+    PdoDefaults: "the table `pdo`",
+    CobIdPool: "the table `cob_ids`",
+    PdoSpec: "a PDO",
 }
 _ELSEWHERE: dict[tuple[type[Section], str], str] = {
     **{
@@ -158,6 +184,10 @@ _ELSEWHERE: dict[tuple[type[Section], str], str] = {
     **{
         (MappingFile, key): f"`{key}` belongs into the section `modbus`"
         for key in ("listen", "unit", "allow")
+    },
+    **{
+        (MappingFile, key): f"`{key}` belongs into the section `canopen`"
+        for key in ("channel", "bitrate", "node", "pdos")
     },
 }
 _EXPECTED = {
@@ -195,6 +225,7 @@ class _Reader:
             self._cell(root.entries.get("cell")),
             self._section(Robot, root.entries.get("robot")),
             self._section(Modbus, root.entries.get("modbus")),
+            self._canopen(root.entries.get("canopen")),
             self._sections(WriterSpec, root.entries.get("writers")),
             self._sections(Group, root.entries.get("groups")),
             self._sections(VariableSpec, root.entries.get("variables")),
@@ -239,6 +270,15 @@ class _Reader:
             if named and part is not None:
                 parts[name] = part
         return parts
+
+    def _canopen(self, entry: Entry | None) -> Part[Canopen] | None:
+        part = self._section(Canopen, entry)
+        reserved = [name for name in (AUTO, NO_PDO) if part is not None and name in part.spec.pdos]
+        for name in reserved:
+            assert part is not None
+            message = f"a PDO cannot be called `{name}`: the word has a meaning of its own"
+            self._find(syntax.BAD_NAME, message, part.key_at("pdos", name), "choose another name")
+        return None if reserved else part
 
     def _name(self, model: type[Section], entry: Entry) -> bool:
         if model is WriterSpec and entry.key.text == ANY:
@@ -302,9 +342,10 @@ class _Reader:
         kind, context = details["type"], details.get("ctx", {})
         rule = _CUSTOM.get(kind)
         if rule is not None:
-            self._find(rule, context["message"], value, context["hint"])
+            place = key if rule is syntax.MISSING_KEY else value
+            self._find(rule, context["message"], place, context["hint"])
             return
-        inner = next((_NESTED[step] for step in reversed(path[:-1]) if step in _NESTED), model)
+        inner = _NESTED.get((model, str(path[0])), model) if len(path) > 1 else model
         name = str(
             next((step for step in reversed((*prefix, *path)) if isinstance(step, str)), entry.key.text)
         )
@@ -361,12 +402,14 @@ _CUSTOM = {
     for rule in (
         syntax.BAD_ADDRESS,
         syntax.BAD_CHOICE,
+        syntax.BAD_COB_ID,
         syntax.BAD_DURATION,
         syntax.BAD_NAME,
         syntax.BAD_NETWORK,
         syntax.BAD_NUMBER,
         syntax.BAD_RANGE,
         syntax.BAD_REFERENCE,
+        syntax.MISSING_KEY,
         syntax.OUT_OF_RANGE,
         syntax.WRONG_TYPE,
     )

@@ -12,6 +12,7 @@ from enum import Enum, auto
 from typing import Final
 
 from gatewayd.core.definition import Direction, ValueKind
+from gatewayd.mapping.can_expand import Candidate, CanopenCell, expand_canopen
 from gatewayd.mapping.codec import TYPES, Codec, make_codec
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Document, Part
@@ -201,11 +202,16 @@ class ExpandedCell:
     locks: tuple[ConcreteLock, ...]
     """By first variable."""
     unresolved: tuple[Unresolved, ...]
+    canopen: CanopenCell | None = None
 
     @property
     def is_complete(self) -> bool:
         """Whether everything in it could be expanded."""
-        return not self.unresolved and all(placement.problem is None for placement in self.placements)
+        return (
+            not self.unresolved
+            and all(placement.problem is None for placement in self.placements)
+            and (self.canopen is None or self.canopen.is_complete)
+        )
 
 
 def expand(document: Document) -> ExpandedCell:
@@ -252,7 +258,26 @@ class _Builder:
             tuple(placements),
             tuple(self._lock(index) for index in range(len(self._members))),
             tuple(self.unresolved),
+            self._canopen(),
         )
+
+    def _canopen(self) -> CanopenCell | None:
+        part = self.document.canopen
+        if part is None:
+            return None
+        candidates = [
+            Candidate(
+                variable.index,
+                variable.part.name,
+                variable.member,
+                variable.direction,
+                variable.type,
+                variable.kind,
+                variable.spec.canopen,
+            )
+            for variable in self.variables
+        ]
+        return expand_canopen(part, candidates)
 
     def _variable(self, part: Part[VariableSpec], target: Target, member: int | None) -> ConcreteVariable:
         name = part.name if member is None else f"{part.name}[{member}]"

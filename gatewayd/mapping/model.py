@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from gatewayd.core.definition import Fallback
+from gatewayd.mapping.can_model import Canopen, Place
+from gatewayd.mapping.can_scalars import MillisecondTime
 from gatewayd.mapping.plan import Area
 from gatewayd.mapping.rules import syntax
 from gatewayd.mapping.scalars import (
@@ -31,6 +33,7 @@ from gatewayd.mapping.scalars import (
     Whole,
     refuse,
 )
+from gatewayd.mapping.section import Section
 from gatewayd.rtde.types import DEFAULT_PORT
 
 __all__ = [
@@ -58,12 +61,6 @@ NumberType = Literal[
     "bool", "bit", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"
 ]
 WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
-
-
-class Section(BaseModel):
-    """Anything that is a table in the file: strict types, no unknown keys, immutable."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
 class Watchdog(Section):
@@ -135,13 +132,51 @@ class Modbus(Section):
 class WriterSpec(Section):
     """A party that may write inputs."""
 
+    model_config = ConfigDict(
+        json_schema_extra={"anyOf": [{"required": ["modbus"]}, {"required": ["canopen"]}]}
+    )
+
     modbus: Networks = Field(
-        min_length=1, description="address or network of the Modbus client, or a list of them"
+        default=(), description="address or network of the Modbus client, or a list of them"
+    )
+    canopen: Literal["rpdo", "sdo", "any"] | None = Field(
+        default=None, description="services of the CANopen node by which it writes: rpdo, sdo, or any (both)"
+    )
+    node: Whole | None = Field(
+        default=None, ge=1, le=127, description="node-ID whose heartbeat tells whether it lives (CANopen)"
+    )
+    heartbeat: MillisecondTime = Field(
+        default=None, description="time without a heartbeat of `node` after which the writer is lost"
     )
     timeout: OptionalDuration = Field(
         default=None,
         description="time without any request after which the writer counts as lost; default: none",
     )
+
+    @model_validator(mode="after")
+    def _some_link(self) -> Self:
+        if not self.modbus and self.canopen is None:
+            refuse(
+                syntax.MISSING_KEY,
+                "a writer needs the key `modbus` or `canopen`, by which it is known",
+                "add for example `modbus: 192.168.1.20` or `canopen: rpdo`",
+            )
+        return self
+
+    @property
+    def by_rpdo(self) -> bool:
+        """Whether RPDOs are this writer's."""
+        return self.canopen in ("rpdo", "any")
+
+    @property
+    def by_sdo(self) -> bool:
+        """Whether SDO requests are this writer's."""
+        return self.canopen in ("sdo", "any")
+
+    @property
+    def is_supervised(self) -> bool:
+        """Whether it is noticed when it hangs, be its connection open or not."""
+        return self.timeout is not None or (self.heartbeat is not None and not self.modbus)
 
 
 class Group(Section):
@@ -257,6 +292,9 @@ class VariableSpec(Section):
         default=(),
         description="address from 0 (100), bit of a register (100.3), {area: address, type: ...}, or a list of these",
     )
+    canopen: Place | None = Field(
+        default=None, description="auto, object (no PDO), or {pdo: NAME, type: ...}; default: not on CANopen"
+    )
     owner: Names | None = Field(
         default=None, description="writers by priority, first is highest; or any (default, first come)"
     )
@@ -298,6 +336,7 @@ class MappingFile(Section):
     cell: CellName = Field(description="name of the cell")
     robot: Robot = Field(description="the controller")
     modbus: Modbus | None = Field(default=None, description="the Modbus TCP server")
+    canopen: Canopen | None = Field(default=None, description="the CANopen node")
     writers: dict[Name, WriterSpec] = Field(default_factory=dict, description="who may write inputs")
     groups: dict[Name, Group] = Field(default_factory=dict, description="variables that are owned together")
     variables: dict[Name, VariableSpec] = Field(description="the variables by name")

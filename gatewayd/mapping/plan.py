@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import Enum
 from ipaddress import IPv4Network, IPv6Network
 
+from gatewayd.canopen.plan import CanopenPlan
 from gatewayd.core.definition import CellDefinition
 from gatewayd.mapping.codec import Codec
 
@@ -110,3 +111,4 @@ class Plan:
     cell: CellDefinition
     robot: RobotPlan
     modbus: ModbusPlan | None
+    canopen: CanopenPlan | None = None

@@ -22,6 +22,7 @@ from gatewayd.mapping.rules import syntax
 from gatewayd.mapping.source import RealNumber, WholeNumber
 
 __all__ = [
+    "OPTIONAL_DURATION_SCHEMA",
     "Address",
     "CellName",
     "Duration",
@@ -38,7 +39,12 @@ __all__ = [
     "RobotReference",
     "Version",
     "Whole",
+    "one_or_many",
+    "optional_duration",
     "refuse",
+    "scalar",
+    "span",
+    "written",
 ]
 
 _DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?")
@@ -68,7 +74,7 @@ def refuse(rule: Rule, message: str, hint: str) -> NoReturn:
     raise PydanticCustomError(rule.slug, "{message}", {"message": message, "hint": hint})
 
 
-def _text(value: object) -> str:
+def written(value: object) -> str:
     """Return a scalar as it was written."""
     if isinstance(value, (WholeNumber, RealNumber)):
         return value.text
@@ -77,7 +83,8 @@ def _text(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _scalar(value: object, what: str, hint: str) -> str:
+def scalar(value: object, what: str, hint: str) -> str:
+    """A plain value as it was written; anything else is refused, since `what` is expected there."""
     if value is None or isinstance(value, (dict, list, tuple, bool)):
         kinds = {
             dict: "a table",
@@ -87,7 +94,7 @@ def _scalar(value: object, what: str, hint: str) -> str:
             type(None): "nothing",
         }
         refuse(syntax.WRONG_TYPE, f"{kinds[type(value)]} stands where {what} is expected", hint)
-    return _text(value)
+    return written(value)
 
 
 def _decimal(value: object) -> object:
@@ -101,7 +108,7 @@ def _decimal(value: object) -> object:
         refuse(syntax.BAD_NUMBER, f"`{value.text}` is not a plain decimal number", hint)
     if isinstance(value, float):
         if not math.isfinite(value):
-            refuse(syntax.BAD_NUMBER, f"`{_text(value)}` is not a finite number", hint)
+            refuse(syntax.BAD_NUMBER, f"`{written(value)}` is not a finite number", hint)
         return float(value)
     return int(value) if isinstance(value, WholeNumber) else value
 
@@ -114,7 +121,7 @@ Real = Annotated[float, BeforeValidator(_decimal), Field(allow_inf_nan=False)]
 
 def _duration(value: object) -> float:
     hint = "name the unit: 500ms, 2s, 1.5s or 5min"
-    text = _scalar(value, "a duration", hint)
+    text = scalar(value, "a duration", hint)
     match = _DURATION.fullmatch(text)
     if match is None:
         if isinstance(value, (int, float)):
@@ -130,20 +137,21 @@ def _duration(value: object) -> float:
     return seconds
 
 
-def _optional_duration(value: object) -> float | None:
+def optional_duration(value: object) -> float | None:
+    """Read a duration in seconds, or `none`."""
     return None if value == "none" else _duration(value)
 
 
 _DURATION_SCHEMA = Annotated[
     str, Field(pattern=r"^[0-9]+(\.[0-9]+)? ?(ms|s|min|h)$", examples=["500ms", "2s"])
 ]
-_OPTIONAL_DURATION_SCHEMA = Annotated[
+OPTIONAL_DURATION_SCHEMA = Annotated[
     str, Field(pattern=r"^(none|[0-9]+(\.[0-9]+)? ?(ms|s|min|h))$", examples=["none", "60s"])
 ]
 Duration = Annotated[float, BeforeValidator(_duration, json_schema_input_type=_DURATION_SCHEMA)]
 """Seconds, written with a unit."""
 OptionalDuration = Annotated[
-    float | None, BeforeValidator(_optional_duration, json_schema_input_type=_OPTIONAL_DURATION_SCHEMA)
+    float | None, BeforeValidator(optional_duration, json_schema_input_type=OPTIONAL_DURATION_SCHEMA)
 ]
 """Seconds, written with a unit, or `none`."""
 
@@ -165,7 +173,7 @@ def _listen(value: object) -> Endpoint:
     if isinstance(value, Endpoint):
         return value
     hint = "write host:port, for example 127.0.0.1:1502, 0.0.0.0:502 or [::1]:502"
-    text = _scalar(value, "a listen address", hint)
+    text = scalar(value, "a listen address", hint)
     match = _LISTEN.fullmatch(text)
     if match is None:
         refuse(syntax.BAD_NETWORK, f"`{text}` is not a listen address", hint)
@@ -196,7 +204,7 @@ Listen = Annotated[
 
 def _network(value: object) -> Network:
     hint = "write an address (192.168.1.20) or a network (192.168.1.0/28)"
-    text = _scalar(value, "an IP address or network", hint)
+    text = scalar(value, "an IP address or network", hint)
     try:
         return ip_network(text)
     except ValueError:
@@ -210,7 +218,7 @@ def _network(value: object) -> Network:
     refuse(syntax.BAD_NETWORK, f"`{text}` has host bits set", hint)
 
 
-def _many(value: object) -> object:
+def one_or_many(value: object) -> object:
     """One thing may stand for a list of one."""
     if isinstance(value, (list, tuple)):
         return tuple(value) or refuse(
@@ -225,7 +233,7 @@ _OneNetwork = Annotated[
 ]
 Networks = Annotated[
     tuple[_OneNetwork, ...],
-    BeforeValidator(_many, json_schema_input_type=_NETWORK_SCHEMA | list[_NETWORK_SCHEMA]),
+    BeforeValidator(one_or_many, json_schema_input_type=_NETWORK_SCHEMA | list[_NETWORK_SCHEMA]),
     Field(strict=False),
 ]
 """An address, a network, or a list of them."""
@@ -233,7 +241,7 @@ Networks = Annotated[
 
 def _name(value: object) -> str:
     hint = "begin with a letter and go on with letters, digits and `_`"
-    text = _scalar(value, "a name", hint)
+    text = scalar(value, "a name", hint)
     if not _NAME.fullmatch(text):
         refuse(syntax.BAD_NAME, f"`{text}` is not a name", hint)
     if len(text) > _LONGEST_NAME:
@@ -245,7 +253,7 @@ def _name(value: object) -> str:
 
 def _cell_name(value: object) -> str:
     hint = "use small letters, digits and `-`, for example press-3"
-    text = _scalar(value, "a name", hint)
+    text = scalar(value, "a name", hint)
     if not _CELL_NAME.fullmatch(text) or len(text) > _LONGEST_NAME:
         refuse(syntax.BAD_NAME, f"`{text}` is not a name of a cell", hint)
     return text
@@ -263,7 +271,7 @@ CellName = Annotated[
 """Name of a cell."""
 Names = Annotated[
     tuple[Name, ...],
-    BeforeValidator(_many, json_schema_input_type=_NAME_SCHEMA | list[_NAME_SCHEMA]),
+    BeforeValidator(one_or_many, json_schema_input_type=_NAME_SCHEMA | list[_NAME_SCHEMA]),
     Field(strict=False),
 ]
 """A name or a list of names."""
@@ -273,7 +281,7 @@ def _version(value: object) -> tuple[int, int, int]:
     hint = "write the controller software as PolyScope shows it, for example 5.12 or 10.7.0"
     if isinstance(value, tuple):
         return value
-    text = _scalar(value, "a version", hint)
+    text = scalar(value, "a version", hint)
     match = _VERSION.fullmatch(text)
     if match is None:
         refuse(syntax.BAD_NUMBER, f"`{text}` is not a version", hint)
@@ -295,7 +303,7 @@ def _address(value: object) -> tuple[int, int | None]:
     if isinstance(value, tuple):
         return value
     hint = "write a register (100) or a bit of a register (100.3), counted from 0"
-    text = _scalar(value, "an address", hint)
+    text = scalar(value, "an address", hint)
     match = _ADDRESS.fullmatch(text)
     if match is None:
         refuse(syntax.BAD_ADDRESS, f"`{text}` is not an address", hint)
@@ -359,20 +367,21 @@ def _reference(value: object) -> Reference:
     hint = (
         "write a field (actual_TCP_pose), 'field[0]', field.3, or a range such as output_int_register_0..23"
     )
-    text = _scalar(value, "the name of an RTDE field", hint)
+    text = scalar(value, "the name of an RTDE field", hint)
     match = _REFERENCE.fullmatch(text)
     if match is None:
         refuse(syntax.BAD_REFERENCE, f"`{text}` does not name an RTDE field", hint)
-    registers = _span(text, match, "first", "last")
-    elements = _span(text, match, "element_first", "element_last")
-    bits = _span(text, match, "bit_first", "bit_last")
+    registers = span(text, match, "first", "last")
+    elements = span(text, match, "element_first", "element_last")
+    bits = span(text, match, "bit_first", "bit_last")
     ranges = sum(match[key] is not None for key in ("last", "element_last", "bit_last"))
     if ranges > 1:
         refuse(syntax.BAD_REFERENCE, f"`{text}` holds more than one range", hint)
     return Reference(text, match["field"], registers, elements, bits, many=ranges > 0)
 
 
-def _span(text: str, match: re.Match[str], first: str, last: str) -> range | None:
+def span(text: str, match: re.Match[str], first: str, last: str) -> range | None:
+    """The numbers from one group of a match to another, both included; None where there are none."""
     if match[first] is None:
         return None
     low = int(match[first])
@@ -408,7 +417,7 @@ def _policy(value: Any, words: tuple[str, ...]) -> Fallback:
     if isinstance(value, (int, float)):
         number = _decimal(value)
         return Fallback(FallbackKind.VALUE, number)  # type: ignore[arg-type]
-    text = _scalar(value, "a policy", f"write {choices}")
+    text = scalar(value, "a policy", f"write {choices}")
     if text not in words:
         refuse(syntax.BAD_CHOICE, f"`{text}` is not a policy", f"write {choices}")
     return Fallback(FallbackKind(text))

@@ -6,12 +6,15 @@ import csv
 import dataclasses
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from gatewayd.core.definition import Direction, Fallback
 from gatewayd.mapping.expand import ConcretePlacement, ConcreteVariable, ExpandedCell
+from gatewayd.mapping.pdo_table import as_document, load_by_bit_rate, object_place, pdo_rows
 from gatewayd.mapping.plan import Area, Plan
+from gatewayd.mapping.rules.wording import cob, seconds
 
 __all__ = [
     "AREA_NAMES",
@@ -74,6 +77,16 @@ class Row:
     on_stale: str
     """Outputs: what the fieldbus sees when the robot stops telling."""
     comment: str
+    object: str = ""
+    """CANopen object, `2000h:01`; empty where there is none."""
+    can_type: str = ""
+    """Its CiA 301 type."""
+    pdo: str = ""
+    """PDO that carries it, `TPDO 3`; empty where none does."""
+    cob_id: str = ""
+    """COB-ID of the PDO, `0x190`."""
+    pdo_bit: int | None = None
+    """Where it begins in the PDO, 0 the least significant bit of the first byte."""
 
 
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
@@ -84,11 +97,27 @@ def rows(cell: ExpandedCell) -> tuple[Row, ...]:
     placed: dict[int, list[ConcretePlacement]] = {}
     for placement in cell.placements:
         placed.setdefault(placement.variable.index, []).append(placement)
+    on_can = _canopen(cell)
     found: list[Row] = []
     for variable in cell.variables:
         places: Sequence[ConcretePlacement | None] = placed.get(variable.index) or [None]
-        found.extend(_row(cell, variable, place) for place in places)
+        found.extend(_row(cell, variable, place, on_can.get(variable.index, {})) for place in places)
     return tuple(found)
+
+
+def _canopen(cell: ExpandedCell) -> dict[int, dict[str, Any]]:
+    """What the CANopen columns hold, by variable."""
+    if cell.canopen is None:
+        return {}
+    columns: dict[int, dict[str, Any]] = {
+        one.variable: {"object": object_place(one), "can_type": one.plan.type.name}
+        for one in cell.canopen.objects
+    }
+    for pdo in cell.canopen.pdos:
+        assert pdo.slot.cob_id is not None
+        for bit, one in pdo.offsets:
+            columns[one.variable] |= {"pdo": pdo.label, "cob_id": cob(pdo.slot.cob_id), "pdo_bit": bit}
+    return columns
 
 
 def by_line(cell: ExpandedCell) -> tuple[tuple[Row, Row], ...]:
@@ -104,7 +133,12 @@ def by_line(cell: ExpandedCell) -> tuple[tuple[Row, Row], ...]:
     return tuple(ends.values())
 
 
-def _row(cell: ExpandedCell, variable: ConcreteVariable, place: ConcretePlacement | None) -> Row:
+def _row(
+    cell: ExpandedCell,
+    variable: ConcreteVariable,
+    place: ConcretePlacement | None,
+    canopen: dict[str, Any],
+) -> Row:
     spec = variable.spec
     lock = cell.locks[variable.lock] if variable.lock is not None else None
     is_number = place is not None and place.codec is not None
@@ -139,6 +173,7 @@ def _row(cell: ExpandedCell, variable: ConcreteVariable, place: ConcretePlacemen
         on_release=_fallback(spec.on_release) if is_input else "",
         on_stale="" if is_input else _fallback(spec.on_stale),
         comment=spec.comment,
+        **canopen,
     )
 
 
@@ -157,8 +192,10 @@ def as_csv(table: Sequence[Row]) -> str:
     return text.getvalue()
 
 
-def as_json(plan: Plan, table: Sequence[Row]) -> str:
-    """One JSON document: `version`, `cell`, `fingerprint`, `modbus` (or null) and `variables`, a list of rows.
+def as_json(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
+    """One JSON document: `version`, `cell`, `fingerprint`, `modbus` and `canopen` (each may be null), `variables`.
+
+    `variables` is a list of rows, `canopen` has the PDO table and the load of the bus by bit-rate.
 
     Keys are only ever added within a version.
     """
@@ -168,13 +205,14 @@ def as_json(plan: Plan, table: Sequence[Row]) -> str:
         "cell": plan.cell.name,
         "fingerprint": f"{plan.cell.fingerprint:08X}",
         "modbus": None if modbus is None else {"host": modbus.host, "port": modbus.port, "unit": modbus.unit},
+        "canopen": as_document(cell),
         "variables": [dataclasses.asdict(row) for row in table],
     }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
-def as_markdown(plan: Plan, table: Sequence[Row]) -> str:
-    """A Markdown page with the columns that a PLC programmer needs."""
+def as_markdown(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
+    """A Markdown page with the columns that a PLC programmer needs; the PDO table after it."""
     lines = [f"# Registers of {plan.cell.name}", ""]
     if plan.modbus is not None:
         modbus = plan.modbus
@@ -191,7 +229,44 @@ def as_markdown(plan: Plan, table: Sequence[Row]) -> str:
     )  # fmt: skip
     lines += ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     lines.extend("| " + " | ".join(map(_cell, _markdown(row))) + " |" for row in table)
+    lines.extend(_markdown_pdos(cell))
     return "\n".join(lines) + "\n"
+
+
+def _markdown_pdos(cell: ExpandedCell) -> Iterator[str]:
+    """The PDO table, where there is a node."""
+    if cell.canopen is None:
+        return
+    spec = cell.canopen.part.spec
+    yield from ("", f"## PDOs of node {spec.node} on {spec.channel} ({spec.bitrate} bit/s)", "")
+    head = (
+        "PDO",
+        "COB-ID",
+        "transmission",
+        "inhibit",
+        "event or deadline",
+        "bit",
+        "variable",
+        "object",
+        "type",
+    )
+    yield from ("| " + " | ".join(head) + " |", "|" + "---|" * len(head))
+    for row in pdo_rows(cell):
+        times = [seconds(time) if time is not None else "" for time in (row.inhibit, row.event)]
+        for run in row.runs:
+            texts = (
+                row.pdo,
+                row.cob_id,
+                row.transmission,
+                *times,
+                str(run.bit),
+                run.names,
+                run.objects,
+                run.type,
+            )
+            yield "| " + " | ".join(map(_cell, texts)) + " |"
+    shares = ", ".join(f"{rate // 1000}k {share:.0%}" for rate, share in load_by_bit_rate(cell).items())
+    yield from ("", f"Worst-case load of the bus by bit-rate: {shares}.")
 
 
 def _markdown(row: Row) -> tuple[str, ...]:

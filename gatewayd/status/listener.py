@@ -18,7 +18,7 @@ from gatewayd import __version__
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import Reload
 from gatewayd.control.server import application
-from gatewayd.daemon import Station
+from gatewayd.station import Station
 from gatewayd.status import view
 from gatewayd.status.guard import GREATEST_BODY, MOST_CONNECTIONS, Doors, is_local_name, middleware
 from gatewayd.status.health import health, readiness

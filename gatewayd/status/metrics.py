@@ -22,7 +22,7 @@ from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
-from gatewayd.daemon import Station
+from gatewayd.station import Station
 from gatewayd.status.health import readiness
 from gatewayd.status.histogram import Histogram
 from gatewayd.status.probes import Probes

@@ -16,9 +16,10 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Fallback, Lock, Variable
 from gatewayd.core.events import Event
 from gatewayd.core.image import Quality
-from gatewayd.daemon import Daemon, Station
+from gatewayd.daemon import Daemon
 from gatewayd.mapping.plan import Placement
 from gatewayd.modbus.server import ModbusListener
+from gatewayd.station import Station
 from gatewayd.status import picture
 from gatewayd.status.picture import Level, Node
 from gatewayd.status.probes import Probes

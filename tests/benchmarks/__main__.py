@@ -16,6 +16,7 @@ SUBJECTS = {
     "throughput": "Modbus requests per second and round trips, beside libmodbus and the stock pymodbus server",
     "latency": "robot to PLC and PLC to robot, as histograms",
     "cost": "CPU time, memory and start of the daemon with the full image at 500 Hz",
+    "canopen": "CPU per PDO, a saturated bus and SYNC, beside python-canopen's own node",
     "check": "time of `gatewayd check`",
     "script": "the script that a user would write instead: ur_rtde feeding a pymodbus server",
 }

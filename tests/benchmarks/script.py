@@ -27,6 +27,9 @@ DOUBLES = 8
 SILENCE = 3.0
 """Seconds for which the controller says nothing while its connection stays open."""
 
+LAG = 0.04
+"""Seconds in which even a slow server shows the last package."""
+
 DEFINITION = """\
 Every double is the same number in each package; the PLC reads eight of them in one request, after each
 package and then without a pause. The script maps 16 registers outward and nothing else; gatewayd serves the
@@ -93,8 +96,9 @@ def _column(controller: Controller, served: Served, seconds: float) -> dict[str,
 def _silence(controller: Controller, plc: Plc) -> float | None:
     """Seconds of silence until the PLC reads something else than the last value; None: it never does."""
     pace(controller, 0.1)
-    last = plc.read(FIRST, 4)
     begin = time.monotonic()
+    time.sleep(LAG)
+    last = plc.read(FIRST, 4)
     while time.monotonic() - begin < SILENCE:
         controller.pump(0)
         if plc.read(FIRST, 4) != last:

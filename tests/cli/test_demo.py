@@ -29,6 +29,9 @@ def test_ends_by_itself_with_success_and_plain_lines() -> None:
     assert (done.returncode, done.stderr) == (0, "")
     assert "\x1b" not in done.stdout
     assert re.search(r"[1-9]\d* parts? ordered, [1-9]\d* parts? made", done.stdout)
+    assert re.search(
+        r"CANopen: [1-9]\d* heartbeats, [1-9]\d* PDOs received, [1-9]\d* sent, [1-9]", done.stdout
+    )
     assert "mbpoll -0 -p " in done.stdout
 
 

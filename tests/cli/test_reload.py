@@ -38,7 +38,11 @@ def reloading(tmp_path: Path) -> Reloading:
 
         path = tmp_path / "control.sock"
         with bind(path) as listening:
-            async with serving(listening, Api(Daemon([]), Audit()), reload if outcome is not None else None):
+            async with serving(
+                listening,
+                Api(Daemon([], Path("/nonexistent")), Audit()),
+                reload if outcome is not None else None,
+            ):
                 done = await asyncio.to_thread(CliRunner().invoke, command, ["--socket", str(path), *args])
         assert asked == ([] if outcome is None else ["--force" in args])
         return done

@@ -19,7 +19,9 @@ BROKEN = ROOT / "docs/reference/rules/GW214-register-overlap/bad.yaml"
 
 def show(*args: str | Path, content: str | None = None, **environment: str) -> Result:
     unset: dict[str, str | None] = {"COLUMNS": None}  # test runners set it for their own sake
-    return CliRunner(env=unset | environment).invoke(command, [str(argument) for argument in args], input=content)
+    return CliRunner(env=unset | environment).invoke(
+        command, [str(argument) for argument in args], input=content
+    )
 
 
 @pytest.mark.parametrize("path", MAPPINGS, ids=lambda path: path.stem)
@@ -47,6 +49,31 @@ def test_the_table_names_both_kinds_of_address() -> None:
     )
     assert "in_bits[0..63]     -> input_bit_register_0..63     coil 0-63" in output
     assert "full-image: 224 variables, Modbus TCP 127.0.0.1:1502 unit 1, fingerprint " in output
+
+
+def test_the_pdo_table_and_the_load_of_the_bus() -> None:
+    """PDO, COB-ID, type, times, bits, variables, objects; what no PDO carries; the load by bit-rate."""
+    output = show(ROOT / "mappings" / "two-buses.yaml", COLUMNS="130").output
+    assert "CANopen can0 node 20, fingerprint" in output
+    lines = [" ".join(line.split()) for line in output.splitlines()]
+    assert "RPDO 1 (command) 0x214 sync (1) 100ms 0-15 -> recipe 2070h:01 UNSIGNED16" in lines
+    assert "17 -> feed_ready 2000h:02 BOOLEAN" in lines
+    assert "TPDO 3 (forces) 0x1C0 every 5 SYNCs (5) 0-31 <- force 2430h:01 REAL32" in lines
+    assert "by SDO only: part_number 2010h:01" in lines
+    assert any(line.startswith("worst-case bus load by bit-rate: 1000k ") for line in lines)
+    assert "writer line: RPDO, heartbeat of node 1, lost after 0.5s of silence" in lines
+
+
+def test_a_variable_on_canopen_alone_shows_its_object() -> None:
+    lines = show(ROOT / "mappings" / "canopen-only.yaml", COLUMNS="130").output.splitlines()
+    assert any("in_bits[0..63]" in line and "object 2000h:01-40" in line for line in lines)
+
+
+def test_json_and_markdown_have_the_pdo_table() -> None:
+    document = json.loads(show("--format", "json", ROOT / "mappings" / "two-buses.yaml").output)
+    assert document["canopen"]["pdos"][4]["cob_id"] == "0x1C0"
+    text = show("--format", "markdown", ROOT / "mappings" / "two-buses.yaml").output
+    assert "| TPDO 3 (forces) | 0x1C0 | every 5 SYNCs (5) |  |  | 32 | torque | 2430h:02 | REAL32 |" in text
 
 
 def test_all_shows_every_variable() -> None:

@@ -31,6 +31,18 @@ def test_handshake_counts_when_the_robot_is_ready_again() -> None:
     assert program.scan(READY).words == [1, 102, 475]
 
 
+def test_every_tenth_part_is_fed_slowly() -> None:
+    program = Program()
+    slow = []
+    for cycles in range(13):
+        order = program.scan(READY)
+        program.scan(busy(order))
+        program.scan(done(order, cycles))
+        slow.append(order.slow)
+        program.scan(READY)
+    assert [number for number, is_slow in enumerate(slow) if is_slow] == [2, 12]
+
+
 def test_answers_that_differ_are_told() -> None:
     program = Program()
     order = program.scan(READY)

@@ -1,14 +1,17 @@
-"""The three parties together, over real sockets."""
+"""The four parties together, over real sockets and a bus of this process."""
 
 from __future__ import annotations
 
 import asyncio
 import socket
+from collections import deque
 
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from gatewayd.demo.scene import HOST, Scene, free_port
+
+SPEED_NOW = 11
 
 
 async def test_values_go_both_ways(scene: Scene, until) -> None:  # type: ignore[no-untyped-def]
@@ -17,6 +20,14 @@ async def test_values_go_both_ways(scene: Scene, until) -> None:  # type: ignore
     assert program.wrong == []
     assert program.verified >= 3
     assert scene.plc.refused == 0
+
+
+async def test_values_go_both_ways_on_canopen(scene: Scene, until) -> None:  # type: ignore[no-untyped-def]
+    master = scene.master
+    await until(lambda: master.feeder.verified >= 2 and scene.plc.program.handshakes >= 2)
+    assert master.feeder.wrong == []
+    assert master.heartbeats > 0
+    assert scene.problems == deque()
 
 
 async def test_somebody_else_is_refused_with_busy(scene: Scene, until) -> None:  # type: ignore[no-untyped-def]
@@ -28,7 +39,7 @@ async def test_somebody_else_is_refused_with_busy(scene: Scene, until) -> None: 
         assert refused.exception_code == 6
         taken = await client.write_register(10, 50)
         assert not taken.isError()
-        await until(lambda: scene.cell.image.values[9] == 50.0)  # speed_now: the robot has answered
+        await until(lambda: scene.cell.image.values[SPEED_NOW] == 50.0)  # speed_now: the robot has answered
     finally:
         client.close()
 

@@ -11,6 +11,9 @@ from gatewayd.core.refusal import Reason
 from gatewayd.demo.scene import HOST, Scene
 from gatewayd.demo.snapshot import describe, number, snapshot
 
+FEED = 3
+"""Index of the variable for which both buses contend."""
+
 
 async def test_everything_shown_is_what_the_gateway_knows(scene: Scene, until) -> None:  # type: ignore[no-untyped-def]
     await until(lambda: scene.plc.program.order.start and scene.cell.image.values[0])
@@ -26,6 +29,8 @@ async def test_everything_shown_is_what_the_gateway_knows(scene: Scene, until) -
     assert lines["part_number"].lease.endswith(" s")
     assert lines["part_number"].refused == "you refused: 06"
     assert lines["busy"].owner == "robot"
+    assert (lines["busy"].object, lines["busy"].cob_id) == ("2400h:01", "0x290")
+    assert (lines["start"].object, lines["start"].cob_id) == ("", "")
     assert "wrote part_number = 7: refused with exception 06, held by plc" in shot.happenings[-1].text
     assert shot.happenings[-1].bad
 
@@ -37,6 +42,31 @@ async def test_every_kind_of_event_has_words(scene: Scene) -> None:
     for reason in Reason:
         event = Event(0.0, EventKind.REFUSED, reason=reason)
         assert "a stranger wrote an address refused with exception 0" in describe(event, scene.cell)
+
+
+async def test_contention_of_the_buses_is_told_on_both(scene: Scene, until) -> None:  # type: ignore[no-untyped-def]
+    """The PLC takes the feed over for its third part; the master is told by EMCY, and gets it back by itself."""
+    await until(lambda: scene.master.feeder.held)
+    shot = snapshot(scene, time.monotonic())
+    line = shot.lines[FEED]
+    assert (line.row.name, line.value) == ("feed", "20 %")
+    assert line.owner == "plc"
+    assert "line: FF01h" in line.refused
+    texts = [one.text for one in shot.happenings]
+    assert "plc took feed over from line" in texts
+    refused = "line wrote feed = 60 %: refused with EMCY FF01h, held by plc"
+    assert any(text.startswith(refused) for text in texts)
+    await until(lambda: not scene.master.feeder.held)
+    assert scene.cell.image.values[FEED] == 60.0
+    assert scene.plc.refused == 0
+
+
+async def test_state_of_the_node_is_told_as_the_master_hears_it(scene: Scene, until) -> None:  # type: ignore[no-untyped-def]
+    await until(lambda: scene.master.operational(time.monotonic()))
+    shot = snapshot(scene, time.monotonic())
+    assert (shot.node, shot.operational) == ("operational", True)
+    later = snapshot(scene, time.monotonic() + 60)
+    assert (later.node, later.operational) == ("lost", False)
 
 
 def test_numbers_are_short() -> None:

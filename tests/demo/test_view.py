@@ -16,6 +16,7 @@ from gatewayd.demo.view import commands, plain, screen
 @pytest.fixture
 async def shot(scene: Scene, until) -> Snapshot:  # type: ignore[no-untyped-def]
     await until(lambda: scene.plc.program.order.start and scene.cell.health.packages > 0)
+    await until(lambda: scene.master.sent > 0 and scene.master.rate(time.monotonic()) > 0)
     return snapshot(scene, time.monotonic())
 
 
@@ -34,7 +35,9 @@ async def test_picture_fits(shot: Snapshot, width: int, height: int) -> None:
     text = "\n".join(picture)
     for line in shot.lines:
         assert line.row.name in text
-    assert ("400001.0" in text) is (width >= 100)
+    assert "operational" in text
+    assert ("2030h:01" in text and "0x210" in text) is (width >= 100)
+    assert ("400001.0" in text) is (width >= 115)
     assert ("mbpoll" in text) is (height >= 30)
 
 
@@ -45,6 +48,9 @@ async def test_plain_lines_tell_the_same(shot: Snapshot) -> None:
         assert f"{line.row.name} " in text
         assert line.row.robot in text
         assert line.row.notation in text
+        assert line.object in text
+        assert line.cob_id in text
+    assert "node operational" in text
 
 
 def test_commands_name_the_port() -> None:

@@ -7,7 +7,10 @@ tests/docs/test_generated.py fails while one is not current.
 from __future__ import annotations
 
 import ast
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
@@ -15,10 +18,8 @@ from textwrap import indent
 from typing import Any
 
 import click
-from click.testing import CliRunner
 
 from gatewayd.cli import COMMANDS
-from gatewayd.cli import command as root
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
@@ -32,6 +33,8 @@ from gatewayd.modbus.functions import EXCEPTION_OF, ExceptionCode
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series
 from gatewayd.status.histogram import BOUNDS
 from gatewayd.status.metrics import METRICS, PROCESS_METRICS
+from tests.docs import canopen
+from tests.docs.canopen import table
 
 __all__ = ["DOCS", "PARTS", "ROOT", "pages", "renewed"]
 
@@ -52,17 +55,6 @@ def renewed(text: str) -> str:
     return _PART.sub(lambda found: f"{found[1]}\n{PARTS[found[2]]().strip()}\n\n{found[4]}", text)
 
 
-def _table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    lines = ["| " + " | ".join(head) + " |"]
-    lines.append("|" + "---|" * len(lines[0].split(" | ")))
-    lines += ["| " + " | ".join(_cell(value) for value in row) + " |" for row in rows]
-    return "\n".join(lines)
-
-
-def _cell(value: object) -> str:
-    return str(value).replace("|", "\\|")
-
-
 # -- mapping file -----------------------------------------------------------------------------------------------------
 
 _SECTIONS = {
@@ -70,10 +62,16 @@ _SECTIONS = {
     "Robot": "`robot:`",
     "Watchdog": "`robot: watchdog:`",
     "Modbus": "`modbus:`",
+    "Canopen": "`canopen:`",
+    "Sync": "`canopen: sync:`",
+    "PdoDefaults": "`canopen: pdo:`",
+    "CobIdPool": "`canopen: cob_ids:`",
+    "PdoSpec": "`canopen: pdos:` NAME`:`",
     "WriterSpec": "`writers:` NAME`:`",
     "Group": "`groups:` NAME`:`",
     "VariableSpec": "`variables:` NAME`:`",
     "PlacementSpec": "`variables:` NAME`: modbus:`",
+    "CanopenPlace": "`variables:` NAME`: canopen:`",
 }
 _DURATION = re.compile(r"ms\|s\|min\|h")
 
@@ -94,7 +92,7 @@ def mapping_keys() -> str:
             )
             for key, value in section["properties"].items()
         ]
-        parts.append(f"### {title}\n\n" + _table(("key", "type", "default", "meaning"), rows))
+        parts.append(f"### {title}\n\n" + table(("key", "type", "default", "meaning"), rows))
     assert not sections, f"no title for {list(sections)}"
     return "\n\n".join(parts)
 
@@ -152,18 +150,34 @@ def _default(key: str, schema: Mapping[str, Any], required: Iterable[str]) -> st
 # -- command line -----------------------------------------------------------------------------------------------------
 
 
+def command_names() -> list[str]:
+    """Every command as it is typed after `gatewayd`; the empty one first, groups before what is in them."""
+    names = [""]
+    for name in COMMANDS:
+        command = import_module(f"gatewayd.cli.{name}").command
+        names.append(name)
+        if isinstance(command, click.Group):
+            names += [f"{name} {inner}" for inner in command.commands]
+    return names
+
+
 def help_text(name: str) -> str:
     """What `gatewayd NAME --help` prints; `gatewayd --help` for an empty name."""
-    arguments = [name, "--help"] if name else ["--help"]
-    result = CliRunner().invoke(root, arguments, prog_name="gatewayd", terminal_width=HELP_WIDTH)
-    assert result.exit_code == 0
-    return result.output.rstrip()
+    # A process of its own: within one, click remembers the help option of whoever asked first.
+    arguments = [*name.split(), "--help"]
+    return subprocess.run(
+        [sys.executable, "-m", "gatewayd", *arguments],
+        check=True,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"COLUMNS": str(HELP_WIDTH + 2)},
+    ).stdout.rstrip()
 
 
 def command_line() -> str:
     """The help of every command."""
     parts = [
-        f"## gatewayd {name}".rstrip() + "\n\n" + indent(help_text(name), "    ") for name in ("", *COMMANDS)
+        f"## gatewayd {name}".rstrip() + "\n\n" + indent(help_text(name), "    ") for name in command_names()
     ]
     return "\n\n".join(parts)
 
@@ -171,15 +185,13 @@ def command_line() -> str:
 def exit_codes() -> str:
     """What each command says about its exit codes, in one table."""
     rows = []
-    for name in ("", *COMMANDS):
-        command = root if not name else import_module(f"gatewayd.cli.{name}").command
-        assert isinstance(command, click.Command)
-        told = (command.epilog or "").partition("Exit codes:\n")[2]
+    for name in command_names():
+        told = help_text(name).partition("Exit codes:\n")[2]
         rows += [
             (f"`gatewayd {name}`" if name else "any command", found[1], found[2])
             for found in re.finditer(r"^ +(\d+) +(.+)$", told, re.MULTILINE)
         ]
-    return _table(("command", "code", "meaning"), rows)
+    return table(("command", "code", "meaning"), rows)
 
 
 # -- what can be seen on the bus --------------------------------------------------------------------------------------
@@ -195,13 +207,13 @@ def _places(offset: int, words: int) -> tuple[str, str]:
 def status_header() -> str:
     """The numbers of the status block."""
     rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in FIELDS]
-    return _table(("address", "4xxxxx", "name", "meaning"), rows)
+    return table(("address", "4xxxxx", "name", "meaning"), rows)
 
 
 def status_tables() -> str:
     """The tables of the status block."""
     rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in TABLES]
-    return _table(("address", "4xxxxx", "name", "meaning"), rows)
+    return table(("address", "4xxxxx", "name", "meaning"), rows)
 
 
 _QUALITIES = {
@@ -223,13 +235,13 @@ _SOURCES = {
 def qualities() -> str:
     """The qualities by number."""
     rows = [(quality.value, f"`{quality.name.lower()}`", _QUALITIES[quality]) for quality in Quality]
-    return _table(("number", "quality", "meaning"), rows)
+    return table(("number", "quality", "meaning"), rows)
 
 
 def sources() -> str:
     """The states of the robot by number."""
     rows = [(source.value, f"`{source.name.lower()}`", _SOURCES[source]) for source in Source]
-    return _table(("number", "robot_state", "meaning"), rows)
+    return table(("number", "robot_state", "meaning"), rows)
 
 
 def refusals() -> str:
@@ -238,7 +250,7 @@ def refusals() -> str:
         (reason.value, reason.text, f"{EXCEPTION_OF[reason]:02X}", PRECEDENCE[reason] + 1)
         for reason in Reason
     ]
-    return _table(("reason", "in words", "exception", "told first"), rows)
+    return table(("reason", "in words", "exception", "told first"), rows)
 
 
 _EXCEPTIONS = {
@@ -257,13 +269,13 @@ _EXCEPTIONS = {
 def exceptions() -> str:
     """The exception codes in use."""
     rows = [(f"{code:02X}", code.name.lower().replace("_", " "), _EXCEPTIONS[code]) for code in ExceptionCode]
-    return _table(("code", "name", "when"), rows)
+    return table(("code", "name", "when"), rows)
 
 
 def events() -> str:
     """The events of a cell, with the level that the log gives them."""
     rows = [(f"`{kind.value}`", _level(kind)) for kind in EventKind]
-    return _table(("event", "level"), rows)
+    return table(("event", "level"), rows)
 
 
 def _level(kind: EventKind) -> str:
@@ -276,12 +288,12 @@ def metrics() -> str:
     rows = [
         (f"`{one.name}`", one.kind.value, ", ".join(one.labels) or "none", one.meaning) for one in METRICS
     ]
-    return _table(("name", "type", "labels", "meaning"), rows)
+    return table(("name", "type", "labels", "meaning"), rows)
 
 
 def process_metrics() -> str:
     """What prometheus-client tells of the process."""
-    return _table(("name", "meaning"), [(f"`{name}`", text) for name, text in PROCESS_METRICS.items()])
+    return table(("name", "meaning"), [(f"`{name}`", text) for name, text in PROCESS_METRICS.items()])
 
 
 def histogram_bounds() -> str:
@@ -325,7 +337,7 @@ def _fields(fields: Mapping[str, Field]) -> str:
         else:
             ranges.append((stem, number, number))
             rows.append([f"`{name}`", *facts])
-    return _table(("field", "type", "unit", *(series.word for series in Series), "meaning"), rows)
+    return table(("field", "type", "unit", *(series.word for series in Series), "meaning"), rows)
 
 
 def _since(field: Field, series: Series) -> str:
@@ -338,7 +350,20 @@ def _since(field: Field, series: Series) -> str:
 # -- architecture -----------------------------------------------------------------------------------------------------
 
 
-_FOLDERS = ("core", "rtde", "robot", "simulator", "mapping", "mapping/rules", "modbus", "demo", "cli")
+_FOLDERS = (
+    "core",
+    "rtde",
+    "robot",
+    "simulator",
+    "mapping",
+    "mapping/rules",
+    "modbus",
+    "canopen",
+    "canopen/sdo",
+    "canopen/pdo",
+    "demo",
+    "cli",
+)
 """Packages in the order in which a reader meets them; others follow by name."""
 
 
@@ -353,7 +378,7 @@ def modules() -> str:
         title = (
             f"`gatewayd/{folder}/`: {_subject(package / folder / '__init__.py')}" if folder else "`gatewayd/`"
         )
-        parts.append(f"### {title}\n\n" + _table(("module", "subject"), rows))
+        parts.append(f"### {title}\n\n" + table(("module", "subject"), rows))
     return "\n\n".join(parts)
 
 
@@ -364,13 +389,13 @@ def _subject(path: Path) -> str:
 
 def layers() -> str:
     """Who may import whom."""
-    table = import_module("tests.test_architecture").LAYERS
+    allowed = import_module("tests.test_architecture").LAYERS
     rows = [
         (f"`{name}`", ", ".join(f"`{one}`" for one in sorted(may - {name})) or "nothing of ours")
-        for name, may in table.items()
+        for name, may in allowed.items()
         if name != "gatewayd"
     ]
-    return _table(("what", "may import"), rows)
+    return table(("what", "may import"), rows)
 
 
 # -- shipped files ----------------------------------------------------------------------------------------------------
@@ -402,5 +427,6 @@ PARTS: dict[str, Callable[[], str]] = {
     "modules": modules,
     "layers": layers,
     "simulator-control": simulator_control,
+    **canopen.PARTS,
 }
 """Name of a part -> what makes it."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
 import pytest
 
-from tests.docs.generated import DOCS, PARTS, pages, renewed
+from gatewayd.modbus.functions import _FUNCTIONS
+from tests.docs.generated import DOCS, PARTS, ROOT, pages, renewed
 
 every_page = pytest.mark.parametrize("page", pages(), ids=lambda page: page.relative_to(DOCS).as_posix())
 
@@ -44,3 +46,24 @@ def test_every_page_is_found_from_the_index() -> None:
                 linked.add(target)
                 waiting.append(target)
     assert {page for page in DOCS.rglob("*.md") if "rules" not in page.parent.parts} - linked == set()
+
+
+def test_every_function_code_is_listed() -> None:
+    page = (DOCS / "reference" / "modbus.md").read_text()
+    table = page.split("## Function codes")[1].split("\n## ")[0]
+    assert {int(code) for code in re.findall(r"^\| (\d+)", table, re.MULTILINE)} == set(_FUNCTIONS)
+
+
+def test_every_text_of_the_log_is_listed() -> None:
+    page = (DOCS / "reference" / "log.md").read_text()
+    logged = [
+        str(call.args[0].value)
+        for path in (ROOT / "gatewayd").rglob("*.py")
+        if not {"simulator", "demo"} & set(path.parts)
+        for call in ast.walk(ast.parse(path.read_text()))
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute)
+        if ast.unparse(call.func.value) in ("log", "_log") and call.func.attr != "log"
+        if call.args and isinstance(call.args[0], ast.Constant)
+    ]
+    assert logged
+    assert [text for text in logged if f"`{text}`" not in page] == []

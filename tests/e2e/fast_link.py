@@ -13,8 +13,8 @@ from pathlib import Path
 
 from gatewayd.core.cell import Cell
 from gatewayd.mapping.loader import load
-from gatewayd.rtde.client import ClientSettings, Loss, RtdeClient
 from gatewayd.robot.link import RobotLink
+from gatewayd.rtde.client import ClientSettings, Loss, RtdeClient
 
 __all__ = ["resident_kilobytes"]
 

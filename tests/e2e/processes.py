@@ -49,7 +49,7 @@ def wait_for(condition: Callable[[], bool], what: str, limit: float = PATIENCE) 
 class Process:
     """One program; what it prints goes to `log`."""
 
-    def __init__(self, command: Sequence[str], log: Path) -> None:
+    def __init__(self, command: Sequence[str], log: Path, *, pass_fds: Sequence[int] = ()) -> None:
         self.log = log
         with log.open("wb") as stream:
             self.popen = subprocess.Popen(
@@ -60,6 +60,7 @@ class Process:
                 text=True,
                 bufsize=1,
                 cwd=_ROOT,
+                pass_fds=pass_fds,
             )
 
     @property

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gatewayd.canopen.eds import eds_text, objects_of, sheet_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together
 from gatewayd.mapping.report import Outcome, as_github, as_json, as_text
@@ -53,8 +54,12 @@ def examine(data: bytes) -> Loaded:
     if loaded.plan is not None:
         table = rows(loaded.cell)
         assert as_csv(table)
-        assert as_markdown(loaded.plan, table)
-        assert table_as_json(loaded.plan, table)
+        assert as_markdown(loaded.plan, loaded.cell, table)
+        assert table_as_json(loaded.plan, loaded.cell, table)
+        canopen = loaded.plan.canopen
+        if canopen is not None:
+            cell = loaded.plan.cell
+            assert eds_text(objects_of(canopen, cell), sheet_of(canopen, cell)).isascii()
     assert time.perf_counter() - started < SLOW
     return loaded
 

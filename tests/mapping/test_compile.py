@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.plan import CanopenPlan, Consumer, ObjectPlan, PdoEntry, PdoPlan, SyncPlan
 from gatewayd.core.definition import (
     Direction,
     Fallback,
@@ -19,6 +21,9 @@ from gatewayd.mapping.document import read_document
 from gatewayd.mapping.expand import expand
 from gatewayd.mapping.plan import Area, Plan, WatchdogPlan
 from gatewayd.mapping.source import parse
+
+FINGERPRINT = 0x3DE7_CFA4
+"""Of `GOOD`, since the first version of the language."""
 
 GOOD = """gatewayd: 1
 cell: press-3
@@ -139,6 +144,129 @@ def test_modbus_plan() -> None:
     codec = modbus.placements[1].codec
     assert codec is not None
     assert codec.encode(12.34) == (123).to_bytes(2, "big")
+
+
+CANOPEN = """gatewayd: 1
+cell: press-3
+robot: {host: 192.168.1.10}
+canopen:
+  channel: can0
+  bitrate: 500000
+  node: 16
+  heartbeat: 250ms
+  sync: {cob_id: 0x90, producer: true, period: 12.5ms, counter: 10}
+  pdo: {inhibit: 2.5ms, event: 300ms, deadline: 400ms}
+  cob_ids: {tpdo: 0x680..0x68F}
+  pdos:
+    forces: {cob_id: 0x1C0, transmission: 4, sync_start: 2, inhibit: none, event: none, variables: force}
+writers:
+  hmi: {canopen: sdo}
+  line: {canopen: rpdo, node: 1, heartbeat: 1.5s}
+variables:
+  start: {robot: input_bit_register_33, canopen: auto, owner: line}
+  speed: {robot: input_double_register_1, canopen: {type: REAL32}, owner: [line, hmi]}
+  mode: {robot: robot_mode, canopen: object}
+  force: {robot: output_double_register_0, canopen: auto}
+"""
+
+
+def node(text: str = CANOPEN) -> CanopenPlan:
+    found = compiled(text).canopen
+    assert found is not None
+    return found
+
+
+def test_canopen_plan() -> None:
+    """Times in the units of the object dictionary, writers and variables by index."""
+    plan = node()
+    assert (plan.interface, plan.channel, plan.bitrate, plan.node) == ("socketcan", "can0", 500_000, 16)
+    assert (plan.autostart, plan.heartbeat) == (False, 250)
+    assert plan.sync == SyncPlan(0x90, producer=True, period=12_500, counter=10)
+    assert plan.consumers == (Consumer(1, 1500, 1),)
+    assert (plan.rpdo_writer, plan.sdo_writer) == (1, 0)
+    assert plan.objects == (
+        ObjectPlan(0, 0x2000, 1, CanType.BOOLEAN),
+        ObjectPlan(1, 0x2030, 1, CanType.REAL32),
+        ObjectPlan(2, 0x2410, 1, CanType.INTEGER32),
+        ObjectPlan(3, 0x2420, 1, CanType.REAL64),
+    )
+
+
+def test_pdo_plans() -> None:
+    """Those towards the robot first; a deadline is the event time of an RPDO."""
+    bits, speed, forces = node().pdos
+    assert (bits.number, bits.direction, bits.cob_id, bits.predefined) == (1, Direction.INPUT, 0x210, True)
+    assert (bits.transmission, bits.inhibit, bits.event) == (254, 25, 400)
+    assert speed.entries == (PdoEntry(1, 0x2030, 1, 32),)
+    assert forces == PdoPlan(
+        number=1,
+        direction=Direction.OUTPUT,
+        cob_id=0x1C0,
+        predefined=False,
+        transmission=4,
+        inhibit=0,
+        event=0,
+        entries=(PdoEntry(3, 0x2420, 1, 64),),
+        sync_start=2,
+        name="forces",
+    )
+
+
+def test_without_a_heartbeat_and_without_writers() -> None:
+    text = (
+        "gatewayd: 1\ncell: c\nrobot: {host: r}\n"
+        "canopen: {channel: can0, bitrate: 10000, node: 1, heartbeat: none}\n"
+    )
+    plan = node(f"{text}variables: {{a: {{robot: robot_mode, canopen: auto}}}}")
+    assert (plan.heartbeat, plan.rpdo_writer, plan.sdo_writer, plan.consumers) == (0, None, None, ())
+    assert plan.sync == SyncPlan()
+
+
+CANOPEN_CHANGES = [
+    ("can0", "can1"),
+    ("bitrate: 500000", "bitrate: 250000"),
+    ("node: 16", "node: 17"),
+    ("heartbeat: 250ms", "heartbeat: none"),
+    ("heartbeat: 250ms", "autostart: true"),
+    ("cob_id: 0x90", "cob_id: 0x80"),
+    ("producer: true", "producer: false"),
+    ("12.5ms", "20ms"),
+    ("counter: 10", "counter: 0"),
+    ("inhibit: 2.5ms", "inhibit: 5ms"),
+    ("event: 300ms", "transmission: sync"),
+    ("deadline: 400ms", "deadline: none"),
+    ("0x1C0", "0x1C1"),
+    ("transmission: 4", "transmission: 5"),
+    ("sync_start: 2", "sync_start: 3"),
+    ("canopen: sdo", "canopen: any"),
+    ("node: 1, heartbeat: 1.5s", "node: 2, heartbeat: 1.5s"),
+    ("heartbeat: 1.5s", "heartbeat: 2s"),
+    ("type: REAL32", "type: REAL64"),
+    ("canopen: object", "canopen: auto"),
+    ("robot_mode, canopen: object", "robot_mode, modbus: 4"),
+]
+
+
+def test_fingerprint_changes_with_the_canopen_side() -> None:
+    """What a master was configured for is what it finds."""
+    fingerprints = {compiled(CANOPEN).cell.fingerprint}
+    for old, new in CANOPEN_CHANGES:
+        assert old in CANOPEN, old
+        fingerprints.add(compiled(CANOPEN.replace(old, new, 1)).cell.fingerprint)
+    assert len(fingerprints) == len(CANOPEN_CHANGES) + 1
+
+
+@pytest.mark.parametrize(
+    "old, new", [("0x1C0", "0x1c0"), ("250ms", "0.25s"), ("canopen: auto, owner", "canopen: {}, owner")]
+)
+def test_fingerprint_stays_with_the_meaning_of_the_canopen_side(old: str, new: str) -> None:
+    assert compiled(CANOPEN.replace(old, new, 1)).cell.fingerprint == compiled(CANOPEN).cell.fingerprint
+
+
+def test_a_canopen_section_changes_nothing_for_those_without() -> None:
+    """Fingerprints that PLCs have stored stay what they were."""
+    assert compiled().canopen is None
+    assert compiled().cell.fingerprint == FINGERPRINT
 
 
 def test_without_a_modbus_section_there_is_no_modbus_plan() -> None:

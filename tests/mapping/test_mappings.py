@@ -39,17 +39,32 @@ def test_all_of_them_can_run_in_one_process() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_listens_on_loopback_and_says_how_to_change_it(name: str) -> None:
-    modbus = plan(name).modbus
-    assert modbus is not None
-    assert modbus.host == "127.0.0.1"
-    assert modbus.port > 1023
     text = (MAPPINGS / name).read_text()
-    assert "0.0.0.0:502" in text
     assert text.startswith("# yaml-language-server: $schema=schema.json\n")
+    modbus = plan(name).modbus
+    assert (modbus is None) == (name == "canopen-only.yaml")
+    if modbus is not None:
+        assert modbus.host == "127.0.0.1"
+        assert modbus.port > 1023
+        assert "0.0.0.0:502" in text
+
+
+@pytest.mark.parametrize("name", ["canopen-only.yaml", "two-buses.yaml"])
+def test_names_a_bus_to_try_it_on(name: str) -> None:
+    canopen = plan(name).canopen
+    assert canopen is not None
+    assert (canopen.interface, canopen.channel) == ("socketcan", "can0")
+    assert "vcan0" in (MAPPINGS / name).read_text()
 
 
 def test_ready_made_files_are_there() -> None:
-    assert {"full-image.yaml", "small-cell.yaml", "two-plcs.yaml"} <= set(NAMES)
+    assert set(NAMES) == {
+        "canopen-only.yaml",
+        "full-image.yaml",
+        "small-cell.yaml",
+        "two-buses.yaml",
+        "two-plcs.yaml",
+    }
 
 
 def test_full_image_is_full() -> None:
@@ -91,6 +106,33 @@ def test_full_image_has_the_documented_addresses(name: str, address: int, bit: i
         if placement.variable == index and placement.area is Area.HOLDING
     ]
     assert places == [(address, bit)]
+
+
+def test_canopen_only_has_the_documented_objects_and_pdos() -> None:
+    """The table in the file's head: masters are configured by it."""
+    canopen = plan("canopen-only.yaml").canopen
+    assert canopen is not None
+    ends: dict[int, int] = {}
+    for one in canopen.objects:
+        ends[one.index] = one.subindex
+    assert ends == {0x2000: 64, 0x2010: 24, 0x2030: 24, 0x2400: 64, 0x2410: 24, 0x2430: 24}
+    for direction in Direction:
+        pdos = [pdo for pdo in canopen.pdos if pdo.direction is direction]
+        assert [pdo.number for pdo in pdos] == list(range(1, 26))
+        kinds = [pdo.entries[0].index & 0xFF for pdo in pdos]
+        assert kinds == [0x00] + [0x10] * 12 + [0x30] * 12
+        assert [pdo.predefined for pdo in pdos] == [True] * 4 + [False] * 21
+    words = (MAPPINGS / "canopen-only.yaml").read_text()
+    for place in ("2000h:01-40", "RPDO 2 to 13", "2430h:01-18", "TPDO 14 to 25"):
+        assert place in words
+
+
+def test_two_buses_contend_for_one_variable() -> None:
+    found = plan("two-buses.yaml")
+    lock = next(lock for lock in found.cell.locks if lock.name == "lamp")
+    assert found.canopen is not None
+    assert [found.cell.writers[owner].name for owner in lock.owners] == ["plc", "line"]
+    assert found.canopen.rpdo_writer == lock.owners[1]
 
 
 def test_two_plcs_share_by_priority() -> None:

@@ -340,3 +340,196 @@ def test_the_largest_cell_is_judged_in_bounded_time() -> None:
     found = findings(lines)
     assert time.perf_counter() - started < 10
     assert {rule for rule, _ in found} == {"GW214"}
+
+
+@pytest.mark.parametrize("side", ["input", "output"])
+def test_a_misspelt_reserved_bit_is_recognised(side: str) -> None:
+    """The gateway's own names for bits 0 to 63 are no RTDE fields, and what people mean first."""
+    text = f"gatewayd: 1\ncell: c\nrobot: {{host: r}}\nvariables: {{a: {{robot: {side}_bit_regster_7}}}}"
+    (finding,) = [one for one in load(text.encode(), "c.yaml").diagnostics if one.rule.id == "GW301"]
+    assert finding.hint is not None
+    assert finding.hint.startswith(f"did you mean `{side}_bit_register_7`")
+
+
+CAN_HEAD = """\
+gatewayd: 1
+cell: press-3
+robot: {host: 192.168.1.10, series: e, frequency: 50}
+canopen:
+  channel: can0
+  bitrate: 1000000
+  node: 16
+"""
+
+
+def on_can(lines: str, head: str = CAN_HEAD) -> list[Diagnostic]:
+    return list(load((head + lines).encode(), "cell.yaml").diagnostics)
+
+
+def test_the_number_of_missing_cob_ids_comes_with_free_ones() -> None:
+    """Those of both directions do not meet, and what is declared already stays."""
+    found = on_can(
+        "  cob_ids: {tpdo: [0x680, 0x1C0]}\n"
+        "writers: {plc: {canopen: rpdo, node: 1, heartbeat: 1s}}\n"
+        "variables:\n"
+        "  a: {robot: output_double_register_0..9, canopen: auto}\n"
+        "  b: {robot: input_double_register_0..4, canopen: auto}\n"
+    )
+    assert [(one.rule.id, one.message, one.hint) for one in found] == [
+        (
+            "GW409",
+            "1 of 5 PDOs towards the robot have no COB-ID: four are predefined, and none declared",
+            "add `cob_ids: {rpdo: 0x685}` if nobody else uses them",
+        ),
+        (
+            "GW409",
+            "4 of 10 PDOs from the robot have no COB-ID: four are predefined, and 2 declared",
+            "add `cob_ids: {tpdo: [0x680, 0x1C0, 0x681..0x684]}` if nobody else uses them",
+        ),
+    ]
+
+
+def test_a_proposal_goes_on_where_the_free_range_ends() -> None:
+    """0x680 to 0x6DF, then PDOs of high node-IDs; all of them pass."""
+    head = CAN_HEAD.replace("50}", "1}")
+    lines = (
+        "variables:\n  a: {robot: output_double_register_0..47, canopen: auto}\n"
+        "  b: {robot: actual_q, canopen: auto}\n  c: {robot: target_q, canopen: auto}\n"
+        "  d: {robot: actual_qd, canopen: auto}\n  e: {robot: target_qd, canopen: auto}\n"
+        "  f: {robot: target_qdd, canopen: auto}\n  g: {robot: actual_current, canopen: auto}\n"
+        "  h: {robot: target_current, canopen: auto}\n  i: {robot: target_moment, canopen: auto}\n"
+        "  j: {robot: actual_TCP_pose, canopen: auto}\n  k: {robot: target_TCP_pose, canopen: auto}\n"
+    )
+    (missing,) = (one for one in on_can(lines, head) if one.rule.id == "GW409")
+    assert missing.hint == "add `cob_ids: {tpdo: [0x680..0x6DF, 0x1C0..0x1C7]}` if nobody else uses them"
+    declared = "  cob_ids: {tpdo: [0x680..0x6DF, 0x1C0..0x1C7]}\n"
+    assert "GW409" not in [one.rule.id for one in on_can(declared + lines, head)]
+
+
+def test_the_hint_of_a_loaded_bus_works() -> None:
+    """The inhibit time that it names brings the load below the warning; a millisecond less does not."""
+    text = (
+        "  cob_ids: {tpdo: 0x680..0x693}\n"
+        "variables:\n  a: {robot: output_double_register_0..23, canopen: auto}\n"
+    )
+    head = CAN_HEAD.replace("50}", "500}")
+    (loaded,) = on_can(text, head)
+    assert loaded.rule.id == "GW427"
+    assert "162% of 1000000 bit/s" in loaded.message
+    hint = re.match(r"`pdo: \{inhibit: (\d+)ms\}`", loaded.hint or "")
+    assert hint is not None
+    milliseconds = int(hint[1])
+    assert on_can(f"  pdo: {{inhibit: {milliseconds}ms}}\n{text}", head) == []
+    (warned,) = on_can(f"  pdo: {{inhibit: {milliseconds - 1}ms}}\n{text}", head)
+    assert warned.rule.id == "GW426"
+
+
+def test_all_cells_of_a_bus_load_it() -> None:
+    """Two cells that pass alone do not pass together; on two buses they do."""
+    text = CAN_HEAD.replace("1000000", "125000") + (
+        "variables:\n  a: {robot: output_double_register_0..3, canopen: auto}\n"
+    )
+    other = text.replace("press-3", "press-4").replace("1.10", "1.11").replace("node: 16", "node: 17")
+    assert on_can("", text) == []
+    together = load_together([("a.yaml", text.encode()), ("b.yaml", other.encode())])
+    assert [[one.rule.id for one in cell.diagnostics] for cell in together] == [["GW426"], []]
+    assert "by 2 cells" in together[0].diagnostics[0].message
+    apart = load_together([("a.yaml", text.encode()), ("b.yaml", other.replace("can0", "can1").encode())])
+    assert [cell.diagnostics for cell in apart] == [(), ()]
+
+
+def test_one_cell_may_receive_what_another_sends() -> None:
+    """That is how a TPDO reaches another node, without a master between them."""
+    sender = CAN_HEAD + (
+        "  pdos: {out: {cob_id: 0x1C0, variables: a}}\nvariables: {a: {robot: output_int_register_0}}\n"
+    )
+    receiver = (
+        (CAN_HEAD.replace("press-3", "press-4").replace("1.10", "1.11").replace("node: 16", "node: 17"))
+        + "  pdos: {in: {cob_id: 0x1C0, variables: a}}\nwriters: {other: {canopen: rpdo, node: 16, heartbeat: 1s}}\n"
+        + "variables: {a: {robot: input_int_register_0, owner: other}}\n"
+    )
+    both = load_together([("a.yaml", sender.encode()), ("b.yaml", receiver.encode())])
+    assert [cell.diagnostics for cell in both] == [(), ()]
+
+
+@pytest.mark.parametrize(
+    "owner, canopen, modbus, rules",
+    [
+        ("plc", "auto", "10", ["GW423"]),
+        ("plc", "object", "10", []),
+        ("plc", "object", None, ["GW423"]),
+        ("line", "auto", None, []),
+        ("line", "object", None, ["GW423"]),
+        ("line", None, "10", ["GW423"]),
+        ("hmi", "object", None, []),
+        ("hmi", "auto", None, ["GW423"]),
+        ("[plc, line]", "auto", "10", []),
+        ("[plc, line]", "auto", None, ["GW432"]),
+        ("[plc, hmi]", "object", "10", []),
+        ("[hmi, line]", "object", None, ["GW432"]),
+        ("any", "auto", None, []),
+    ],
+)
+def test_every_input_lies_where_an_owner_can_write(
+    owner: str, canopen: str | None, modbus: str | None, rules: list[str]
+) -> None:
+    """plc writes by Modbus, line by RPDO, hmi by SDO."""
+    places = "".join(
+        f", {key}: {value}" for key, value in (("canopen", canopen), ("modbus", modbus)) if value
+    )
+    found = on_can(
+        "modbus: {listen: '192.168.1.2:1502'}\n"
+        "writers:\n"
+        "  plc: {modbus: 192.168.1.20, timeout: 1s}\n"
+        "  line: {canopen: rpdo, node: 1, heartbeat: 1s}\n"
+        "  hmi: {canopen: sdo, node: 2, heartbeat: 1s}\n"
+        "variables:\n"
+        "  keep: {robot: input_bit_register_9, modbus: 90.0, canopen: auto, owner: any, lease: 2s}\n"
+        f"  a: {{robot: input_int_register_0, owner: {owner}{places}}}\n"
+    )
+    assert [one.rule.id for one in found] == rules
+
+
+@pytest.mark.parametrize("wrong", ["output_int_register_99", "[]"])
+def test_a_broken_variable_makes_no_further_finding_at_its_pdo(wrong: str) -> None:
+    """What a PDO names is there, only wrong in itself."""
+    found = on_can(
+        "  pdos: {p: {variables: a}}\nvariables:\n"
+        f"  a: {{robot: {wrong}}}\n  b: {{robot: robot_mode, canopen: auto}}\n"
+    )
+    assert len(found) == 1
+    assert not found[0].rule.id.startswith("GW4")
+
+
+def test_cob_ids_are_echoed_in_hexadecimal() -> None:
+    (found,) = on_can(
+        "  pdos: {p: {cob_id: 0x6e5, variables: a}}\nvariables: {a: {robot: output_int_register_0}}\n"
+    )
+    assert "0x6E5" in found.message
+
+
+def test_a_growing_real_is_never_enough_in_a_real32() -> None:
+    """Even where the line says REAL32 itself."""
+    (found,) = on_can("variables: {t: {robot: timestamp, canopen: {type: REAL32}}}\n")
+    assert (found.rule.id, found.hint) == ("GW414", "write `canopen: {type: REAL64}`")
+
+
+def test_bits_of_several_owners_may_share_a_pdo() -> None:
+    """A bit that the PDO does not change stops nothing, so packing them is no risk."""
+    found = on_can(
+        "modbus: {listen: '192.168.1.2:1502'}\n"
+        "writers:\n"
+        "  plc: {modbus: 192.168.1.20, timeout: 1s}\n"
+        "  line: {canopen: rpdo, node: 1, heartbeat: 1s}\n"
+        "variables:\n"
+        "  a: {robot: input_bit_register_0..7, modbus: 0.0, canopen: auto, owner: [plc, line]}\n"
+    )
+    assert found == []
+
+
+def test_a_file_without_writers_is_told_how_its_bus_knows_them() -> None:
+    (found,) = on_can("variables: {a: {robot: input_int_register_0, canopen: auto}}\n")
+    assert (found.rule.id, found.hint) == (
+        "GW501",
+        "add `writers: {plc: {canopen: rpdo, node: 1, heartbeat: 1s}}`",
+    )

@@ -110,7 +110,7 @@ def test_csv_reads_back(loaded: Loaded) -> None:
 
 
 def test_json_is_complete(loaded: Loaded, plan: Plan) -> None:
-    document = json.loads(as_json(plan, rows(loaded.cell)))
+    document = json.loads(as_json(plan, loaded.cell, rows(loaded.cell)))
     assert (document["version"], document["cell"]) == (1, "press-3")
     assert document["modbus"] == {"host": "192.168.1.2", "port": 1502, "unit": 3}
     assert int(document["fingerprint"], 16) == plan.cell.fingerprint
@@ -119,7 +119,7 @@ def test_json_is_complete(loaded: Loaded, plan: Plan) -> None:
 
 def test_markdown_is_a_table(loaded: Loaded, plan: Plan) -> None:
     """Bars in a comment do not break it."""
-    lines = as_markdown(plan, rows(loaded.cell)).splitlines()
+    lines = as_markdown(plan, loaded.cell, rows(loaded.cell)).splitlines()
     table = [line for line in lines if line.startswith("|")]
     assert len(table) == 2 + 10
     assert {line.replace("\\|", "").count("|") for line in table} == {14}

@@ -11,8 +11,9 @@ import pytest
 from gatewayd.audit import Audit
 from gatewayd.control.api import Api
 from gatewayd.core.cell import Cell, Change
-from gatewayd.daemon import Daemon, Station
+from gatewayd.daemon import Daemon
 from gatewayd.mapping.loader import load
+from gatewayd.station import Station
 from gatewayd.status.listener import StatusListener
 from gatewayd.status.probes import Probes
 from tests.status.press import FORCE_LIMIT, HMI, MAPPING, PLC, SPARE, START, TOKEN
@@ -22,7 +23,7 @@ from tests.status.press import FORCE_LIMIT, HMI, MAPPING, PLC, SPARE, START, TOK
 def daemon() -> Daemon:
     loaded = load(MAPPING.encode(), "press.yaml")
     assert loaded.plan is not None, loaded.diagnostics
-    return Daemon([loaded.plan])
+    return Daemon([loaded.plan], Path("/nonexistent"))
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from gatewayd.core.cell import Cell
-from gatewayd.daemon import Station
+from gatewayd.station import Station
 from gatewayd.status.metrics import METRICS, PROCESS_METRICS, Exposition, Kind
 from gatewayd.status.probes import Probes
 
@@ -111,7 +111,7 @@ def test_counters_of_a_can_node_are_told_by_name(probes: Probes, station: Statio
     class Link:
         node = Node()
 
-    station.can = Link()  # type: ignore[attr-defined]
+    station.can = Link()  # type: ignore[assignment]
     samples = read(probes)
     assert one(samples, "gatewayd_can_total", cell="press", counter="received") == 5
     assert one(samples, "gatewayd_can_bus_state", cell="press") == 0

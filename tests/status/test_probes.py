@@ -11,7 +11,8 @@ from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Direction
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
-from gatewayd.daemon import Daemon, Station
+from gatewayd.daemon import Daemon
+from gatewayd.station import Station
 from gatewayd.status.probes import CellProbe, Probes
 from tests.status.press import PLC, START
 

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from gatewayd.core.events import Event, EventKind
-from gatewayd.daemon import Daemon, Station
+from gatewayd.daemon import Daemon
+from gatewayd.station import Station
 from gatewayd.status.probes import Probes
 from gatewayd.status.view import EVENTS, as_json, layout, overview, state
 from tests.status.press import CYCLES, FORCE_LIMIT, PLC, SPARE

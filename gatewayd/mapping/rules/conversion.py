@@ -12,7 +12,7 @@ from gatewayd.mapping.expand import ConcretePlacement, ConcreteVariable, Expande
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.wording import first_of_each_line, number, where
 
-__all__: list[str] = []
+__all__ = ["GROWING", "range_of"]
 
 _FLOAT_DIGITS = {"float32": 1 << 24, "float64": 1 << 53}
 """Integers up to here survive in a real of the type."""
@@ -36,7 +36,8 @@ _KNOWN_RANGES = {
     "actual_configurable_digital_output_bits": (0, 0xFF),
 }
 """Values that fields take in truth, where that is much less than their type holds."""
-_GROWING = ("timestamp",)
+GROWING = ("timestamp",)
+"""Fields that grow for ever."""
 
 
 @cell_rule(
@@ -52,7 +53,7 @@ coarser than the cycle of the robot. Use float64, or an integer type with a scal
 def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Growing reals in a float32."""
     for placement in _numbers(cell):
-        if placement.type == "float32" and placement.variable.field.name in _GROWING:
+        if placement.type == "float32" and placement.variable.field.name in GROWING:
             message = (
                 f"`{placement.variable.name}` grows for ever, and float32 at {where(placement)} loses its end"
             )
@@ -102,7 +103,7 @@ def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Integer outputs in types that do not hold their range."""
     for placement in _numbers(cell):
         variable = placement.variable
-        bounds = _range_of(variable)
+        bounds = range_of(variable)
         if variable.direction is Direction.INPUT or variable.kind is not ValueKind.INT or bounds is None:
             continue
         low, high = _reach(placement)
@@ -281,7 +282,7 @@ def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Integers in reals with fewer digits."""
     for placement in _numbers(cell):
         variable, digits = placement.variable, _FLOAT_DIGITS.get(placement.type)
-        bounds = _range_of(variable)
+        bounds = range_of(variable)
         if variable.kind is not ValueKind.INT or digits is None or bounds is None:
             continue
         if max(-bounds[0], bounds[1]) > digits:
@@ -350,7 +351,7 @@ def _numbers(cell: ExpandedCell) -> Iterator[ConcretePlacement]:
     return (item for item in first_of_each_line(cell.placements) if item.codec is not None)
 
 
-def _range_of(variable: ConcreteVariable) -> tuple[float, float] | None:
+def range_of(variable: ConcreteVariable) -> tuple[float, float] | None:
     """What an integer can be: its limits, what the field is known to take, or its type; None for other kinds."""
     if variable.low is None or variable.high is None:
         return None

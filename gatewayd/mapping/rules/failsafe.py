@@ -155,7 +155,7 @@ def _unsupervised_motion(cell: ExpandedCell) -> Iterator[tuple[ConcreteVariable,
         if variable.lock is None or not _is_motion(variable):
             continue
         lock = cell.locks[variable.lock]
-        silent = [name for name in lock.owners if cell.document.writers[name].spec.timeout is None]
+        silent = [name for name in lock.owners if not cell.document.writers[name].spec.is_supervised]
         if lock.lease is None and silent:
             yield variable, silent[0]
 

@@ -111,7 +111,7 @@ def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     if modbus is None or not modbus.spec.allow:
         return
     for writer in cell.document.writers.values():
-        if not any(_meet(network, modbus.spec.allow) for network in writer.spec.modbus):
+        if writer.spec.modbus and not any(_meet(peer, modbus.spec.allow) for peer in writer.spec.modbus):
             shown = ", ".join(map(_shown, writer.spec.modbus[:3]))
             message = f"the access list of the listener shuts the writer `{writer.name}` ({shown}) out"
             related = (Related(modbus.at("allow"), "the access list is here"),)
@@ -177,7 +177,7 @@ def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     if modbus is None or not ip_address(modbus.spec.listen.host).is_loopback:
         return
     for writer in cell.document.writers.values():
-        if not any(_meet(network, _LOOPBACK) for network in writer.spec.modbus):
+        if writer.spec.modbus and not any(_meet(peer, _LOOPBACK) for peer in writer.spec.modbus):
             shown = _shown(writer.spec.modbus[0])
             message = (
                 f"the writer `{writer.name}` ({shown}) cannot reach {modbus.spec.listen}, "

@@ -36,7 +36,9 @@ def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     if inputs:
         more = f" and {len(inputs) - 1} more inputs" if len(inputs) > 1 else ""
         message = f"nobody can write `{inputs[0].name}`{more}: the file declares no writers"
-        hint = "add `writers: {plc: {modbus: 192.168.1.20, timeout: 1s}}`"
+        on_can = cell.document.modbus is None and cell.canopen is not None
+        known_by = "canopen: rpdo, node: 1, heartbeat: 1s" if on_can else "modbus: 192.168.1.20, timeout: 1s"
+        hint = f"add `writers: {{plc: {{{known_by}}}}}`"
         yield rule.at(inputs[0].position, message, hint=hint)
 
 
@@ -372,7 +374,7 @@ lease, or the writer a timeout.
 def endless_lock(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Shared locks without a lease whose owners are not all supervised."""
     for lock in _distinct(cell.locks):
-        silent = [name for name in lock.owners if cell.document.writers[name].spec.timeout is None]
+        silent = [name for name in lock.owners if not cell.document.writers[name].spec.is_supervised]
         if len(lock.owners) > 1 and lock.lease is None and silent:
             writer = cell.document.writers[silent[0]]
             message = f"`{lock.name}` has no lease, and its owner `{silent[0]}` no timeout"
@@ -398,7 +400,7 @@ def unsupervised_watchdog(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
         return
     for index, name in enumerate(robot.spec.watchdog.requires or ()):
         writer = cell.document.writers.get(name)
-        if writer is not None and writer.spec.timeout is None:
+        if writer is not None and not writer.spec.is_supervised:
             message = f"the watchdog requires `{name}`, which has no timeout"
             related = (Related(writer.key, f"`{name}` is here"),)
             hint = f"add `timeout: 1s` to `{name}`"

@@ -413,8 +413,12 @@ one, or remove the line.
     Severity.WARNING,
 )
 def unmapped_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Lines without a placement."""
+    """Lines without a placement and without an object."""
+    canopen = cell.document.canopen
+    pdos = canopen.spec.pdos.values() if canopen is not None else ()
+    listed = {member.name for pdo in pdos for member in pdo.variables}
     for part in cell.document.variables.values():
-        if not part.spec.modbus:
+        if not part.spec.modbus and part.spec.canopen is None and part.name not in listed:
             message = f"`{part.name}` ({part.spec.robot}) has no address on any fieldbus"
-            yield rule.at(part.key, message, hint="add `modbus: N`, or remove the line")
+            hint = "add `modbus: N` or `canopen: auto`, or remove the line"
+            yield rule.at(part.key, message, hint=hint)

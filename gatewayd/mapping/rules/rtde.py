@@ -63,8 +63,15 @@ def unknown_field(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(watchdog[1], message, hint=_suggestion(watchdog[0]))
 
 
+_NAMES = (
+    *dict.fromkeys((*INPUTS, *OUTPUTS)),
+    *(f"{side}_bit_register_{number}" for side in ("input", "output") for number in range(64)),
+)
+"""Fields, and the gateway's own names for bits of the reserved words."""
+
+
 def _suggestion(name: str) -> str:
-    close = suggest(name)
+    close = suggest(name, _NAMES)
     if not close:
         return "fields are listed in the RTDE guide; registers are such as output_int_register_0"
     return "did you mean " + " or ".join(f"`{item}`" for item in close) + "?"

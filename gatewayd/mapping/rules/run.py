@@ -6,12 +6,36 @@ from collections.abc import Sequence
 
 from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.expand import ExpandedCell
-from gatewayd.mapping.rules import bounds, conversion, failsafe, listener, ownership, places, rtde
+from gatewayd.mapping.rules import (
+    bounds,
+    can_bus,
+    canopen,
+    conversion,
+    failsafe,
+    listener,
+    ownership,
+    pdo_company,
+    pdos,
+    places,
+    rtde,
+)
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
 __all__ = ["FAMILY_MODULES", "check_cell", "check_plant"]
 
-FAMILY_MODULES = (bounds, places, listener, rtde, ownership, failsafe, conversion)
+FAMILY_MODULES = (
+    bounds,
+    places,
+    listener,
+    rtde,
+    canopen,
+    pdos,
+    pdo_company,
+    can_bus,
+    ownership,
+    failsafe,
+    conversion,
+)
 """The modules whose rules are applied."""
 
 

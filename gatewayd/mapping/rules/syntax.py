@@ -8,6 +8,7 @@ __all__ = [
     "ALIAS",
     "BAD_ADDRESS",
     "BAD_CHOICE",
+    "BAD_COB_ID",
     "BAD_DURATION",
     "BAD_NAME",
     "BAD_NETWORK",
@@ -127,7 +128,7 @@ BAD_NUMBER = declare(
     """
 `010` is 8 to some YAML readers and 10 to others; `1E3`, `22:30`, `0x10`, `1_000` and `0.10` have similar
 histories. The mapping language takes plain decimal integers, plain decimal fractions where a fraction
-makes sense, and nothing else.
+makes sense, and nothing else; CAN identifiers alone are hexadecimal (`0x1A0`).
 """,
 )
 BAD_DURATION = declare(
@@ -202,6 +203,16 @@ NOT_UTF8 = declare(
     """
 The file holds bytes that are not UTF-8, or control characters. Editors on Windows may have saved it as
 UTF-16 or in a national code page: save it as UTF-8.
+""",
+)
+BAD_COB_ID = declare(
+    "GW121",
+    "bad-cob-id",
+    "a COB-ID that cannot be read",
+    """
+COB-IDs are written with `0x` and hexadecimal digits (`0x1A0`), as every CANopen manual and every bus monitor
+shows them, and several of them as a range (`0x1A0..0x1AF`). `180` might mean 180h to one reader and B4h to
+the next. They have 11 bits: the greatest is 0x7FF.
 """,
 )
 BAD_RANGE = declare(

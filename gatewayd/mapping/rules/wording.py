@@ -8,7 +8,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from gatewayd.mapping.expand import ConcretePlacement
 from gatewayd.mapping.plan import Area
 
-__all__ = ["AREA_WORDS", "did_you_mean", "first_of_each_line", "number", "one_and_more", "seconds", "where"]
+__all__ = [
+    "AREA_WORDS",
+    "cob",
+    "did_you_mean",
+    "first_of_each_line",
+    "number",
+    "one_and_more",
+    "seconds",
+    "where",
+]
 
 AREA_WORDS = {
     Area.HOLDING: "holding register",
@@ -35,6 +44,11 @@ def number(value: float) -> str:
     if isinstance(value, int):
         return str(value)
     return f"{value:.10g}"
+
+
+def cob(cob_id: int) -> str:
+    """A COB-ID as every finding and table shows it: `0x1A0`."""
+    return f"0x{cob_id:03X}"
 
 
 def seconds(duration: float) -> str:

@@ -1,0 +1,208 @@
+"""EMCY: the errors that are active, what was told of them, and how fast (CiA 301, 7.2.7 and 7.5.2.2, .4, .17, .18).
+
+An error is active from `raise_error` until `clear`; raising it again says nothing new. The first message of an error
+tells its code, the message 0000h tells that the last active error has gone. Messages wait while the NMT state forbids
+EMCY and while the inhibit time runs; if more wait than `CAPACITY`, the oldest are lost, because the last ones tell
+how things stand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterable
+from enum import IntEnum, IntFlag
+
+from gatewayd.canopen.cob_ids import BASIC_FRAME, INVALID, Function, is_restricted
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, variable
+from gatewayd.canopen.frame import Frame, Priority, Send
+
+__all__ = ["CAPACITY", "HISTORY", "Emergency", "ErrorCode", "Register", "register_of"]
+
+CAPACITY = 32
+"""Messages that may wait."""
+HISTORY = 8
+"""Errors kept in 1003h."""
+
+
+class ErrorCode(IntEnum):
+    """The emergency error codes that this node uses (CiA 301, table 26)."""
+
+    NONE = 0x0000
+    STORED_PARAMETERS = 0x6300
+    """Data set: stored parameters could not be read."""
+    OVERRUN = 0x8110
+    PASSIVE = 0x8120
+    HEARTBEAT = 0x8130
+    """Life guarding or heartbeat error."""
+    BUS_OFF_RECOVERED = 0x8140
+    PDO_TOO_SHORT = 0x8210
+    PDO_TOO_LONG = 0x8220
+    SYNC_LENGTH = 0x8240
+    RPDO_TIMEOUT = 0x8250
+    WRITE_HELD = 0xFF01
+    WRITE_OUT_OF_LIMITS = 0xFF02
+    WRITE_ROBOT_LOST = 0xFF03
+    WRITE_CLAIMED_ELSEWHERE = 0xFF04
+    WRITE_NEVER = 0xFF05
+
+
+class Register(IntFlag):
+    """Bits of the error register 1001h."""
+
+    GENERIC = 0x01
+    CURRENT = 0x02
+    VOLTAGE = 0x04
+    TEMPERATURE = 0x08
+    COMMUNICATION = 0x10
+    PROFILE = 0x20
+    MANUFACTURER = 0x80
+
+
+_REGISTERS = {
+    0x2: Register.CURRENT,
+    0x3: Register.VOLTAGE,
+    0x4: Register.TEMPERATURE,
+    0x8: Register.COMMUNICATION,
+    0xF: Register.MANUFACTURER,
+}
+
+
+def register_of(code: int) -> Register:
+    """The bits of 1001h that an error sets: always the generic one, and that of its class."""
+    return Register.GENERIC | _REGISTERS.get(code >> 12, Register.GENERIC)
+
+
+class Emergency:
+    """The errors of one node. `allowed()` tells whether the NMT state lets EMCY run."""
+
+    def __init__(self, send: Send, node: int, allowed: Callable[[], bool]) -> None:
+        self._send = send
+        self._allowed = allowed
+        self._active: dict[tuple[int, int], Register] = {}
+        self._history: deque[int] = deque(maxlen=HISTORY)
+        self._waiting: deque[bytes] = deque(maxlen=CAPACITY)
+        self._not_before = -math.inf
+        self.lost = 0
+        """Messages that found the queue full and pushed the oldest one out."""
+        self._register = Entry(
+            0, "Error register", CanType.UNSIGNED8, Access.RO, b"\0", source=self._read_register
+        )
+        self._cob_id = Entry(
+            0,
+            "COB-ID EMCY",
+            CanType.UNSIGNED32,
+            Access.RW,
+            CanType.UNSIGNED32.pack(Function.EMCY + node),
+            plus_node=True,
+            stored=True,
+            check=self._check_cob_id,
+        )
+        self._inhibit = Entry(0, "Inhibit time EMCY", CanType.UNSIGNED16, Access.RW, bytes(2), stored=True)
+
+    @property
+    def register(self) -> Register:
+        """The error register."""
+        value = Register(0)
+        for bits in self._active.values():
+            value |= bits
+        return value
+
+    def active(self, code: int, instance: int = 0) -> bool:
+        """Whether the error is active."""
+        return (code, instance) in self._active
+
+    def objects(self) -> Iterable[Object]:
+        """1001h, 1003h, 1014h, 1015h."""
+        yield variable(0x1001, self._register)
+        count = Entry(
+            0, "Number of errors", CanType.UNSIGNED8, Access.RW, b"\0", source=self._count, sink=self._forget
+        )
+        fields = (
+            Entry(
+                number,
+                f"Standard error field {number}",
+                CanType.UNSIGNED32,
+                Access.RO,
+                bytes(4),
+                source=self._reader(number),
+            )
+            for number in range(1, HISTORY + 1)
+        )
+        yield array(0x1003, "Pre-defined error field", (count, *fields))
+        yield variable(0x1014, self._cob_id)
+        yield variable(0x1015, self._inhibit)
+
+    def raise_error(self, code: int, now: float, data: bytes = b"", instance: int = 0) -> None:
+        """An error has come. `data`: up to 5 bytes for the message, the first two of them also for 1003h.
+
+        `instance` tells errors of one code apart: a node-ID, a PDO's COB-ID.
+        """
+        if (code, instance) in self._active:
+            return
+        self._active[code, instance] = register_of(code)
+        self._history.appendleft(code | int.from_bytes(data[:2], "little") << 16)
+        self._queue(code, data, now)
+
+    def clear(self, code: int, now: float, instance: int = 0) -> None:
+        """An error has gone; does nothing if it was not active."""
+        if self._active.pop((code, instance), None) is not None and not self._active:
+            self._queue(ErrorCode.NONE, b"", now)
+
+    def restart(self, *, forget: bool) -> None:
+        """NMT reset: no active error, nothing waits; with `forget` (reset node) the history is empty as well."""
+        self._active.clear()
+        self._waiting.clear()
+        self._not_before = -math.inf
+        if forget:
+            self._history.clear()
+
+    def tick(self, now: float) -> None:
+        """Send what waits, if it may be sent now."""
+        while self._waiting and self._allowed() and now >= self._not_before:
+            message = self._waiting.popleft()
+            if self._cob_id.number & INVALID:
+                continue
+            self._send(Frame(self._cob_id.number & BASIC_FRAME, message), Priority.ORDERED)
+            if self._inhibit.number:
+                self._not_before = now + self._inhibit.number / 10_000
+
+    def next_deadline(self, now: float) -> float:
+        """When `tick` has something to do; a change of the NMT state makes it tick anyway."""
+        return self._not_before if self._waiting and self._allowed() else math.inf
+
+    def _queue(self, code: int, data: bytes, now: float) -> None:
+        if len(self._waiting) == CAPACITY:
+            self.lost += 1
+        message = code.to_bytes(2, "little") + bytes([self.register]) + data[:5].ljust(5, b"\0")
+        self._waiting.append(message)
+        self.tick(now)
+
+    def _read_register(self) -> bytes:
+        return bytes([self.register])
+
+    def _count(self) -> bytes:
+        return bytes([len(self._history)])
+
+    def _forget(self, data: bytes) -> None:
+        if data != b"\0":
+            raise Abort(AbortCode.INVALID_VALUE)
+        self._history.clear()
+
+    def _reader(self, number: int) -> Callable[[], bytes]:
+        def read() -> bytes:
+            if number > len(self._history):
+                raise Abort(AbortCode.NO_DATA)
+            return self._history[number - 1].to_bytes(4, "little")
+
+        return read
+
+    def _check_cob_id(self, data: bytes) -> None:
+        """Only 11-bit identifiers; another identifier only after the valid bit was taken away."""
+        new, old = int.from_bytes(data, "little"), self._cob_id.number
+        identifier = new & BASIC_FRAME
+        if new & ~(INVALID | BASIC_FRAME) or is_restricted(identifier):
+            raise Abort(AbortCode.INVALID_VALUE)
+        if not (new | old) & INVALID and new != old:
+            raise Abort(AbortCode.INVALID_VALUE)

@@ -1,0 +1,108 @@
+"""Error frames of SocketCAN: what a CAN controller tells about itself and the wire (linux/can/error.h)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+
+__all__ = ["Controller", "ErrorClass", "ErrorFrame", "Violation", "decode"]
+
+
+class ErrorClass(IntFlag):
+    """What an error frame is about; bits of its identifier."""
+
+    TX_TIMEOUT = 0x001
+    LOST_ARBITRATION = 0x002
+    CONTROLLER = 0x004
+    PROTOCOL = 0x008
+    TRANSCEIVER = 0x010
+    NO_ACKNOWLEDGE = 0x020
+    BUS_OFF = 0x040
+    BUS_ERROR = 0x080
+    RESTARTED = 0x100
+    COUNTERS = 0x200
+
+
+class Controller(IntFlag):
+    """State of the controller; byte 1."""
+
+    RX_OVERFLOW = 0x01
+    TX_OVERFLOW = 0x02
+    RX_WARNING = 0x04
+    TX_WARNING = 0x08
+    RX_PASSIVE = 0x10
+    TX_PASSIVE = 0x20
+    ACTIVE = 0x40
+
+
+class Violation(IntFlag):
+    """How the protocol was violated; byte 2."""
+
+    SINGLE_BIT = 0x01
+    FORM = 0x02
+    STUFFING = 0x04
+    DOMINANT_BIT = 0x08
+    RECESSIVE_BIT = 0x10
+    OVERLOAD = 0x20
+    ACTIVE_ERROR = 0x40
+    WHILE_SENDING = 0x80
+
+
+_NO_CONTROLLER = Controller(0)
+_NO_VIOLATION = Violation(0)
+_ACKNOWLEDGE_SLOT = 0x19
+"""Byte 3 of a protocol error where nobody acknowledged."""
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorFrame:
+    """One error frame, decoded."""
+
+    classes: ErrorClass
+    controller: Controller = _NO_CONTROLLER
+    violation: Violation = _NO_VIOLATION
+    location: int = 0
+    """Where in the frame the protocol was violated; 0: unknown."""
+    transceiver: int = 0
+    """Wiring fault as the transceiver reports it; 0: none."""
+    tx_errors: int | None = None
+    """Transmit error counter, where the driver tells it."""
+    rx_errors: int | None = None
+
+    @property
+    def overrun(self) -> bool:
+        """Whether the controller lost received frames."""
+        return bool(self.controller & Controller.RX_OVERFLOW)
+
+    @property
+    def unacknowledged(self) -> bool:
+        """Whether nobody acknowledged a frame: this node is alone, or the others have another bit rate."""
+        return bool(self.classes & ErrorClass.NO_ACKNOWLEDGE) or self.location == _ACKNOWLEDGE_SLOT
+
+    def __str__(self) -> str:
+        words = [_spell(self.classes & ~ErrorClass.COUNTERS), _spell(self.controller), _spell(self.violation)]
+        if self.tx_errors is not None:
+            words.append(f"{self.tx_errors} transmit and {self.rx_errors} receive errors")
+        return ", ".join(word for word in words if word) or "error frame"
+
+
+def _spell(flags: IntFlag) -> str:
+    return ", ".join(flag.name.lower().replace("_", " ") for flag in flags if flag.name)
+
+
+def decode(can_id: int, data: bytes) -> ErrorFrame:
+    """An error frame by its identifier (the error flag may be set) and its up to eight bytes."""
+    bytes_ = data.ljust(8, b"\0")
+    classes = ErrorClass(can_id & 0x3FF)
+    about_controller = bool(classes & ErrorClass.CONTROLLER)
+    # Kernels before 5.19 fill in the counters of controller frames without announcing them.
+    counted = bool(classes & ErrorClass.COUNTERS) or (about_controller and any(bytes_[6:8]))
+    return ErrorFrame(
+        classes,
+        Controller(bytes_[1] & 0x7F) if about_controller else _NO_CONTROLLER,
+        Violation(bytes_[2]) if classes & ErrorClass.PROTOCOL else _NO_VIOLATION,
+        bytes_[3] if classes & ErrorClass.PROTOCOL else 0,
+        bytes_[4] if classes & ErrorClass.TRANSCEIVER else 0,
+        bytes_[6] if counted else None,
+        bytes_[7] if counted else None,
+    )

@@ -1,0 +1,33 @@
+"""A CAN data or remote frame with an 11-bit identifier: all that CANopen uses of CAN."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+from typing import NamedTuple
+
+__all__ = ["Frame", "Priority", "Send"]
+
+
+class Frame(NamedTuple):
+    """One frame. Its length code is the length of `data`, or `length` for a remote frame."""
+
+    can_id: int
+    """COB-ID, 0 to 0x7FF."""
+    data: bytes = b""
+    remote: bool = False
+    length: int = 0
+    """Length code of a remote frame, which carries no data."""
+
+
+class Priority(IntEnum):
+    """What becomes of a frame that cannot be sent at once."""
+
+    PDO = 0
+    """The newest of each COB-ID replaces the one that waits."""
+    ORDERED = 1
+    """First in, first out: NMT, SYNC, heartbeat, EMCY, SDO, LSS."""
+
+
+Send = Callable[[Frame, Priority], None]
+"""Hands a frame to the bus; never waits, never fails."""

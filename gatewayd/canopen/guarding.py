@@ -1,0 +1,94 @@
+"""Node guarding and life guarding, answered for old masters while no heartbeat is produced (CiA 301, 7.2.8.2.1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+from gatewayd.canopen.cob_ids import Function
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.dictionary import Access, Entry, Object, variable
+from gatewayd.canopen.frame import Frame, Priority, Send
+from gatewayd.canopen.nmt import NmtState
+
+__all__ = ["TOGGLE", "NodeGuarding"]
+
+TOGGLE = 0x80
+"""Bit of the answer that changes with every request."""
+
+
+class NodeGuarding:
+    """Answers remote frames on 700h + node-ID, and misses them if they stay away for the node life time.
+
+    The life time is 100Ch milliseconds times 100Dh; supervision begins with the first request. `lost(now)` and
+    `back(now)` are told of the master. Nothing happens while `heartbeat()` says that this node produces a heartbeat.
+    """
+
+    def __init__(
+        self,
+        send: Send,
+        node: Callable[[], int],
+        state: Callable[[], NmtState],
+        heartbeat: Callable[[], bool],
+        *,
+        lost: Callable[[float], None],
+        back: Callable[[float], None],
+    ) -> None:
+        self._send = send
+        self._node = node
+        self._state = state
+        self._heartbeat = heartbeat
+        self._lost = lost
+        self._back = back
+        self._toggle = 0
+        self._due = math.inf
+        self._asked = -math.inf
+        self._is_lost = False
+        self._time = self._parameter("Guard time", CanType.UNSIGNED16)
+        self._factor = self._parameter("Life time factor", CanType.UNSIGNED8)
+
+    def objects(self) -> Iterable[Object]:
+        """100Ch and 100Dh."""
+        yield variable(0x100C, self._time)
+        yield variable(0x100D, self._factor)
+
+    def restart(self, now: float) -> None:
+        """Begin with toggle bit 0 and without supervision."""
+        self._toggle = 0
+        self._due = math.inf
+        self._asked = -math.inf
+        self._is_lost = False
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """A frame with this node's error control COB-ID; only remote frames mean anything."""
+        if not frame.remote or self._heartbeat() or self._state() is NmtState.INITIALISING:
+            return
+        answer = bytes([self._state() | self._toggle])
+        self._send(Frame(Function.ERROR_CONTROL + self._node(), answer), Priority.ORDERED)
+        self._toggle ^= TOGGLE
+        self._asked = now
+        self._supervise()
+        if self._is_lost:
+            self._is_lost = False
+            self._back(now)
+
+    def tick(self, now: float) -> None:
+        """Notice that the master has stopped asking."""
+        if now < self._due:
+            return
+        self._due = math.inf
+        if not self._heartbeat() and not self._is_lost:
+            self._is_lost = True
+            self._lost(now)
+
+    def next_deadline(self, now: float) -> float:
+        """When `tick` has something to do."""
+        return self._due
+
+    def _parameter(self, name: str, kind: CanType) -> Entry:
+        return Entry(0, name, kind, Access.RW, kind.pack(0), stored=True, changed=self._supervise)
+
+    def _supervise(self) -> None:
+        life = self._time.number * self._factor.number / 1000
+        watched = life > 0 and self._asked > -math.inf and not self._is_lost
+        self._due = self._asked + life if watched else math.inf

@@ -1,0 +1,257 @@
+"""Heartbeat: ours as a sign that the core lives (1017h), the watch over others' (1016h; CiA 301, 7.2.8.2.2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from gatewayd.canopen.cob_ids import Function
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, variable
+from gatewayd.canopen.frame import Frame, Priority, Send
+from gatewayd.canopen.nmt import NmtState
+from gatewayd.canopen.plan import Consumer
+
+__all__ = ["LEAST_CONSUMERS", "WATCH", "HeartbeatConsumer", "HeartbeatProducer", "Seen", "Watch"]
+
+LEAST_CONSUMERS = 8
+"""Entries of 1016h, or more if the mapping names more nodes."""
+
+
+class HeartbeatProducer:
+    """Sends the NMT state every 1017h milliseconds, but only while `alive(now)` says that the core lives."""
+
+    def __init__(
+        self,
+        send: Send,
+        node: Callable[[], int],
+        state: Callable[[], NmtState],
+        alive: Callable[[float], bool],
+        milliseconds: int,
+    ) -> None:
+        self._send = send
+        self._node = node
+        self._state = state
+        self._alive = alive
+        self._due = math.inf
+        self.withheld = 0
+        """Heartbeats that were due and not sent because the core did not live."""
+        self._period = Entry(
+            0,
+            "Producer heartbeat time",
+            CanType.UNSIGNED16,
+            Access.RW,
+            CanType.UNSIGNED16.pack(milliseconds),
+            stored=True,
+            changed=self._changed,
+        )
+
+    @property
+    def enabled(self) -> bool:
+        """Whether this node produces a heartbeat, and so does no guarding."""
+        return self._period.number != 0
+
+    def objects(self) -> Iterable[Object]:
+        """1017h."""
+        yield variable(0x1017, self._period)
+
+    def restart(self, now: float) -> None:
+        """The boot-up was sent, which counts as the first heartbeat."""
+        self._due = now + self._period.number / 1000 if self.enabled else math.inf
+
+    def tick(self, now: float) -> None:
+        """Send what is due. Heartbeats that were missed are not made up for."""
+        if now < self._due:
+            return
+        period = self._period.number / 1000
+        self._due = self._due + period if now < self._due + period else now + period
+        if self._state() is NmtState.INITIALISING:
+            return
+        if not self._alive(now):
+            self.withheld += 1
+            return
+        self._send(Frame(Function.ERROR_CONTROL + self._node(), bytes([self._state()])), Priority.ORDERED)
+
+    def next_deadline(self, now: float) -> float:
+        """When `tick` has something to do."""
+        return self._due
+
+    def _changed(self) -> None:
+        # A new time begins at once: the next tick sends.
+        self._due = -math.inf if self.enabled else math.inf
+
+
+class Watch(Enum):
+    """How far a watched node is known."""
+
+    WAITING = "no heartbeat yet"
+    ALIVE = "heard in time"
+    LOST = "silent for too long"
+
+
+class Seen(Enum):
+    """What happens to a watched node."""
+
+    HEARTBEAT = "heartbeat"
+    BOOT_UP = "boot-up"
+    TIMEOUT = "consumer heartbeat time has passed"
+
+
+WATCH: dict[tuple[Watch, Seen], Watch] = {
+    (Watch.WAITING, Seen.HEARTBEAT): Watch.ALIVE,
+    (Watch.ALIVE, Seen.HEARTBEAT): Watch.ALIVE,
+    (Watch.ALIVE, Seen.BOOT_UP): Watch.WAITING,
+    (Watch.ALIVE, Seen.TIMEOUT): Watch.LOST,
+    (Watch.LOST, Seen.HEARTBEAT): Watch.ALIVE,
+}
+"""A pair that is not listed leaves the state. A node that boots is waited for again: supervision starts with its
+first heartbeat, and what it wrote before is nobody's any more."""
+
+
+@dataclass(slots=True)
+class _Watched:
+    node: int
+    timeout: float
+    state: Watch = Watch.WAITING
+    due: float = math.inf
+
+
+class HeartbeatConsumer:
+    """Watches the nodes of 1016h, each from its first heartbeat on.
+
+    `lost(node, now)`: its heartbeat stays away. `back(node, now)`: it is heard after it was lost, or its watch ended.
+    `booted(node, now)`: it was alive and has restarted.
+    """
+
+    def __init__(
+        self,
+        consumers: Sequence[Consumer],
+        *,
+        lost: Callable[[int, float], None],
+        back: Callable[[int, float], None],
+        booted: Callable[[int, float], None],
+        changed: Callable[[], None],
+    ) -> None:
+        self._lost = lost
+        self._back = back
+        self._booted = booted
+        self._cob_ids_changed = changed
+        self._stale = False
+        self._watched: dict[int, _Watched] = {}
+        count = max(LEAST_CONSUMERS, len(consumers))
+        defaults = [one.node << 16 | one.timeout for one in consumers] + [0] * (count - len(consumers))
+        self._entries = tuple(
+            Entry(
+                number,
+                f"Consumer heartbeat time {number}",
+                CanType.UNSIGNED32,
+                Access.RW,
+                CanType.UNSIGNED32.pack(default),
+                stored=True,
+            )
+            for number, default in enumerate(defaults, 1)
+        )
+        for entry in self._entries:
+            entry.check = self._checker(entry)
+            entry.changed = self._mark
+        self._watched = self._configured()
+
+    @property
+    def nodes(self) -> frozenset[int]:
+        """The watched nodes."""
+        return frozenset(self._watched)
+
+    def objects(self) -> Iterable[Object]:
+        """1016h."""
+        yield array(0x1016, "Consumer heartbeat time", self._entries)
+
+    def state(self, node: int) -> Watch | None:
+        """How far a node is known; None if it is not watched."""
+        watched = self._watched.get(node)
+        return watched.state if watched is not None else None
+
+    def restart(self, now: float) -> None:
+        """Wait for every node's first heartbeat anew, without a word about those that were lost."""
+        self._watched = self._configured()
+        self._stale = False
+        self._cob_ids_changed()
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """A frame with COB-ID 700h + node-ID."""
+        watched = self._watched.get(frame.can_id - Function.ERROR_CONTROL)
+        if watched is None or frame.remote or len(frame.data) != 1:
+            return
+        # Bit 7 is the toggle bit of a node that answers guarding: no heartbeat has it.
+        self._see(watched, Seen.BOOT_UP if frame.data[0] == NmtState.INITIALISING else Seen.HEARTBEAT, now)
+
+    def tick(self, now: float) -> None:
+        """Adopt a changed 1016h, notice silence."""
+        if self._stale:
+            self._adopt(now)
+        for watched in list(self._watched.values()):
+            if now >= watched.due:
+                self._see(watched, Seen.TIMEOUT, now)
+
+    def next_deadline(self, now: float) -> float:
+        """When `tick` has something to do."""
+        if self._stale:
+            return -math.inf
+        return min((watched.due for watched in self._watched.values()), default=math.inf)
+
+    def _see(self, watched: _Watched, seen: Seen, now: float) -> None:
+        old = watched.state
+        watched.state = WATCH.get((old, seen), old)
+        if seen is Seen.HEARTBEAT:
+            watched.due = now + watched.timeout
+        elif watched.state is not Watch.ALIVE:
+            watched.due = math.inf
+        if old is Watch.LOST and watched.state is Watch.ALIVE:
+            self._back(watched.node, now)
+        elif old is Watch.ALIVE and watched.state is Watch.LOST:
+            self._lost(watched.node, now)
+        elif old is Watch.ALIVE and watched.state is Watch.WAITING:
+            self._booted(watched.node, now)
+
+    def _adopt(self, now: float) -> None:
+        """Changed entries wait for their first heartbeat; the others go on as they were."""
+        self._stale = False
+        old, self._watched = self._watched, self._configured()
+        for node, watched in old.items():
+            present = self._watched.get(node)
+            if present is not None and present.timeout == watched.timeout:
+                self._watched[node] = watched
+            elif watched.state is Watch.LOST:
+                self._back(node, now)
+        self._cob_ids_changed()
+
+    def _configured(self) -> dict[int, _Watched]:
+        found = {}
+        for entry in self._entries:
+            node, milliseconds = entry.number >> 16 & 0xFF, entry.number & 0xFFFF
+            if node and milliseconds:
+                found[node] = _Watched(node, milliseconds / 1000)
+        return found
+
+    def _checker(self, entry: Entry) -> Callable[[bytes], None]:
+        def check(data: bytes) -> None:
+            number = int.from_bytes(data, "little")
+            node, milliseconds = number >> 16, number & 0xFFFF
+            if node > 127:
+                raise Abort(AbortCode.INVALID_VALUE)
+            if (
+                node
+                and milliseconds
+                and any(_watches(other, node) for other in self._entries if other is not entry)
+            ):
+                raise Abort(AbortCode.PARAMETER_INCOMPATIBLE)
+
+        return check
+
+    def _mark(self) -> None:
+        self._stale = True
+
+
+def _watches(entry: Entry, node: int) -> bool:
+    return entry.number >> 16 & 0xFF == node and entry.number & 0xFFFF != 0

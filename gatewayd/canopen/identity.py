@@ -1,0 +1,122 @@
+"""What the node says of itself, and what it does when communication fails (CiA 301, 7.5.2.1 to .29)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from gatewayd import __version__
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, record, variable
+from gatewayd.canopen.nmt import NmtCommand, NmtState
+
+__all__ = [
+    "PRODUCT_CODE",
+    "REACTIONS",
+    "VENDOR_ID",
+    "ErrorBehaviour",
+    "Identity",
+    "identity_objects",
+    "revision",
+]
+
+VENDOR_ID = 0
+"""No vendor-ID was assigned by CiA: 0 says so. Nobody else's is used."""
+PRODUCT_CODE = 0x4757_4401
+"""`GWD` and 1 for the product: a robot cell as one node."""
+
+
+def revision(version: str = __version__) -> int:
+    """Revision number of a release: major in the high word, minor in the low one."""
+    numbers = re.match(r"(\d+)\.(\d+)", version)
+    assert numbers is not None
+    return int(numbers[1]) << 16 | int(numbers[2])
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """1018h, and the LSS address."""
+
+    vendor: int
+    product: int
+    revision: int
+    serial: int
+
+    @classmethod
+    def of(cls, fingerprint: int) -> Identity:
+        """The identity of a cell: its mapping's fingerprint tells it from the other cells on the bus."""
+        return cls(VENDOR_ID, PRODUCT_CODE, revision(), fingerprint)
+
+
+def identity_objects(identity: Identity, status: Callable[[], int]) -> Iterable[Object]:
+    """1000h, 1002h, 1008h to 100Ah, 1018h. `status` tells the flags of the status block."""
+    yield variable(0x1000, _number(0, "Device type", 0))
+    yield variable(
+        0x1002,
+        Entry(
+            0,
+            "Manufacturer status register",
+            CanType.UNSIGNED32,
+            Access.RO,
+            bytes(4),
+            source=lambda: CanType.UNSIGNED32.pack(status()),
+        ),
+    )
+    yield variable(0x1008, _text("Manufacturer device name", "gatewayd"))
+    yield variable(0x1009, _text("Manufacturer hardware version", "none"))
+    yield variable(0x100A, _text("Manufacturer software version", __version__))
+    yield record(
+        0x1018,
+        "Identity object",
+        (
+            _number(1, "Vendor-ID", identity.vendor),
+            _number(2, "Product code", identity.product),
+            _number(3, "Revision number", identity.revision),
+            _number(4, "Serial number", identity.serial),
+        ),
+    )
+
+
+REACTIONS: dict[tuple[int, NmtState], NmtCommand] = {
+    (0, NmtState.OPERATIONAL): NmtCommand.ENTER_PRE_OPERATIONAL,
+    (2, NmtState.OPERATIONAL): NmtCommand.STOP,
+    (2, NmtState.PRE_OPERATIONAL): NmtCommand.STOP,
+}
+"""What a communication error does, by 1029h sub-index 1 and NMT state; nothing where nothing is listed."""
+
+
+class ErrorBehaviour:
+    """1029h: the change of NMT state after a communication error (heartbeat, guarding, bus-off)."""
+
+    def __init__(self) -> None:
+        self._communication = Entry(
+            1,
+            "Communication error",
+            CanType.UNSIGNED8,
+            Access.RW,
+            b"\0",
+            stored=True,
+            check=_check_behaviour,
+        )
+
+    def objects(self) -> Iterable[Object]:
+        """1029h."""
+        yield array(0x1029, "Error behaviour", (self._communication,))
+
+    def reaction(self, state: NmtState) -> NmtCommand | None:
+        """What a communication error does in this state."""
+        return REACTIONS.get((self._communication.number, state))
+
+
+def _check_behaviour(data: bytes) -> None:
+    if data[0] > 2:
+        raise Abort(AbortCode.INVALID_VALUE)
+
+
+def _number(subindex: int, name: str, value: int) -> Entry:
+    return Entry(subindex, name, CanType.UNSIGNED32, Access.RO, CanType.UNSIGNED32.pack(value))
+
+
+def _text(name: str, text: str) -> Entry:
+    return Entry(0, name, CanType.VISIBLE_STRING, Access.CONST, text.encode("ascii"))

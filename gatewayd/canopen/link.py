@@ -1,0 +1,225 @@
+"""The CANopen link: one node, its bus, and the loop's clock.
+
+Frames go from the driver into the node and out again within one turn of the loop; one timer follows the node's next
+deadline. The heartbeat needs the core: a daemon that is frozen, or whose core stands still, falls silent.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import time
+from datetime import datetime
+
+from gatewayd.canopen.bus import Bus, BusError, BusState
+from gatewayd.canopen.drivers import make_bus
+from gatewayd.canopen.errors import ErrorFrame
+from gatewayd.canopen.frame import Frame
+from gatewayd.canopen.lss import BIT_RATES
+from gatewayd.canopen.nmt import NmtState
+from gatewayd.canopen.node import Node, Observer
+from gatewayd.canopen.plan import CanopenPlan
+from gatewayd.canopen.queue import Transmitter
+from gatewayd.canopen.storage import Store
+from gatewayd.core.cell import Cell
+from gatewayd.core.definition import Direction
+from gatewayd.logs import fields
+
+__all__ = ["CORE_TIME", "RETRY", "CanLink"]
+
+CORE_TIME = 0.5
+"""Seconds without a count of the core's heartbeat after which the core counts as stuck."""
+RETRY = 5.0
+"""Seconds between two attempts at a bus that cannot be used as it is set up."""
+CLOCK_STEP = 1.0
+"""Seconds by which the network's time may differ from what was last told before it is told again."""
+
+log = logging.getLogger("gatewayd.canopen")
+
+
+class CanLink(Observer):
+    """Keeps `cell` on its CAN bus while `run` runs."""
+
+    def __init__(self, plan: CanopenPlan, cell: Cell, store: Store) -> None:
+        self._plan = plan
+        self._cell = cell
+        self._bus: Bus | None = None
+        self._transmitter = Transmitter(self._offer)
+        self._timer: asyncio.TimerHandle | None = None
+        self._due = math.inf
+        self._beat = (-1, -math.inf)
+        self._offset = math.inf
+        self._switching: asyncio.TimerHandle | None = None
+        # The kernel's interfaces are set by whoever administers them; python-can opens its own with a bit rate.
+        self._bit_rates = (
+            () if plan.interface == "socketcan" else tuple(rate for rate in BIT_RATES if rate is not None)
+        )
+        self.node = Node(
+            plan,
+            cell,
+            self._transmitter.send,
+            store,
+            self._core_lives,
+            observer=self,
+            bit_rates=self._bit_rates,
+        )
+        cell.listeners.append(self._on_image)
+
+    async def run(self) -> None:
+        """Stay on the bus until cancelled."""
+        try:
+            await self._open(self.node.bit_rate)
+            now = time.monotonic()
+            self.node.start(now)
+            self._schedule(now)
+            await asyncio.get_running_loop().create_future()
+        finally:
+            self._leave()
+
+    async def close(self) -> None:
+        """Send what still waits, as far as the bus takes it."""
+        self._transmitter.flush()
+
+    # -- called by the driver ------------------------------------------------------------------------------------
+
+    def on_frames(self, frames: list[Frame], now: float) -> None:
+        """Received frames."""
+        receive = self.node.receive
+        for frame in frames:
+            receive(frame, now)
+        self._schedule(now)
+
+    def on_error(self, error: ErrorFrame, now: float) -> None:
+        """An error frame; what follows from it comes as a state."""
+
+    def on_lost(self, count: int, now: float) -> None:
+        """Frames were lost for want of room."""
+        log.warning("CAN frames lost", extra=fields(**self._names(), frames=count))
+        self.node.frames_lost(count, now)
+        self._schedule(now)
+
+    def on_state(self, state: BusState, reason: str, now: float) -> None:
+        """The bus is in another state."""
+        level = logging.INFO if state is BusState.ACTIVE else logging.WARNING
+        log.log(
+            level,
+            "CAN bus %s",
+            state.name.lower().replace("_", "-"),
+            extra=fields(**self._names(), reason=reason),
+        )
+        self._cell.health.can_bus = state + 1
+        if state.carries:
+            self._transmitter.open()
+        else:
+            self._transmitter.close()
+        self.node.bus_changed(state, now)
+        self._schedule(now)
+
+    def on_writable(self, now: float) -> None:
+        """There is room in the driver again."""
+        self._transmitter.flush()
+
+    # -- called by the node --------------------------------------------------------------------------------------
+
+    def cob_ids_changed(self) -> None:
+        """The node listens to other COB-IDs now."""
+        if self._bus is not None:
+            self._bus.set_filters(self.node.cob_ids(), self.node.remote_ids())
+
+    def nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
+        """The node is in another NMT state."""
+        self._cell.health.nmt_state = new
+        log.info("CANopen node %s", new.name.lower().replace("_", "-"), extra=fields(**self._names()))
+
+    def report(self, text: str) -> None:
+        """Something for the log."""
+        log.warning("CANopen: %s", text, extra=fields(**self._names()))
+
+    def time_told(self, moment: datetime, now: float) -> None:
+        """The network's clock: told once, and when it was set."""
+        offset = moment.timestamp() - now
+        if abs(offset - self._offset) > CLOCK_STEP:
+            self._offset = offset
+            log.info(
+                "network time", extra=fields(**self._names(), time=moment.isoformat(timespec="milliseconds"))
+            )
+
+    def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
+        """An LSS master activates a bit rate: be silent, switch, be silent for as long again (CiA 305)."""
+        if self._plan.interface == "socketcan":
+            return
+        self._close_bus("LSS switches the bit rate")
+        loop = asyncio.get_running_loop()
+        self._switching = loop.call_later(2 * delay, lambda: loop.create_task(self._open(bit_rate)))
+
+    # -- inside --------------------------------------------------------------------------------------------------
+
+    async def _open(self, bit_rate: int) -> None:
+        """Open the bus; a set-up that cannot work is told once and tried again, in case it is repaired."""
+        told = ""
+        while True:
+            bus = make_bus(self._plan.interface, self._plan.channel, bit_rate, self)
+            bus.set_filters(self.node.cob_ids(), self.node.remote_ids())
+            self._bus = bus
+            try:
+                await bus.open()
+            except BusError as error:
+                self._bus = None
+                if str(error) != told:
+                    told = str(error)
+                    log.error("%s", told, extra=fields(**self._names(), retry_s=RETRY))  # noqa: TRY400 - the text says it all
+                await asyncio.sleep(RETRY)
+            else:
+                return
+
+    def _offer(self, frame: Frame) -> bool:
+        return self._bus is not None and self._bus.send(frame)
+
+    def _close_bus(self, reason: str) -> None:
+        bus, self._bus = self._bus, None
+        if bus is not None:
+            bus.close()
+            self.on_state(BusState.DOWN, reason, time.monotonic())
+
+    def _leave(self) -> None:
+        for handle in (self._timer, self._switching):
+            if handle is not None:
+                handle.cancel()
+        self._timer = self._switching = None
+        self._close_bus("the link ends")
+
+    def _on_image(self, direction: Direction) -> None:
+        now = time.monotonic()
+        self.node.image_changed(direction, now)
+        self._schedule(now)
+
+    def _schedule(self, now: float) -> None:
+        """Move the timer if the node's next deadline has come nearer."""
+        due = self.node.next_deadline(now)
+        if due >= self._due:
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._due = due
+        self._timer = asyncio.get_running_loop().call_at(due, self._tick)
+
+    def _tick(self) -> None:
+        now = time.monotonic()
+        self._timer, self._due = None, math.inf
+        self.node.tick(now)
+        self._schedule(now)
+
+    def _core_lives(self, now: float) -> bool:
+        count, since = self._beat
+        if self._cell.health.heartbeat != count:
+            self._beat = (self._cell.health.heartbeat, now)
+            return True
+        return now - since <= CORE_TIME
+
+    def _names(self) -> dict[str, object]:
+        return {
+            "cell": self._cell.definition.name,
+            "bus": f"{self._plan.interface}:{self._plan.channel}",
+            "node": self._plan.node,
+        }

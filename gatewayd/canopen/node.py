@@ -1,0 +1,531 @@
+"""The node: all services of a CiA 301 slave put together over one cell. Pure: frames and time in, frames out.
+
+What befalls the node, and what follows:
+
+| happening | writers of the cell | NMT (1029h = 0 / 1 / 2) | EMCY |
+|---|---|---|---|
+| RPDO in OPERATIONAL, SDO request | the writer is alive | | |
+| heartbeat of a watched node lost | its writer is lost | PRE-OPERATIONAL / as it is / STOPPED | 8130h till it is back |
+| watched node boots | its writer is lost | as it is | |
+| guarding stays away | | PRE-OPERATIONAL / as it is / STOPPED | 8130h until it is back |
+| RPDO deadline passes | the RPDO writer is lost | as it is | 8250h until it is received |
+| OPERATIONAL left | the RPDO writer is lost | | |
+| SDO no longer allowed (STOPPED, reset) | the SDO writer is lost | | |
+| bus off, down or absent | all are lost | PRE-OPERATIONAL / as it is / STOPPED | none goes out |
+| bus is back | | "reset communication" if its loss had ended OPERATIONAL / as it is / as it is | 8140h, 0000h after \
+bus-off |
+| controller passive | | as it is | 8120h until it is no more |
+| received frames lost | | as it is | 8110h until none was lost for `OVERRUN_TIME` |
+
+Nothing is sent while the bus carries nothing: a queue would only send old news later. A node that is started while the
+bus carries nothing boots when it does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import partial
+from typing import Final
+
+from gatewayd.canopen.bus import BusState
+from gatewayd.canopen.clock import TimeConsumer
+from gatewayd.canopen.cob_ids import Function
+from gatewayd.canopen.dictionary import Dictionary, Entry, Object
+from gatewayd.canopen.emergency import Emergency, ErrorCode
+from gatewayd.canopen.frame import Frame, Priority, Send
+from gatewayd.canopen.guarding import NodeGuarding
+from gatewayd.canopen.heartbeat import HeartbeatConsumer, HeartbeatProducer, Watch
+from gatewayd.canopen.identity import ErrorBehaviour, Identity, identity_objects
+from gatewayd.canopen.lss import LssSlave
+from gatewayd.canopen.nmt import ALLOWED, UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
+from gatewayd.canopen.pdo.parameters import Configuration, PdoTable
+from gatewayd.canopen.pdo.receive import Fault, ReceiveEngine
+from gatewayd.canopen.pdo.transmit import TransmitEngine
+from gatewayd.canopen.peers import Peers
+from gatewayd.canopen.plan import CanopenPlan
+from gatewayd.canopen.sdo import SdoServer
+from gatewayd.canopen.sdo.parameters import server_parameter
+from gatewayd.canopen.status_objects import StatusObjects
+from gatewayd.canopen.storage import Parameters, Store, StoreError
+from gatewayd.canopen.sync import Sync
+from gatewayd.canopen.variables import VariableObjects
+from gatewayd.core.cell import Cell
+from gatewayd.core.definition import Direction
+from gatewayd.core.status import StatusBlock
+
+__all__ = ["OVERRUN_TIME", "Node", "NodeCounters", "Observer"]
+
+OVERRUN_TIME: Final = 1.0
+"""Seconds without a lost frame after which the overrun is over."""
+
+SDO_LENGTH: Final = 8
+"""Bytes of every SDO frame."""
+
+Handler = Callable[[Frame, float], None]
+
+
+class Observer:
+    """Whom a node tells what is not for the bus; does nothing by itself."""
+
+    def cob_ids_changed(self) -> None:
+        """`Node.cob_ids` or `Node.remote_ids` is another one now."""
+
+    def nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
+        """The NMT state is another one now."""
+
+    def report(self, text: str) -> None:
+        """Something for the log."""
+
+    def time_told(self, moment: datetime, now: float) -> None:
+        """The network's wall clock (TIME)."""
+
+    def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
+        """An LSS master demands it: be silent for `delay` seconds, switch, be silent for as long again."""
+
+
+@dataclass(slots=True)
+class NodeCounters:
+    """Since the node was made."""
+
+    received: int = 0
+    """Frames that were handed to the node."""
+    ignored: int = 0
+    """Frames with a COB-ID that means nothing in the present NMT state."""
+    outside_window: int = 0
+    """Synchronous RPDOs that came after the synchronous window (1007h)."""
+    communication_errors: int = 0
+    """Losses of heartbeat, guarding or bus."""
+    overruns: int = 0
+    """Received frames that were lost."""
+
+
+class Node:
+    """One cell as one node.
+
+    `alive(now)` tells whether the core lives: without it the heartbeat is withheld. `bit_rates` are those that the
+    link can switch to for an LSS master.
+    """
+
+    def __init__(
+        self,
+        plan: CanopenPlan,
+        cell: Cell,
+        send: Send,
+        store: Store,
+        alive: Callable[[float], bool],
+        *,
+        observer: Observer | None = None,
+        bit_rates: Iterable[int] = (),
+    ) -> None:
+        self.plan = plan
+        self.cell = cell
+        self.bus = BusState.ABSENT
+        self.counters = NodeCounters()
+        self._link = send
+        self._observer = observer if observer is not None else Observer()
+        self._now = 0.0
+        self._started = False
+        self._fell = False
+        self._was_off = False
+        self._store_damaged = False
+        self._overrun_until = math.inf
+        self._peers = Peers(cell)
+        self._writers = {consumer.node: consumer.writer for consumer in plan.consumers}
+        self._routes: dict[int, tuple[Service, Handler]] = {}
+        self._handlers: dict[int, Handler] = {}
+        self._synchronous: frozenset[int] = frozenset()
+        self.parameters = Parameters(
+            store,
+            plan.node,
+            ready=lambda: self.nmt.state is not NmtState.OPERATIONAL,
+            report=self._observer.report,
+            failed=self._store_failed,
+        )
+        node = self.parameters.node
+        identity = Identity.of(cell.definition.fingerprint)
+        self.lss = LssSlave(
+            self._send,
+            identity,
+            node,
+            self.bit_rate,
+            bit_rates=frozenset({*bit_rates, plan.bitrate}),
+            configured=self._configured,
+            store=self._store_lss,
+            activate=self._observer.switch_bit_rate,
+        )
+        self.nmt = NmtSlave(self._send, self._node, self._nmt_changed, self._reset, autostart=plan.autostart)
+        self.emergency = Emergency(self._send, node, self._emergencies_allowed)
+        self.behaviour = ErrorBehaviour()
+        self.producer = HeartbeatProducer(self._send, self._node, self._state, alive, plan.heartbeat)
+        self.consumer = HeartbeatConsumer(
+            plan.consumers,
+            lost=self._heartbeat_lost,
+            back=self._heartbeat_back,
+            booted=self._peer_booted,
+            changed=self._route,
+        )
+        self.guarding = NodeGuarding(
+            self._send,
+            self._node,
+            self._state,
+            lambda: self.producer.enabled,
+            lost=self._guarding_lost,
+            back=partial(self.emergency.clear, ErrorCode.HEARTBEAT),
+        )
+        self.sync = Sync(
+            self._send,
+            plan.sync,
+            allowed=lambda: self.nmt.allows(Service.SYNC),
+            on_sync=self._on_sync,
+            wrong_length=self._sync_length,
+            changed=self._route,
+        )
+        self.time = TimeConsumer(on_time=self._observer.time_told, changed=self._route)
+        self.transmit = TransmitEngine(cell, self._send)
+        self.receive_pdos = ReceiveEngine(cell, plan.rpdo_writer, self._fault_raised, self._fault_cleared)
+        self.pdos = PdoTable(
+            replace(plan, node=node),
+            cell.definition.variables,
+            self._find,
+            self._pdo_changed,
+        )
+        self.dictionary = Dictionary(self._objects(identity))
+        self.parameters.bind(self.dictionary)
+        self.sdo = SdoServer(self.dictionary)
+
+    # -- what the link calls -------------------------------------------------------------------------------------
+
+    @property
+    def node_id(self) -> int:
+        """The node-ID in force; 255 for none."""
+        return self.lss.node
+
+    @property
+    def bit_rate(self) -> int:
+        """The bit rate to open the bus with: what LSS has stored, else the mapping's."""
+        lss = self.parameters.lss
+        return lss.bitrate if lss is not None and lss.bitrate is not None else self.plan.bitrate
+
+    def cob_ids(self) -> frozenset[int]:
+        """The COB-IDs of all data frames that mean anything to the node, in any NMT state."""
+        return frozenset(self._routes)
+
+    def remote_ids(self) -> frozenset[int]:
+        """The COB-IDs of all remote frames that it answers: node guarding."""
+        if self.node_id == UNCONFIGURED:
+            return frozenset()
+        return frozenset({Function.ERROR_CONTROL + self.node_id})
+
+    def start(self, now: float) -> None:
+        """Power-on: once, before anything else but `bus_changed`."""
+        self._now = now
+        self._started = True
+        self._reset(NmtCommand.RESET_NODE, now)
+        if self.bus.carries:
+            self.nmt.boot(now)
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """A frame from the bus."""
+        self._now = now
+        self.counters.received += 1
+        handler = self._handlers.get(frame.can_id)
+        if handler is None:
+            self.counters.ignored += 1
+            return
+        handler(frame, now)
+
+    def image_changed(self, direction: Direction, now: float) -> None:
+        """Values or qualities of the cell have changed: a listener of the cell."""
+        self._now = now
+        if direction is Direction.OUTPUT:
+            self.transmit.image_changed(now)
+
+    def bus_changed(self, state: BusState, now: float) -> None:
+        """The bus is in another state, or told for the first time."""
+        self._now = now
+        old, self.bus = self.bus, state
+        self._was_off = self._was_off or state is BusState.BUS_OFF
+        if old.carries and not state.carries:
+            self._bus_lost(now)
+        elif state.carries and not old.carries:
+            self._bus_back(now)
+        self._judge_passive(now)
+
+    def frames_lost(self, count: int, now: float) -> None:
+        """So many received frames found no room in a buffer."""
+        self._now = now
+        self.counters.overruns += count
+        self._overrun_until = now + OVERRUN_TIME
+        self.emergency.raise_error(ErrorCode.OVERRUN, now)
+
+    def tick(self, now: float) -> None:
+        """Do what time brings. Cheap before `next_deadline`."""
+        self._now = now
+        self.sync.tick(now)
+        self.transmit.tick(now)
+        self.receive_pdos.tick(now)
+        self.producer.tick(now)
+        self.consumer.tick(now)
+        self.guarding.tick(now)
+        self.emergency.tick(now)
+        self._answer(self.sdo.tick(now))
+        if now >= self._overrun_until:
+            self._overrun_until = math.inf
+            self.emergency.clear(ErrorCode.OVERRUN, now)
+
+    def next_deadline(self, now: float) -> float:
+        """When `tick` is wanted, not before `now`; infinity if time alone brings nothing."""
+        return max(
+            now,
+            min(
+                self.sync.next_deadline(now),
+                self.transmit.next_deadline(now),
+                self.receive_pdos.next_deadline(now),
+                self.producer.next_deadline(now),
+                self.consumer.next_deadline(now),
+                self.guarding.next_deadline(now),
+                self.emergency.next_deadline(now),
+                self.sdo.next_deadline(now),
+                self._overrun_until,
+            ),
+        )
+
+    # -- received frames -----------------------------------------------------------------------------------------
+
+    def _route(self) -> None:
+        """Who gets which COB-ID; where two claim one, the service that cannot be moved has it."""
+        routes: dict[int, tuple[Service, Handler]] = {Function.LSS_REQUEST: (Service.LSS, self.lss.receive)}
+        if self.node_id != UNCONFIGURED:
+            time = self.time.cob_id
+            routes |= dict.fromkeys(self.receive_pdos.can_ids, (Service.PDO, self._receive_pdo))
+            if time is not None:
+                routes[time] = (Service.TIME, self.time.receive)
+            routes[self.sync.cob_id] = (Service.SYNC, self.sync.receive)
+            for node in self.consumer.nodes:
+                routes[Function.ERROR_CONTROL + node] = (Service.ERROR_CONTROL, self._receive_heartbeat)
+            routes[Function.ERROR_CONTROL + self.node_id] = (Service.ERROR_CONTROL, self.guarding.receive)
+            routes[Function.SDO_REQUEST + self.node_id] = (Service.SDO, self._receive_sdo)
+            routes[Function.NMT] = (Service.NODE_CONTROL, self.nmt.receive)
+        changed = routes.keys() != self._routes.keys()
+        self._routes = routes
+        self._gate()
+        if changed:
+            self._observer.cob_ids_changed()
+
+    def _gate(self) -> None:
+        """Who of them runs in the present NMT state."""
+        allowed = ALLOWED[self.nmt.state]
+        self._handlers = {
+            can_id: handler for can_id, (service, handler) in self._routes.items() if service in allowed
+        }
+
+    def _receive_pdo(self, frame: Frame, now: float) -> None:
+        if frame.remote:
+            return
+        if frame.can_id in self._synchronous and not self.sync.window_open(now):
+            self.counters.outside_window += 1
+            return
+        self._peers.connect(self.plan.rpdo_writer, "RPDO", now)
+        self.receive_pdos.receive(frame.can_id, frame.data, now)
+
+    def _receive_sdo(self, frame: Frame, now: float) -> None:
+        if not frame.remote and len(frame.data) == SDO_LENGTH:
+            self._peers.heard(self.plan.sdo_writer, "SDO", now)
+            self._answer(self.sdo.receive(frame.data, now))
+
+    def _receive_heartbeat(self, frame: Frame, now: float) -> None:
+        self.consumer.receive(frame, now)
+        node = frame.can_id - Function.ERROR_CONTROL
+        if self.consumer.state(node) is Watch.ALIVE:
+            self._peers.heartbeat(self._writers.get(node), now)
+
+    def _answer(self, answers: Iterable[bytes]) -> None:
+        for data in answers:
+            self._send(Frame(Function.SDO_RESPONSE + self.node_id, data), Priority.ORDERED)
+
+    def _send(self, frame: Frame, priority: Priority) -> None:
+        if self.bus.carries:
+            self._link(frame, priority)
+
+    # -- NMT -----------------------------------------------------------------------------------------------------
+
+    def _nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
+        operational = new is NmtState.OPERATIONAL
+        self._gate()
+        if old is NmtState.INITIALISING:
+            self.producer.restart(now)
+        if new is NmtState.STOPPED:
+            self.sync.stopped()
+        if not self.nmt.allows(Service.SDO):
+            self.sdo.reset()
+            self._peers.lose(self.plan.sdo_writer, f"NMT state {new.name}", now)
+        if old is NmtState.OPERATIONAL:
+            self._peers.lose(self.plan.rpdo_writer, f"NMT state {new.name}", now)
+        self.receive_pdos.nmt(operational, now)
+        self.transmit.nmt(operational, now)
+        self.emergency.tick(now)
+        self._observer.nmt_changed(old, new, now)
+
+    def _reset(self, command: NmtCommand, now: float) -> None:
+        """Power-on values for what the command resets, and every service as after power-on."""
+        self.lss.restart()
+        self.emergency.restart(forget=command is NmtCommand.RESET_NODE)
+        self.pdos.restore(self.node_id)
+        self.parameters.apply(command, self.node_id)
+        broken = self.pdos.reload()
+        if broken:
+            indices = ", ".join(f"{index:04X}h" for index in broken)
+            self._observer.report(
+                f"stored parameters of these PDOs make no PDO, defaults are used: {indices}"
+            )
+        self.consumer.restart(now)
+        self.guarding.restart(now)
+        self.sync.restart(now)
+        self._route()
+        self._judge_passive(now)
+        self._judge_store(now)
+
+    def _configured(self, now: float) -> None:
+        """LSS has given a node-ID to a node that had none."""
+        self._reset(NmtCommand.RESET_NODE, now)
+        self.nmt.boot(now)
+
+    # -- errors --------------------------------------------------------------------------------------------------
+
+    def _communication_error(self, now: float) -> None:
+        self.counters.communication_errors += 1
+        reaction = self.behaviour.reaction(self.nmt.state)
+        if reaction is not None:
+            self.nmt.command(reaction, now)
+
+    def _heartbeat_lost(self, node: int, now: float) -> None:
+        self.emergency.raise_error(ErrorCode.HEARTBEAT, now, bytes([node]), instance=node)
+        self._peers.lose(self._writers.get(node), f"no heartbeat of node {node}", now)
+        self._communication_error(now)
+
+    def _heartbeat_back(self, node: int, now: float) -> None:
+        self.emergency.clear(ErrorCode.HEARTBEAT, now, instance=node)
+
+    def _peer_booted(self, node: int, now: float) -> None:
+        self._peers.lose(self._writers.get(node), f"node {node} has restarted", now)
+
+    def _guarding_lost(self, now: float) -> None:
+        self.emergency.raise_error(ErrorCode.HEARTBEAT, now)
+        self._communication_error(now)
+
+    def _sync_length(self, length: int, now: float) -> None:
+        self.emergency.raise_error(ErrorCode.SYNC_LENGTH, now, bytes([length]))
+
+    def _fault_raised(self, fault: Fault, number: int, now: float) -> None:
+        self.emergency.raise_error(fault.value, now, number.to_bytes(2, "little"), instance=number)
+        if fault is Fault.TIMEOUT:
+            self._peers.lose(self.plan.rpdo_writer, f"RPDO {number} stays away", now)
+
+    def _fault_cleared(self, fault: Fault, number: int, now: float) -> None:
+        self.emergency.clear(fault.value, now, instance=number)
+
+    def _emergencies_allowed(self) -> bool:
+        return self.bus.carries and self.nmt.allows(Service.EMCY)
+
+    def _store_failed(self, damaged: bool) -> None:
+        self._store_damaged = damaged
+        if self._started:
+            self._judge_store(self._now)
+
+    def _judge_store(self, now: float) -> None:
+        self._judge(ErrorCode.STORED_PARAMETERS, self._store_damaged, now)
+
+    def _judge_passive(self, now: float) -> None:
+        self._judge(ErrorCode.PASSIVE, self.bus is BusState.PASSIVE, now)
+
+    def _judge(self, code: ErrorCode, wrong: bool, now: float) -> None:
+        if wrong:
+            self.emergency.raise_error(code, now)
+        else:
+            self.emergency.clear(code, now)
+
+    # -- bus -----------------------------------------------------------------------------------------------------
+
+    def _bus_lost(self, now: float) -> None:
+        self._peers.lose_all(f"bus {self.bus.name.lower().replace('_', '-')}", now)
+        self.sdo.reset()
+        was_operational = self.nmt.state is NmtState.OPERATIONAL
+        self._communication_error(now)
+        self._fell = was_operational and self.nmt.state is NmtState.PRE_OPERATIONAL
+
+    def _bus_back(self, now: float) -> None:
+        if not self._started:
+            return
+        fell, self._fell = self._fell, False
+        was_off, self._was_off = self._was_off, False
+        if self.nmt.state is NmtState.INITIALISING:
+            self.nmt.boot(now)
+        elif fell:
+            self.nmt.command(NmtCommand.RESET_COMMUNICATION, now)
+        elif self.nmt.state is NmtState.OPERATIONAL:
+            # What was sent meanwhile has reached nobody: every TPDO starts anew.
+            self.transmit.nmt(False, now)
+            self.transmit.nmt(True, now)
+        if was_off:
+            self.emergency.raise_error(ErrorCode.BUS_OFF_RECOVERED, now)
+            self.emergency.clear(ErrorCode.BUS_OFF_RECOVERED, now)
+
+    # -- assembly ------------------------------------------------------------------------------------------------
+
+    def _objects(self, identity: Identity) -> Iterable[Object]:
+        status = StatusBlock(self.cell)
+        yield from identity_objects(identity, lambda: int.from_bytes(status.read(1, 1, self._now), "big"))
+        yield from server_parameter(self.parameters.node)
+        for service in (
+            self.emergency,
+            self.sync,
+            self.guarding,
+            self.parameters,
+            self.time,
+            self.consumer,
+            self.producer,
+            self.behaviour,
+            self.pdos,
+            VariableObjects(self.plan, self.cell, self._clock),
+            StatusObjects(self.cell, self.plan.sdo_writer, self._clock),
+        ):
+            yield from service.objects()
+
+    def _find(self, index: int, subindex: int) -> Entry:
+        return self.dictionary.entry(index, subindex)
+
+    def _clock(self) -> float:
+        return self._now
+
+    def _pdo_changed(self, direction: Direction, number: int, configuration: Configuration | None) -> None:
+        if direction is Direction.OUTPUT:
+            self.transmit.configure(number, configuration)
+            return
+        self.receive_pdos.configure(number, configuration)
+        immediate = {
+            pdo.configuration.can_id for pdo in self.receive_pdos.pdos if not pdo.configuration.is_synchronous
+        }
+        self._synchronous = self.receive_pdos.can_ids - immediate
+        if self._started:
+            self._route()
+
+    def _on_sync(self, counter: int | None, now: float) -> None:
+        self.emergency.clear(ErrorCode.SYNC_LENGTH, now)
+        self.transmit.on_sync(counter, now)
+        self.receive_pdos.on_sync(now)
+
+    def _store_lss(self, node: int, bit_rate: int) -> bool:
+        try:
+            self.parameters.save_lss(node, bit_rate if bit_rate != self.plan.bitrate else None)
+        except StoreError:
+            return False
+        return True
+
+    def _node(self) -> int:
+        return self.lss.node
+
+    def _state(self) -> NmtState:
+        return self.nmt.state

@@ -1,0 +1,1 @@
+"""The process data objects of a CiA 301 slave: parameters, content, transmission and reception."""

@@ -1,0 +1,100 @@
+"""The compiled CANopen side of a mapping: one node on one bus, immutable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.core.definition import Direction
+
+__all__ = ["CanopenPlan", "Consumer", "ObjectPlan", "PdoEntry", "PdoPlan", "SyncPlan"]
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectPlan:
+    """Where one variable lies in the object dictionary."""
+
+    variable: int
+    """Index into `CellDefinition.variables`."""
+    index: int
+    subindex: int
+    type: CanType
+
+
+@dataclass(frozen=True, slots=True)
+class PdoEntry:
+    """One mapped object of a PDO; `variable` is None for a dummy entry that fills a gap."""
+
+    variable: int | None
+    index: int
+    subindex: int
+    bits: int
+
+
+@dataclass(frozen=True, slots=True)
+class PdoPlan:
+    """One PDO as it is after power-on."""
+
+    number: int
+    """From 1 within its direction: parameters at 1400h/1800h + number - 1."""
+    direction: Direction
+    """INPUT: an RPDO; OUTPUT: a TPDO."""
+    cob_id: int
+    predefined: bool
+    """The COB-ID is the predefined one: it follows the node-ID."""
+    transmission: int
+    """0, 1-240, 254 or 255 (CiA 301, 7.5.2.36)."""
+    inhibit: int
+    """Least distance of two transmissions in 100 us; 0: none. RPDO: what its producer keeps, for the bus load."""
+    event: int
+    """TPDO: longest distance of two transmissions; RPDO: deadline; in ms; 0: none."""
+    entries: tuple[PdoEntry, ...]
+    sync_start: int = 0
+    name: str = ""
+    """As the mapping calls it; empty for a PDO of the automatic layout."""
+
+
+@dataclass(frozen=True, slots=True)
+class Consumer:
+    """A node whose heartbeat is watched (1016h)."""
+
+    node: int
+    timeout: int
+    """Milliseconds."""
+    writer: int | None
+    """The writer that is lost with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class SyncPlan:
+    """What this node has to do with SYNC."""
+
+    cob_id: int = 0x80
+    producer: bool = False
+    period: int = 0
+    """Communication cycle period in us; 0: none."""
+    counter: int = 0
+    """Synchronous counter overflow value; 0: SYNC carries no counter."""
+
+
+@dataclass(frozen=True, slots=True)
+class CanopenPlan:
+    """One node on one bus."""
+
+    interface: str
+    """Interface of python-can; `socketcan` has a path of its own."""
+    channel: str
+    bitrate: int
+    node: int
+    autostart: bool
+    """Enter OPERATIONAL without waiting for an NMT master."""
+    heartbeat: int
+    """Producer heartbeat time in ms after power-on."""
+    sync: SyncPlan
+    consumers: tuple[Consumer, ...]
+    objects: tuple[ObjectPlan, ...]
+    pdos: tuple[PdoPlan, ...]
+    rpdo_writer: int | None
+    """The writer that RPDOs are; None: nobody writes by PDO."""
+    sdo_writer: int | None
+    """The writer that SDO clients are; None: variables are read-only by SDO."""

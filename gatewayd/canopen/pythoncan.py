@@ -1,0 +1,356 @@
+"""Every other interface of python-can on the loop: virtual, slcan, udp_multicast, vendors' adapters.
+
+There is no thread of ours. Where the interface has a file descriptor the loop watches it; where it has none it is
+asked for frames every millisecond while there is traffic, more seldom when there is none. What python-can's
+configuration file says (`~/.canrc`, `/etc/can.conf`) holds for what the mapping does not say, so a vendor's own options
+have a place.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import select
+from collections.abc import Iterable
+from time import monotonic
+from typing import Any
+
+import can
+
+from gatewayd.canopen.bus import DRAIN, BusCounters, BusError, BusHandler, BusState
+from gatewayd.canopen.cob_ids import BASIC_FRAME
+from gatewayd.canopen.errors import ErrorClass, ErrorFrame, decode
+from gatewayd.canopen.frame import Frame
+from gatewayd.canopen.supervision import LOOK, Event, Supervisor, event_of_error
+
+__all__ = ["ASK", "ASK_LIMIT", "PythonCanBus"]
+
+ASK = 0.001
+"""Seconds between two questions to an interface without a file descriptor, while frames come."""
+ASK_LIMIT = 0.008
+"""The same after a while without frames."""
+SLICE = 0.005
+"""Longest time for reading before the loop has its turn: an adapter may hand over its frames byte by byte."""
+RETRY = 0.001
+"""Seconds to wait where an interface without a file descriptor takes no frame."""
+
+_OPTIONS: dict[str, dict[str, Any]] = {
+    # It would sleep two seconds for boards that restart when they are opened, and a millisecond for every read.
+    "slcan": {"sleep_after_open": 0, "timeout": 0},
+}
+_LIKE_SOCKETCAN = {"socketcan", "socketcand", "udp_multicast", "virtual"}
+"""Interfaces whose error frames have the layout of SocketCAN."""
+
+logging.getLogger("can").setLevel(logging.CRITICAL)
+
+
+class PythonCanBus:
+    """One channel of one interface. What cannot be opened is tried again, at intervals that grow to two seconds."""
+
+    def __init__(self, interface: str, channel: str, bitrate: int, handler: BusHandler) -> None:
+        self.counters = BusCounters()
+        self._interface = interface
+        self._channel = channel
+        self._bitrate = bitrate
+        self._handler = handler
+        self._supervisor = Supervisor()
+        self._wanted: frozenset[int] = frozenset()
+        self._wanted_remote: frozenset[int] = frozenset()
+        self._bus: can.BusABC | None = None
+        self._descriptor = -1
+        self._readiness = select.poll()
+        self._room = select.poll()
+        self._full = False
+        self._ask = ASK
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._looking: asyncio.TimerHandle | None = None
+        self._reading: asyncio.Handle | None = None
+        self._retrying: asyncio.TimerHandle | None = None
+
+    @property
+    def state(self) -> BusState:
+        """As far as the interface tells it."""
+        return self._supervisor.state
+
+    @property
+    def bitrate(self) -> int | None:
+        """What the interface was told to use; most cannot tell what they do use."""
+        return None
+
+    async def open(self) -> None:
+        """Start. BusError if python-can has no such interface, lacks a package for it, or refuses the settings."""
+        self._loop = asyncio.get_running_loop()
+        self._acquire(monotonic())
+        self._looking = self._loop.call_later(LOOK, self._look)
+
+    def close(self) -> None:
+        """Stop."""
+        if self._looking is not None:
+            self._looking.cancel()
+            self._looking = None
+        self._release()
+
+    def set_filters(self, can_ids: Iterable[int], remote_ids: Iterable[int] = ()) -> None:
+        """Filter in the adapter where it can, and here in any case."""
+        self._wanted = frozenset(can_ids)
+        self._wanted_remote = frozenset(remote_ids)
+        if self._bus is not None:
+            self._filter_in_adapter(self._bus)
+
+    def send(self, frame: Frame) -> bool:
+        """Hand a frame to the interface, if it carries frames and has room."""
+        if self._bus is None or self._full or not self._supervisor.state.carries:
+            self.counters.refused += 1
+            return False
+        if self._descriptor >= 0 and not self._room.poll(0):
+            self.counters.refused += 1
+            self._wait_for_room()
+            return False
+        message = can.Message(
+            arbitration_id=frame.can_id,
+            is_extended_id=False,
+            is_remote_frame=frame.remote,
+            dlc=frame.length if frame.remote else len(frame.data),
+            data=None if frame.remote else frame.data,
+            check=False,
+        )
+        try:
+            self._bus.send(message, timeout=0)
+        except (can.CanError, OSError, ValueError) as error:
+            self.counters.refused += 1
+            if isinstance(error, TimeoutError | BlockingIOError):
+                self._wait_for_room()
+            else:
+                self._lose(error)
+            return False
+        self.counters.sent += 1
+        return True
+
+    # Room in the interface
+
+    def _wait_for_room(self) -> None:
+        assert self._loop is not None
+        self._full = True
+        if self._descriptor >= 0:
+            self._loop.add_writer(self._descriptor, self._writable)
+        else:
+            self._retrying = self._loop.call_later(RETRY, self._writable)
+
+    def _writable(self) -> None:
+        self._forget_waiting()
+        self._handler.on_writable(monotonic())
+
+    def _forget_waiting(self) -> None:
+        self._full = False
+        if self._retrying is not None:
+            self._retrying.cancel()
+            self._retrying = None
+        if self._descriptor >= 0 and self._loop is not None:
+            self._loop.remove_writer(self._descriptor)
+
+    # Receiving
+
+    def _readable(self) -> None:
+        """The descriptor has something."""
+        if self._bus is not None and not self._read(self._bus) and self._reading is None:
+            # What the interface has read already, no descriptor announces.
+            assert self._loop is not None
+            self._reading = self._loop.call_soon(self._read_on)
+
+    def _read_on(self) -> None:
+        self._reading = None
+        self._readable()
+
+    def _look_for_frames(self) -> None:
+        """There is no descriptor: ask, the more often the more comes."""
+        assert self._loop is not None
+        before = self.counters.received
+        if self._bus is None:
+            return
+        exhausted = self._read(self._bus)
+        self._ask = ASK if self.counters.received != before else min(2 * self._ask, ASK_LIMIT)
+        self._reading = self._loop.call_later(self._ask if exhausted else 0, self._look_for_frames)
+
+    def _read(self, bus: can.BusABC) -> bool:
+        """Read for a while; whether there is no more."""
+        now = monotonic()
+        frames: list[Frame] = []
+        errors: list[ErrorFrame] = []
+        failure: Exception | None = None
+        exhausted = False
+        try:
+            while len(frames) < DRAIN and monotonic() - now < SLICE:
+                message = bus.recv(0)
+                if message is not None:
+                    self._take(message, frames, errors)
+                elif self._descriptor < 0 or not self._readiness.poll(0):
+                    exhausted = True
+                    break
+        except (can.CanError, OSError, ValueError) as error:
+            failure = error
+        if frames:
+            self.counters.received += len(frames)
+            self._handler.on_frames(frames, now)
+        for report in errors:
+            self._take_error(report, now)
+        if failure is not None:
+            self._lose(failure)
+        return exhausted or failure is not None
+
+    def _take(self, message: can.Message, frames: list[Frame], errors: list[ErrorFrame]) -> None:
+        can_id = message.arbitration_id
+        if message.is_error_frame:
+            known = self._interface in _LIKE_SOCKETCAN
+            errors.append(decode(can_id, bytes(message.data)) if known else ErrorFrame(ErrorClass(0)))
+        elif message.is_extended_id or message.is_fd or can_id > BASIC_FRAME:
+            return
+        elif message.is_remote_frame:
+            if can_id in self._wanted_remote:
+                frames.append(Frame(can_id, b"", remote=True, length=message.dlc))
+        elif can_id in self._wanted:
+            frames.append(Frame(can_id, bytes(message.data)))
+
+    def _take_error(self, report: ErrorFrame, now: float) -> None:
+        self.counters.errors += 1
+        if report.tx_errors is not None and report.rx_errors is not None:
+            self.counters.tx_errors, self.counters.rx_errors = report.tx_errors, report.rx_errors
+        self._handler.on_error(report, now)
+        event = event_of_error(report)
+        if event is not None:
+            self._feed(event, now, f"the controller reports: {report}")
+
+    # State
+
+    def _look(self) -> None:
+        """Open what is closed, ask an adapter that knows its state for it, and come again."""
+        assert self._loop is not None
+        now = monotonic()
+        self._looking = self._loop.call_later(LOOK, self._look)
+        if self._bus is None and self._supervisor.may_open(now):
+            with contextlib.suppress(BusError):  # it could be used before, so that will pass too
+                self._acquire(now)
+        elif self._bus is not None and type(self._bus).state is not can.BusABC.state:
+            try:
+                off = self._bus.state is can.BusState.ERROR
+            except (can.CanError, OSError) as error:
+                self._lose(error)
+                return
+            self._feed(
+                Event.OFF if off else Event.UP, now, f"{self._name} is {'off the bus' if off else 'up'}"
+            )
+
+    @property
+    def _name(self) -> str:
+        return f"{self._interface} {self._channel}"
+
+    def _feed(self, event: Event, now: float, reason: str) -> None:
+        if not self._supervisor.feed(event, now):
+            return
+        state = self._supervisor.state
+        if state is BusState.BUS_OFF:
+            self.counters.bus_off += 1
+        if not state.carries:
+            self._forget_waiting()
+        self._handler.on_state(state, reason, now)
+
+    def _lose(self, error: Exception) -> None:
+        """The interface fails: close it, and open it again when it can be."""
+        now = monotonic()
+        self._release(broken=True)
+        self._supervisor.failed(now)
+        self._feed(Event.GONE, now, f"{self._name}: {error}")
+
+    # The interface
+
+    def _acquire(self, now: float) -> None:
+        assert self._loop is not None
+        self._supervisor.failed(now)  # until it is known better
+        try:
+            self._bus = bus = self._make()
+        except (can.CanInitializationError, can.CanOperationError, OSError) as error:
+            self._feed(Event.GONE, now, f"{self._name} cannot be opened: {error}")
+            return
+        self._supervisor.opened()
+        self.counters.opened += 1
+        self._filter_in_adapter(bus)
+        self._descriptor = _descriptor(bus)
+        self._readiness, self._room = select.poll(), select.poll()
+        if self._descriptor >= 0:
+            self._readiness.register(self._descriptor, select.POLLIN)
+            self._room.register(self._descriptor, select.POLLOUT)
+            self._loop.add_reader(self._descriptor, self._readable)
+        self._ask = ASK
+        read = self._readable if self._descriptor >= 0 else self._look_for_frames
+        self._reading = self._loop.call_soon(read)
+        self._feed(Event.UP, now, f"{self._name} is open")
+
+    def _make(self) -> can.BusABC:
+        try:
+            bus = can.Bus(
+                channel=self._channel,
+                interface=self._interface,
+                bitrate=self._bitrate,
+                **_OPTIONS.get(self._interface, {}),
+            )
+        except (can.CanInterfaceNotImplementedError, ImportError) as error:
+            raise BusError(
+                f"python-can cannot use the interface {self._interface}: {error}; "
+                "install what it needs, or name another one (`python3 -m can.viewer --help` lists them)"
+            ) from error
+        except (ValueError, TypeError, can.CanInitializationError) as error:
+            if isinstance(error, can.CanError) and not isinstance(error.__cause__, ValueError):
+                raise
+            raise BusError(
+                f"{self._interface} refuses channel {self._channel} at {self._bitrate} bit/s: {error}"
+            ) from error
+        port = _serial_port(bus)
+        if port is not None:
+            port.flush = _do_nothing  # it would wait until the wire has carried the frame
+        return bus
+
+    def _filter_in_adapter(self, bus: can.BusABC) -> None:
+        if type(bus)._apply_filters is can.BusABC._apply_filters:  # noqa: SLF001 - the only way to know if it would be done in Python
+            return
+        both = self._wanted | self._wanted_remote
+        with contextlib.suppress(can.CanError, OSError, NotImplementedError):
+            bus.set_filters(
+                [{"can_id": can_id, "can_mask": BASIC_FRAME, "extended": False} for can_id in both]
+            )
+
+    def _release(self, *, broken: bool = False) -> None:
+        bus, self._bus = self._bus, None
+        if bus is None:
+            return
+        self._forget_waiting()
+        if self._reading is not None:
+            self._reading.cancel()
+            self._reading = None
+        if self._descriptor >= 0 and self._loop is not None:
+            self._loop.remove_reader(self._descriptor)
+        port = _serial_port(bus)
+        if port is not None and (broken or not self._room.poll(0)):
+            with contextlib.suppress(
+                Exception
+            ):  # saying goodbye to a device that takes nothing would wait for ever
+                port.close()
+        self._descriptor = -1
+        with contextlib.suppress(Exception):  # a driver may raise anything about a device that is gone
+            bus.shutdown()
+
+
+def _descriptor(bus: can.BusABC) -> int:
+    """What the loop can watch; -1 if there is nothing."""
+    try:
+        return bus.fileno()
+    except (NotImplementedError, can.CanError, OSError):
+        return -1
+
+
+def _serial_port(bus: can.BusABC) -> Any:
+    """The serial port below slcan; None for every other interface."""
+    return getattr(bus, "serialPortOrig", None)
+
+
+def _do_nothing() -> None:
+    pass

@@ -1,0 +1,147 @@
+"""The bytes of SDO frames: what a client's command byte asks for, and the server's answers (CiA 301, 7.2.4.3)."""
+
+from __future__ import annotations
+
+import struct
+from enum import Enum, auto
+
+from gatewayd.canopen.dictionary import AbortCode
+
+__all__ = [
+    "BLOCK_SEGMENTS",
+    "REQUESTS",
+    "SEGMENT",
+    "Request",
+    "abort",
+    "block_download_acknowledged",
+    "block_download_ended",
+    "block_download_initiated",
+    "block_upload_ended",
+    "block_upload_initiated",
+    "download_initiated",
+    "download_segment_taken",
+    "is_expedited",
+    "upload_initiated",
+    "upload_segment",
+]
+
+SEGMENT = 7
+"""Bytes of data in a segment."""
+
+
+class Request(Enum):
+    """What a client's frame asks for."""
+
+    DOWNLOAD = auto()
+    DOWNLOAD_SEGMENT = auto()
+    UPLOAD = auto()
+    UPLOAD_SEGMENT = auto()
+    BLOCK_DOWNLOAD = auto()
+    BLOCK_SEGMENT = auto()
+    BLOCK_DOWNLOAD_END = auto()
+    BLOCK_UPLOAD = auto()
+    BLOCK_UPLOAD_START = auto()
+    BLOCK_UPLOAD_ACKNOWLEDGE = auto()
+    BLOCK_UPLOAD_END = auto()
+    ABORT = auto()
+    UNKNOWN = auto()
+
+
+_SPECIFIERS = {
+    0: Request.DOWNLOAD_SEGMENT,
+    1: Request.DOWNLOAD,
+    2: Request.UPLOAD,
+    3: Request.UPLOAD_SEGMENT,
+    4: Request.ABORT,
+}
+"""Client command specifier, bits 7-5."""
+_BLOCK_UPLOAD = (
+    Request.BLOCK_UPLOAD,
+    Request.BLOCK_UPLOAD_END,
+    Request.BLOCK_UPLOAD_ACKNOWLEDGE,
+    Request.BLOCK_UPLOAD_START,
+)
+"""Specifier 5 by its subcommand, bits 1-0."""
+_BLOCK_DOWNLOAD = (Request.BLOCK_DOWNLOAD, Request.BLOCK_DOWNLOAD_END)
+"""Specifier 6 by its subcommand, bit 0."""
+
+
+def _request(command: int) -> Request:
+    specifier = command >> 5
+    if specifier == 5:
+        return _BLOCK_UPLOAD[command & 3]
+    if specifier == 6:
+        return _BLOCK_DOWNLOAD[command & 1]
+    return _SPECIFIERS.get(specifier, Request.UNKNOWN)
+
+
+REQUESTS = tuple(map(_request, range(256)))
+"""What a command byte means."""
+BLOCK_SEGMENTS = tuple(Request.ABORT if command == 0x80 else Request.BLOCK_SEGMENT for command in range(256))
+"""What it means while the segments of a block download come: a sequence number, for all but an abort."""
+
+_PADDING = tuple(bytes(count) for count in range(8))
+_SIZE = struct.Struct("<I")
+_CRC = struct.Struct("<BH5x")
+
+
+def abort(multiplexer: bytes, code: AbortCode) -> bytes:
+    """The transfer of an object (the three bytes of its index and sub-index) has ended with `code`."""
+    return b"\x80" + multiplexer + _SIZE.pack(code)
+
+
+def download_initiated(multiplexer: bytes) -> bytes:
+    """An expedited download was done, or segments may come."""
+    return b"\x60" + multiplexer + _PADDING[4]
+
+
+def download_segment_taken(toggle: int) -> bytes:
+    """The segment with this toggle bit (0 or 0x10) was taken."""
+    return bytes((0x20 | toggle,)) + _PADDING[7]
+
+
+def upload_initiated(multiplexer: bytes, data: bytes) -> bytes:
+    """One to four bytes at once, or the size of what follows in segments."""
+    if is_expedited(data):
+        unused = 4 - len(data)
+        return bytes((0x43 | unused << 2,)) + multiplexer + data + _PADDING[unused]
+    return b"\x41" + multiplexer + _SIZE.pack(len(data))
+
+
+def is_expedited(data: bytes) -> bool:
+    """Whether an upload of `data` takes one frame."""
+    return 1 <= len(data) <= 4
+
+
+def upload_segment(toggle: int, data: bytes, *, last: bool) -> bytes:
+    """Up to seven bytes of an upload."""
+    unused = SEGMENT - len(data)
+    return bytes((toggle | unused << 1 | last,)) + data + _PADDING[unused]
+
+
+def block_download_initiated(multiplexer: bytes, segments: int, *, checked: bool) -> bytes:
+    """Segments may come, `segments` to a sub-block; `checked`: the CRC will be."""
+    return bytes((0xA4 if checked else 0xA0,)) + multiplexer + bytes((segments, 0, 0, 0))
+
+
+def block_download_acknowledged(taken: int, segments: int) -> bytes:
+    """So many segments of the sub-block were taken; the next sub-block may have `segments`."""
+    return bytes((0xA2, taken, segments)) + _PADDING[5]
+
+
+def block_download_ended() -> bytes:
+    """The data was taken whole."""
+    return b"\xa1" + _PADDING[7]
+
+
+def block_upload_initiated(multiplexer: bytes, size: int, *, checked: bool) -> bytes:
+    """So many bytes will come; `checked`: with a CRC.
+
+    There are clients that take the server's word alone for it, so it is given only to those that asked for a CRC.
+    """
+    return bytes((0xC6 if checked else 0xC2,)) + multiplexer + _SIZE.pack(size)
+
+
+def block_upload_ended(unused: int, crc: int) -> bytes:
+    """All came; `unused` bytes of the last segment are no data."""
+    return _CRC.pack(0xC1 | unused << 2, crc)

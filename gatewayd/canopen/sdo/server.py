@@ -1,0 +1,288 @@
+"""The SDO server: one transfer at a time, frames in and frames out (CiA 301, 7.2.4).
+
+What a frame does follows from the state of the transfer and from what the frame asks for, by the tables of `SdoServer`.
+A download reaches the dictionary once, when all of it is there and before it is confirmed; an upload takes the value
+once, when it begins.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable
+from enum import Enum
+from typing import ClassVar
+
+from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary
+from gatewayd.canopen.sdo import protocol
+from gatewayd.canopen.sdo.protocol import BLOCK_SEGMENTS, REQUESTS, Request
+from gatewayd.canopen.sdo.transfers import (
+    BLOCK_SEGMENTS_GREATEST,
+    BlockDownload,
+    BlockUpload,
+    Download,
+    Upload,
+)
+
+__all__ = ["LONGEST_DOWNLOAD", "SLOWEST_FRAME", "SUB_BLOCK_TIMEOUT", "TIMEOUT", "SdoServer", "State"]
+
+TIMEOUT = 1.0
+"""Seconds without a frame after which a transfer is aborted."""
+SUB_BLOCK_TIMEOUT = 0.25
+"""Seconds without a segment after which an unfinished sub-block is acknowledged: its last segment was lost."""
+SLOWEST_FRAME = 0.0135
+"""Seconds that a frame takes at 10 kbit/s, the slowest bit rate: a whole sub-block is longer than `TIMEOUT`."""
+LONGEST_DOWNLOAD = 4096
+"""Bytes; far beyond the longest object."""
+
+_FRAME = 8
+_NOTHING = b"\0\0\0"
+_MULTIPLEXER = struct.Struct("<HB")
+_SIZE = struct.Struct("<4xI")
+_CRC = struct.Struct("<xH5x")
+_TOGGLE = 0x10
+_CRC_SUPPORTED = 0x04
+
+
+class State(Enum):
+    """What the server waits for."""
+
+    IDLE = "a transfer"
+    DOWNLOAD = "a segment"
+    UPLOAD = "the request of a segment"
+    BLOCK_DOWNLOAD = "a segment of a sub-block"
+    BLOCK_DOWNLOAD_END = "the end of a block download"
+    BLOCK_UPLOAD_START = "the start of a block upload"
+    BLOCK_UPLOAD = "the acknowledgement of a sub-block"
+    BLOCK_UPLOAD_END = "the end of a block upload"
+
+
+Act = Callable[["SdoServer", bytes], list[bytes]]
+"""Takes a frame and gives the answers; raises Abort."""
+
+
+class SdoServer:
+    """One SDO channel."""
+
+    __slots__ = (
+        "_block_download",
+        "_block_upload",
+        "_dictionary",
+        "_download",
+        "_heard",
+        "_longest",
+        "_multiplexer",
+        "_upload",
+        "state",
+    )
+
+    def __init__(self, dictionary: Dictionary, longest: int = LONGEST_DOWNLOAD) -> None:
+        """`longest`: bytes that a download may have."""
+        self._dictionary = dictionary
+        self._longest = longest
+        self._multiplexer = _NOTHING
+        self._heard = -math.inf
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the transfer without a word: the node leaves the states in which SDO is served."""
+        self.state = State.IDLE
+        self._download: Download | None = None
+        self._upload: Upload | None = None
+        self._block_download: BlockDownload | None = None
+        self._block_upload: BlockUpload | None = None
+
+    def receive(self, data: bytes, now: float) -> list[bytes]:
+        """The answers to a frame of the client; frames that are not 8 bytes long are ignored."""
+        if len(data) != _FRAME:
+            return []
+        state = self.state
+        request = (BLOCK_SEGMENTS if state is State.BLOCK_DOWNLOAD else REQUESTS)[data[0]]
+        self._heard = now
+        act = self.IN_ANY_STATE.get(request) or self.TRANSITIONS.get((state, request))
+        try:
+            if act is None:
+                raise self._unexpected(data)
+            return act(self, data)
+        except Abort as abort:
+            return self._abort(abort.code)
+
+    def tick(self, now: float) -> list[bytes]:
+        """What the client's silence leads to."""
+        if now < self.next_deadline(now):
+            return []
+        if self._block_download is not None and self._block_download.pending:
+            return self._acknowledge(self._block_download)
+        return self._abort(AbortCode.TIMED_OUT)
+
+    def next_deadline(self, now: float) -> float:
+        """When `tick` will have something to do; infinity without a transfer."""
+        if self.state is State.IDLE:
+            return math.inf
+        download, upload = self._block_download, self._block_upload
+        if download is not None and download.pending:
+            return self._heard + SUB_BLOCK_TIMEOUT
+        return self._heard + TIMEOUT + (upload.sent * SLOWEST_FRAME if upload is not None else 0.0)
+
+    # -- beginning and ending ------------------------------------------------------------------------------------
+
+    def _begin(self, data: bytes) -> tuple[int, int]:
+        """Index and sub-index of a new transfer; a former one ends without a word, as the client has given it up."""
+        if self.state is not State.IDLE:
+            self.reset()
+        self._multiplexer = data[1:4]
+        index, subindex = _MULTIPLEXER.unpack(self._multiplexer)
+        return index, subindex
+
+    def _unexpected(self, data: bytes) -> Abort:
+        if self.state is State.IDLE:
+            # Only a command that nobody knows may name an object; segments carry data in its place.
+            self._multiplexer = data[1:4] if REQUESTS[data[0]] is Request.UNKNOWN else _NOTHING
+        return Abort(AbortCode.UNKNOWN_COMMAND)
+
+    def _abort(self, code: AbortCode) -> list[bytes]:
+        self.reset()
+        return [protocol.abort(self._multiplexer, code)]
+
+    def _end(self, _data: bytes) -> list[bytes]:
+        self.reset()
+        return []
+
+    def _write(self, data: bytes) -> None:
+        """The download is whole: it is over, whatever the dictionary says."""
+        self.reset()
+        index, subindex = _MULTIPLEXER.unpack(self._multiplexer)
+        self._dictionary.write(index, subindex, data)
+
+    # -- download ------------------------------------------------------------------------------------------------
+
+    def _initiate_download(self, data: bytes) -> list[bytes]:
+        index, subindex = self._begin(data)
+        command = data[0]
+        indicated = command & 0x01
+        if command & 0x02:
+            size = 4 - (command >> 2 & 3) if indicated else self._natural_size(index, subindex)
+            self._dictionary.write(index, subindex, data[4 : 4 + size])
+        else:
+            self._demand_writable(index, subindex)
+            self._download = Download(_SIZE.unpack(data)[0] if indicated else None, self._longest)
+            self.state = State.DOWNLOAD
+        return [protocol.download_initiated(self._multiplexer)]
+
+    def _natural_size(self, index: int, subindex: int) -> int:
+        """How many bytes an expedited download has that does not say it."""
+        return min(4, self._dictionary.entry(index, subindex).type.size or 4)
+
+    def _demand_writable(self, index: int, subindex: int) -> None:
+        if not self._dictionary.entry(index, subindex).access.writable:
+            raise Abort(AbortCode.READ_ONLY)
+
+    def _take_segment(self, data: bytes) -> list[bytes]:
+        download, command = self._download, data[0]
+        assert download is not None
+        toggle = download.toggle
+        if command & _TOGGLE != toggle:
+            raise Abort(AbortCode.TOGGLE)
+        download.toggle ^= _TOGGLE
+        download.add(data[1 : _FRAME - (command >> 1 & 7)])
+        if command & 0x01:
+            self._write(download.whole())
+        return [protocol.download_segment_taken(toggle)]
+
+    # -- upload --------------------------------------------------------------------------------------------------
+
+    def _initiate_upload(self, data: bytes) -> list[bytes]:
+        index, subindex = self._begin(data)
+        return self._upload_of(self._dictionary.read(index, subindex))
+
+    def _upload_of(self, value: bytes) -> list[bytes]:
+        if not protocol.is_expedited(value):
+            self._upload = Upload(value)
+            self.state = State.UPLOAD
+        return [protocol.upload_initiated(self._multiplexer, value)]
+
+    def _give_segment(self, data: bytes) -> list[bytes]:
+        upload = self._upload
+        assert upload is not None
+        if data[0] & _TOGGLE != upload.toggle:
+            raise Abort(AbortCode.TOGGLE)
+        segment = upload.segment()
+        upload.toggle ^= _TOGGLE
+        if upload.done:
+            self.reset()
+        return [segment]
+
+    # -- block download ------------------------------------------------------------------------------------------
+
+    def _initiate_block_download(self, data: bytes) -> list[bytes]:
+        index, subindex = self._begin(data)
+        self._demand_writable(index, subindex)
+        size = _SIZE.unpack(data)[0] if data[0] & 0x02 else None
+        checked = bool(data[0] & _CRC_SUPPORTED)
+        self._block_download = BlockDownload(Download(size, self._longest), checked=checked)
+        self.state = State.BLOCK_DOWNLOAD
+        return [
+            protocol.block_download_initiated(self._multiplexer, BLOCK_SEGMENTS_GREATEST, checked=checked)
+        ]
+
+    def _take_block_segment(self, data: bytes) -> list[bytes]:
+        block = self._block_download
+        assert block is not None
+        return self._acknowledge(block) if block.receive(data) else []
+
+    def _acknowledge(self, block: BlockDownload) -> list[bytes]:
+        if block.complete:
+            self.state = State.BLOCK_DOWNLOAD_END
+        return [block.acknowledge()]
+
+    def _end_block_download(self, data: bytes) -> list[bytes]:
+        block = self._block_download
+        assert block is not None
+        self._write(block.whole(data[0] >> 2 & 7, *_CRC.unpack(data)))
+        return [protocol.block_download_ended()]
+
+    # -- block upload --------------------------------------------------------------------------------------------
+
+    def _initiate_block_upload(self, data: bytes) -> list[bytes]:
+        index, subindex = self._begin(data)
+        segments, threshold = data[4], data[5]
+        value = self._dictionary.read(index, subindex)
+        if threshold and len(value) <= threshold:
+            return self._upload_of(value)
+        checked = bool(data[0] & _CRC_SUPPORTED)
+        self._block_upload = BlockUpload(value, segments, checked=checked)
+        self.state = State.BLOCK_UPLOAD_START
+        return [protocol.block_upload_initiated(self._multiplexer, len(value), checked=checked)]
+
+    def _start_block_upload(self, _data: bytes) -> list[bytes]:
+        assert self._block_upload is not None
+        self.state = State.BLOCK_UPLOAD
+        return self._block_upload.sub_block()
+
+    def _next_sub_block(self, data: bytes) -> list[bytes]:
+        block = self._block_upload
+        assert block is not None
+        block.acknowledge(data[1], data[2])
+        if not block.done:
+            return block.sub_block()
+        self.state = State.BLOCK_UPLOAD_END
+        return [block.end()]
+
+    IN_ANY_STATE: ClassVar[dict[Request, Act]] = {
+        Request.DOWNLOAD: _initiate_download,
+        Request.UPLOAD: _initiate_upload,
+        Request.BLOCK_DOWNLOAD: _initiate_block_download,
+        Request.BLOCK_UPLOAD: _initiate_block_upload,
+        Request.ABORT: _end,
+    }
+    """What ends the present transfer, and may begin another. In a sub-block only an abort can be told from data."""
+    TRANSITIONS: ClassVar[dict[tuple[State, Request], Act]] = {
+        (State.DOWNLOAD, Request.DOWNLOAD_SEGMENT): _take_segment,
+        (State.UPLOAD, Request.UPLOAD_SEGMENT): _give_segment,
+        (State.BLOCK_DOWNLOAD, Request.BLOCK_SEGMENT): _take_block_segment,
+        (State.BLOCK_DOWNLOAD_END, Request.BLOCK_DOWNLOAD_END): _end_block_download,
+        (State.BLOCK_UPLOAD_START, Request.BLOCK_UPLOAD_START): _start_block_upload,
+        (State.BLOCK_UPLOAD, Request.BLOCK_UPLOAD_ACKNOWLEDGE): _next_sub_block,
+        (State.BLOCK_UPLOAD_END, Request.BLOCK_UPLOAD_END): _end,
+    }
+    """What goes on with a transfer; anything else aborts it."""

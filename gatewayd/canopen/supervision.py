@@ -1,0 +1,145 @@
+"""How a bus is judged: from what the kernel shows, what the controller reports and what sending fails with.
+
+Pure. What is *seen* (a look at the interface) is the truth of that moment and counts in every state. What is *told* by
+an error frame comes at once, but may be old: it counts only while frames go through, so that a report read late from
+the buffer cannot revive a bus that is down or off.
+"""
+
+from __future__ import annotations
+
+import errno
+from enum import Enum, auto
+from types import MappingProxyType
+
+from gatewayd.canopen.bus import BusState
+from gatewayd.canopen.errors import Controller, ErrorClass, ErrorFrame
+
+__all__ = [
+    "LOOK",
+    "RETRY",
+    "RETRY_LIMIT",
+    "TRANSITIONS",
+    "Event",
+    "Supervisor",
+    "event_of_errno",
+    "event_of_error",
+]
+
+LOOK = 0.1
+"""Seconds between two looks at the interface."""
+RETRY = 0.1
+"""Seconds before the first attempt to open again; doubles with each failure."""
+RETRY_LIMIT = 2.0
+"""Longest wait before an attempt."""
+
+
+class Event(Enum):
+    """What befalls a bus."""
+
+    GONE = auto()
+    """Seen: there is no such interface."""
+    DOWN = auto()
+    """Seen: it is down."""
+    OFF = auto()
+    """Seen: it is up, its controller off the bus."""
+    PASSIVE = auto()
+    """Seen: error-passive."""
+    WARNING = auto()
+    """Seen: error warning."""
+    ACTIVE = auto()
+    """Seen: error-active."""
+    UP = auto()
+    """Seen: it carries frames; how well, the driver does not tell."""
+    TOLD_OFF = auto()
+    TOLD_PASSIVE = auto()
+    TOLD_WARNING = auto()
+    TOLD_ACTIVE = auto()
+    TOLD_RESTARTED = auto()
+    """Told: the controller is back on the bus."""
+
+
+_SEEN = {
+    Event.GONE: BusState.ABSENT,
+    Event.DOWN: BusState.DOWN,
+    Event.OFF: BusState.BUS_OFF,
+    Event.PASSIVE: BusState.PASSIVE,
+    Event.WARNING: BusState.WARNING,
+    Event.ACTIVE: BusState.ACTIVE,
+}
+_TOLD = {
+    Event.TOLD_OFF: BusState.BUS_OFF,
+    Event.TOLD_PASSIVE: BusState.PASSIVE,
+    Event.TOLD_WARNING: BusState.WARNING,
+    Event.TOLD_ACTIVE: BusState.ACTIVE,
+}
+
+TRANSITIONS = MappingProxyType(
+    {(state, event): target for state in BusState for event, target in _SEEN.items()}
+    | {(state, event): target for state in BusState if state.carries for event, target in _TOLD.items()}
+    | {
+        (BusState.ABSENT, Event.UP): BusState.ACTIVE,
+        (BusState.DOWN, Event.UP): BusState.ACTIVE,
+        (BusState.BUS_OFF, Event.UP): BusState.ACTIVE,
+        (BusState.BUS_OFF, Event.TOLD_RESTARTED): BusState.ACTIVE,
+    }
+)
+"""State and event -> next state; what is not here changes nothing."""
+
+_REPORTS = (
+    (Controller.RX_PASSIVE | Controller.TX_PASSIVE, Event.TOLD_PASSIVE),
+    (Controller.RX_WARNING | Controller.TX_WARNING, Event.TOLD_WARNING),
+    (Controller.ACTIVE, Event.TOLD_ACTIVE),
+)
+_FAILURES = {
+    errno.ENETDOWN: Event.DOWN,
+    errno.ENODEV: Event.GONE,
+    errno.ENXIO: Event.GONE,
+}
+
+
+def event_of_error(error: ErrorFrame) -> Event | None:
+    """What an error frame tells of the state; None if it tells nothing of it."""
+    if error.classes & ErrorClass.BUS_OFF:
+        return Event.TOLD_OFF
+    if error.classes & ErrorClass.RESTARTED:
+        return Event.TOLD_RESTARTED
+    return next((event for flags, event in _REPORTS if error.controller & flags), None)
+
+
+def event_of_errno(number: int) -> Event | None:
+    """What a failed send or receive tells of the interface; None if it tells nothing of it."""
+    return _FAILURES.get(number)
+
+
+class Supervisor:
+    """The state of one bus, and when to try to open it again."""
+
+    def __init__(self) -> None:
+        self.state = BusState.ABSENT
+        self.since = 0.0
+        """When it came into this state."""
+        self._retry_at = 0.0
+        self._wait = RETRY
+
+    def feed(self, event: Event, now: float) -> bool:
+        """Judge an event; whether the state is another one now."""
+        target = TRANSITIONS.get((self.state, event), self.state)
+        if target is self.state:
+            return False
+        self.state = target
+        self.since = now
+        return True
+
+    def may_open(self, now: float) -> bool:
+        """Whether it is time for an attempt."""
+        return now >= self._retry_at
+
+    def opened(self) -> None:
+        """The attempt went well: after the next loss try again at once."""
+        self._retry_at = 0.0
+        self._wait = RETRY
+
+    def failed(self, now: float) -> None:
+        """It did not: the next one has to wait, longer each time."""
+        self._retry_at = now + self._wait
+        self._wait = min(2 * self._wait, RETRY_LIMIT)

@@ -1,0 +1,175 @@
+"""SYNC: heard, counted and, if this node is the producer, sent (CiA 301, 7.2.5 and 7.5.2.5 to .7, .21)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+from gatewayd.canopen.cob_ids import BASIC_FRAME, is_restricted
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, variable
+from gatewayd.canopen.frame import Frame, Priority, Send
+from gatewayd.canopen.plan import SyncPlan
+
+__all__ = ["GREATEST_COUNTER", "LEAST_PERIOD", "PRODUCER", "Sync"]
+
+PRODUCER = 0x4000_0000
+"""Bit 30 of 1005h: this node sends SYNC."""
+_DO_NOT_CARE = 0x8000_0000
+GREATEST_COUNTER = 240
+LEAST_PERIOD = 1000
+"""Microseconds: a shorter cycle would fill the bus, and no timer of this node keeps it."""
+
+
+class Sync:
+    """The SYNC object.
+
+    `on_sync(counter, now)` is called for every SYNC of the right length, our own ones included; the counter is None
+    if SYNC carries none. `wrong_length(length, now)` is called for every other one, which does nothing else.
+    `allowed()` tells whether the NMT state lets SYNC run; `changed()` is called when the COB-ID changes.
+    """
+
+    def __init__(
+        self,
+        send: Send,
+        plan: SyncPlan,
+        *,
+        allowed: Callable[[], bool],
+        on_sync: Callable[[int | None, float], None],
+        wrong_length: Callable[[int, float], None],
+        changed: Callable[[], None],
+    ) -> None:
+        self._send = send
+        self._allowed = allowed
+        self._on_sync = on_sync
+        self._wrong_length = wrong_length
+        self._cob_id_changed = changed
+        self._due = math.inf
+        self._counter = 0
+        self._last = -math.inf
+        self.count = 0
+        """SYNC messages heard or sent."""
+        u32 = CanType.UNSIGNED32
+        self._cob_id = Entry(
+            0,
+            "COB-ID SYNC",
+            u32,
+            Access.RW,
+            u32.pack(plan.cob_id | (PRODUCER if plan.producer else 0)),
+            stored=True,
+            check=self._check_cob_id,
+            changed=self._configured,
+        )
+        self._period = Entry(
+            0,
+            "Communication cycle period",
+            u32,
+            Access.RW,
+            u32.pack(plan.period),
+            stored=True,
+            check=_check_period,
+            changed=self._configured,
+        )
+        self._window = Entry(0, "Synchronous window length", u32, Access.RW, u32.pack(0), stored=True)
+        self._overflow = Entry(
+            0,
+            "Synchronous counter overflow value",
+            CanType.UNSIGNED8,
+            Access.RW,
+            bytes([plan.counter]),
+            stored=True,
+            check=self._check_overflow,
+        )
+
+    @property
+    def cob_id(self) -> int:
+        """Where SYNC is heard and sent."""
+        return self._cob_id.number & BASIC_FRAME
+
+    @property
+    def produces(self) -> bool:
+        """Whether this node sends SYNC."""
+        return bool(self._cob_id.number & PRODUCER) and self._period.number > 0
+
+    def objects(self) -> Iterable[Object]:
+        """1005h, 1006h, 1007h, 1019h."""
+        yield variable(0x1005, self._cob_id)
+        yield variable(0x1006, self._period)
+        yield variable(0x1007, self._window)
+        yield variable(0x1019, self._overflow)
+
+    def restart(self, now: float) -> None:
+        """Begin anew with the parameters as they are: counter 1, the first own SYNC after one period."""
+        self._counter = 0
+        self._last = -math.inf
+        self._due = now + self._period.number / 1e6 if self.produces else math.inf
+
+    def stopped(self) -> None:
+        """The node has been stopped: the counter begins with 1 when it goes on."""
+        self._counter = 0
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """A frame with the COB-ID of SYNC."""
+        if frame.remote or not self._allowed():
+            return
+        if len(frame.data) != (1 if self._overflow.number else 0):
+            self._wrong_length(len(frame.data), now)
+            return
+        self._sync(frame.data[0] if frame.data else None, now)
+
+    def window_open(self, now: float) -> bool:
+        """Whether synchronous PDOs may still be sent and taken: always without a window (1007h = 0)."""
+        window = self._window.number
+        return window == 0 or now - self._last <= window / 1e6
+
+    def tick(self, now: float) -> None:
+        """Send the SYNC that is due. Cycles that were missed are not made up for."""
+        if now < self._due:
+            return
+        period = self._period.number / 1e6
+        self._due = self._due + period if now < self._due + period else now + period
+        if not self._allowed():
+            return
+        counter = self._next_counter()
+        self._send(Frame(self.cob_id, b"" if counter is None else bytes([counter])), Priority.ORDERED)
+        self._sync(counter, now)
+
+    def next_deadline(self, now: float) -> float:
+        """When `tick` has something to do."""
+        return self._due
+
+    def _sync(self, counter: int | None, now: float) -> None:
+        self._last = now
+        self.count += 1
+        self._on_sync(counter, now)
+
+    def _next_counter(self) -> int | None:
+        if not self._overflow.number:
+            return None
+        self._counter = self._counter % self._overflow.number + 1
+        return self._counter
+
+    def _configured(self) -> None:
+        # The first SYNC has to come within one period: the next tick sends it.
+        self._counter = 0
+        self._due = -math.inf if self.produces else math.inf
+        self._cob_id_changed()
+
+    def _check_cob_id(self, data: bytes) -> None:
+        new, old = int.from_bytes(data, "little"), self._cob_id.number
+        identifier = new & BASIC_FRAME
+        if new & ~(PRODUCER | _DO_NOT_CARE | BASIC_FRAME) or is_restricted(identifier):
+            raise Abort(AbortCode.INVALID_VALUE)
+        if old & new & PRODUCER and identifier != old & BASIC_FRAME:
+            raise Abort(AbortCode.INVALID_VALUE)
+
+    def _check_overflow(self, data: bytes) -> None:
+        if data[0] == 1 or data[0] > GREATEST_COUNTER:
+            raise Abort(AbortCode.INVALID_VALUE)
+        if self._period.number:
+            raise Abort(AbortCode.DEVICE_STATE)
+
+
+def _check_period(data: bytes) -> None:
+    if 0 < int.from_bytes(data, "little") < LEAST_PERIOD:
+        raise Abort(AbortCode.VALUE_TOO_LOW)

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import pytest
+
+from gatewayd import __version__
+from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary
+from gatewayd.canopen.identity import (
+    PRODUCT_CODE,
+    VENDOR_ID,
+    ErrorBehaviour,
+    Identity,
+    identity_objects,
+    revision,
+)
+from gatewayd.canopen.nmt import NmtCommand, NmtState
+from tests.canopen.wire import Client
+
+
+@pytest.fixture
+def dictionary() -> Dictionary:
+    return Dictionary(identity_objects(Identity.of(0xCAFE_F00D), lambda: 0x55))
+
+
+def test_the_node_tells_who_it_is(dictionary: Dictionary) -> None:
+    client = Client(dictionary)
+    assert client.read(0x1000) == 0
+    assert client.read(0x1002) == 0x55
+    assert [client.read(0x1018, number) for number in range(5)] == [
+        4,
+        VENDOR_ID,
+        PRODUCT_CODE,
+        revision(),
+        0xCAFE_F00D,
+    ]
+    assert dictionary.read(0x1008, 0) == b"gatewayd"
+    assert dictionary.read(0x100A, 0) == __version__.encode()
+
+
+def test_cct_sdo_03_writing_the_device_type_is_refused(dictionary: Dictionary) -> None:
+    with pytest.raises(Abort) as caught:
+        dictionary.write(0x1000, 0, bytes(4))
+    assert caught.value.code is AbortCode.READ_ONLY
+
+
+def test_revision_has_major_and_minor() -> None:
+    assert revision("3.17.2") == revision("3.17rc1") == 0x0003_0011
+
+
+@pytest.mark.parametrize(
+    "behaviour, state, reaction",
+    [
+        (0, NmtState.OPERATIONAL, NmtCommand.ENTER_PRE_OPERATIONAL),
+        (0, NmtState.PRE_OPERATIONAL, None),
+        (0, NmtState.STOPPED, None),
+        (1, NmtState.OPERATIONAL, None),
+        (2, NmtState.OPERATIONAL, NmtCommand.STOP),
+        (2, NmtState.PRE_OPERATIONAL, NmtCommand.STOP),
+    ],
+)
+def test_reaction_to_a_communication_error(
+    behaviour: int, state: NmtState, reaction: NmtCommand | None
+) -> None:
+    service = ErrorBehaviour()
+    Client(service.objects()).write(0x1029, 1, behaviour)
+    assert service.reaction(state) is reaction
+
+
+def test_unknown_behaviour_is_refused() -> None:
+    Client(ErrorBehaviour().objects()).refused(0x1029, 1, 3, AbortCode.INVALID_VALUE)

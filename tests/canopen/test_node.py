@@ -1,0 +1,737 @@
+"""One node over one cell, frame by frame: what its services do together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gatewayd.canopen.bus import BusState
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.frame import Frame, Priority
+from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
+from gatewayd.canopen.node import OVERRUN_TIME, Node, Observer
+from gatewayd.canopen.plan import CanopenPlan, Consumer, ObjectPlan, PdoEntry, PdoPlan, SyncPlan
+from gatewayd.canopen.storage import MemoryStore, Saved, Store
+from gatewayd.core.cell import Cell
+from gatewayd.core.definition import CellDefinition, Direction, Lock, Value, ValueKind, Variable, Writer
+from tests.canopen.wire import Wire
+
+NODE = 5
+MASTER = 1
+LINE, TOOL = 0, 1
+PART, SPEED, CYCLES, FORCE = range(4)
+START = bytes([1, 0])
+STOP = bytes([2, 0])
+PRE_OPERATIONAL = bytes([128, 0])
+RESET_NODE = bytes([129, 0])
+RESET_COMMUNICATION = bytes([130, 0])
+BOOT_UP = Frame(0x705, b"\0")
+
+_VARIABLES = (
+    Variable(
+        1,
+        "part",
+        Direction.INPUT,
+        ValueKind.INT,
+        "input_int_register_0",
+        low=-(2**31),
+        high=2**31 - 1,
+        lock=0,
+    ),
+    Variable(2, "speed", Direction.INPUT, ValueKind.FLOAT, "input_double_register_0", lock=1),
+    Variable(3, "cycles", Direction.OUTPUT, ValueKind.INT, "output_int_register_0"),
+    Variable(4, "force", Direction.OUTPUT, ValueKind.FLOAT, "output_double_register_0"),
+)
+_CELL = CellDefinition(
+    "press-3",
+    0xCAFE_F00D,
+    _VARIABLES,
+    (Lock("part", (PART,), (LINE, TOOL)), Lock("speed", (SPEED,), (LINE, TOOL))),
+    (Writer("line"), Writer("tool")),
+    0.1,
+)
+_OBJECTS = (
+    ObjectPlan(PART, 0x2001, 1, CanType.INTEGER32),
+    ObjectPlan(SPEED, 0x2002, 1, CanType.REAL32),
+    ObjectPlan(CYCLES, 0x2401, 1, CanType.INTEGER32),
+    ObjectPlan(FORCE, 0x2402, 1, CanType.REAL32),
+)
+
+
+def _pdo(number: int, direction: Direction, one: ObjectPlan, transmission: int, event: int = 0) -> PdoPlan:
+    base = 0x100 + 0x100 * number if direction is Direction.INPUT else 0x80 + 0x100 * number
+    entry = PdoEntry(one.variable, one.index, one.subindex, one.type.bits)
+    return PdoPlan(number, direction, base + NODE, True, transmission, 0, event, (entry,))
+
+
+PLAN = CanopenPlan(
+    interface="virtual",
+    channel="test",
+    bitrate=500_000,
+    node=NODE,
+    autostart=False,
+    heartbeat=1000,
+    sync=SyncPlan(),
+    consumers=(Consumer(MASTER, 500, LINE),),
+    objects=_OBJECTS,
+    pdos=(
+        _pdo(1, Direction.INPUT, _OBJECTS[PART], 255),
+        _pdo(2, Direction.INPUT, _OBJECTS[SPEED], 1),
+        _pdo(1, Direction.OUTPUT, _OBJECTS[CYCLES], 255),
+        _pdo(2, Direction.OUTPUT, _OBJECTS[FORCE], 1),
+    ),
+    rpdo_writer=LINE,
+    sdo_writer=TOOL,
+)
+
+
+class Notebook(Observer):
+    """Remembers what it was told."""
+
+    def __init__(self) -> None:
+        self.filters = 0
+        self.reports: list[str] = []
+        self.times: list[datetime] = []
+        self.rates: list[tuple[int, float]] = []
+
+    def cob_ids_changed(self) -> None:
+        self.filters += 1
+
+    def report(self, text: str) -> None:
+        self.reports.append(text)
+
+    def time_told(self, moment: datetime, now: float) -> None:
+        self.times.append(moment)
+
+    def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
+        self.rates.append((bit_rate, delay))
+
+
+class Plant:
+    """A node on an active bus, with the robot connected, and a master's hands."""
+
+    def __init__(self, plan: CanopenPlan = PLAN, store: Store | None = None) -> None:
+        self.now = 100.0
+        self.wire = Wire()
+        self.alive = True
+        self.notebook = Notebook()
+        self.cell = Cell(_CELL)
+        self.cell.robot_connected(self.now)
+        self.cell.adopt({PART: 0, SPEED: 0.0}, self.now)
+        self.cell.package_arrived(1.0, self.now)
+        self.node = Node(
+            plan,
+            self.cell,
+            self.wire.send,
+            store or MemoryStore(),
+            lambda _now: self.alive,
+            observer=self.notebook,
+        )
+        self.cell.listeners.append(lambda direction: self.node.image_changed(direction, self.now))
+
+    def power_on(self, bus: BusState = BusState.ACTIVE) -> Plant:
+        self.node.bus_changed(bus, self.now)
+        self.node.start(self.now)
+        return self
+
+    def operational(self) -> Plant:
+        self.power_on()
+        self.hear(0, START)
+        self.wire.take()
+        return self
+
+    @property
+    def state(self) -> NmtState:
+        return self.node.nmt.state
+
+    def hear(self, can_id: int, data: bytes = b"") -> list[Frame]:
+        """A frame comes; what the node sends on it."""
+        self.node.receive(Frame(can_id, data), self.now)
+        return self.take()
+
+    def take(self) -> list[Frame]:
+        return self.wire.take()
+
+    def run(self, seconds: float) -> list[Frame]:
+        """Let time pass as a link would; what is sent meanwhile."""
+        end = self.now + seconds
+        for _ in range(1000):
+            self.now = max(self.now, self.node.next_deadline(self.now))
+            if self.now > end:
+                break
+            self.node.tick(self.now)
+        else:
+            pytest.fail("the node is never done")
+        self.now = end
+        return self.take()
+
+    def bus(self, state: BusState) -> list[Frame]:
+        self.node.bus_changed(state, self.now)
+        return self.take()
+
+    def show(self, variable: int, value: Value) -> list[Frame]:
+        """The robot tells a value."""
+        self.cell.image.values[variable] = value
+        self.cell.outputs_written(self.now)
+        return self.take()
+
+    def heartbeat(self, state: int = 5) -> list[Frame]:
+        return self.hear(0x700 + MASTER, bytes([state]))
+
+    def read(self, index: int, subindex: int = 0, node: int = NODE) -> int | None:
+        """Expedited SDO upload; None without an answer, negative for an abort code."""
+        return _answer(self.hear(0x600 + node, b"\x40" + _multiplexer(index, subindex) + bytes(4)))
+
+    def write(
+        self, index: int, subindex: int, value: int | bytes, size: int = 4, node: int = NODE
+    ) -> int | None:
+        """Expedited SDO download; 0 for success."""
+        data = value if isinstance(value, bytes) else value.to_bytes(size, "little")
+        command = 0x23 | (4 - len(data)) << 2
+        request = bytes([command]) + _multiplexer(index, subindex) + data.ljust(4, b"\0")
+        return _answer(self.hear(0x600 + node, request))
+
+    def part(self, value: int) -> list[Frame]:
+        return self.hear(0x205, value.to_bytes(4, "little"))
+
+
+def _multiplexer(index: int, subindex: int) -> bytes:
+    return index.to_bytes(2, "little") + bytes([subindex])
+
+
+def _answer(frames: list[Frame]) -> int | None:
+    answers = [frame for frame in frames if 0x580 <= frame.can_id < 0x600]
+    if not answers:
+        return None
+    assert len(answers) == 1
+    data = answers[0].data
+    value = int.from_bytes(data[4:8], "little")
+    return -value if data[0] == 0x80 else value
+
+
+def _emergencies(frames: list[Frame]) -> list[int]:
+    return [int.from_bytes(frame.data[:2], "little") for frame in frames if frame.can_id == 0x80 + NODE]
+
+
+# -- start and NMT ---------------------------------------------------------------------------------------------------
+
+
+def test_node_boots_and_tells_heartbeats() -> None:
+    plant = Plant().power_on()
+    assert plant.take() == [BOOT_UP]
+    assert plant.run(2.0) == [Frame(0x705, b"\x7f")] * 2
+
+
+def test_node_that_finds_no_bus_boots_when_there_is_one() -> None:
+    plant = Plant().power_on(BusState.ABSENT)
+    assert plant.run(5.0) == []
+    assert plant.state is NmtState.INITIALISING
+    assert plant.bus(BusState.ACTIVE) == [BOOT_UP]
+
+
+def test_heartbeat_is_silent_while_the_core_does_not_live() -> None:
+    plant = Plant().power_on()
+    plant.take()
+    plant.alive = False
+    assert plant.run(3.0) == []
+    plant.alive = True
+    assert len(plant.run(1.0)) == 1
+
+
+def test_autostart() -> None:
+    plant = Plant(replace(PLAN, autostart=True)).power_on()
+    assert plant.state is NmtState.OPERATIONAL
+    assert plant.take() == [BOOT_UP, Frame(0x185, bytes(4))]
+
+
+@pytest.mark.parametrize(
+    "command, sdo, pdo, emcy, lss",
+    [
+        (START, True, True, True, False),
+        (PRE_OPERATIONAL, True, False, True, True),
+        (STOP, False, False, False, True),
+    ],
+    ids=["OPERATIONAL", "PRE_OPERATIONAL", "STOPPED"],
+)
+def test_cct_state_03_services_by_state(command: bytes, sdo: bool, pdo: bool, emcy: bool, lss: bool) -> None:
+    plant = Plant().operational()
+    plant.hear(0, command)
+    assert (plant.read(0x1000) == 0) is sdo
+    plant.part(7)
+    assert (plant.cell.image.values[PART] == 7) is pdo
+    assert bool(plant.show(CYCLES, 3)) is pdo
+    plant.node.frames_lost(1, plant.now)
+    assert bool(_emergencies(plant.take())) is emcy
+    plant.hear(0x7E5, b"\x04\x01" + bytes(6))
+    assert bool(plant.hear(0x7E5, b"\x5e" + bytes(7))) is lss
+    assert len(plant.run(1.0)) >= 1, "the heartbeat runs in every state"
+
+
+def test_cct_state_04_emergencies_wait_for_a_state_that_allows_them() -> None:
+    plant = Plant().operational()
+    plant.hear(0, STOP)
+    plant.node.frames_lost(1, plant.now)
+    assert _emergencies(plant.take()) == []
+    assert _emergencies(plant.hear(0, PRE_OPERATIONAL)) == [0x8110]
+
+
+@pytest.mark.parametrize("command", [RESET_NODE, RESET_COMMUNICATION])
+def test_cct_transition_04_resets_bring_communication_defaults_and_boot_again(command: bytes) -> None:
+    plant = Plant().operational()
+    plant.write(0x1017, 0, 20, 2)
+    plant.write(0x1800, 1, 0x8000_0185)
+    plant.write(0x1800, 1, 0x4000_0190)
+    assert plant.hear(0, command) == [BOOT_UP]
+    assert plant.read(0x1017) == 1000
+    assert plant.read(0x1800, 1) == 0x4000_0185
+
+
+# -- PDO and SYNC ----------------------------------------------------------------------------------------------------
+
+
+def test_rpdo_reaches_the_cell_and_the_image_the_bus() -> None:
+    plant = Plant().operational()
+    plant.part(1234)
+    assert plant.cell.image.values[PART] == 1234
+    assert plant.show(CYCLES, 5) == [Frame(0x185, b"\5\0\0\0")]
+    assert plant.show(CYCLES, 5) == []
+
+
+def test_sync_sends_and_applies_what_waits_for_it() -> None:
+    plant = Plant().operational()
+    plant.show(FORCE, 1.0)
+    plant.hear(0x305, CanType.REAL32.pack(2.5))
+    assert plant.cell.image.values[SPEED] == 0.0
+    assert plant.hear(0x80) == [Frame(0x285, CanType.REAL32.pack(1.0))]
+    assert plant.cell.image.values[SPEED] == 2.5
+
+
+def test_sync_of_wrong_length_is_an_emergency_until_a_good_one() -> None:
+    plant = Plant().operational()
+    assert _emergencies(plant.hear(0x80, b"\1")) == [0x8240]
+    assert _emergencies(plant.hear(0x80)) == [0]
+
+
+def test_synchronous_rpdos_after_the_window_are_dropped() -> None:
+    plant = Plant().operational()
+    plant.write(0x1007, 0, 5000)
+    plant.hear(0x80)
+    plant.now += 0.01
+    plant.hear(0x305, CanType.REAL32.pack(2.5))
+    plant.part(7)
+    plant.hear(0x80)
+    assert (plant.cell.image.values[SPEED], plant.cell.image.values[PART]) == (0.0, 7)
+    assert plant.node.counters.outside_window == 1
+
+
+def test_node_as_sync_producer() -> None:
+    plant = Plant(replace(PLAN, sync=SyncPlan(producer=True, period=100_000, counter=10))).operational()
+    assert plant.run(0.25) == [
+        Frame(0x80, b"\1"),
+        Frame(0x285, bytes(4)),
+        Frame(0x80, b"\2"),
+        Frame(0x285, bytes(4)),
+    ]
+
+
+def test_length_faults_are_emergencies() -> None:
+    plant = Plant().operational()
+    assert _emergencies(plant.hear(0x205, b"\1\2")) == [0x8210]
+    assert _emergencies(plant.hear(0x205, bytes(8))) == [0x8220]
+    assert _emergencies(plant.part(1)) == [0]
+
+
+def test_refused_write_is_an_emergency_until_one_succeeds() -> None:
+    plant = Plant().operational()
+    assert plant.write(0x2001, 1, 9) == 0
+    assert _emergencies(plant.part(7)) == [0xFF01]
+    assert plant.cell.image.values[PART] == 9
+    plant.cell.release(TOOL, PART, plant.now)
+    assert _emergencies(plant.part(7)) == [0]
+
+
+def test_time_reaches_the_log() -> None:
+    plant = Plant().operational()
+    plant.hear(0x100, bytes(6))
+    assert plant.notebook.times == [datetime(1984, 1, 1, tzinfo=UTC)]
+
+
+# -- writers ---------------------------------------------------------------------------------------------------------
+
+
+def _line_alive(plant: Plant) -> bool:
+    return plant.cell.writers.alive[LINE]
+
+
+def test_rpdo_writer_lives_from_its_first_rpdo_and_is_counted_once() -> None:
+    plant = Plant().operational()
+    plant.heartbeat()
+    assert not _line_alive(plant)
+    plant.part(1)
+    plant.part(2)
+    plant.hear(0x305, bytes(4))
+    assert plant.cell.writers.connections == [1, 0]
+    assert plant.cell.ownership.owners == [LINE, None]
+
+
+@pytest.mark.parametrize("command", [PRE_OPERATIONAL, STOP, RESET_NODE, RESET_COMMUNICATION])
+def test_leaving_operational_loses_the_rpdo_writer(command: bytes) -> None:
+    plant = Plant().operational()
+    plant.part(7)
+    plant.hear(0, command)
+    assert not _line_alive(plant)
+    assert plant.cell.ownership.owners == [None, None]
+    assert plant.cell.image.values[PART] == 0
+
+
+def test_lost_heartbeat_loses_the_writer_and_operational() -> None:
+    plant = Plant().operational()
+    plant.heartbeat()
+    plant.part(7)
+    frames = plant.run(0.6)
+    assert _emergencies(frames) == [0x8130]
+    assert plant.state is NmtState.PRE_OPERATIONAL
+    assert not _line_alive(plant)
+    assert plant.read(0x1001) == 0x11
+    assert _emergencies(plant.heartbeat()) == [0]
+
+
+@pytest.mark.parametrize(
+    "behaviour, state",
+    [(0, NmtState.PRE_OPERATIONAL), (1, NmtState.OPERATIONAL), (2, NmtState.STOPPED)],
+)
+def test_error_behaviour_1029h(behaviour: int, state: NmtState) -> None:
+    plant = Plant().operational()
+    plant.write(0x1029, 1, behaviour, 1)
+    plant.heartbeat()
+    plant.part(7)
+    plant.run(0.6)
+    assert (plant.state, _line_alive(plant)) == (state, False)
+
+
+def test_a_master_that_restarts_is_lost_as_a_writer_without_an_emergency() -> None:
+    plant = Plant().operational()
+    plant.heartbeat()
+    plant.part(7)
+    assert plant.heartbeat(0) == []
+    assert (plant.state, _line_alive(plant)) == (NmtState.OPERATIONAL, False)
+
+
+def test_rpdo_deadline_loses_the_writer() -> None:
+    first, *others = PLAN.pdos
+    plant = Plant(replace(PLAN, heartbeat=0, pdos=(replace(first, event=50), *others))).operational()
+    plant.part(7)
+    assert _emergencies(plant.run(0.06)) == [0x8250]
+    assert not _line_alive(plant)
+    assert _emergencies(plant.part(8)) == [0]
+    assert _line_alive(plant)
+
+
+def test_sdo_client_is_a_writer_until_sdo_is_no_longer_served() -> None:
+    plant = Plant().power_on()
+    plant.read(0x1000)
+    assert plant.cell.writers.alive == [False, True]
+    plant.hear(0, START)
+    plant.hear(0, PRE_OPERATIONAL)
+    assert plant.cell.writers.alive == [False, True]
+    plant.hear(0, STOP)
+    assert plant.cell.writers.alive == [False, False]
+
+
+def test_heartbeat_feeds_a_writer_that_sends_only_changes() -> None:
+    definition = replace(_CELL, writers=(Writer("line", timeout=1.0), Writer("tool")))
+    plant = Plant()
+    cell = plant.cell = Cell(definition)
+    cell.robot_connected(plant.now)
+    cell.adopt({PART: 0, SPEED: 0.0}, plant.now)
+    plant.node = Node(PLAN, cell, plant.wire.send, MemoryStore(), lambda _now: True)
+    plant.operational()
+    plant.part(7)
+    for _ in range(10):
+        plant.heartbeat()
+        plant.run(0.4)
+        cell.tick(plant.now)
+    assert _line_alive(plant)
+
+
+# -- bus -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("state", [BusState.BUS_OFF, BusState.DOWN, BusState.ABSENT])
+def test_without_a_bus_nobody_writes_and_nothing_is_sent(state: BusState) -> None:
+    plant = Plant().operational()
+    plant.part(7)
+    plant.read(0x1000)
+    assert plant.bus(state) == []
+    assert plant.cell.writers.alive == [False, False]
+    assert plant.state is NmtState.PRE_OPERATIONAL
+    assert plant.show(CYCLES, 9) == []
+    assert plant.run(10.0) == []
+
+
+@pytest.mark.parametrize(
+    "autostart, state", [(False, NmtState.PRE_OPERATIONAL), (True, NmtState.OPERATIONAL)]
+)
+def test_recovery_from_bus_off_boots_again_and_is_an_emergency(autostart: bool, state: NmtState) -> None:
+    plant = Plant(replace(PLAN, autostart=autostart)).operational()
+    plant.bus(BusState.BUS_OFF)
+    plant.run(1.0)
+    frames = plant.bus(BusState.ACTIVE)
+    assert frames[0] == BOOT_UP
+    assert _emergencies(frames) == [0x8140, 0]
+    assert plant.state is state
+
+
+def test_a_bus_that_was_down_is_no_bus_off() -> None:
+    plant = Plant().operational()
+    plant.bus(BusState.ABSENT)
+    assert plant.bus(BusState.ACTIVE) == [BOOT_UP]
+
+
+def test_a_node_that_was_not_operational_goes_on_where_it_was() -> None:
+    plant = Plant().power_on()
+    plant.hear(0, STOP)
+    plant.take()
+    plant.bus(BusState.DOWN)
+    assert plant.bus(BusState.ACTIVE) == []
+    assert plant.state is NmtState.STOPPED
+
+
+def test_error_behaviour_1_stays_operational_and_sends_everything_anew() -> None:
+    plant = Plant().operational()
+    plant.write(0x1029, 1, 1, 1)
+    plant.bus(BusState.DOWN)
+    plant.show(CYCLES, 9)
+    assert plant.bus(BusState.ACTIVE) == [Frame(0x185, b"\x09\0\0\0")]
+    assert plant.state is NmtState.OPERATIONAL
+
+
+def test_passive_controller_is_an_emergency_while_it_lasts_and_after_a_reset() -> None:
+    plant = Plant().operational()
+    assert _emergencies(plant.bus(BusState.PASSIVE)) == [0x8120]
+    assert _emergencies(plant.hear(0, RESET_COMMUNICATION)) == [0x8120]
+    assert _emergencies(plant.bus(BusState.WARNING)) == [0]
+
+
+def test_overrun_is_an_emergency_until_nothing_is_lost_any_more() -> None:
+    plant = Plant().operational()
+    plant.node.frames_lost(3, plant.now)
+    plant.node.frames_lost(4, plant.now)
+    assert _emergencies(plant.take()) == [0x8110]
+    assert plant.node.counters.overruns == 7
+    assert _emergencies(plant.run(OVERRUN_TIME)) == [0]
+
+
+def test_node_guarding_without_a_heartbeat() -> None:
+    plant = Plant(replace(PLAN, heartbeat=0)).operational()
+    plant.write(0x100C, 0, 100, 2)
+    plant.write(0x100D, 0, 2, 1)
+    plant.node.receive(Frame(0x705, remote=True, length=1), plant.now)
+    assert plant.take() == [Frame(0x705, b"\x05")]
+    assert _emergencies(plant.run(0.3)) == [0x8130]
+    assert plant.state is NmtState.PRE_OPERATIONAL
+
+
+# -- storage and LSS -------------------------------------------------------------------------------------------------
+
+
+def test_saved_communication_parameters_and_mappings_survive_a_restart() -> None:
+    store = MemoryStore()
+    first = Plant(store=store).power_on()
+    assert first.write(0x1017, 0, 250, 2) == 0
+    assert first.write(0x1800, 1, 0xC000_0185) == 0
+    assert first.write(0x1A00, 0, 0, 1) == 0
+    assert first.write(0x1A00, 1, 0x2402_0120) == 0
+    assert first.write(0x1A00, 0, 1, 1) == 0
+    assert first.write(0x1800, 1, 0x4000_0185) == 0
+    assert first.write(0x1010, 1, b"save") == 0
+    second = Plant(store=store).operational()
+    assert second.notebook.reports == []
+    assert (second.read(0x1017), second.read(0x1A00, 1)) == (250, 0x2402_0120)
+    assert second.show(FORCE, 1.5) == [Frame(0x185, CanType.REAL32.pack(1.5))]
+
+
+def test_stored_values_that_make_no_pdo_are_reported_and_defaults_used() -> None:
+    store = MemoryStore()
+    plant = Plant(store=store).power_on()
+    plant.write(0x1010, 1, b"save")
+    store.save(Saved(store.load().layout, {(0x1800, 2): b"\xfc"}))
+    second = Plant(store=store).power_on()
+    assert second.read(0x1800, 2) == 255
+    assert "1800h" in second.notebook.reports[0]
+
+
+def test_parameters_are_not_saved_while_operational() -> None:
+    plant = Plant().operational()
+    assert plant.write(0x1010, 1, b"save") == -0x0800_0022
+    assert plant.write(0x1010, 1, b"evas") == -0x0800_0020
+
+
+def _lss(plant: Plant, *data: int) -> list[Frame]:
+    return plant.hear(0x7E5, bytes(data).ljust(8, b"\0"))
+
+
+def test_new_node_id_comes_with_reset_communication_and_is_kept_if_stored() -> None:
+    store = MemoryStore()
+    plant = Plant(store=store).power_on()
+    plant.take()
+    _lss(plant, 0x04, 1)
+    _lss(plant, 0x11, 9)
+    _lss(plant, 0x17)
+    _lss(plant, 0x04, 0)
+    assert plant.read(0x1000) == 0
+    assert plant.hear(0, RESET_COMMUNICATION) == [Frame(0x709, b"\0")]
+    assert (plant.read(0x1000), plant.read(0x1014, node=9)) == (None, 0x89)
+    assert plant.read(0x1400, 1, node=9) == 0x209
+    assert plant.node.cob_ids() >= {0x209, 0x309, 0x609}
+    assert not plant.node.cob_ids() & {0x205, 0x605}
+    again = Plant(store=store).power_on()
+    assert again.take() == [Frame(0x709, b"\0")]
+    moved = Plant(replace(PLAN, node=6), store).power_on()
+    assert moved.take() == [Frame(0x706, b"\0")]
+    assert "node-ID 9" in moved.notebook.reports[0]
+
+
+def test_unconfigured_node_waits_in_lss_and_boots_with_its_node_id() -> None:
+    plant = Plant(replace(PLAN, node=UNCONFIGURED)).power_on()
+    assert plant.node.cob_ids() == {0x7E5}
+    assert plant.hear(0, START) == []
+    assert plant.run(5.0) == []
+    assert _lss(plant, 0x4C) == [Frame(0x7E4, b"\x50" + bytes(7))]
+    _lss(plant, 0x04, 1)
+    _lss(plant, 0x11, 7)
+    assert _lss(plant, 0x04, 0) == [Frame(0x707, b"\0")]
+    assert plant.read(0x1800, 1, node=7) == 0x4000_0187
+    assert plant.run(1.0) == [Frame(0x707, b"\x7f")]
+
+
+def test_bit_rate_is_the_links_affair() -> None:
+    plant = Plant().power_on()
+    _lss(plant, 0x04, 1)
+    _lss(plant, 0x15, 100, 0)
+    assert plant.notebook.rates == [(500_000, 0.1)]
+    assert plant.node.bit_rate == 500_000
+
+
+# -- dictionary and COB-IDs ------------------------------------------------------------------------------------------
+
+
+def test_filters_hold_exactly_what_the_node_hears() -> None:
+    plant = Plant().power_on()
+    assert plant.node.cob_ids() == {0x000, 0x080, 0x100, 0x205, 0x305, 0x605, 0x701, 0x705, 0x7E5}
+    assert plant.node.remote_ids() == {0x705}
+
+
+def test_changed_cob_ids_are_announced() -> None:
+    plant = Plant().power_on()
+    told = plant.notebook.filters
+    plant.write(0x1400, 1, 0x8000_0205)
+    plant.write(0x1400, 1, 0x190)
+    plant.write(0x1005, 0, 0x90)
+    assert plant.notebook.filters > told
+    assert plant.node.cob_ids() == {0x000, 0x090, 0x100, 0x190, 0x305, 0x605, 0x701, 0x705, 0x7E5}
+    plant.hear(0, START)
+    plant.hear(0x190, b"\7\0\0\0")
+    assert plant.cell.image.values[PART] == 7
+
+
+def test_status_flags_are_the_manufacturer_status_register() -> None:
+    plant = Plant().power_on()
+    assert plant.read(0x1002) == plant.read(0x5F00, 2)
+
+
+def test_identity_is_that_of_the_mapping() -> None:
+    assert Plant().power_on().read(0x1018, 4) == 0xCAFE_F00D
+
+
+def test_robot_lost_and_ownership_are_abort_codes() -> None:
+    plant = Plant().operational()
+    plant.part(7)
+    assert plant.write(0x2001, 1, 9) == -0x0800_0021
+    plant.cell.robot_lost("unplugged", plant.now)
+    assert plant.write(0x2002, 1, 9) == -0x0800_0022
+
+
+@pytest.mark.parametrize("plan", [PLAN, replace(PLAN, autostart=True), replace(PLAN, node=UNCONFIGURED)])
+def test_every_object_can_be_read_or_says_why_not(plan: CanopenPlan) -> None:
+    plant = Plant(plan).power_on()
+    for one in plant.node.dictionary:
+        for entry in one.entries:
+            if one.index != 0x1003 and entry.access.readable:
+                assert entry.type.size in (None, len(plant.node.dictionary.read(one.index, entry.subindex)))
+
+
+_OUR_IDS = (0x000, 0x080, 0x100, 0x205, 0x305, 0x605, 0x701, 0x705, 0x7E5)
+_WRITABLE = [
+    (one.index, entry.subindex, entry.type.size)
+    for one in Plant().node.dictionary
+    for entry in one.entries
+    if entry.access.writable and entry.type.size is not None
+]
+
+
+def _download(place: tuple[int, int, int], value: bytes) -> Frame:
+    index, subindex, size = place
+    command = 0x23 | (4 - size) << 2
+    return Frame(0x605, bytes([command]) + _multiplexer(index, subindex) + value[:size].ljust(4, b"\0"))
+
+
+_IDENTIFIERS = st.sampled_from(_OUR_IDS) | st.integers(0, 0x7FF)
+_FRAMES = (
+    st.builds(Frame, _IDENTIFIERS, st.binary(max_size=8) | st.binary(min_size=8, max_size=8))
+    | st.builds(Frame, _IDENTIFIERS, st.just(b""), st.just(True), st.integers(0, 8))
+    | st.builds(
+        _download, st.sampled_from(_WRITABLE), st.binary(min_size=4, max_size=4) | st.just(b"\1\0\0\0")
+    )
+)
+_STEPS = st.lists(
+    _FRAMES | st.sampled_from(BusState) | st.sampled_from([START, STOP, PRE_OPERATIONAL, RESET_NODE]),
+    max_size=40,
+)
+
+
+@given(_STEPS, st.booleans())
+def test_whatever_comes_the_node_stands_and_its_answers_are_bounded(
+    steps: list[Frame | BusState | bytes], autostart: bool
+) -> None:
+    """Any frame in any state: no exception, no flood, 8-byte SDO answers, nothing into a dead bus."""
+    plant = Plant(replace(PLAN, autostart=autostart)).power_on()
+    plant.take()
+    for step in steps:
+        if isinstance(step, BusState):
+            frames = plant.bus(step)
+        elif isinstance(step, bytes):
+            frames = plant.hear(0, step)
+        else:
+            plant.node.receive(step, plant.now)
+            frames = plant.take()
+        frames += plant.run(0.01)
+        assert len(frames) <= 200
+        assert not frames or plant.node.bus.carries
+        assert all(len(frame.data) == 8 for frame in frames if frame.can_id == 0x585)
+    deadline = plant.node.next_deadline(plant.now)
+    assert deadline > plant.now
+
+
+def test_pdos_may_be_replaced_while_they_wait_and_nothing_else() -> None:
+    plant = Plant(replace(PLAN, autostart=True)).power_on()
+    plant.hear(0x80)
+    plant.heartbeat()
+    plant.read(0x1000)
+    plant.run(1.0)
+    sent = plant.wire.sent
+    assert {frame.can_id for frame, _ in sent} == {0x705, 0x185, 0x285, 0x585, 0x085}
+    assert {frame.can_id for frame, priority in sent if priority is Priority.PDO} == {0x185, 0x285}
+
+
+def test_sdo_server_tells_its_cob_ids_whatever_the_node_id() -> None:
+    plant = Plant().power_on()
+    assert (plant.read(0x1200, 1), plant.read(0x1200, 2)) == (0x605, 0x585)
+    _lss(plant, 0x04, 1)
+    _lss(plant, 0x11, 9)
+    plant.hear(0, RESET_COMMUNICATION)
+    assert (plant.read(0x1200, 1, node=9), plant.read(0x1200, 2, node=9)) == (0x609, 0x589)

@@ -1,0 +1,193 @@
+"""The status block as objects: the same numbers as on Modbus, and the same requests."""
+
+from __future__ import annotations
+
+import pytest
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Pdo
+from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES, StatusObjects
+from gatewayd.core.cell import Cell, Change
+from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
+from gatewayd.core.status import FIELDS, LENGTH, RELEASE_ALL, TABLES, StatusBlock
+
+LINE, HMI = range(2)
+COUNT = 300
+"""More variables than an array has entries."""
+
+
+def _definition(count: int = COUNT, writers: tuple[str, ...] = ("line", "hmi")) -> CellDefinition:
+    variables = tuple(
+        Variable(
+            index + 1,
+            f"v{index}",
+            Direction.INPUT,
+            ValueKind.INT,
+            f"input_{index}",
+            low=-9,
+            high=9,
+            lock=index,
+        )
+        for index in range(count)
+    )
+    return CellDefinition(
+        name="big",
+        fingerprint=0xC0FFEE42,
+        variables=variables,
+        locks=tuple(
+            Lock(one.name, (index,), (LINE, HMI) if index else (HMI,), lease=2.0)
+            for index, one in enumerate(variables)
+        ),
+        writers=tuple(map(Writer, writers)),
+        stale_after=0.1,
+    )
+
+
+class Node:
+    """A cell with its robot up, and its status block as objects, at a time that can be set."""
+
+    def __init__(self, writer: int | None = LINE) -> None:
+        self.now = 1.0
+        self.cell = Cell(_definition())
+        self.cell.robot_connected(0.0)
+        self.cell.adopt(dict.fromkeys(range(COUNT), 0), 0.0)
+        self.dictionary = Dictionary(StatusObjects(self.cell, writer, lambda: self.now).objects())
+        self.subindices = {
+            entry.name: entry.subindex
+            for one in self.dictionary
+            for entry in one.entries
+            if one.index == HEADER
+        }
+
+    def field(self, name: str) -> int:
+        return int.from_bytes(self.dictionary.read(HEADER, self.subindices[name]), "little")
+
+    def put(self, name: str, value: int) -> AbortCode | None:
+        try:
+            self.dictionary.write(HEADER, self.subindices[name], value.to_bytes(2, "little"))
+        except Abort as abort:
+            return abort.code
+        return None
+
+    def entry(self, table: str, number: int) -> int:
+        further, subindex = divmod(number - 1, 254)
+        return int.from_bytes(self.dictionary.read(TABLE_INDICES[table] + further, subindex + 1), "little")
+
+
+@pytest.fixture
+def node() -> Node:
+    return Node()
+
+
+def test_header_has_every_field_by_its_name() -> None:
+    header = next(iter(Node().dictionary))
+    assert header.index == 0x5F00
+    assert [(one.subindex, one.name) for one in header.entries[1:]] == [
+        (number, field.name) for number, field in enumerate(FIELDS, 1)
+    ]
+    assert {one.type for one in header.entries[1:]} == {CanType.UNSIGNED16, CanType.UNSIGNED32}
+    writable = [one.name for one in header.entries if one.access is Access.RW]
+    assert writable == ["request", "release"]
+    assert all(one.pdo is Pdo.NONE for one in header.entries)
+
+
+def test_indices_are_fixed_and_apart() -> None:
+    """The largest cell has five indices to a table of variables."""
+    assert set(TABLE_INDICES) == {table.name for table in TABLES}
+    assert TABLE_INDICES == {
+        "good": 0x5F01,
+        "writers_alive": 0x5F02,
+        "owner": 0x5F10,
+        "lease": 0x5F20,
+        "age": 0x5F30,
+        "quality": 0x5F40,
+    }
+    largest = Cell(_definition(1024, tuple(f"w{number}" for number in range(32))))
+    indices = [one.index for one in StatusObjects(largest, None, float).objects()]
+    assert len(indices) == len(set(indices)) == 3 + 4 * 5
+    assert all(len(one.entries) <= 255 for one in StatusObjects(largest, None, float).objects())
+
+
+def test_every_word_is_that_of_the_block(node: Node) -> None:
+    """Whatever the state of the cell, both buses show the same."""
+    cell = node.cell
+    cell.writer_connected(LINE, 0.5)
+    for index in (1, 20, 299):
+        assert cell.write(LINE, [Change(index, 3)], 0.5 + index / 1000) is None
+    assert cell.write(HMI, [Change(20, 4)], 0.9) is not None
+    cell.set_availability([7], False, "in use", 0.9)
+    block = StatusBlock(cell).read(0, LENGTH, node.now)
+
+    def words(offset: int, count: int) -> int:
+        return int.from_bytes(block[2 * offset : 2 * (offset + count)], "big")
+
+    assert {field.name: node.field(field.name) for field in FIELDS} == {
+        field.name: words(field.offset, field.words) for field in FIELDS
+    }
+    counts = {"good": 19, "writers_alive": 2}
+    for table in TABLES:
+        numbers = range(1, counts.get(table.name, COUNT) + 1)
+        assert [node.entry(table.name, number) for number in numbers] == [
+            words(table.offset + number - 1, 1) for number in numbers
+        ]
+    assert node.field("fingerprint") == 0xC0FFEE42
+    assert node.entry("owner", 300) == LINE + 1
+
+
+def test_entries_are_named_after_variables_and_writers(node: Node) -> None:
+    def name(index: int, subindex: int) -> str:
+        return node.dictionary.entry(index, subindex).name
+
+    assert name(TABLE_INDICES["owner"], 1) == "owner v0"
+    assert name(TABLE_INDICES["age"] + 1, 1) == "age v254"
+    assert name(TABLE_INDICES["good"], 2) == "good v16..v31"
+    assert name(TABLE_INDICES["writers_alive"], 2) == "writers_alive hmi"
+
+
+def test_a_cell_without_writers_has_no_table_of_them() -> None:
+    bare = Cell(CellDefinition("bare", 1, (), (), (), 0.1))
+    assert [one.index for one in StatusObjects(bare, None, float).objects()] == [HEADER]
+
+
+def test_tables_are_read_only(node: Node) -> None:
+    with pytest.raises(Abort) as error:
+        node.dictionary.write(TABLE_INDICES["owner"], 1, bytes(2))
+    assert error.value.code is AbortCode.READ_ONLY
+    assert node.put("layout", 1) is AbortCode.READ_ONLY
+
+
+def test_request_and_release_take_variable_numbers(node: Node) -> None:
+    assert node.put("request", 2) is None
+    assert (node.entry("owner", 2), node.entry("lease", 2)) == (LINE + 1, 2000)
+    assert node.field("request") == 0
+    node.now = 1.5
+    assert node.entry("lease", 2) == 1500
+    assert node.put("release", 2) is None
+    assert node.entry("owner", 2) == 0
+
+
+def test_release_all(node: Node) -> None:
+    assert node.put("request", 2) is None
+    assert node.put("request", 3) is None
+    assert node.put("release", RELEASE_ALL) is None
+    assert node.cell.ownership.held_by(LINE) == []
+
+
+def test_0_requests_nothing(node: Node) -> None:
+    assert node.put("request", 0) is None
+    assert node.cell.health.writes_refused == 0
+
+
+def test_refused_requests_are_aborted(node: Node) -> None:
+    node.cell.request(HMI, 1, node.now)
+    assert node.put("request", 2) is AbortCode.LOCAL_CONTROL
+    assert node.put("release", 2) is AbortCode.LOCAL_CONTROL
+    assert node.put("request", 1) is AbortCode.READ_ONLY
+    assert node.put("request", COUNT + 1) is AbortCode.INVALID_VALUE
+    assert node.cell.health.writes_refused == 4
+
+
+def test_an_undeclared_sdo_client_takes_no_lock() -> None:
+    node = Node(writer=None)
+    assert node.put("request", 2) is AbortCode.READ_ONLY
+    assert node.cell.health.writes_refused == 1

@@ -1,0 +1,52 @@
+"""A bus that keeps what was sent, and an SDO client's view of a few objects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pytest
+
+from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary, Object
+from gatewayd.canopen.frame import Frame, Priority
+
+__all__ = ["Client", "Wire"]
+
+
+class Wire:
+    """Takes frames; `take` hands them out once."""
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+        self.sent: list[tuple[Frame, Priority]] = []
+        """Everything, whether it was taken or not."""
+
+    def send(self, frame: Frame, priority: Priority) -> None:
+        self.frames.append(frame)
+        self.sent.append((frame, priority))
+
+    def take(self) -> list[Frame]:
+        frames, self.frames = self.frames, []
+        return frames
+
+
+class Client:
+    """Reads and writes unsigned numbers."""
+
+    def __init__(self, objects: Iterable[Object] | Dictionary) -> None:
+        self.dictionary = objects if isinstance(objects, Dictionary) else Dictionary(objects)
+
+    def read(self, index: int, subindex: int = 0) -> int:
+        return int.from_bytes(self.dictionary.read(index, subindex), "little")
+
+    def write(self, index: int, subindex: int, value: int) -> None:
+        size = self.dictionary.entry(index, subindex).type.size
+        assert size is not None
+        self.dictionary.write(index, subindex, value.to_bytes(size, "little"))
+
+    def refused(self, index: int, subindex: int, value: int, code: AbortCode) -> None:
+        """Writing the value is refused with this code, and changes nothing."""
+        before = self.read(index, subindex)
+        with pytest.raises(Abort) as caught:
+            self.write(index, subindex, value)
+        assert caught.value.code is code
+        assert self.read(index, subindex) == before
