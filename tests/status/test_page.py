@@ -138,6 +138,27 @@ async def test_a_reloaded_mapping_is_shown_without_reloading_the_page(plant: Pla
         await shown.page.wait(f"{row('made', 'span.quality')}.startsWith('good')")
 
 
+async def test_one_page_shows_several_cells(plant: Plant) -> None:
+    simulator, port = plant.simulator(), free_port()
+    outputs = "variables:\n  {name}: {{robot: output_int_register_0, modbus: 110}}\n"
+    files = [
+        plant.mapping(outputs.format(name=f"cycles_{unit}"), simulator.port, name=f"cell-{unit}", unit=unit)
+        for unit in (1, 2)
+    ]
+    plant.daemon(*files, "--status", f"{HOST}:{port}").wait_for_line("status page")
+    async with browsing(plant.directory) as page:
+        await page.open(f"http://{HOST}:{port}/", *NARROW)
+        await page.wait(f"{LIVE} && {text('button.name')} === 'cycles_1'")
+        assert await page.run("[...document.getElementById('cells').options].map((one) => one.value)") == [
+            "cell-1",
+            "cell-2",
+        ]
+        await page.run("location.hash = 'cell-2'")
+        await page.wait(f"{LIVE} && {text('button.name')} === 'cycles_2'")
+        assert await page.run("document.getElementById('cells').value") == "cell-2"
+        assert await page.run("document.documentElement.scrollWidth") <= NARROW[0]
+
+
 async def test_filter_and_details_by_keyboard_alone(plant: Plant) -> None:
     async with showing(plant, WIDE) as shown:
         page = shown.page
