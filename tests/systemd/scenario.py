@@ -34,6 +34,12 @@ variables:
 MORE = MAPPING + "  level:  {robot: output_double_register_0, modbus: 110}\n"
 BROKEN = MAPPING + "  cycles: {robot: output_int_register_0, modbus: 100}\n"
 
+DPKG = (
+    "dpkg --force-unsafe-io --force-confold "
+    # A third of the files, which the service never opens.
+    "--path-exclude='/usr/lib/gatewayd/lib/*/pygments/lexers/*' --path-exclude='/usr/share/doc/gatewayd/reference/*'"
+)
+
 Facts = dict[str, Any]
 STEPS: list[Callable[[], Facts]] = []
 
@@ -60,7 +66,7 @@ def wait_for(condition: Callable[[], bool], seconds: float = 15) -> bool:
     while time.monotonic() < end:
         if condition():
             return True
-        time.sleep(0.05)
+        time.sleep(0.1)
     return False
 
 
@@ -92,7 +98,7 @@ def journal(since: str = "") -> list[Facts]:
 @step
 def install() -> Facts:
     """The package on a machine that never had one."""
-    done = timed("dpkg --force-unsafe-io --install /srv/results/gatewayd.deb")
+    done = timed(f"{DPKG} --install /srv/results/gatewayd.deb")
     user = pwd.getpwnam("gatewayd")
     return {
         **done,
@@ -300,7 +306,7 @@ def upgrade() -> Facts:
     """While the cell runs: the new version serves the old mapping, and settings stay."""
     before = show()
     Path("/etc/default/gatewayd").write_text("# mine\n")
-    done = timed("dpkg --force-unsafe-io --force-confold --install /srv/results/gatewayd-next.deb")
+    done = timed(f"{DPKG} --install /srv/results/gatewayd-next.deb")
     return {
         **done,
         "before": before,
