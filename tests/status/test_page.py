@@ -25,7 +25,7 @@ writers:
   plc: {modbus: 127.0.0.2}
   hmi: {modbus: 127.0.0.3}
 variables:
-  start:  {robot: input_bit_register_0, modbus: 0.0, owner: plc, comment: begin one cycle}
+  start:  {robot: input_bit_register_0, modbus: [0.0, {coil: 5}], owner: plc, comment: begin one cycle}
   part:   {robot: input_int_register_0, modbus: {holding: 10, type: uint16}, owner: plc, limits: [0, 999]}
   cycles: {robot: output_int_register_0, modbus: 110, on_stale: hold}
   tcp:    {robot: actual_TCP_pose, modbus: {holding: 130, type: float32}, unit: m}
@@ -91,7 +91,8 @@ async def test_values_owners_and_events_are_live(plant: Plant) -> None:
         await page.wait(f"{text('#happened')}.includes('plc took part')")
         assert await page.run(row("part", "td.address")) == "10"
         assert await page.run(row("part", "td.notation")) == "400011"
-        assert await page.run(row("start", "td.notation")) == "400001.0"
+        assert await page.run(row("start", "td.notation")) == "400001.0000006"
+        assert await page.run(row("start", "td.address")) == "0.0coil 5"
         hmi = plant.plc(HMI)
         assert hmi.write(10, [5]) == 2
         await page.wait("document.querySelectorAll('.writers .node')[1].dataset.level === 'warn'")
