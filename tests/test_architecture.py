@@ -125,7 +125,6 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "cli.completion": "tests/cli/test_main.py",
     "control": "a docstring",
     "core": "a docstring",
-    "demo": "a docstring",
     "mapping": "a docstring",
     "mapping.plan": "records; tests/mapping/test_compile.py pins their content",
     "modbus": "a docstring",
