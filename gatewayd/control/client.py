@@ -34,7 +34,7 @@ class ControlError(Exception):
 
 
 def find_socket(named: Path | None, environ: Mapping[str, str]) -> Path:
-    """The socket that was named, or the first of the usual ones that is there, or the only instance's. Raises NoDaemon."""
+    """The socket that was named, the first of the usual ones that is there, or the only instance's. Raises NoDaemon."""
     if named is not None:
         return named
     usual = candidates(environ)
