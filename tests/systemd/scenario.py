@@ -152,6 +152,19 @@ def journal_fields() -> Facts:
 
 
 @step
+def control() -> Facts:
+    """Who reaches the control socket: root, the group, nobody else."""
+    nobody = "setpriv --reuid=nobody --regid=nogroup"
+    return {
+        "root": timed("gatewayd status"),
+        "member": timed(f"{nobody} --groups=gatewayd gatewayd status"),
+        "stranger": timed(f"{nobody} --clear-groups gatewayd status"),
+        "lists": timed(f"{nobody} --clear-groups ls /run/gatewayd /etc/gatewayd /var/lib/gatewayd"),
+        "modes": sh("stat -c '%n %a %U:%G' /run/gatewayd /run/gatewayd/* /var/lib/gatewayd").stdout,
+    }
+
+
+@step
 def confinement() -> Facts:
     """What a program under the same restrictions may do: measured, not read from the unit."""
     sh("ip link add vcan0 type vcan; ip link set vcan0 up; ip address add 203.0.113.1/32 dev lo")
