@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlencode
 
-from gatewayd.control.paths import candidates
+from gatewayd.control.paths import SYSTEM_SOCKET, candidates
 
 __all__ = ["Client", "ControlError", "NoDaemon", "find_socket", "segment"]
 
@@ -34,17 +34,33 @@ class ControlError(Exception):
 
 
 def find_socket(named: Path | None, environ: Mapping[str, str]) -> Path:
-    """The socket that was named, or the first of the usual ones that exists. Raises NoDaemon."""
+    """The socket that was named, the first of the usual ones that is there, or the only instance's. Raises NoDaemon."""
     if named is not None:
         return named
     usual = candidates(environ)
-    found = next((path for path in usual if path.exists()), None)
+    found = next((path for path in usual if _is_there(path)), None)
     if found is None:
+        instances = sorted(SYSTEM_SOCKET.parent.glob(f"*/{SYSTEM_SOCKET.name}"))
+        if len(instances) == 1:
+            return instances[0]
+        if instances:
+            raise NoDaemon(f"several run here: name one with --socket: {', '.join(map(str, instances))}")
         places = " or ".join(map(str, usual))
         raise NoDaemon(
             f"no gatewayd runs here: there is no {places}; start one, or name its socket with --socket"
         )
     return found
+
+
+def _is_there(path: Path) -> bool:
+    """Also if it may be there, but this user may not look: then the attempt says so."""
+    try:
+        path.stat()
+    except PermissionError:
+        return True
+    except OSError:
+        return False
+    return True
 
 
 class Client:

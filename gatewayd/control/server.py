@@ -208,10 +208,10 @@ async def _body(request: web.Request) -> dict[str, Any]:
 
 
 async def _who(request: web.Request) -> str:
-    """Who is at the other end, as the kernel knows it."""
+    """Who is at the other end, as the kernel knows it; a peer on the network by its address."""
     sock = request.transport.get_extra_info("socket") if request.transport is not None else None
     if sock is None or sock.family != socket.AF_UNIX:
-        return ""
+        return f"from {request.remote}" if request.remote else ""
     raw = sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER_CREDENTIALS.size)
     _pid, user, _group = _PEER_CREDENTIALS.unpack(raw)
     # The user database may be on the network.

@@ -124,8 +124,8 @@ async function run() {
 function start() {
   byId("cells").addEventListener("change", (event) => {
     location.hash = encodeURIComponent(event.target.value);
-    layout = null;
   });
+  addEventListener("hashchange", () => { layout = null; });
   for (const button of document.querySelectorAll(".tabs button")) {
     button.addEventListener("click", () => {
       document.body.dataset.tab = button.dataset.tab;

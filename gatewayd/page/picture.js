@@ -13,7 +13,7 @@ export class Picture {
   }
 
   show(picture) {
-    const shape = `${picture.buses.length} ${picture.writers.length}`;
+    const shape = [...picture.buses, ...picture.writers].map((one) => one.name).join(" ");
     if (shape !== this.shape) this.build(picture, shape);
     const told = [picture.robot, picture.gateway, ...picture.buses, ...picture.writers];
     told.forEach((one, index) => this.fill(this.parts[index], one));
@@ -27,7 +27,7 @@ export class Picture {
     this.parts = [];
     const robot = this.node("robot"), gateway = this.node("gateway");
     this.robotLink = this.link("RTDE");
-    this.busLink = this.link(picture.buses.length ? "Modbus TCP" : "no bus");
+    this.busLink = this.link(picture.buses.map((bus) => bus.name.split(" ")[0]).join(", ") || "no bus");
     const buses = make("div", "buses");
     picture.buses.forEach(() => buses.append(this.node("bus")));
     const writers = make("ul", "writers plain");

@@ -141,7 +141,7 @@ class Row {
       ["plot", this.canvas],
       ["quality", this.quality],
       ["owner", this.holder],
-      ["address", ...variable.places.map((place) => make("span", "", place.address))],
+      ["address", ...variable.places.map((place) => make("span", "", areaOf(place) + place.address))],
       ["notation", ...variable.places.map((place) => make("span", "muted", place.notation))],
     ];
     row.append(...cells.map(([className, ...content]) => {
@@ -188,6 +188,10 @@ class Row {
     this.detail = null;
     this.button.setAttribute("aria-expanded", "false");
   }
+}
+
+function areaOf(place) {
+  return place.area === "holding" ? "" : `${place.area} `;
 }
 
 function factsOf(variable, layout) {

@@ -13,7 +13,7 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.status.health import SOURCES
 
-__all__ = ["RECENT", "Level", "Node", "bus", "gateway", "robot", "writers"]
+__all__ = ["RECENT", "Level", "Node", "bus", "can_bus", "gateway", "robot", "writers"]
 
 RECENT = 10.0
 """Seconds for which a refusal or a differing read-back colours the picture."""
@@ -101,6 +101,22 @@ def bus(name: str, connections: int, *, listening: bool) -> Node:
     if not listening:
         return Node(f"Modbus {name}", Level.BAD, "not listening, see the log")
     return Node(f"Modbus {name}", Level.GOOD, f"listening, {_count(connections, 'connection')}")
+
+
+def can_bus(state: int) -> Node:
+    """A CAN bus, by the state that the cell's health tells: 1 absent ... 6 active."""
+    level, words = _CAN_BUS.get(state, (Level.BAD, "in an unknown state"))
+    return Node("CAN bus", level, words)
+
+
+_CAN_BUS = {
+    1: (Level.BAD, "absent: no such interface"),
+    2: (Level.BAD, "down: the interface is not configured"),
+    3: (Level.BAD, "bus-off: cut off after too many errors"),
+    4: (Level.WARN, "error-passive: look at cable, termination and bit rate"),
+    5: (Level.WARN, "many errors: look at cable, termination and bit rate"),
+    6: (Level.GOOD, "active"),
+}
 
 
 def writers(cell: Cell, now: float) -> list[Node]:

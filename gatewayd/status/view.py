@@ -194,6 +194,9 @@ def _picture(station: Station, probes: Probes, now: float) -> dict[str, object]:
     buses = []
     if listener is not None:
         buses.append(picture.bus(listener.name, listener.connections, listening=listener.listening))
+    can_bus: int = getattr(cell.health, "can_bus", 0)
+    if can_bus:
+        buses.append(picture.can_bus(can_bus))
     writers = picture.writers(cell, now)
     levels = [one.level for one in (robot, gateway, *buses, *writers) if one.level is not Level.IDLE]
     return {

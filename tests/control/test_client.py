@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from gatewayd.control import client, paths
 from gatewayd.control.client import Client, NoDaemon, find_socket, segment
 
 
@@ -23,6 +24,30 @@ def test_the_sessions_socket_is_found(tmp_path: Path) -> None:
 def test_without_a_daemon_the_places_are_named(tmp_path: Path) -> None:
     with pytest.raises(NoDaemon, match=r"there is no .*gatewayd\.sock or /run/gatewayd/control\.sock"):
         find_socket(None, {"XDG_RUNTIME_DIR": str(tmp_path)})
+
+
+def test_a_socket_behind_a_closed_door_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that the user is told about the group, not that nothing runs."""
+
+    def closed(_path: Path) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(Path, "stat", closed)
+    assert find_socket(None, {"XDG_RUNTIME_DIR": str(tmp_path)}) == tmp_path / "gatewayd.sock"
+
+
+def test_the_only_instance_is_found_and_of_several_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in (client, paths):
+        monkeypatch.setattr(module, "SYSTEM_SOCKET", tmp_path / "control.sock")
+    (tmp_path / "press").mkdir()
+    (tmp_path / "press" / "control.sock").touch()
+    assert find_socket(None, {}) == tmp_path / "press" / "control.sock"
+    (tmp_path / "weld").mkdir()
+    (tmp_path / "weld" / "control.sock").touch()
+    with pytest.raises(NoDaemon, match=r"name one with --socket: .*press.*weld"):
+        find_socket(None, {})
 
 
 def test_a_missing_file(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from typing import Any
 import click
 
 from gatewayd.cli import COMMANDS
+from gatewayd.control import documented
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
@@ -301,6 +302,35 @@ def histogram_bounds() -> str:
     return ", ".join(f"{bound * 1000:g}" for bound in BOUNDS) + " ms, and all the rest."
 
 
+# -- control interface ------------------------------------------------------------------------------------------------
+
+_OBJECTS = {
+    "STATUS": "Status",
+    "CELL": "Cell (`cells` of the status)",
+    "ROBOT": "Robot (`robot` of a cell)",
+    "MODBUS": "Modbus (`modbus` of a cell)",
+    "WRITER": "Writer (`writers` of a cell)",
+    "REFUSAL": "Refusal (`last_refusal` of a cell)",
+    "VARIABLE": "Variable",
+    "LOCK": "Lock",
+    "EVENT": "Event",
+    "AUDIT": "Record of the audit",
+    "VERSION": "Version",
+}
+
+
+def control_fields() -> str:
+    """Every field that the control interface answers."""
+    assert set(_OBJECTS) == set(documented.__all__)
+    return "\n\n".join(
+        f"### {title}\n\n"
+        + _table(
+            ("field", "meaning"), ((f"`{one}`", text) for one, text in getattr(documented, name).items())
+        )
+        for name, title in _OBJECTS.items()
+    )
+
+
 # -- RTDE -------------------------------------------------------------------------------------------------------------
 
 
@@ -419,6 +449,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "refusals": refusals,
     "exceptions": exceptions,
     "events": events,
+    "control-fields": control_fields,
     "metrics": metrics,
     "process-metrics": process_metrics,
     "histogram-bounds": histogram_bounds,

@@ -22,6 +22,7 @@ ELSEWHERE = {
     r"gatewayd demo": "tests/cli/test_demo.py",
     r"gatewayd run .*": "tests/docs/test_tutorial.py, tests/e2e",
     r"gatewayd diff .*": "tests/cli/test_diff.py",
+    r"gatewayd (status|watch|locks|events|force|unforce)\b.*": "tests/cli, tests/e2e/test_control.py",
     r"gatewayd reload|systemctl reload .*": "tests/e2e/test_reload.py",
     r"gatewayd simulate .*": "test_simulator_takes_the_options_of_the_guides below, tests/cli/test_simulate.py",
     r"mbpoll -0 -p 1502 -t 4:int -B -r 101 -c 2 127\.0\.0\.1": "tests/demo/test_view.py: the demonstration's own",
@@ -32,10 +33,16 @@ ELSEWHERE = {
     r"(sudo )?apt install .*|apt-get install .*": "the system's",
     r"sudo modprobe vcan|sudo ip link .*|ip -details .*": "the system's; tests/kernel sets interfaces up this way",
     r"candump vcan0|(while sleep 0\.4; do )?cansend vcan0 \S+( done)?": "tests/docs/test_canopen_tutorial.py",
+    r"make (deb|install)\b.*": "tests/systemd/test_package.py",
+    r"gatewayd --version": "tests/cli/test_main.py",
+    r"gatewayd (check|show) /etc/gatewayd.*": "tests/systemd/test_boot.py",
+    r"unpacked/usr/lib/gatewayd/bin/python3 -I -m gatewayd check /etc/gatewayd": "tests/systemd/test_package.py",
+    r"systemctl .*|systemd-sysusers .*": "tests/systemd/test_boot.py",
+    r"(journalctl|networkctl|install|editor|cp|dpkg-deb) .*": "the system's",
 }
 """Command (the whole line) -> what else tests it."""
 
-RUN = re.compile(r"gatewayd (check|show|export) .*")
+RUN = re.compile(r"gatewayd (check|show|export) (?!/etc/).*")
 """What test_command_works runs."""
 
 

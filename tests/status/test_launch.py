@@ -13,6 +13,7 @@ import pytest
 
 from gatewayd.daemon import Daemon
 from gatewayd.status.launch import Settings, SettingsError, parse_address, read_token, serve
+from tests.e2e.plant import Plant
 from tests.e2e.processes import HOST, free_port
 from tests.status.press import TOKEN
 
@@ -81,6 +82,31 @@ async def _said(caplog: pytest.LogCaptureFixture, words: str) -> None:
     async with asyncio.timeout(10):
         while words not in caplog.text:  # noqa: ASYNC110 - a log has no event to wait for
             await asyncio.sleep(0.02)
+
+
+async def test_the_daemon_answers_and_obeys_the_token(tmp_path: Path, token_file: Path) -> None:
+    """From the command line to a reload over the network, without a robot."""
+    plant, port = Plant(tmp_path), free_port()
+    try:
+        mapping = plant.mapping("variables: {cycles: {robot: output_int_register_0, modbus: 0}}\n", 1)
+        options = ("--status", f"{HOST}:{port}", "--token-file", token_file)
+        daemon = plant.daemon(mapping, *options)
+        daemon.wait_for_line("status page")
+        async with aiohttp.ClientSession(f"http://{HOST}:{port}") as session:
+            async with session.get("/readyz") as response:
+                assert response.status == 503
+                assert "robot not connected" in await response.text()
+            async with session.post("/api/v1/reload") as response:
+                assert response.status == 401
+            headers = {"Authorization": f"Bearer {TOKEN}"}
+            async with session.post("/api/v1/reload", headers=headers) as response:
+                assert response.status == 200, await response.text()
+        daemon.wait_for_line("reload asked for", "from 127.")
+        code, seconds = daemon.stop()
+        assert code == 0
+        assert seconds < 3
+    finally:
+        plant.stop()
 
 
 def test_nothing_of_it_is_imported_unless_asked_for() -> None:

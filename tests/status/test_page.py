@@ -25,7 +25,7 @@ writers:
   plc: {modbus: 127.0.0.2}
   hmi: {modbus: 127.0.0.3}
 variables:
-  start:  {robot: input_bit_register_0, modbus: 0.0, owner: plc, comment: begin one cycle}
+  start:  {robot: input_bit_register_0, modbus: [0.0, {coil: 5}], owner: plc, comment: begin one cycle}
   part:   {robot: input_int_register_0, modbus: {holding: 10, type: uint16}, owner: plc, limits: [0, 999]}
   cycles: {robot: output_int_register_0, modbus: 110, on_stale: hold}
   tcp:    {robot: actual_TCP_pose, modbus: {holding: 130, type: float32}, unit: m}
@@ -91,7 +91,8 @@ async def test_values_owners_and_events_are_live(plant: Plant) -> None:
         await page.wait(f"{text('#happened')}.includes('plc took part')")
         assert await page.run(row("part", "td.address")) == "10"
         assert await page.run(row("part", "td.notation")) == "400011"
-        assert await page.run(row("start", "td.notation")) == "400001.0"
+        assert await page.run(row("start", "td.notation")) == "400001.0000006"
+        assert await page.run(row("start", "td.address")) == "0.0coil 5"
         hmi = plant.plc(HMI)
         assert hmi.write(10, [5]) == 2
         await page.wait("document.querySelectorAll('.writers .node')[1].dataset.level === 'warn'")
@@ -136,6 +137,27 @@ async def test_a_reloaded_mapping_is_shown_without_reloading_the_page(plant: Pla
         plant.mapping(MAPPING.replace("cycles:", "made:"), shown.simulator.port)
         shown.daemon.popen.send_signal(1)
         await shown.page.wait(f"{row('made', 'span.quality')}.startsWith('good')")
+
+
+async def test_one_page_shows_several_cells(plant: Plant) -> None:
+    simulator, port = plant.simulator(), free_port()
+    outputs = "variables:\n  {name}: {{robot: output_int_register_0, modbus: 110}}\n"
+    files = [
+        plant.mapping(outputs.format(name=f"cycles_{unit}"), simulator.port, name=f"cell-{unit}", unit=unit)
+        for unit in (1, 2)
+    ]
+    plant.daemon(*files, "--status", f"{HOST}:{port}").wait_for_line("status page")
+    async with browsing(plant.directory) as page:
+        await page.open(f"http://{HOST}:{port}/", *NARROW)
+        await page.wait(f"{LIVE} && {text('button.name')} === 'cycles_1'")
+        assert await page.run("[...document.getElementById('cells').options].map((one) => one.value)") == [
+            "cell-1",
+            "cell-2",
+        ]
+        await page.run("location.hash = 'cell-2'")
+        await page.wait(f"{LIVE} && {text('button.name')} === 'cycles_2'")
+        assert await page.run("document.getElementById('cells').value") == "cell-2"
+        assert await page.run("document.documentElement.scrollWidth") <= NARROW[0]
 
 
 async def test_filter_and_details_by_keyboard_alone(plant: Plant) -> None:

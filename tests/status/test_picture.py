@@ -8,7 +8,7 @@ import pytest
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import Event, EventKind
-from gatewayd.status.picture import RECENT, Level, bus, gateway, robot, writers
+from gatewayd.status.picture import RECENT, Level, bus, can_bus, gateway, robot, writers
 from tests.status.press import CYCLES, HMI, LINE, PLC, SPARE
 
 ADDRESS = "10.0.0.1:30004"
@@ -64,6 +64,12 @@ def test_gateway_tells_the_worst_first(cell: Cell, now: float) -> None:
 def test_a_bus_is_red_while_nobody_listens() -> None:
     assert bus(":502", 1, listening=True).words == "listening, 1 connection"
     assert bus(":502", 0, listening=False).level is Level.BAD
+
+
+def test_a_can_bus_is_green_only_when_active() -> None:
+    levels = [can_bus(state).level for state in range(1, 8)]
+    assert levels.index(Level.GOOD) == 5
+    assert levels.count(Level.GOOD) == 1
 
 
 def test_writers_by_their_last_deeds(cell: Cell, now: float) -> None:

@@ -114,6 +114,18 @@ def test_the_journal_has_priority_unit_and_name(steps: Facts) -> None:
     assert not [text for text in lines if text.startswith("<")], "the priority is no part of the text"
 
 
+def test_the_control_socket_is_for_root_and_the_group(steps: Facts) -> None:
+    seen = steps["control"]
+    degraded = 1  # no PLC is connected
+    assert (seen["root"]["code"], seen["member"]["code"]) == (degraded, degraded), seen
+    assert "press-3" in seen["root"]["said"]
+    assert "press-3" in seen["member"]["said"]
+    assert seen["stranger"]["code"] != 0
+    assert "press-3" not in seen["stranger"]["said"] + seen["lists"]["said"]
+    assert seen["lists"]["said"].count("Permission denied") == 3, seen["lists"]
+    assert "/run/gatewayd 750 gatewayd:gatewayd" in seen["modes"]
+
+
 def test_what_it_may_do_and_what_not(steps: Facts) -> None:
     (line,) = [line for line in steps["confinement"]["said"].splitlines() if line.startswith("{")]
     seen = json.loads(line)

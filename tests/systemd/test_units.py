@@ -102,6 +102,7 @@ def test_the_template_differs_in_what_it_must() -> None:
         "AssertPathExists",
         "ConditionPathExistsGlob",
         "Description",
+        "EnvironmentFile",
         "ExecReload",
         "ExecStart",
         "ExecStartPre",

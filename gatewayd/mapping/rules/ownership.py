@@ -16,6 +16,7 @@ from gatewayd.mapping.rules.wording import did_you_mean, seconds
 __all__: list[str] = []
 
 _LEAST_LEASE = 0.1
+_RESERVED = (ANY, "free", "gateway", "operator", "robot", "undeclared")
 _POLICY = ("owner", "lease", "takeover")
 
 
@@ -424,6 +425,27 @@ def any_among_owners(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             message = f"`{ANY}` stands among the named owners of `{part.name}`"
             hint = "write `owner: any`, or name all writers by priority"
             yield rule.at(part.at("owner", owners.index(ANY)), message, hint=hint)
+
+
+@cell_rule(
+    "GW517",
+    "reserved-writer-name",
+    "a writer with a name that the gateway uses itself",
+    """
+Log, status, events and audit tell who wrote what by name. `operator` is the local operator, who takes locks and
+forces values by hand; `gateway` is the gateway itself, which applies fallbacks; `robot` is the owner of outputs;
+`undeclared` is a peer that no writer stands for, and `any` and `free` stand where no writer does. A writer of such
+a name could not be told from them.
+""",
+)
+def reserved_writer_name(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Writers named like parties that no mapping declares."""
+    for writer in cell.document.writers.values():
+        if writer.name in _RESERVED:
+            message = f"`{writer.name}` is a name that the gateway uses itself"
+            yield rule.at(
+                writer.key, message, hint="give the writer another name, say what it is: plc, hmi, line"
+            )
 
 
 def _owned(document: Document) -> Iterator[Part[Group] | Part[VariableSpec]]:
