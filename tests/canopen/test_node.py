@@ -595,6 +595,16 @@ def test_node_guarding_without_a_heartbeat() -> None:
     assert plant.state is NmtState.PRE_OPERATIONAL
 
 
+def test_life_guarding_is_watched_again_from_the_first_request_after_a_loss() -> None:
+    plant = Plant(replace(PLAN, heartbeat=0)).operational()
+    plant.write(0x100C, 0, 100, 2)
+    plant.write(0x100D, 0, 2, 1)
+    for _ in range(2):
+        plant.node.receive(Frame(0x705, remote=True, length=1), plant.now)
+        plant.take()
+        assert _emergencies(plant.run(0.3)) == [0x8130]
+
+
 # -- storage and LSS -------------------------------------------------------------------------------------------------
 
 
