@@ -50,14 +50,14 @@ LAYERS: dict[str, set[str]] = {
     "daemon": {"canopen", "core", "eventlog", "logs", "mapping", "modbus", "robot"},
     "demo": {"core", "daemon", "demo", "eventlog", "logs", "mapping", "modbus", "rtde", "simulator"},
     "cli": {"cli", "core", "daemon", "demo", "eventlog", "logs", "mapping", "rtde", "simulator", "startup"},
-    "cli.export": {"canopen.eds", "canopen.plan", "mapping"},
+    "cli.export": {"canopen.dictionary", "canopen.eds", "canopen.importer", "canopen.plan", "mapping"},
     "__main__": {"cli"},
 }
 """Module or package -> what it and everything in it may import; the longest name that fits decides."""
 
 LIBRARIES: dict[str, set[str]] = {
     "can": {"canopen.pythoncan", "demo.master"},
-    "canopen": set(),
+    "canopen": {"canopen.importer"},
     "click": {"__main__", "cli"},
     "pydantic": {"mapping"},
     "pydantic_core": {"mapping"},
