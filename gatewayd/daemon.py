@@ -62,12 +62,14 @@ class Daemon:
             observer(cell)
 
     def turns(self) -> dict[str, int]:
-        """A counter for each part that has to go on: cores, robot links, listeners. 0: it has not begun."""
+        """A counter for each part that has to go on: cores, links, listeners. 0: it has not begun."""
         found = {f"listener {listener.name}": listener.turns for listener in self.listeners}
         for station in self.stations:
             name = station.plan.cell.name
             found[f"core of {name}"] = station.cell.health.heartbeat
             found[f"robot link of {name}"] = station.robot.turns
+            if station.can is not None:
+                found[f"CAN link of {name}"] = station.can.turns
         return found
 
     def troubles(self) -> list[str]:

@@ -58,7 +58,17 @@ LAYERS: dict[str, set[str]] = {
     "service": {"core", "liveness", "logs", "sentence", "systemd"},
     "reload": {"core", "logs", "mapping", "modbus.server", "robot.link", "startup"},
     "startup": {"logs", "mapping"},
-    "status": {"control", "core", "daemon", "liveness", "logs", "mapping.plan", "modbus.server", "status"},
+    "status": {
+        "control",
+        "core",
+        "daemon",
+        "liveness",
+        "logs",
+        "mapping.plan",
+        "modbus.server",
+        "station",
+        "status",
+    },
     "status.health": {"core"},
     "status.histogram": set(),
     "status.picture": {"core", "status.health"},
@@ -85,7 +95,7 @@ LAYERS: dict[str, set[str]] = {
     },
     "daemon": {"core", "eventlog", "logs", "mapping", "modbus", "station"},
     "station": {"canopen", "core", "eventlog", "mapping.plan", "robot"},
-    "cli.export": {"canopen.eds", "canopen.plan", "mapping"},
+    "cli.export": {"canopen.dictionary", "canopen.eds", "canopen.importer", "canopen.plan", "mapping"},
     "__main__": {"cli"},
 }
 """Module or package -> what it and everything in it may import; the longest name that fits decides."""
@@ -93,7 +103,7 @@ LAYERS: dict[str, set[str]] = {
 LIBRARIES: dict[str, set[str]] = {
     "aiohttp": {"control.server", "status.guard", "status.listener"},
     "can": {"canopen.pythoncan", "demo.master"},
-    "canopen": set(),
+    "canopen": {"canopen.importer"},
     "click": {"__main__", "cli"},
     "prometheus_client": {"status.metrics"},
     "pydantic": {"mapping"},

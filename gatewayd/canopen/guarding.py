@@ -67,9 +67,9 @@ class NodeGuarding:
         self._send(Frame(Function.ERROR_CONTROL + self._node(), answer), Priority.ORDERED)
         self._toggle ^= TOGGLE
         self._asked = now
+        was_lost, self._is_lost = self._is_lost, False
         self._supervise()
-        if self._is_lost:
-            self._is_lost = False
+        if was_lost:
             self._back(now)
 
     def tick(self, now: float) -> None:

@@ -10,6 +10,7 @@ import asyncio
 import logging
 import math
 import time
+from contextlib import suppress
 from datetime import datetime
 
 from gatewayd.canopen.bus import Bus, BusError, BusState
@@ -26,12 +27,16 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.logs import fields
 
-__all__ = ["CORE_TIME", "RETRY", "CanLink"]
+__all__ = ["CORE_TIME", "LOSS_INTERVAL", "RETRY", "TURN", "CanLink"]
 
 CORE_TIME = 0.5
 """Seconds without a count of the core's heartbeat after which the core counts as stuck."""
-RETRY = 5.0
+RETRY = 2.0
 """Seconds between two attempts at a bus that cannot be used as it is set up."""
+TURN = 1.0
+"""Seconds between two counts of `CanLink.turns`."""
+LOSS_INTERVAL = 10.0
+"""Seconds between two lines of the log about lost frames."""
 CLOCK_STEP = 1.0
 """Seconds by which the network's time may differ from what was last told before it is told again."""
 
@@ -48,9 +53,17 @@ class CanLink(Observer):
         self._transmitter = Transmitter(self._offer)
         self._timer: asyncio.TimerHandle | None = None
         self._due = math.inf
+        self._runs = False
+        self._started = False
         self._beat = (-1, -math.inf)
         self._offset = math.inf
-        self._switching: asyncio.TimerHandle | None = None
+        self._lost = 0
+        self._lost_told = -math.inf
+        self._other_bit_rate: int | None = None
+        self._switch = (0, 0.0)
+        self._switching = asyncio.Event()
+        self.turns = 0
+        """Counts while the link's task goes on, whatever the bus does."""
         # The kernel's interfaces are set by whoever administers them; python-can opens its own with a bit rate.
         self._bit_rates = (
             () if plan.interface == "socketcan" else tuple(rate for rate in BIT_RATES if rate is not None)
@@ -65,15 +78,24 @@ class CanLink(Observer):
             bit_rates=self._bit_rates,
         )
         cell.listeners.append(self._on_image)
+        cell.health.can_bus = BusState.ABSENT + 1
 
     async def run(self) -> None:
-        """Stay on the bus until cancelled."""
+        """Stay on the bus until cancelled. May be run again: for the node the bus was away meanwhile."""
+        self._runs = True
         try:
             await self._open(self.node.bit_rate)
             now = time.monotonic()
-            self.node.start(now)
+            if not self._started:
+                self._started = True
+                self.node.start(now)
             self._schedule(now)
-            await asyncio.get_running_loop().create_future()
+            while True:
+                await self._turn_until(math.inf)
+                self._switching.clear()
+                bit_rate, silence = self._switch
+                await self._turn_until(time.monotonic() + silence)
+                await self._open(bit_rate)
         finally:
             self._leave()
 
@@ -95,13 +117,16 @@ class CanLink(Observer):
 
     def on_lost(self, count: int, now: float) -> None:
         """Frames were lost for want of room."""
-        log.warning("CAN frames lost", extra=fields(**self._names(), frames=count))
+        self._lost += count
+        if now - self._lost_told >= LOSS_INTERVAL:
+            log.warning("CAN frames lost", extra=fields(**self._names(), frames=self._lost))
+            self._lost, self._lost_told = 0, now
         self.node.frames_lost(count, now)
         self._schedule(now)
 
     def on_state(self, state: BusState, reason: str, now: float) -> None:
         """The bus is in another state."""
-        level = logging.INFO if state is BusState.ACTIVE else logging.WARNING
+        level = logging.INFO if state is BusState.ACTIVE or not self._runs else logging.WARNING
         log.log(
             level,
             "CAN bus %s",
@@ -110,6 +135,7 @@ class CanLink(Observer):
         )
         self._cell.health.can_bus = state + 1
         if state.carries:
+            self._compare_bit_rates()
             self._transmitter.open()
         else:
             self._transmitter.close()
@@ -150,10 +176,17 @@ class CanLink(Observer):
         if self._plan.interface == "socketcan":
             return
         self._close_bus("LSS switches the bit rate")
-        loop = asyncio.get_running_loop()
-        self._switching = loop.call_later(2 * delay, lambda: loop.create_task(self._open(bit_rate)))
+        self._switch = (bit_rate, 2 * delay)
+        self._switching.set()
 
     # -- inside --------------------------------------------------------------------------------------------------
+
+    async def _turn_until(self, moment: float) -> None:
+        """Wait for that moment, or for a switch of the bit rate, and count meanwhile."""
+        while not self._switching.is_set() and (rest := moment - time.monotonic()) > 0:
+            self.turns += 1
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._switching.wait(), min(rest, TURN))
 
     async def _open(self, bit_rate: int) -> None:
         """Open the bus; a set-up that cannot work is told once and tried again, in case it is repaired."""
@@ -169,9 +202,20 @@ class CanLink(Observer):
                 if str(error) != told:
                     told = str(error)
                     log.error("%s", told, extra=fields(**self._names(), retry_s=RETRY))  # noqa: TRY400 - the text says it all
+                self.turns += 1
                 await asyncio.sleep(RETRY)
             else:
                 return
+
+    def _compare_bit_rates(self) -> None:
+        """The kernel's interface is what it is; `check` has computed the load with what the mapping says."""
+        actual = self._bus.bitrate if self._bus is not None else None
+        if actual not in (None, self._plan.bitrate, self._other_bit_rate):
+            log.warning(
+                "CAN bit rate is not that of the mapping",
+                extra=fields(**self._names(), bitrate=actual, mapping=self._plan.bitrate),
+            )
+        self._other_bit_rate = actual
 
     def _offer(self, frame: Frame) -> bool:
         return self._bus is not None and self._bus.send(frame)
@@ -183,11 +227,12 @@ class CanLink(Observer):
             self.on_state(BusState.DOWN, reason, time.monotonic())
 
     def _leave(self) -> None:
-        for handle in (self._timer, self._switching):
-            if handle is not None:
-                handle.cancel()
-        self._timer = self._switching = None
+        self._runs = False
         self._close_bus("the link ends")
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer, self._due = None, math.inf
+        self._switching.clear()
 
     def _on_image(self, direction: Direction) -> None:
         now = time.monotonic()
@@ -197,7 +242,7 @@ class CanLink(Observer):
     def _schedule(self, now: float) -> None:
         """Move the timer if the node's next deadline has come nearer."""
         due = self.node.next_deadline(now)
-        if due >= self._due:
+        if due >= self._due or not self._runs:
             return
         if self._timer is not None:
             self._timer.cancel()

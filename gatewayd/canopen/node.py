@@ -361,9 +361,9 @@ class Node:
             self.sync.stopped()
         if not self.nmt.allows(Service.SDO):
             self.sdo.reset()
-            self._peers.lose(self.plan.sdo_writer, f"NMT state {new.name}", now)
+            self._lose(self.plan.sdo_writer, f"NMT state {new.name}", now)
         if old is NmtState.OPERATIONAL:
-            self._peers.lose(self.plan.rpdo_writer, f"NMT state {new.name}", now)
+            self._lose(self.plan.rpdo_writer, f"NMT state {new.name}", now)
         self.receive_pdos.nmt(operational, now)
         self.transmit.nmt(operational, now)
         self.emergency.tick(now)
@@ -401,16 +401,21 @@ class Node:
         if reaction is not None:
             self.nmt.command(reaction, now)
 
+    def _lose(self, writer: int | None, reason: str, now: float) -> None:
+        self._peers.lose(writer, reason, now)
+        if writer == self.plan.rpdo_writer:
+            self.receive_pdos.forget()
+
     def _heartbeat_lost(self, node: int, now: float) -> None:
         self.emergency.raise_error(ErrorCode.HEARTBEAT, now, bytes([node]), instance=node)
-        self._peers.lose(self._writers.get(node), f"no heartbeat of node {node}", now)
+        self._lose(self._writers.get(node), f"no heartbeat of node {node}", now)
         self._communication_error(now)
 
     def _heartbeat_back(self, node: int, now: float) -> None:
         self.emergency.clear(ErrorCode.HEARTBEAT, now, instance=node)
 
     def _peer_booted(self, node: int, now: float) -> None:
-        self._peers.lose(self._writers.get(node), f"node {node} has restarted", now)
+        self._lose(self._writers.get(node), f"node {node} has restarted", now)
 
     def _guarding_lost(self, now: float) -> None:
         self.emergency.raise_error(ErrorCode.HEARTBEAT, now)
@@ -422,7 +427,7 @@ class Node:
     def _fault_raised(self, fault: Fault, number: int, now: float) -> None:
         self.emergency.raise_error(fault.value, now, number.to_bytes(2, "little"), instance=number)
         if fault is Fault.TIMEOUT:
-            self._peers.lose(self.plan.rpdo_writer, f"RPDO {number} stays away", now)
+            self._lose(self.plan.rpdo_writer, f"RPDO {number} stays away", now)
 
     def _fault_cleared(self, fault: Fault, number: int, now: float) -> None:
         self.emergency.clear(fault.value, now, instance=number)
@@ -451,6 +456,7 @@ class Node:
 
     def _bus_lost(self, now: float) -> None:
         self._peers.lose_all(f"bus {self.bus.name.lower().replace('_', '-')}", now)
+        self.receive_pdos.forget()
         self.sdo.reset()
         was_operational = self.nmt.state is NmtState.OPERATIONAL
         self._communication_error(now)

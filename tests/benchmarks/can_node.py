@@ -75,6 +75,8 @@ class PairBus(SocketCanBus):
 class Gateway:
     """A cell with its link; the robot is a list of values."""
 
+    link: CanLink
+
     def __init__(self, pair: socket.socket) -> None:
         plan = _plan()
         self.cell = Cell(plan.cell)

@@ -1,134 +1,206 @@
-"""The link on a bus of this process: node, driver and the loop's clock together."""
+"""The link in a running loop: its bus, its timer, its life and its end. What the node does is shown elsewhere."""
 
 from __future__ import annotations
 
 import asyncio
-import itertools
 import logging
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
+from uuid import uuid4
 
 import can
 import pytest
 
-from gatewayd.canopen.link import CORE_TIME, CanLink
+from gatewayd.canopen import link as link_module
+from gatewayd.canopen.bus import BusState
+from gatewayd.canopen.frame import Frame
+from gatewayd.canopen.link import LOSS_INTERVAL, CanLink
 from gatewayd.canopen.nmt import NmtState
+from gatewayd.canopen.plan import CanopenPlan
 from gatewayd.canopen.storage import MemoryStore
 from gatewayd.core.cell import Cell
-from gatewayd.core.events import EventKind
+from tests.canopen.conformance.bench import compiled
 from tests.canopen.recorder import until
-from tests.canopen.test_node import _CELL, NODE, PART, PLAN
 
-CHANNELS = (f"link {number}" for number in itertools.count())
-PATIENCE = 10.0
+HEARTBEAT = 0x705
 
 
-class Master:
-    """The other end of the bus."""
+class Station:
+    """A link on a virtual bus, its cell with a core that counts, and a peer."""
 
-    def __init__(self, channel: str) -> None:
-        self._bus = can.Bus(interface="virtual", channel=channel)
-        self.seen: list[tuple[int, bytes]] = []
-
-    def send(self, can_id: int, data: bytes) -> None:
-        self._bus.send(can.Message(arbitration_id=can_id, data=data, is_extended_id=False))
-
-    def has(self, can_id: int, data: bytes) -> bool:
-        while (message := self._bus.recv(0)) is not None:
-            self.seen.append((message.arbitration_id, bytes(message.data)))
-        return (can_id, data) in self.seen
-
-    def close(self) -> None:
-        self._bus.shutdown()
-
-
-class Line:
-    """A cell with a robot, its link, and a master."""
-
-    def __init__(self) -> None:
-        channel = next(CHANNELS)
-        self.cell = Cell(_CELL)
-        self.master = Master(channel)
-        self.link = CanLink(replace(PLAN, channel=channel, heartbeat=100), self.cell, MemoryStore())
-        self.ticking = True
-
-    async def _tick(self) -> None:
-        while True:
-            if self.ticking:
-                self.cell.tick(time.monotonic())
-            await asyncio.sleep(0.02)
-
-    @asynccontextmanager
-    async def running(self) -> AsyncIterator[None]:
+    def __init__(self, channel: str, **changes: object) -> None:
+        compiled_plan = compiled()
+        assert compiled_plan.canopen is not None
+        settings = {"channel": channel, "heartbeat": 10, **changes}
+        plan: CanopenPlan = replace(compiled_plan.canopen, **settings)  # type: ignore[arg-type]
+        self.names = {one.name: index for index, one in enumerate(compiled_plan.cell.variables)}
+        self.cell = Cell(replace(compiled_plan.cell, stale_after=1e9))
         now = time.monotonic()
         self.cell.robot_connected(now)
-        self.cell.adopt({PART: 0}, now)
-        tasks = [asyncio.create_task(self._tick()), asyncio.create_task(self.link.run())]
-        try:
-            yield
-        finally:
-            for task in tasks:
-                task.cancel()
-                with suppress(asyncio.CancelledError):
-                    await task
-            self.master.close()
+        self.cell.adopt({self.names["ints_in[0]"]: 0, self.names["ints_in[1]"]: 0}, now)
+        self.cell.package_arrived(1.0, now)
+        self.cell.outputs_written(now)
+        self.link = CanLink(plan, self.cell, MemoryStore())
+        self.peer = can.Bus(channel, interface="virtual")
+        self.heard: list[Frame] = []
+        self.beating = True
+
+    async def count(self) -> None:
+        """The core's heartbeat."""
+        while True:
+            if self.beating:
+                self.cell.health.heartbeat += 1
+            await asyncio.sleep(0.01)
+
+    def send(self, can_id: int, data: bytes = b"") -> None:
+        self.peer.send(can.Message(arbitration_id=can_id, data=data, is_extended_id=False))
+
+    def frames(self, can_id: int) -> list[bytes]:
+        """All frames of an identifier so far."""
+        while (message := self.peer.recv(0)) is not None:
+            self.heard.append(Frame(message.arbitration_id, bytes(message.data)))
+        return [frame.data for frame in self.heard if frame.can_id == can_id]
+
+    def forget(self) -> None:
+        self.frames(0)
+        self.heard.clear()
+
+
+@asynccontextmanager
+async def running(station: Station) -> AsyncIterator[asyncio.Task[None]]:
+    core = asyncio.create_task(station.count())
+    task = asyncio.create_task(station.link.run())
+    try:
+        yield task
+    finally:
+        for one in (task, core):
+            one.cancel()
+            with suppress(asyncio.CancelledError):
+                await one
 
 
 @pytest.fixture
-async def line() -> AsyncIterator[Line]:
-    made = Line()
-    async with made.running():
-        await until(lambda: made.master.has(0x700 + NODE, b"\0"), PATIENCE)
-        yield made
+def station() -> Station:
+    return Station(str(uuid4()))
 
 
-async def test_values_go_both_ways(line: Line) -> None:
-    line.master.send(0, bytes([1, NODE]))
-    await until(lambda: line.link.node.nmt.state is NmtState.OPERATIONAL, PATIENCE)
-    line.master.send(0x200 + NODE, (-7).to_bytes(4, "little", signed=True))
-    await until(lambda: line.cell.image.values[PART] == -7, PATIENCE)
-    line.master.send(0x600 + NODE, bytes.fromhex("4000100000000000"))
-    await until(lambda: line.master.has(0x580 + NODE, bytes.fromhex("4300100000000000")), PATIENCE)
+async def test_values_go_both_ways(station: Station) -> None:
+    async with running(station):
+        await until(lambda: station.frames(HEARTBEAT))
+        station.send(0x000, b"\1\5")
+        await until(lambda: station.cell.health.nmt_state == NmtState.OPERATIONAL)
+        station.send(0x305, b"\7\0\0\0\x08\0\0\0")
+        await until(lambda: station.cell.image.values[station.names["ints_in[1]"]] == 8)
+        station.cell.image.values[station.names["ints_out[0]"]] = 9
+        station.cell.outputs_written(time.monotonic())
+        await until(lambda: b"\x09" + bytes(7) in station.frames(0x285))
+        assert station.cell.health.can_bus == BusState.ACTIVE + 1
 
 
-async def test_status_of_the_cell_tells_bus_and_node(line: Line) -> None:
-    assert line.cell.health.can_bus == 6
-    line.master.send(0, bytes([2, NODE]))
-    await until(lambda: line.cell.health.nmt_state == NmtState.STOPPED, PATIENCE)
+async def test_two_nodes_share_a_bus() -> None:
+    channel = str(uuid4())
+    one, other = Station(channel), Station(channel, node=6)
+    async with running(one), running(other):
+        await until(lambda: one.frames(0x705) and one.frames(0x706))
+        one.send(0x000, b"\1\6")
+        await until(lambda: b"\5" in one.frames(0x706))
+        assert b"\5" not in one.frames(0x705)
 
 
-async def test_heartbeat_stops_with_the_core_and_comes_back(line: Line) -> None:
-    await until(lambda: line.master.has(0x700 + NODE, b"\x7f"), PATIENCE)
-    line.ticking = False
-    await asyncio.sleep(CORE_TIME + 0.3)
-    line.master.has(0, b"")
-    line.master.seen.clear()
-    await asyncio.sleep(0.4)
-    assert not line.master.has(0x700 + NODE, b"\x7f")
-    line.ticking = True
-    await until(lambda: line.master.has(0x700 + NODE, b"\x7f"), PATIENCE)
+async def test_heartbeat_stops_with_the_core_and_comes_back_with_it(station: Station) -> None:
+    async with running(station):
+        await until(lambda: len(station.frames(HEARTBEAT)) > 3)
+        station.beating = False
+        await asyncio.sleep(link_module.CORE_TIME + 0.05)
+        station.forget()
+        await asyncio.sleep(0.1)
+        assert station.frames(HEARTBEAT) == []
+        station.send(0x605, bytes.fromhex("4000100000000000"))
+        await until(lambda: station.frames(0x585))
+        station.beating = True
+        await until(lambda: station.frames(HEARTBEAT))
 
 
-async def test_end_of_the_link_takes_its_writers_and_its_bus_away(caplog: pytest.LogCaptureFixture) -> None:
-    line = Line()
-    caplog.set_level(logging.INFO, "gatewayd.canopen")
-    async with line.running():
-        await until(lambda: line.master.has(0x700 + NODE, b"\0"), PATIENCE)
-        line.master.send(0x600 + NODE, bytes.fromhex("4000100000000000"))
-        await until(lambda: line.master.has(0x580 + NODE, bytes.fromhex("4300100000000000")), PATIENCE)
-    assert line.cell.health.can_bus == 2
-    assert [event.detail for event in line.cell.events if event.kind is EventKind.WRITER_LOST] == ["bus down"]
-    assert "CAN bus down" in caplog.text
+async def test_link_that_is_started_again_keeps_time(station: Station) -> None:
+    """The daemon starts a link again after a defect; its timer must not wait for a moment that is over."""
+    async with running(station):
+        await until(lambda: len(station.frames(HEARTBEAT)) > 3)
+    station.forget()
+    await asyncio.sleep(0.03)
+    assert station.frames(HEARTBEAT) == []
+    async with running(station):
+        await until(lambda: len(station.frames(HEARTBEAT)) > 3)
+        station.send(0x605, bytes.fromhex("4000100000000000"))
+        await until(lambda: station.frames(0x585))
 
 
-async def test_interface_that_does_not_exist_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
-    link = CanLink(replace(PLAN, interface="no-such-thing"), Cell(_CELL), MemoryStore())
-    task = asyncio.create_task(link.run())
-    await until(lambda: "no-such-thing" in caplog.text, PATIENCE)
-    task.cancel()
-    with suppress(asyncio.CancelledError):
-        await task
-    assert caplog.text.count("cannot use the interface no-such-thing") == 1
-    assert "Traceback" not in caplog.text
+async def test_nothing_runs_on_after_the_end(station: Station) -> None:
+    async with running(station):
+        await until(lambda: station.frames(HEARTBEAT))
+    assert station.link._timer is None
+    station.cell.outputs_written(time.monotonic())
+    station.cell.image.values[station.names["ints_out[0]"]] = 3
+    station.forget()
+    await asyncio.sleep(0.05)
+    assert station.heard == []
+    assert station.cell.health.can_bus == BusState.DOWN + 1
+
+
+async def test_a_bus_that_cannot_be_used_is_told_once_and_shown_as_absent(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(link_module, "RETRY", 0.01)
+    station = Station(str(uuid4()), interface="nosuchinterface")
+    assert station.cell.health.can_bus == BusState.ABSENT + 1, "not 0, which says that there is no CANopen"
+    async with running(station) as task:
+        await asyncio.sleep(0.05)
+        assert not task.done()
+        assert station.cell.health.can_bus == BusState.ABSENT + 1
+    assert [record.levelname for record in caplog.records if "nosuchinterface" in record.message] == ["ERROR"]
+
+
+async def test_bit_rate_is_switched_once_whatever_comes_at_once(station: Station) -> None:
+    """Two activations in one batch of frames open one bus."""
+    async with running(station):
+        await until(lambda: station.frames(HEARTBEAT))
+        activate = Frame(0x7E5, bytes([0x15, 20, 0]).ljust(8, b"\0"))
+        now = time.monotonic()
+        station.link.on_frames([Frame(0x7E5, b"\4\1".ljust(8, b"\0")), activate, activate], now)
+        station.forget()
+        await asyncio.sleep(0.025)
+        assert station.frames(HEARTBEAT) == []
+        await until(lambda: station.frames(HEARTBEAT))
+        await asyncio.sleep(0.06)
+        station.forget()
+        station.send(0x605, bytes.fromhex("4000100000000000"))
+        await until(lambda: station.frames(0x585))
+        await asyncio.sleep(0.02)
+        assert len(station.frames(0x585)) == 1, "two buses would answer twice"
+
+
+async def test_end_while_the_bit_rate_is_switched(station: Station) -> None:
+    async with running(station):
+        await until(lambda: station.frames(HEARTBEAT))
+        station.send(0x7E5, b"\4\1".ljust(8, b"\0"))
+        station.send(0x7E5, bytes([0x15, 20, 0]).ljust(8, b"\0"))
+        await until(lambda: station.cell.health.can_bus == BusState.DOWN + 1)
+    station.forget()
+    await asyncio.sleep(0.08)
+    assert station.frames(HEARTBEAT) == []
+    assert station.cell.health.can_bus == BusState.DOWN + 1
+
+
+async def test_lost_frames_are_told_seldom_and_all_counted(
+    station: Station, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.WARNING)
+    async with running(station):
+        await until(lambda: station.frames(HEARTBEAT))
+        begin = time.monotonic()
+        for number in range(100):
+            station.link.on_lost(3, begin + number * LOSS_INTERVAL / 50)
+    told = [record for record in caplog.records if record.message == "CAN frames lost"]
+    assert len(told) == 2
+    assert station.link.node.counters.overruns == 300

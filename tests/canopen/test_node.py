@@ -431,6 +431,65 @@ def test_rpdo_deadline_loses_the_writer() -> None:
     assert _line_alive(plant)
 
 
+def _kept_for_sync(behaviour: int = 0) -> Plant:
+    """An RPDO of the watched master waits for SYNC."""
+    plant = Plant().operational()
+    plant.write(0x1029, 1, behaviour, 1)
+    plant.heartbeat()
+    plant.hear(0x305, CanType.REAL32.pack(2.5))
+    return plant
+
+
+@pytest.mark.parametrize("loss", ["boot-up", "heartbeat", "bus"])
+def test_what_a_lost_writer_left_for_sync_is_never_written(loss: str) -> None:
+    """Whatever 1029h says, and though the master is heard again before the SYNC."""
+    plant = _kept_for_sync(behaviour=1)
+    if loss == "boot-up":
+        plant.heartbeat(0)
+    elif loss == "heartbeat":
+        plant.run(0.6)
+    else:
+        plant.bus(BusState.DOWN)
+        plant.bus(BusState.ACTIVE)
+    assert plant.state is NmtState.OPERATIONAL
+    assert not _line_alive(plant)
+    plant.part(1)
+    plant.hear(0x80)
+    assert (plant.cell.image.values[PART], plant.cell.image.values[SPEED]) == (1, 0.0)
+    plant.hear(0x305, CanType.REAL32.pack(1.5))
+    plant.hear(0x80)
+    assert plant.cell.image.values[SPEED] == 1.5
+
+
+def test_what_a_deadline_of_one_rpdo_costs_the_others() -> None:
+    """The writer is lost with it, and what another RPDO of it has left for SYNC as well."""
+    first, *others = PLAN.pdos
+    plant = Plant(replace(PLAN, heartbeat=0, pdos=(replace(first, event=50), *others))).operational()
+    plant.part(7)
+    plant.hear(0x305, CanType.REAL32.pack(2.5))
+    plant.run(0.06)
+    assert plant.hear(0x80) == [Frame(0x285, bytes(4))]
+    assert plant.cell.image.values[SPEED] == 0.0
+    assert plant.cell.ownership.owners == [None, None]
+
+
+def test_a_writer_that_has_timed_out_writes_nothing_with_a_sync() -> None:
+    definition = replace(_CELL, writers=(Writer("line", timeout=1.0), Writer("tool")))
+    plant = Plant()
+    cell = plant.cell = Cell(definition)
+    cell.robot_connected(plant.now)
+    cell.adopt({PART: 0, SPEED: 0.0}, plant.now)
+    plant.node = Node(PLAN, cell, plant.wire.send, MemoryStore(), lambda _now: True)
+    plant.operational()
+    plant.hear(0x305, CanType.REAL32.pack(2.5))
+    plant.run(2.0)
+    cell.tick(plant.now)
+    assert not _line_alive(plant)
+    plant.hear(0x80)
+    assert cell.image.values[SPEED] == 0.0
+    assert not _line_alive(plant)
+
+
 def test_sdo_client_is_a_writer_until_sdo_is_no_longer_served() -> None:
     plant = Plant().power_on()
     plant.read(0x1000)
@@ -534,6 +593,16 @@ def test_node_guarding_without_a_heartbeat() -> None:
     assert plant.take() == [Frame(0x705, b"\x05")]
     assert _emergencies(plant.run(0.3)) == [0x8130]
     assert plant.state is NmtState.PRE_OPERATIONAL
+
+
+def test_life_guarding_is_watched_again_from_the_first_request_after_a_loss() -> None:
+    plant = Plant(replace(PLAN, heartbeat=0)).operational()
+    plant.write(0x100C, 0, 100, 2)
+    plant.write(0x100D, 0, 2, 1)
+    for _ in range(2):
+        plant.node.receive(Frame(0x705, remote=True, length=1), plant.now)
+        plant.take()
+        assert _emergencies(plant.run(0.3)) == [0x8130]
 
 
 # -- storage and LSS -------------------------------------------------------------------------------------------------

@@ -324,9 +324,7 @@ def control_fields() -> str:
     assert set(_OBJECTS) == set(documented.__all__)
     return "\n\n".join(
         f"### {title}\n\n"
-        + _table(
-            ("field", "meaning"), ((f"`{one}`", text) for one, text in getattr(documented, name).items())
-        )
+        + table(("field", "meaning"), ((f"`{one}`", text) for one, text in getattr(documented, name).items()))
         for name, title in _OBJECTS.items()
     )
 

@@ -143,6 +143,33 @@ def test_every_register_both_ways_on_both_buses(plant: Plant) -> None:
     assert "Traceback" not in cell.daemon.text()
 
 
+def test_parameters_saved_by_the_master_survive_the_daemon(plant: Plant) -> None:
+    """And a daemon that is stopped leaves the robot with the release fallbacks of what the master held."""
+    cell = Cell(plant, SMALL)
+    master = cell.master
+    master.ask("inputs", {COMMAND: 7, KEPT: 8, SETPOINT: 2.5})
+    wait_for(lambda: cell.robot("input_int_register_0", "input_double_register_0") == [7, 2.5], "the values")
+    master.ask("nmt", "PRE-OPERATIONAL")
+    master.becomes(PRE_OPERATIONAL)
+    wait_for(lambda: cell.simulator.integer("input_int_register_0") == 0, "fallbacks outside OPERATIONAL")
+    assert master.ask("write", 0x1017, 0, 150) is None
+    assert master.ask("write", 0x1010, 1, 0x6576_6173) is None
+    master.ask("nmt", "OPERATIONAL")
+    master.becomes(OPERATIONAL)
+    master.ask("inputs", {COMMAND: 9, KEPT: 10, SETPOINT: 3.5})
+    wait_for(lambda: cell.robot("input_int_register_0", "input_double_register_0") == [9, 3.5], "the values")
+
+    code, _ = cell.daemon.stop()
+    assert code == 0
+    assert cell.robot("input_int_register_0", "input_double_register_0") == [0, -1.5]
+    assert cell.simulator.integer("input_int_register_1") == 10, "on_release: hold"
+    boots = master.ask("heard")["boots"]
+    plant.daemon(cell.mapping, "--state", plant.directory)
+    wait_for(lambda: master.ask("heard")["boots"] == boots + 1, "the boot-up")
+    master.becomes(OPERATIONAL)
+    assert master.ask("read", 0x1017, 0) == 150
+
+
 def _bits(master: Master) -> int:
     values = master.ask("outputs")["values"]
     return sum(bool(values[f"2400:{bit + 1}"]) << bit for bit in range(64))

@@ -145,10 +145,13 @@ def test_node_lives_and_dies_with_the_daemon_and_the_interface(vcan: str, plant:
 @pytest.mark.timeout(60)
 async def test_node_on_a_controller_that_fails(adapter: SerialAdapter, plant: Plant) -> None:
     simulator, mapping = _start(plant, adapter.name)
+    mapping.write_text(mapping.read_text().replace("bitrate: 500000", "bitrate: 250000"))
     daemon = plant.run(mapping, "--state", plant.directory)
     await until(lambda: BOOT_UP in adapter.lines and daemon.lines("listening for Modbus"), PATIENCE)
     plc = plant.plc()
     await until(lambda: plc.writable, PATIENCE)
+    (told,) = daemon.lines("CAN bit rate is not that of the mapping")
+    assert "bitrate=500000 mapping=250000" in told
     adapter.say("t21044E000000")
     await until(lambda: plc.integers(0) == [78], PATIENCE)
     assert (plc.owner(1), plc.status(NMT_STATE)) == (THE_MASTER, OPERATIONAL)

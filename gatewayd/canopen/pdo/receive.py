@@ -1,7 +1,7 @@
 """What a received RPDO does (CiA 301, 7.2.2 and 7.5.2.35): one write of the cell, whole or not at all.
 
 An RPDO of type 254 or 255 is written at once. One of type 0-240 is kept, the newest replacing what is kept, and written
-with the next SYNC. Both only in OPERATIONAL.
+with the next SYNC, if its writer still lives. Both only in OPERATIONAL.
 
 | cause | what becomes of the frame | fault |
 |---|---|---|
@@ -170,12 +170,20 @@ class ReceiveEngine:
         return True
 
     def on_sync(self, now: float) -> None:
-        """A SYNC was received: write what was kept for it."""
+        """A SYNC was received: write what was kept for it, unless the writer was lost meanwhile."""
         self._now = now
+        if self._writer is not None and not self._cell.writers.alive[self._writer]:
+            self.forget()
+            return
         for pdo in self._synchronous:
             if pdo.latched is not None:
                 data, pdo.latched = pdo.latched, None
                 self._write(pdo, data, now)
+
+    def forget(self) -> None:
+        """The writer is lost: what it left for the next SYNC is nobody's any more."""
+        for pdo in self._synchronous:
+            pdo.latched = None
 
     def tick(self, now: float) -> None:
         """Notice deadlines that have passed. Cheap before `next_deadline`."""
