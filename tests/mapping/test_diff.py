@@ -11,7 +11,7 @@ from gatewayd.mapping.diff import Changes, Kind, as_json, as_text, compare, obje
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 
-GOLDEN = Path(__file__).parents[1] / "golden" / "diff.golden"
+GOLDEN = Path(__file__).parents[1] / "golden" / "diff.txt"
 
 OLD = """\
 gatewayd: 1
