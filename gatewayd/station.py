@@ -51,17 +51,24 @@ class Station:
         return (self.robot,) if self.can is None else (self.robot, self.can)
 
     def succeed(self, plan: Plan, now: float) -> tuple[str, ...]:
-        """Go on with another plan, by the same robot link if that can be; names of inputs left as they were.
+        """Go on with another plan, by the same links if that can be; names of inputs left as they were.
 
-        The CANopen node is made anew and boots: its dictionary and its PDOs are those of one mapping.
+        A CANopen node whose objects or PDOs change is made anew, and boots.
         """
+        can, canopen = self.can, plan.canopen
+        stays = can is not None and canopen is not None and can.fits(canopen, plan.cell)
+        if can is not None and not stays:
+            can.node.lose_writers("the new mapping needs another node", now)
         succession = self._hand_over(plan.cell, now)
         self.plan = plan
         self._furnish(succession.cell)
         if not self.robot.rebind(plan.robot, self.cell, now):
             self.cell.robot_lost("the new mapping needs another session", now)
             self.robot = RobotLink(plan.robot, self.cell, self.robot)
-        self.can = self._can_link()
+        if can is not None and canopen is not None and stays:
+            can.rebind(canopen, self.cell, now)
+        else:
+            self.can = self._can_link()
         return succession.stranded
 
     def retire(self, now: float) -> tuple[str, ...]:

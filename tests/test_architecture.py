@@ -178,7 +178,6 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "canopen": "a docstring",
     "canopen.frame": "records; tests/canopen/test_socketcan.py pins them byte by byte",
     "canopen.pdo": "a docstring",
-    "canopen.plan": "records; tests/mapping/test_compile.py pins their content",
     "cli": "tests/cli/test_main.py",
     "cli.completion": "tests/cli/test_main.py",
     "control": "a docstring",

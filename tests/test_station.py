@@ -45,17 +45,25 @@ def test_a_cell_with_canopen_has_both_links(tmp_path: Path) -> None:
     assert station.links == (station.robot, station.can)
 
 
-def test_another_plan_goes_on_with_values_and_a_new_node(tmp_path: Path) -> None:
-    """The node boots anew, because its dictionary is that of one mapping; the cell's values stay."""
+def test_another_policy_goes_on_with_values_and_node(tmp_path: Path) -> None:
     station = Station(plan(), tmp_path)
-    cell, node = station.cell, station.can
+    cell, can = station.cell, station.can
     cell.image.values[0] = 7
     station.succeed(plan(stale="hold"), 1.0)
     assert station.cell is not cell
     assert station.cell.image.values[0] == 7
-    assert station.can is not None
-    assert station.can is not node
+    assert station.can is can
     assert cell.listeners == []
+
+
+def test_other_objects_need_another_node(tmp_path: Path) -> None:
+    """Its dictionary is that of one mapping: it boots, and who wrote on the former one is lost."""
+    station = Station(plan(), tmp_path)
+    can = station.can
+    station.cell.writer_connected(0, 0.5)
+    station.succeed(plan(placed="object"), 1.0)
+    assert station.can is not None
+    assert station.can is not can
 
 
 def test_canopen_can_be_taken_away(tmp_path: Path) -> None:

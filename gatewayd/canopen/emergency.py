@@ -158,6 +158,13 @@ class Emergency:
         if forget:
             self._history.clear()
 
+    def resume(self, former: Emergency) -> None:
+        """Take over the errors of another one: active, told and waiting to be told."""
+        self._active = former._active
+        self._history = former._history
+        self._waiting = former._waiting
+        self._not_before = former._not_before
+
     def tick(self, now: float) -> None:
         """Send what waits, if it may be sent now."""
         while self._waiting and self._allowed() and now >= self._not_before:

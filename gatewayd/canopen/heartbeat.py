@@ -178,6 +178,13 @@ class HeartbeatConsumer:
         self._stale = False
         self._cob_ids_changed()
 
+    def resume(self, former: HeartbeatConsumer) -> None:
+        """Go on watching as another consumer did, where both watch the same."""
+        for node, watched in former._watched.items():
+            present = self._watched.get(node)
+            if present is not None and present.timeout == watched.timeout:
+                self._watched[node] = watched
+
     def receive(self, frame: Frame, now: float) -> None:
         """A frame with COB-ID 700h + node-ID."""
         watched = self._watched.get(frame.can_id - Function.ERROR_CONTROL)

@@ -20,11 +20,11 @@ from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.lss import BIT_RATES
 from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.node import Node, Observer
-from gatewayd.canopen.plan import CanopenPlan
+from gatewayd.canopen.plan import CanopenPlan, by_name
 from gatewayd.canopen.queue import Transmitter
 from gatewayd.canopen.storage import Store
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import Direction
+from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.logs import fields
 
 __all__ = ["CORE_TIME", "LOSS_INTERVAL", "RETRY", "TURN", "CanLink"]
@@ -68,15 +68,8 @@ class CanLink(Observer):
         self._bit_rates = (
             () if plan.interface == "socketcan" else tuple(rate for rate in BIT_RATES if rate is not None)
         )
-        self.node = Node(
-            plan,
-            cell,
-            self._transmitter.send,
-            store,
-            self._core_lives,
-            observer=self,
-            bit_rates=self._bit_rates,
-        )
+        self._store = store
+        self.node = self._new_node()
         cell.listeners.append(self._on_image)
         cell.health.can_bus = BusState.ABSENT + 1
 
@@ -98,6 +91,23 @@ class CanLink(Observer):
                 await self._open(bit_rate)
         finally:
             self._leave()
+
+    def fits(self, plan: CanopenPlan, definition: CellDefinition) -> bool:
+        """Whether the same node can go on with another plan: nothing that the bus can see is different."""
+        return by_name(self._plan, self._cell.definition) == by_name(plan, definition)
+
+    def rebind(self, plan: CanopenPlan, cell: Cell, now: float) -> None:
+        """Go on, unnoticed by the bus, with the cell that succeeded the present one; only where `fits` says so."""
+        former = self.node
+        self._plan, self._cell = plan, cell
+        self.node = self._new_node()
+        if self._started:
+            self.node.resume(former, now)
+        cell.listeners.append(self._on_image)
+        cell.health.can_bus = former.bus + 1
+        self.cob_ids_changed()
+        if self._runs:
+            self._schedule(now)
 
     async def close(self) -> None:
         """Send what still waits, as far as the bus takes it."""
@@ -180,6 +190,17 @@ class CanLink(Observer):
         self._switching.set()
 
     # -- inside --------------------------------------------------------------------------------------------------
+
+    def _new_node(self) -> Node:
+        return Node(
+            self._plan,
+            self._cell,
+            self._transmitter.send,
+            self._store,
+            self._core_lives,
+            observer=self,
+            bit_rates=self._bit_rates,
+        )
 
     async def _turn_until(self, moment: float) -> None:
         """Wait for that moment, or for a switch of the bit rate, and count meanwhile."""

@@ -130,6 +130,10 @@ class NmtSlave:
         if self._autostart:
             self._enter(NmtState.OPERATIONAL, now)
 
+    def resume(self, state: NmtState, now: float) -> None:
+        """Be in a state without a boot-up, in place of a node that was in it."""
+        self._enter(state, now)
+
     def _enter(self, state: NmtState, now: float) -> None:
         old, self.state = self.state, state
         if old is not state:

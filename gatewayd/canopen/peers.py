@@ -17,6 +17,12 @@ class Peers:
         self._cell = cell
         self._alive: set[int] = set()
 
+    def resume(self, former: Peers) -> None:
+        """The living writers of the cell that this one succeeded, by name; the cell has them counted already."""
+        names = {one.name: index for index, one in enumerate(self._cell.definition.writers)}
+        before = former._cell.definition.writers
+        self._alive = {names[before[writer].name] for writer in former._alive if before[writer].name in names}
+
     def connect(self, writer: int | None, service: str, now: float) -> None:
         """The writer uses a service: it is alive from now on."""
         if writer is not None and writer not in self._alive:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, replace
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.core.definition import Direction
+from gatewayd.core.definition import CellDefinition, Direction
 
-__all__ = ["CanopenPlan", "Consumer", "ObjectPlan", "PdoEntry", "PdoPlan", "SyncPlan"]
+__all__ = ["CanopenPlan", "Consumer", "ObjectPlan", "PdoEntry", "PdoPlan", "SyncPlan", "by_name"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,3 +98,33 @@ class CanopenPlan:
     """The writer that RPDOs are; None: nobody writes by PDO."""
     sdo_writer: int | None
     """The writer that SDO clients are; None: variables are read-only by SDO."""
+
+
+def by_name(plan: CanopenPlan, definition: CellDefinition) -> tuple[object, ...]:
+    """The plan with names in place of the numbers that a mapping gives its variables and writers.
+
+    Two nodes whose results are equal are the same one for the bus, whatever else their mappings say.
+    """
+    variables = [variable.name for variable in definition.variables]
+    writers = [writer.name for writer in definition.writers]
+
+    def variable(index: int | None) -> str | None:
+        return None if index is None else variables[index]
+
+    def writer(index: int | None) -> str | None:
+        return None if index is None else writers[index]
+
+    return (
+        astuple(replace(plan, objects=(), pdos=(), consumers=(), rpdo_writer=None, sdo_writer=None)),
+        writer(plan.rpdo_writer),
+        writer(plan.sdo_writer),
+        [(one.node, one.timeout, writer(one.writer)) for one in plan.consumers],
+        [(variable(one.variable), one.index, one.subindex, one.type) for one in plan.objects],
+        [
+            (
+                astuple(replace(pdo, entries=())),
+                [(variable(one.variable), one.index, one.subindex, one.bits) for one in pdo.entries],
+            )
+            for pdo in plan.pdos
+        ],
+    )

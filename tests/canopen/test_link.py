@@ -21,6 +21,7 @@ from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.plan import CanopenPlan
 from gatewayd.canopen.storage import MemoryStore
 from gatewayd.core.cell import Cell
+from gatewayd.core.succession import succeed
 from tests.canopen.conformance.bench import compiled
 from tests.canopen.recorder import until
 
@@ -204,3 +205,39 @@ async def test_lost_frames_are_told_seldom_and_all_counted(
     told = [record for record in caplog.records if record.message == "CAN frames lost"]
     assert len(told) == 2
     assert station.link.node.counters.overruns == 300
+
+
+async def test_another_cell_takes_over_unnoticed_by_the_bus(station: Station) -> None:
+    """A reload that changes nothing of the node: no boot-up, the same state and parameters, the lock stays."""
+    async with running(station):
+        await until(lambda: station.frames(HEARTBEAT))
+        station.send(0x000, b"\1\5")
+        station.send(0x605, b"\x2b\x17\x10\x00\x14\x00\0\0")  # heartbeat every 20 ms
+        station.send(0x305, b"\7\0\0\0\x08\0\0\0")
+        number = station.names["ints_in[1]"]
+        await until(lambda: station.cell.image.values[number] == 8 and station.frames(0x585))
+        former, now = station.cell, time.monotonic()
+        station.cell = succeed(former, former.definition, now).cell
+        former.listeners.clear()
+        plan = station.link.node.plan
+        assert station.link.fits(plan, station.cell.definition)
+        station.forget()
+        station.link.rebind(plan, station.cell, now)
+        await until(lambda: len(station.frames(HEARTBEAT)) > 2)
+        assert set(station.frames(HEARTBEAT)) == {b"\5"}
+        station.send(0x605, b"\x40\x17\x10\x00\0\0\0\0")
+        await until(lambda: station.frames(0x585))
+        assert station.frames(0x585) == [b"\x4b\x17\x10\x00\x14\x00\0\0"]
+        lock = station.cell.definition.variables[number].lock
+        assert lock is not None
+        assert station.cell.ownership.owners[lock] is not None
+        station.send(0x305, b"\7\0\0\0\x09\0\0\0")
+        await until(lambda: station.cell.image.values[number] == 9)
+        assert former.image.values[number] == 8
+        station.link.node.lose_writers("done", time.monotonic())
+        assert station.cell.ownership.owners[lock] is None
+
+
+def test_a_node_with_another_heartbeat_is_another_node(station: Station) -> None:
+    plan = station.link.node.plan
+    assert not station.link.fits(replace(plan, heartbeat=11), station.cell.definition)

@@ -1,0 +1,36 @@
+"""What makes two plans the same node: names, not the numbers that a mapping happens to give them."""
+
+from __future__ import annotations
+
+from gatewayd.canopen.plan import by_name
+from gatewayd.mapping.loader import load
+from gatewayd.mapping.plan import Plan
+
+HEAD = "gatewayd: 1\ncell: a\nrobot: {host: r}\ncanopen: {channel: c, bitrate: 500000, node: 16}\n"
+WRITERS = "writers: {line: {canopen: any}}\n"
+FIRST = "variables:\n%s  one: {robot: input_int_register_0, canopen: auto, owner: line%s}\n"
+OTHER = "  two: {robot: output_int_register_0, modbus: 5}\n"
+
+
+def plan(before: str = "", more: str = "", modbus: str = "") -> Plan:
+    loaded = load((HEAD + modbus + WRITERS + FIRST % (before, more)).encode(), "a.yaml")
+    assert loaded.plan is not None, loaded.diagnostics
+    return loaded.plan
+
+
+def node(of: Plan) -> tuple[object, ...]:
+    assert of.canopen is not None
+    return by_name(of.canopen, of.cell)
+
+
+def test_other_numbers_and_policies_are_the_same_node() -> None:
+    shifted = plan(
+        before=OTHER, modbus="modbus: {listen: '127.0.0.1:1502'}\n", more=", on_release: hold, lease: 9s"
+    )
+    assert shifted.canopen != plan().canopen
+    assert node(shifted) == node(plan())
+
+
+def test_another_object_is_another_node() -> None:
+    more = "  three: {robot: output_int_register_1, canopen: auto}\n"
+    assert node(plan(before=more)) != node(plan())
