@@ -6,6 +6,7 @@ VENV   ?= .venv
 JOBS   ?= auto
 UV     ?= uv
 CASES  ?= 100000
+SECONDS ?= 3600
 
 PY      = $(VENV)/bin/python
 INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --no-input
@@ -13,7 +14,7 @@ COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate
 SOURCES = gatewayd tests
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test setup dev lint format types check docs-check generated unit-checks ci bench fuzz deb install lock \
+.PHONY: help demo test setup dev lint format types check docs-check generated unit-checks ci bench fuzz soak deb install lock \
 	install-hook clean
 
 help: ## Show this list
@@ -68,6 +69,9 @@ install: $(VENV)/.made ## Install as the package would, below DESTDIR (as root; 
 
 fuzz: $(VENV)/.dev ## Try the parsers and the running daemon with 100,000 hostile cases (CASES=1000000)
 	GATEWAYD_FUZZ_CASES=$(CASES) $(PY) -m pytest --timeout 1800 tests/e2e/test_hostile.py tests/modbus/test_fuzz.py tests/rtde $(ARGS)
+
+soak: $(VENV)/.dev ## Torment the running daemon for an hour, from a seed (SECONDS=300 ARGS="--seed 7 --speed fast")
+	$(PY) -m tests.soak --seconds $(SECONDS) $(ARGS)
 
 lock: ## Pin and hash the newest packages that pyproject.toml allows (needs uv)
 	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --group build -o requirements.lock

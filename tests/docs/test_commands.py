@@ -28,6 +28,7 @@ ELSEWHERE = {
     r"mbpoll -0 -p 1502 -t 4:int -B -r 101 -c 2 127\.0\.0\.1": "tests/demo/test_view.py: the demonstration's own",
     r"mbpoll -0 .*": "tests/docs/test_tutorial.py, with another Modbus client",
     r"make (bench|demo)\b.*": "the Makefile; tests/test_docs.py knows its targets",
+    r"make soak\b.*": "tests/soak/test_soak.py; tests/test_docs.py knows the target",
     r"\(umask 077; head -c 24 /dev/urandom \| base64 > token\)": "tests/status/test_launch.py reads such files",
     r"curl -X POST .* http://127\.0\.0\.1:9502/api/v1/locks/start/take": "tests/status/test_listener.py",
     r"(sudo )?apt install .*|apt-get install .*": "the system's",

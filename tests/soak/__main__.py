@@ -1,0 +1,49 @@
+"""`make soak`: an hour of faults, and what the daemon made of them. Exit code 1 if anything was not as it should be."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import sys
+import tempfile
+from pathlib import Path
+
+from tests.soak.run import PAUSES, soak
+
+__all__: list[str] = []
+
+
+def _main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m tests.soak", description=__doc__)
+    given = float(os.environ.get("GATEWAYD_SOAK_SECONDS", "3600"))
+    parser.add_argument("--seconds", type=float, default=given, help=f"length of the run (default {given:g})")
+    parser.add_argument(
+        "--seed", type=int, default=random.randrange(2**32), help="which faults (default: any)"
+    )
+    parser.add_argument("--speed", choices=sorted(PAUSES), default="real", help="pauses between faults")
+    options = parser.parse_args()
+    directory = Path(tempfile.mkdtemp(prefix="gatewayd-soak-"))
+    print(f"soak: {options.seconds:g} s, --seed {options.seed}, --speed {options.speed}", flush=True)
+    measured = soak(
+        directory, options.seconds, options.seed, options.speed, lambda line: print(line, flush=True)
+    )
+    for table in measured.tables():
+        print(f"\n{table}")
+    found = measured.verdict()
+    for one in found:
+        print(f"soak: NOT GOOD: {one}")
+    print(f"soak: logs in {directory}" if found else "soak: all well")
+    if not found:
+        _remove(directory)
+    return 1 if found else 0
+
+
+def _remove(directory: Path) -> None:
+    for path in directory.iterdir():
+        path.unlink()
+    directory.rmdir()
+
+
+if __name__ == "__main__":
+    sys.exit(_main())
