@@ -116,6 +116,7 @@ def declared_view(plan: Plan) -> tuple[Json, ...]:
     places: dict[int, list[Json]] = {}
     for one in plan.modbus.placements if plan.modbus is not None else ():
         places.setdefault(one.variable, []).append(_place(one))
+    objects = _objects(plan)
     return tuple(
         {
             "cell": plan.cell.name,
@@ -125,6 +126,7 @@ def declared_view(plan: Plan) -> tuple[Json, ...]:
             "kind": variable.kind.name.lower(),
             "robot": robot_name(variable),
             "modbus": places.get(index, []),
+            "canopen": objects.get(index),
             "unit": variable.unit,
             "lock": plan.cell.locks[variable.lock].name if variable.lock is not None else None,
             "limits": None if variable.limits is None else [variable.limits.low, variable.limits.high],
@@ -270,6 +272,22 @@ def _place(placement: Placement) -> Json:
 
 def _fallback(fallback: Fallback) -> object:
     return plain_value(fallback.value) if fallback.kind is FallbackKind.VALUE else fallback.kind.value
+
+
+def _objects(plan: Plan) -> dict[int, Json]:
+    """Where each variable lies in the object dictionary, and the COB-ID of the PDO that carries it, by index."""
+    canopen = plan.canopen
+    if canopen is None:
+        return {}
+    cob_ids = {entry.variable: pdo.cob_id for pdo in canopen.pdos for entry in pdo.entries}
+    return {
+        one.variable: {
+            "object": f"{one.index:04X}h:{one.subindex}",
+            "type": one.type.name,
+            "cob_id": cob_ids.get(one.variable),
+        }
+        for one in canopen.objects
+    }
 
 
 def _address(host: str, port: int) -> str:

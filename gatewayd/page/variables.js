@@ -203,7 +203,7 @@ function factsOf(variable, layout) {
     ["number", `${variable.number} (status block)`],
     ["direction", input ? "input: fieldbus to robot" : "output: robot to fieldbus"],
     ["robot", variable.robot],
-    ["Modbus", places.join("; ")],
+    ["addresses", places.join("; ")],
     ["limits", variable.limits ? `${variable.limits.join(" to ")} ${variable.unit}`.trim() : ""],
     [input ? "owner lost" : "robot lost", variable.fallback],
     ["may own", lock ? lock.owners.join(lock.takeover ? " before " : ", ") || "nobody" : ""],

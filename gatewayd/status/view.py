@@ -61,9 +61,11 @@ def overview(daemon: Daemon, version: str) -> dict[str, object]:
 def layout(station: Station) -> dict[str, object]:
     """What the mapping fixes. It is the same as long as the fingerprint is."""
     definition, modbus = station.cell.definition, station.plan.modbus
-    places: dict[int, list[Placement]] = {}
-    for place in modbus.placements if modbus is not None else ():
-        places.setdefault(place.variable, []).append(place)
+    places: dict[int, list[dict[str, object]]] = {}
+    for one in modbus.placements if modbus is not None else ():
+        places.setdefault(one.variable, []).append(_place(one))
+    for index, place in _objects(station).items():
+        places.setdefault(index, []).append(place)
     return {
         "cell": definition.name,
         "fingerprint": _fingerprint(station.cell),
@@ -88,7 +90,7 @@ def _lock(lock: Lock, cell: Cell) -> dict[str, object]:
     }
 
 
-def _variable(variable: Variable, places: Iterable[Placement]) -> dict[str, object]:
+def _variable(variable: Variable, places: Iterable[dict[str, object]]) -> dict[str, object]:
     limits = variable.limits
     is_input = variable.direction is Direction.INPUT
     return {
@@ -97,7 +99,7 @@ def _variable(variable: Variable, places: Iterable[Placement]) -> dict[str, obje
         "direction": variable.direction.value,
         "kind": variable.kind.name.lower(),
         "robot": robot_name(variable),
-        "places": [_place(one) for one in places],
+        "places": list(places),
         "lock": variable.lock,
         "limits": None if limits is None else [limits.low, limits.high],
         "fallback": _fallback(variable.on_release if is_input else variable.on_stale),
@@ -110,6 +112,23 @@ def _place(place: Placement) -> dict[str, object]:
     decimal, notation = address(place)
     kind = "bit" if place.codec is None else f"{place.codec.type} {place.codec.order}".strip()
     return {"area": AREAS[place.area], "address": decimal, "notation": notation, "type": kind}
+
+
+def _objects(station: Station) -> dict[int, dict[str, object]]:
+    """The CANopen side, in the form of a Modbus place: object, and COB-ID of the PDO that carries it."""
+    canopen = station.plan.canopen
+    if canopen is None:
+        return {}
+    cob_ids = {entry.variable: f"COB-ID 0x{pdo.cob_id:03X}" for pdo in canopen.pdos for entry in pdo.entries}
+    return {
+        one.variable: {
+            "area": "object",
+            "address": f"{one.index:04X}h:{one.subindex}",
+            "notation": cob_ids.get(one.variable, "by SDO"),
+            "type": one.type.name,
+        }
+        for one in canopen.objects
+    }
 
 
 def _fallback(fallback: Fallback) -> str:

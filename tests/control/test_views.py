@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gatewayd.control import documented
 from gatewayd.control.api import Api
-from gatewayd.control.views import problems
+from gatewayd.control.views import declared_view, problems
 from gatewayd.core.cell import Change
+from gatewayd.mapping.loader import load
 from tests.control.served import CYCLES, LIMIT, SPEED, Served, at
 
 PLC, HMI = 0, 1
@@ -134,3 +136,18 @@ def test_odd_reals_are_still_json(api: Api, press: Served, odd: float) -> None:
         api.audit({}, at(1.0)),
     ]
     assert str(odd) in _texts(json.loads(json.dumps(answers, allow_nan=False)))
+
+
+def test_a_variable_on_canopen_tells_its_object_and_pdo() -> None:
+    mapping = Path(__file__).parents[2] / "mappings" / "two-buses.yaml"
+    plan = load(mapping.read_bytes(), mapping.name).plan
+    assert plan is not None
+    assert plan.canopen is not None
+    found = {one["name"]: one["canopen"] for one in declared_view(plan)}
+    carried = {entry.variable for pdo in plan.canopen.pdos for entry in pdo.entries}
+    for one in plan.canopen.objects:
+        told = found[plan.cell.variables[one.variable].name]
+        assert told["object"] == f"{one.index:04X}h:{one.subindex}"
+        assert told["type"] == one.type.name
+        assert (told["cob_id"] is not None) == (one.variable in carried)
+    assert carried

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gatewayd.core.events import Event, EventKind
 from gatewayd.daemon import Daemon
+from gatewayd.mapping.loader import load
 from gatewayd.station import Station
 from gatewayd.status.probes import Probes
 from gatewayd.status.view import EVENTS, as_json, layout, overview, state
@@ -107,3 +109,14 @@ def test_what_json_does_not_know_becomes_text(station: Station, probes: Probes) 
     values = station.cell.image.values
     values[4:7] = [float("nan"), float("inf"), float("-inf")]
     assert told(station, probes)["values"][4:7] == ["NaN", "Infinity", "-Infinity"]
+
+
+def test_an_object_stands_beside_the_registers(tmp_path: Path) -> None:
+    mapping = Path(__file__).parents[2] / "mappings" / "two-buses.yaml"
+    plan = load(mapping.read_bytes(), mapping.name).plan
+    assert plan is not None
+    shown = json.loads(json.dumps(layout(Station(plan, tmp_path))))
+    areas = {place["area"] for one in shown["variables"] for place in one["places"]}
+    assert {"holding", "object"} <= areas
+    objects = [place for one in shown["variables"] for place in one["places"] if place["area"] == "object"]
+    assert any(place["notation"].startswith("COB-ID 0x") for place in objects)
