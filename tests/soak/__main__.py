@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import random
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -23,6 +24,8 @@ def _main() -> int:
     )
     parser.add_argument("--speed", choices=sorted(PAUSES), default="real", help="pauses between faults")
     options = parser.parse_args()
+    # However it is ended, its processes end with it.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     directory = Path(tempfile.mkdtemp(prefix="gatewayd-soak-"))
     print(f"soak: {options.seconds:g} s, --seed {options.seed}, --speed {options.speed}", flush=True)
     measured = soak(

@@ -31,17 +31,19 @@ def _cycle(plc: Plc, register: int, echo: int, number: int) -> None:
         plc.reading_code(echo, 2)
 
 
-def _main(host: str, source: str, port: str, register: str, echo: str, pause: str) -> None:
+def _main(host: str, source: str, *figures: str) -> None:
+    port, register, echo = map(int, figures[:3])
+    pause = float(figures[3])
     number = 0
     while True:
         # AssertionError: an exception code that reads should not give; the run sees it by the echo that stands still.
         with suppress(OSError, AssertionError):
-            plc = Plc(int(port), source, host=host)
+            plc = Plc(port, source, host=host)
             try:
                 while True:
                     number = number % _GREATEST + 1
-                    _cycle(plc, int(register), int(echo), number)
-                    time.sleep(float(pause))
+                    _cycle(plc, register, echo, number)
+                    time.sleep(pause)
             finally:
                 plc.close()
         time.sleep(_RETRY)

@@ -1,4 +1,4 @@
-"""The faults of a soak run: each brings one kind of trouble and takes it away again. What comes then is up to the daemon.
+"""The faults of a soak run: each brings one kind of trouble and takes it away. What comes then is up to the daemon.
 
 Whatever a fault chooses comes from the `Random` it is given, so that a seed makes the same faults again.
 """

@@ -1,9 +1,8 @@
-"""What a soak run torments: daemon, simulator, two PLCs and a slow poller as processes, and how they are found to be well."""
+"""What a soak run torments: daemon, simulator, two PLCs and a slow poller as processes, and whether they are well."""
 
 from __future__ import annotations
 
 import itertools
-import os
 import signal
 import sys
 from contextlib import suppress
@@ -161,7 +160,7 @@ class Rig:
         return [one["name"] for one in found["locks"] if one["owner"] == owner] if found else [owner]
 
     def descriptors(self) -> int:
-        return len(os.listdir(f"/proc/{self.daemon.pid}/fd"))  # noqa: PTH208
+        return sum(1 for _ in Path(f"/proc/{self.daemon.pid}/fd").iterdir())
 
     # -- own parts -----------------------------------------------------------------------------------------------------
 
