@@ -42,7 +42,8 @@ def sentence(cells: Sequence[Cell], troubles: Iterable[str] = ()) -> str:
 
 
 def _is_well(cell: Cell) -> bool:
-    return cell.freshness.state is Source.FRESH and not _unavailable(cell) and all(cell.writers.alive)
+    troubled = _unavailable(cell) or cell.health.can_trouble
+    return cell.freshness.state is Source.FRESH and not troubled and all(cell.writers.alive)
 
 
 def _told(cell: Cell) -> str:
@@ -51,6 +52,8 @@ def _told(cell: Cell) -> str:
         facts[0] += f" at {round(cell.health.frequency)} Hz" if cell.health.frequency else ""
         if not cell.accepts_writes:
             facts.append("its inputs not adopted yet")
+    if cell.health.can_trouble:
+        facts.append(f"CAN bus {cell.health.can_trouble}")
     unavailable = _unavailable(cell)
     if unavailable:
         facts.append(f"{_number(unavailable, 'variable')} unavailable")

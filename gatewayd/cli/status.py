@@ -103,6 +103,11 @@ def _cell(cell: Answer, locks: list[Answer]) -> Iterator[str]:
     if modbus is not None:
         connections = number(modbus["connections"], "connection")
         yield from _part("modbus", [f"{modbus['listen']} unit {modbus['unit']}, {connections}"])
+    canopen = cell["canopen"]
+    if canopen is not None:
+        bus = click.style(f"bus {canopen['bus']}", fg="green" if canopen["bus"] == "active" else "red")
+        node = f"node {canopen['node']} {canopen['nmt_state']}"
+        yield from _part("canopen", [f"{canopen['channel']} {bus}, {node}"])
     yield from _part("writers", [_writer(writer, cell["locks"]["total"]) for writer in cell["writers"]])
     yield from _part("variables", [_variables(cell["variables"])])
     yield from _part("locks", _locks(locks))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 __all__ = [
     "AUDIT",
+    "CANOPEN",
     "CELL",
     "EVENT",
     "LOCK",
@@ -39,10 +40,11 @@ CELL: Fields = {
     "name": "name of the cell",
     "source": "mapping file as it was named",
     "fingerprint": "32 bits of the mapping's meaning, eight hexadecimal digits",
-    "healthy": "robot fresh and writable, every variable available, nothing forced, no writer lost",
+    "healthy": "robot fresh and writable, CAN bus active, every variable available, nothing forced, no writer lost",
     "problems": "list of texts: what makes it unhealthy",
     "robot": "the link to the robot",
     "modbus": "the Modbus side, or null",
+    "canopen": "the CANopen side, or null",
     "writers": "list of declared writers",
     "variables": "number of variables by quality: `total`, `good`, `stale`, `unavailable`, `never`, `forced`",
     "locks": "`total`, `owned`, `operator` (held by the local operator)",
@@ -67,6 +69,12 @@ MODBUS: Fields = {
     "listen": "host:port of the listener",
     "unit": "unit id",
     "connections": "open connections of the listener",
+}
+CANOPEN: Fields = {
+    "channel": "interface:channel of the bus",
+    "node": "node-ID of the mapping",
+    "bus": "`absent`, `down`, `bus-off`, `passive`, `warning` or `active`",
+    "nmt_state": "`initialising`, `stopped`, `pre-operational` or `operational`",
 }
 WRITER: Fields = {
     "name": "name of the writer",

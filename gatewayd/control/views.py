@@ -14,6 +14,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import OPERATOR, Direction, Fallback, FallbackKind, Variable
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
+from gatewayd.core.health import CAN_BUS, NMT_STATES
 from gatewayd.core.image import Quality
 from gatewayd.mapping.plan import Area, Placement, Plan
 
@@ -68,6 +69,14 @@ def cell_view(station: StationView, now: float) -> Json:
             "unit": plan.modbus.unit,
             "connections": health.modbus_connections,
         },
+        "canopen": None
+        if plan.canopen is None
+        else {
+            "channel": f"{plan.canopen.interface}:{plan.canopen.channel}",
+            "node": plan.canopen.node,
+            "bus": CAN_BUS[health.can_bus],
+            "nmt_state": NMT_STATES.get(health.nmt_state, str(health.nmt_state)),
+        },
         "writers": [_writer(cell, index, now) for index in range(len(definition.writers))],
         "variables": {"total": len(quality)} | {one.name.lower(): quality.count(one) for one in Quality},
         "locks": {
@@ -92,6 +101,8 @@ def problems(cell: Cell, now: float) -> list[str]:
         found.append(_SOURCES[state] + _since(now - cell.freshness.last_progress))
     elif not cell.accepts_writes:
         found.append("the robot's inputs are not adopted yet, nothing can be written")
+    if cell.health.can_trouble:
+        found.append(f"CAN bus {cell.health.can_trouble}")
     unavailable = quality.count(Quality.UNAVAILABLE)
     if unavailable:
         found.append(

@@ -12,9 +12,11 @@ import pytest
 
 from gatewayd.control import documented
 from gatewayd.control.api import Api
-from gatewayd.control.views import declared_view, problems
+from gatewayd.control.views import cell_view, declared_view, problems
 from gatewayd.core.cell import Change
 from gatewayd.mapping.loader import load
+from gatewayd.sentence import sentence
+from gatewayd.station import Station
 from tests.control.served import CYCLES, LIMIT, SPEED, Served, at
 
 PLC, HMI = 0, 1
@@ -151,3 +153,18 @@ def test_a_variable_on_canopen_tells_its_object_and_pdo() -> None:
         assert told["type"] == one.type.name
         assert (told["cob_id"] is not None) == (one.variable in carried)
     assert carried
+
+
+def test_a_bus_that_does_not_carry_is_a_problem(tmp_path: Path) -> None:
+    mapping = Path(__file__).parents[2] / "mappings" / "two-buses.yaml"
+    plan = load(mapping.read_bytes(), mapping.name).plan
+    assert plan is not None
+    station = Station(plan, tmp_path)
+    told = cell_view(station, 1.0)
+    assert told["canopen"].keys() == documented.CANOPEN.keys()
+    assert (told["canopen"]["bus"], told["canopen"]["nmt_state"]) == ("absent", "initialising")
+    assert "CAN bus absent" in told["problems"]
+    assert "CAN bus absent" in sentence([station.cell])
+    station.cell.health.can_bus = 6
+    assert not any("CAN" in problem for problem in problems(station.cell, 1.0))
+    assert "CAN" not in sentence([station.cell])

@@ -309,6 +309,7 @@ _OBJECTS = {
     "CELL": "Cell (`cells` of the status)",
     "ROBOT": "Robot (`robot` of a cell)",
     "MODBUS": "Modbus (`modbus` of a cell)",
+    "CANOPEN": "CANopen (`canopen` of a cell)",
     "WRITER": "Writer (`writers` of a cell)",
     "REFUSAL": "Refusal (`last_refusal` of a cell)",
     "VARIABLE": "Variable",
