@@ -27,10 +27,12 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.logs import fields
 
-__all__ = ["CORE_TIME", "LOSS_INTERVAL", "RETRY", "TURN", "CanLink"]
+__all__ = ["CORE_TIME", "GAP", "LOSS_INTERVAL", "RETRY", "TURN", "CanLink"]
 
 CORE_TIME = 0.5
 """Seconds without a count of the core's heartbeat after which the core counts as stuck."""
+GAP = 0.05
+"""Seconds without a frame after which the process may have been suspended."""
 RETRY = 2.0
 """Seconds between two attempts at a bus that cannot be used as it is set up."""
 TURN = 1.0
@@ -57,6 +59,7 @@ class CanLink(Observer):
         self._started = False
         self._beat = (-1, -math.inf)
         self._offset = math.inf
+        self._last_frames = -math.inf
         self._lost = 0
         self._lost_told = -math.inf
         self._other_bit_rate: int | None = None
@@ -116,7 +119,10 @@ class CanLink(Observer):
     # -- called by the driver ------------------------------------------------------------------------------------
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
-        """Received frames."""
+        """Received frames. After a suspension they come before the timers, so the cell's clock is asked first."""
+        if now - self._last_frames > GAP:
+            self._cell.tick(now)
+        self._last_frames = now
         receive = self.node.receive
         for frame in frames:
             receive(frame, now)
@@ -206,8 +212,10 @@ class CanLink(Observer):
         """Wait for that moment, or for a switch of the bit rate, and count meanwhile."""
         while not self._switching.is_set() and (rest := moment - time.monotonic()) > 0:
             self.turns += 1
+            # Not wait_for: Python 3.11's can swallow a cancellation that comes with the time-out.
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._switching.wait(), min(rest, TURN))
+                async with asyncio.timeout(min(rest, TURN)):
+                    await self._switching.wait()
 
     async def _open(self, bit_rate: int) -> None:
         """Open the bus; a set-up that cannot work is told once and tried again, in case it is repaired."""

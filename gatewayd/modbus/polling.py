@@ -17,12 +17,19 @@ _MOST_EVENTS = 32
 """Sockets looked at together."""
 _LONGEST_TURN = 0.0002
 """Seconds after which other work of the loop has its turn, though more may have come in."""
+_LONGEST_GAP = 0.05
+"""Seconds between two turns after which the process may have been suspended: due timers run later."""
 
 
 class ReadPoller:
-    """Calls a function for every socket that can be read; level-triggered."""
+    """Calls a function for every socket that can be read; level-triggered.
 
-    def __init__(self) -> None:
+    `after_a_gap` is called with the time before the first of them if there was no turn for a while.
+    """
+
+    def __init__(self, after_a_gap: Callable[[float], None] = lambda _now: None) -> None:
+        self._after_a_gap = after_a_gap
+        self._last_turn = time.monotonic()
         self._loop = asyncio.get_running_loop()
         self._epoll = select.epoll()
         self._readers: dict[int, Callable[[float], None]] = {}
@@ -48,6 +55,8 @@ class ReadPoller:
     def _turn(self) -> None:
         readers = self._readers
         now = time.monotonic()
+        if now - self._last_turn > _LONGEST_GAP:
+            self._after_a_gap(now)
         end = now + _LONGEST_TURN
         # A client that waits for nothing has its next request under way by now: a look is cheaper than a sleep.
         while now < end and (events := self._epoll.poll(0, _MOST_EVENTS)):
@@ -56,3 +65,4 @@ class ReadPoller:
                 if reader is not None:
                     reader(now)
             now = time.monotonic()
+        self._last_turn = now

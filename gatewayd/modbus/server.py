@@ -200,7 +200,7 @@ class _Server(ModbusTcpServer):
     def __init__(self, owner: ModbusListener, host: str, port: int) -> None:
         super().__init__(SimDevice(1, [SimData(0)]), address=(host, port))
         self.owner = owner
-        self.poller = ReadPoller()
+        self.poller = ReadPoller(owner.catch_up)
 
     def callback_new_connection(self) -> _Connection:
         """Called for every accepted connection."""
@@ -340,6 +340,11 @@ class ModbusListener:
         self._count()
 
     # -- called by connections ------------------------------------------------------------------------------------
+
+    def catch_up(self, now: float) -> None:
+        """Notice what only time brings before a request is answered: after a suspension requests come before timers."""
+        for unit in self._units.values():
+            unit.cell.tick(now)
 
     def connected(self, connection: _Connection) -> bool:
         """A peer has connected: returns whether it is to be served; if not, it was refused."""

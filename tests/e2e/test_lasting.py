@@ -159,10 +159,6 @@ def test_half_open_peers_are_ended_by_the_idle_time_out(plant: Plant) -> None:
     assert plc.write_integers(0, 3) == 0
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a request that waited is answered before the first tick, from values that were fresh once",
-)
 def test_after_a_suspension_nothing_is_told_fresh_that_is_not(plant: Plant) -> None:
     """The robot falls silent, then the process is stopped. A request that waits meanwhile is answered "not fresh"."""
     simulator = plant.simulator()
