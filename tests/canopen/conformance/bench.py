@@ -192,6 +192,9 @@ class LinkDevice(Device):
         self._off = asyncio.Event()
         link = asyncio.create_task(self._link.run())
         clock = asyncio.create_task(self._tick())
+        # What is sent before the bus is open, nobody hears.
+        while self._cell.health.can_bus != BusState.ACTIVE + 1:  # noqa: ASYNC110 - the link tells nobody
+            await asyncio.sleep(0.001)
         started.set()
         await self._off.wait()
         for task in (link, clock):
