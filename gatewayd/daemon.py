@@ -1,7 +1,8 @@
 """The daemon: one process, one loop, several robot cells. The only module that knows every link.
 
 A cell that fails costs that cell: a link whose task ends in an error is started again, a listener whose port is taken
-is tried again, and the others never notice.
+is tried again, and the others never notice. A core whose ticks fail is left to the watchdog: nobody would notice what
+only time brings, and nothing may look fresh that nobody looks after.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -21,6 +23,7 @@ from gatewayd.mapping.plan import ModbusPlan, Plan
 from gatewayd.modbus.peers import PeerEvent, PeerEventKind
 from gatewayd.modbus.server import ListenError, ModbusListener
 from gatewayd.station import Station
+from gatewayd.turning import turning
 
 __all__ = ["CLOSING_TIME", "RETRY_PERIOD", "TICK", "Daemon"]
 
@@ -47,6 +50,8 @@ class Daemon:
         self._group: asyncio.TaskGroup | None = None
         self._tasks: dict[object, asyncio.Task[None]] = {}
         """Of stations (their clocks), links and listeners."""
+        self._rests: Counter[object] = Counter()
+        """Turns of parts while they do not run: a link after an error, a listener whose port is taken."""
         self._observers: list[Callable[[Cell], None]] = []
         self._serve({})
 
@@ -63,13 +68,14 @@ class Daemon:
 
     def turns(self) -> dict[str, int]:
         """A counter for each part that has to go on: cores, links, listeners. 0: it has not begun."""
-        found = {f"listener {listener.name}": listener.turns for listener in self.listeners}
+        rests = self._rests
+        found = {f"listener {one.name}": one.turns + rests[one] for one in self.listeners}
         for station in self.stations:
-            name = station.plan.cell.name
+            name, robot, can = station.plan.cell.name, station.robot, station.can
             found[f"core of {name}"] = station.cell.health.heartbeat
-            found[f"robot link of {name}"] = station.robot.turns
-            if station.can is not None:
-                found[f"CAN link of {name}"] = station.can.turns
+            found[f"robot link of {name}"] = robot.turns + rests[robot]
+            if can is not None:
+                found[f"CAN link of {name}"] = can.turns + rests[can]
         return found
 
     def troubles(self) -> list[str]:
@@ -83,7 +89,7 @@ class Daemon:
             for station in self.stations:
                 self._begin_station(station)
             for listener in self.listeners:
-                self._begin(listener, partial(_open, listener))
+                self._begin(listener, partial(self._open, listener))
             await stop.wait()
             self._group = None
             await self._close()
@@ -168,7 +174,7 @@ class Daemon:
             if link is not former:
                 ended = self._end(former) if former is not None else None
                 if link is not None:
-                    self._begin(link, partial(_keep_running, link.run), ended)
+                    self._begin(link, partial(self._keep_running, link, link.run), ended)
         return [f"{plan.cell.name}: {name}" for name in stranded]
 
     def _show(self, cell: Cell) -> None:
@@ -192,12 +198,12 @@ class Daemon:
             listener = ModbusListener(host, port, observe=_log_peer)
             listener.serve(served)
             self.listeners.append(listener)
-            self._begin(listener, partial(_open, listener))
+            self._begin(listener, partial(self._open, listener))
 
     def _begin_station(self, station: Station) -> None:
-        self._begin(station, partial(_keep_running, partial(_tick, station)))
+        self._begin(station, partial(self._keep_running, station, partial(_tick, station)))
         for link in station.links:
-            self._begin(link, partial(_keep_running, link.run))
+            self._begin(link, partial(self._keep_running, link, link.run))
 
     def _begin(
         self, part: object, work: Callable[[], Awaitable[None]], former: asyncio.Task[None] | None = None
@@ -210,13 +216,48 @@ class Daemon:
     def _forget(self, part: object, task: asyncio.Task[None]) -> None:
         if self._tasks.get(part) is task:
             del self._tasks[part]
+            del self._rests[part]
 
     def _end(self, part: object) -> asyncio.Task[None] | None:
         """Have the part's work cancelled; returns its task, which still says goodbye."""
         task = self._tasks.pop(part, None)
+        del self._rests[part]
         if task is not None:
             task.cancel()
         return task
+
+    async def _rest(self, part: object) -> None:
+        def turn() -> None:
+            self._rests[part] += 1
+
+        await turning(asyncio.sleep(RETRY_PERIOD), turn, RETRY_PERIOD)
+
+    async def _open(self, listener: ModbusListener) -> None:
+        """Open the listener; while that fails, say why once and try again."""
+        told = ""
+        while True:
+            try:
+                await listener.start()
+            except ListenError as error:
+                reason = error.strerror or str(error)
+                if reason != told:
+                    told = reason
+                    log.error(told, extra=fields(retry_s=RETRY_PERIOD))  # noqa: TRY400 - the text says it all
+                await self._rest(listener)
+            else:
+                log.info("listening for Modbus", extra=fields(listen=listener.name))
+                return
+
+    async def _keep_running(self, part: object, work: Callable[[], Awaitable[None]]) -> None:
+        """Start `work` again whenever it ends in an error, so that a defect in one cell never ends the process."""
+        while True:
+            try:
+                await work()
+            except Exception:
+                log.exception("internal error, starting again")
+                await self._rest(part)
+            else:
+                return
 
     async def _close(self) -> None:
         """First nobody writes any more, then the robots get what the policies declare, then the links close."""
@@ -244,35 +285,6 @@ async def _after(former: asyncio.Task[None] | None, work: Callable[[], Awaitable
             await asyncio.wait((former,))
             raise
     await work()
-
-
-async def _open(listener: ModbusListener) -> None:
-    """Open the listener; while that fails, say why once and try again."""
-    told = ""
-    while True:
-        try:
-            await listener.start()
-        except ListenError as error:
-            reason = error.strerror or str(error)
-            if reason != told:
-                told = reason
-                log.error(told, extra=fields(retry_s=RETRY_PERIOD))  # noqa: TRY400 - the text says it all
-            await asyncio.sleep(RETRY_PERIOD)
-        else:
-            log.info("listening for Modbus", extra=fields(listen=listener.name))
-            return
-
-
-async def _keep_running(work: Callable[[], Awaitable[None]]) -> None:
-    """Start `work` again whenever it ends in an error, so that a defect in one cell never ends the process."""
-    while True:
-        try:
-            await work()
-        except Exception:
-            log.exception("internal error, starting again")
-            await asyncio.sleep(RETRY_PERIOD)
-        else:
-            return
 
 
 _PEER_LEVELS = {PeerEventKind.DENIED: logging.WARNING, PeerEventKind.FULL: logging.WARNING}

@@ -1,18 +1,35 @@
-"""Which parts of the gateway have stopped turning, seen from counters that each part moves by itself.
+"""Whether every part of the gateway turns, seen from counters that each part moves by itself.
 
-A part counts what it cannot do without running: the core its ticks, a robot link its connection attempts and its looks
-at a running session, a listener its sweeps. Whether the robot or a PLC answers plays no role.
+A part counts what it cannot do without running: the core its ticks, a robot link its looks at the session, a listener
+its sweeps, each the turns of a wait (`gatewayd.turning`). Whether the robot or a PLC answers plays no role.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-__all__ = ["PATIENCE", "Liveness"]
+__all__ = ["PATIENCE", "Liveness", "Turned"]
 
-PATIENCE = 5.0
-"""Seconds for which a part may stand still. Each allows itself waits of two seconds at most: for a connection, for an
-answer, before it tries again."""
+PATIENCE = 1.0
+"""Seconds for which a part may stand still before it is told to hang: several turns, and less than the watchdog waits,
+so that the journal has its name before the process is ended."""
+
+
+class Turned:
+    """Whether all parts have moved since this was last the case: what a watchdog may be fed for."""
+
+    def __init__(self) -> None:
+        self._former: dict[str, int] = {}
+
+    def all_of(self, counts: Mapping[str, int]) -> bool:
+        """True at most once for each turn of the slowest part.
+
+        A part that was not among the counts before has turned if it has begun (its count is not 0).
+        """
+        if any(count == self._former.get(name, 0) for name, count in counts.items()):
+            return False
+        self._former = dict(counts)
+        return True
 
 
 class Liveness:
@@ -30,7 +47,7 @@ class Liveness:
         If this look itself comes late (the process was stopped), all parts get their patience anew: none of them
         could have moved.
         """
-        held_up = now - self._looked > self._patience / 2
+        held_up = now - self._looked > 0.75 * self._patience
         self._looked = now
         former = {} if held_up else self._moved
         self._moved = {

@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import Protocol
 
 from gatewayd.core.cell import Cell
-from gatewayd.liveness import Liveness
+from gatewayd.liveness import Liveness, Turned
 from gatewayd.logs import fields
 from gatewayd.sentence import sentence
 from gatewayd.systemd import Notifier
@@ -52,6 +52,7 @@ class Service:
         self._notifier = notifier
         self._daemon = daemon
         self._liveness = Liveness()
+        self._turned = Turned()
         self._ready = False
         self._told = ""
         self._told_at = 0.0
@@ -83,7 +84,7 @@ class Service:
         self.late = late
         if not self._ready:
             self._ready = all(turns.values()) and self._notifier.ready()
-        if not late:
+        if self._turned.all_of(turns):
             self._notifier.watchdog()
         self._report(now)
 

@@ -13,9 +13,11 @@ import pytest
 from gatewayd import daemon as daemon_module
 from gatewayd.core.freshness import Source
 from gatewayd.daemon import Daemon
+from gatewayd.liveness import Turned
 from gatewayd.mapping.loader import load_together
 from gatewayd.mapping.plan import Plan
 from gatewayd.simulator.server import SimulatedController
+from gatewayd.turning import TURN
 
 STATE = Path("/nonexistent/gatewayd")  # nothing here keeps anything
 
@@ -127,6 +129,31 @@ async def test_a_link_that_ends_by_a_defect_is_started_again(
             await until(lambda: station.cell.freshness.state is Source.FRESH)
             assert station.cell.accepts_writes
     assert len([record for record in caplog.records if "internal error" in record.getMessage()]) == 2
+
+
+async def test_a_link_that_rests_after_a_defect_turns_and_a_core_that_fails_does_not(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The watchdog ends a process in which nobody would notice that values have become stale, and no other."""
+
+    def fail(*_arguments: object) -> bool:
+        raise RuntimeError("a defect")
+
+    async with SimulatedController() as robot:
+        daemon = Daemon(plans((1, robot.port, free_port())), STATE)
+        (station,) = daemon.stations
+        turned = Turned()
+        async with running(daemon):
+            await until(lambda: turned.all_of(daemon.turns()))
+            monkeypatch.setattr(station.cell, "package_arrived", fail)
+            for _ in range(4):
+                await asyncio.sleep(4 * TURN)
+                assert turned.all_of(daemon.turns())
+            monkeypatch.setattr(station.cell, "tick", fail)
+            await asyncio.sleep(2 * TURN)
+            turned.all_of(daemon.turns())
+            await asyncio.sleep(4 * TURN)
+            assert not turned.all_of(daemon.turns())
 
 
 def test_an_observer_sees_every_cell_that_a_reload_brings_before_it_is_served() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gatewayd.liveness import Liveness
+from gatewayd.liveness import Liveness, Turned
 
 
 def test_whoever_moves_is_alive() -> None:
@@ -44,10 +44,36 @@ def test_a_look_that_comes_late_itself_accuses_nobody() -> None:
     liveness = Liveness(5)
     liveness.late({"core": 1}, 0)
     assert liveness.late({"core": 1}, 3600) == ()
-    assert liveness.late({"core": 1}, 3602) == ()
-    assert liveness.late({"core": 1}, 3604) == ()
+    assert liveness.late({"core": 1}, 3603) == ()
+    assert liveness.late({"core": 1}, 3605) == ()
     assert liveness.late({"core": 1}, 3606) == ("core",)
 
 
 def test_the_first_look_accuses_nobody() -> None:
     assert Liveness(5).late({"core": 0}, 1e9) == ()
+
+
+def test_all_have_turned_once_the_slowest_has() -> None:
+    turned = Turned()
+    counts = [
+        {"core": 1, "robot": 0},
+        {"core": 2, "robot": 1},
+        {"core": 3, "robot": 1},
+        {"core": 3, "robot": 2},
+    ]
+    assert [turned.all_of(one) for one in counts] == [False, True, False, True]
+
+
+def test_turns_since_the_last_time_count_not_since_the_last_question() -> None:
+    turned = Turned()
+    assert turned.all_of({"core": 1, "robot": 1})
+    assert not turned.all_of({"core": 2, "robot": 1})
+    assert turned.all_of({"core": 2, "robot": 2})
+
+
+def test_a_part_that_is_new_has_turned_when_it_has_begun() -> None:
+    turned = Turned()
+    assert turned.all_of({"core": 1})
+    assert not turned.all_of({"core": 2, "CAN": 0})
+    assert turned.all_of({"core": 2, "CAN": 1})
+    assert turned.all_of({"core": 3})

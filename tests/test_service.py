@@ -12,11 +12,12 @@ import pytest
 
 from gatewayd.core.cell import Cell
 from gatewayd.daemon import Daemon
-from gatewayd.liveness import PATIENCE
+from gatewayd.liveness import Turned
 from gatewayd.mapping.loader import load_together
 from gatewayd.service import STATUS_PERIOD, Service
 from gatewayd.simulator.server import SimulatedController
 from gatewayd.systemd import Notifier
+from gatewayd.turning import TURN
 
 MAPPING = """\
 gatewayd: 1
@@ -94,6 +95,7 @@ def test_ready_is_said_once_all_parts_have_turned(manager: Manager, notifier: No
     gateway.turn()
     service.look(0.5)
     assert "READY=1" in manager.read()
+    gateway.turn()
     service.look(1.0)
     assert manager.read() == ["WATCHDOG=1"]
 
@@ -101,10 +103,11 @@ def test_ready_is_said_once_all_parts_have_turned(manager: Manager, notifier: No
 def test_the_watchdog_is_fed_only_while_every_part_turns(
     manager: Manager, notifier: Notifier, caplog: pytest.LogCaptureFixture
 ) -> None:
+    """From the first look at which one part has not turned since the last ping; its name comes before the end."""
     gateway = Gateway()
     service = Service(notifier, gateway)
-    fed = []
-    for step in range(int(5 * PATIENCE)):
+    fed, told = [], []
+    for step in range(16):
         gateway.turn()
         if step >= 10:
             gateway.counts["robot"] = 99
@@ -112,8 +115,11 @@ def test_the_watchdog_is_fed_only_while_every_part_turns(
         heard = manager.read()
         if "WATCHDOG=1" in heard:
             fed.append(step / 2)
-    assert fed[-1] == 5.0 + PATIENCE
-    assert "STATUS=hangs: robot" in manager.heard
+        if "STATUS=hangs: robot" in heard:
+            told.append(step / 2)
+    assert notifier.watchdog_after == 2.0
+    assert fed == [step / 2 for step in range(11)]
+    assert fed[-1] < told[0] < fed[-1] + notifier.watchdog_after
     assert [record.getMessage() for record in caplog.records] == ["a part of the gateway hangs"]
 
 
@@ -123,10 +129,12 @@ def test_a_changed_number_is_told_later_than_a_changed_word(manager: Manager, no
     told = []
     for step, trouble in enumerate(["at 500 Hz", "at 499 Hz", "at 498 Hz", "lost", "lost"]):
         gateway.wrong = [trouble]
+        gateway.turn()
         service.look(step / 2)
         told.append([one for one in manager.read() if one.startswith("STATUS=")])
     assert told == [["STATUS=at 500 Hz"], [], [], ["STATUS=lost"], []]
     gateway.wrong = ["at 1 Hz"]
+    gateway.turn()
     service.look(3.0)
     gateway.wrong = ["at 2 Hz"]
     service.look(3.0 + STATUS_PERIOD)
@@ -202,20 +210,27 @@ async def test_a_real_daemon_is_ready_without_its_robot_and_its_port(
 
 
 async def test_every_part_of_a_real_daemon_turns_whatever_its_peers_do() -> None:
-    """A robot that is there, and one whose host accepts and never says a word."""
+    """A robot that is there, one whose host accepts and never says a word, one that refuses, a port that is taken."""
     with socket.socket() as dumb:
         dumb.bind(("127.0.0.1", 0))
         dumb.listen()
         async with SimulatedController() as robot:
-            gateways = [daemon(robot.port, free_port()), daemon(dumb.getsockname()[1], free_port())]
+            peers = [
+                (robot.port, free_port()),
+                (dumb.getsockname()[1], free_port()),
+                (free_port(), robot.port),
+            ]
+            gateways = [daemon(*ports) for ports in peers]
             stop = asyncio.Event()
             tasks = [asyncio.create_task(gateway.run(stop)) for gateway in gateways]
             try:
                 await until(lambda: all(all(gateway.turns().values()) for gateway in gateways))
-                seen = [gateway.turns() for gateway in gateways]
-                await asyncio.sleep(2.5)
-                for gateway, before in zip(gateways, seen, strict=True):
-                    assert all(count > before[name] for name, count in gateway.turns().items())
+                turned = [Turned() for _ in gateways]
+                for _ in range(6):
+                    await asyncio.sleep(4 * TURN)
+                    assert all(
+                        one.all_of(gateway.turns()) for one, gateway in zip(turned, gateways, strict=True)
+                    )
             finally:
                 stop.set()
                 await asyncio.gather(*tasks)

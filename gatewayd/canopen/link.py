@@ -26,8 +26,9 @@ from gatewayd.canopen.storage import Store
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.logs import fields
+from gatewayd.turning import TURN, turning
 
-__all__ = ["CORE_TIME", "GAP", "LOSS_INTERVAL", "RETRY", "TURN", "CanLink"]
+__all__ = ["CORE_TIME", "GAP", "LOSS_INTERVAL", "RETRY", "CanLink"]
 
 CORE_TIME = 0.5
 """Seconds without a count of the core's heartbeat after which the core counts as stuck."""
@@ -35,8 +36,6 @@ GAP = 0.05
 """Seconds without a frame after which the process may have been suspended."""
 RETRY = 2.0
 """Seconds between two attempts at a bus that cannot be used as it is set up."""
-TURN = 1.0
-"""Seconds between two counts of `CanLink.turns`."""
 LOSS_INTERVAL = 10.0
 """Seconds between two lines of the log about lost frames."""
 CLOCK_STEP = 1.0
@@ -208,10 +207,13 @@ class CanLink(Observer):
             bit_rates=self._bit_rates,
         )
 
+    def _turn(self) -> None:
+        self.turns += 1
+
     async def _turn_until(self, moment: float) -> None:
         """Wait for that moment, or for a switch of the bit rate, and count meanwhile."""
         while not self._switching.is_set() and (rest := moment - time.monotonic()) > 0:
-            self.turns += 1
+            self._turn()
             # Not wait_for: Python 3.11's can swallow a cancellation that comes with the time-out.
             with suppress(TimeoutError):
                 async with asyncio.timeout(min(rest, TURN)):
@@ -231,8 +233,7 @@ class CanLink(Observer):
                 if str(error) != told:
                     told = str(error)
                     log.error("%s", told, extra=fields(**self._names(), retry_s=RETRY))  # noqa: TRY400 - the text says it all
-                self.turns += 1
-                await asyncio.sleep(RETRY)
+                await turning(asyncio.sleep(RETRY), self._turn, RETRY)
             else:
                 return
 

@@ -29,7 +29,13 @@ def default_socket(environ: Mapping[str, str]) -> Path | None:
 
 
 def candidates(environ: Mapping[str, str]) -> list[Path]:
-    """Where a command looks for a daemon that it was not told the socket of, in this order."""
+    """Where a command looks for a daemon that it was not told the socket of, in this order.
+
+    As a part of a service (ExecReload=) at that of the service alone.
+    """
+    if environ.get("RUNTIME_DIRECTORY"):
+        own = default_socket(environ)
+        return [own] if own is not None else []
     session = _session_socket(environ)
     return [SYSTEM_SOCKET] if session is None else [session, SYSTEM_SOCKET]
 

@@ -52,7 +52,7 @@ UNUSED_AFTER = 10.0
 """Seconds without a request after which a connection without locks may have to make room for a new one."""
 STALLED_AFTER = 5.0
 """Seconds for which a peer may leave its answers unread."""
-_SWEEP = 1.0
+_SWEEP = 0.25
 """Seconds between two looks for connections that are idle or stalled."""
 
 # A pulled cable is noticed after KEEPIDLE + KEEPCNT * KEEPINTVL seconds, or TCP_USER_TIMEOUT with answers under way.
@@ -245,7 +245,7 @@ class ModbusListener:
         self._server: _Server | None = None
         self._sweeper: asyncio.TimerHandle | None = None
         self.turns = 0
-        """Moves with each attempt to listen, and at least every other second from then on."""
+        """Moves with each attempt to listen, and several times a second from then on."""
 
     @property
     def port(self) -> int:

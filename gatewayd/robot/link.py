@@ -83,7 +83,7 @@ class RobotLink:
 
     @property
     def turns(self) -> int:
-        """Moves at least every other second while `run` works, whatever the controller does."""
+        """Moves several times a second while `run` works, whatever the controller does."""
         return self._client.statistics.turns
 
     async def run(self) -> None:

@@ -23,6 +23,7 @@ from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.resolve import resolve
 from gatewayd.rtde.types import DEFAULT_PORT
+from gatewayd.turning import turning
 
 __all__ = [
     "ClientHandler",
@@ -123,21 +124,19 @@ class RtdeClient:
         delay = self._settings.backoff
         attempts = 0
         while True:
-            self.statistics.turns += 1
             loss, lasted = await self._session()
-            self.statistics.turns += 1
             attempts = 0 if loss.started else attempts + 1
             if lasted > self._settings.backoff_limit:
                 delay = self._settings.backoff
             self._handler.session_lost(replace(loss, attempts=attempts, retry_in=delay))
-            await asyncio.sleep(delay)
+            await turning(asyncio.sleep(delay), self._turn, delay)
             delay = min(2 * delay, self._settings.backoff_limit)
 
     async def _session(self) -> tuple[Loss, float]:
         """One connection: how it ended, and for how long a session was up."""
         wishes = self._wishes()
         try:
-            connection = await self._connect(wishes)
+            connection = await turning(self._connect(wishes), self._turn, self._settings.connect_timeout)
         except OSError as error:
             return connect_failure(error, self._address), 0.0
         self._connection = connection
@@ -197,6 +196,9 @@ class RtdeClient:
             if option is not None:
                 with contextlib.suppress(OSError):
                     candidate.setsockopt(socket.IPPROTO_TCP, option, value)
+
+    def _turn(self) -> None:
+        self.statistics.turns += 1
 
     def _wishes(self) -> Wishes:
         settings = self._settings

@@ -152,6 +152,7 @@ class Connection(asyncio.Protocol):
         """See asyncio.Protocol."""
         self._transport = cast("asyncio.Transport", transport)
         self._request(self._negotiation.begin())
+        self._watch()
 
     def data_received(self, data: bytes) -> None:
         """See asyncio.Protocol."""
@@ -243,7 +244,6 @@ class Connection(asyncio.Protocol):
         self._period = session.period
         self._pace = Pace(session.period, self._statistics, now)
         self._schedule_retry()
-        self._watch()
         self._handler.session_started(session)
 
     def _inputs_changed(self) -> None:
@@ -277,7 +277,6 @@ class Connection(asyncio.Protocol):
             )
 
     def _request(self, message: ExecutableMessage) -> None:
-        self._statistics.turns += 1
         self._write(message)
         self._disarm()
         if not self.done.done():

@@ -29,7 +29,7 @@ class Statistics:
     frequency: float = 0.0
     """Packages per second, measured lately."""
     turns: int = 0
-    """Moves at least every other second while the client works, whatever the controller does."""
+    """Moves several times a second while the client works, whatever the controller does."""
 
 
 class Pace:
