@@ -25,6 +25,12 @@ def test_the_service_is_found_without_a_session() -> None:
     assert candidates({"XDG_RUNTIME_DIR": "relative"}) == [SYSTEM_SOCKET]
 
 
+def test_what_a_service_runs_finds_its_own_daemon() -> None:
+    """`ExecReload=` of one instance must not reload another."""
+    environ = {"RUNTIME_DIRECTORY": "/run/gatewayd/press", "XDG_RUNTIME_DIR": "/run/user/1000"}
+    assert candidates(environ) == [default_socket(environ)] == [Path("/run/gatewayd/press/control.sock")]
+
+
 def test_without_a_place_of_its_own_there_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(paths, "SYSTEM_SOCKET", tmp_path / "missing" / "control.sock")
     assert default_socket({}) is None

@@ -32,6 +32,8 @@ variables:
   cycles: {robot: output_int_register_0, modbus: 100}
 """
 MORE = MAPPING + "  level:  {robot: output_double_register_0, modbus: 110}\n"
+TURNED = MORE.replace("output_int_register_0", "input_int_register_1")
+"""A value that the PLC reads becomes one that it writes."""
 BROKEN = MAPPING + "  cycles: {robot: output_int_register_0, modbus: 100}\n"
 
 DPKG = (
@@ -276,6 +278,34 @@ def reload_with_a_mistake() -> Facts:
     }
     (MAPPINGS / "press-3.yaml").write_text(MORE)
     return found
+
+
+@step
+def reload_that_is_unsafe() -> Facts:
+    """Refused by the running gateway: nothing is wrong with the file itself."""
+    before = show()
+    (MAPPINGS / "press-3.yaml").write_text(TURNED)
+    checked = sh("gatewayd check /etc/gatewayd").returncode
+    done = timed("systemctl reload gatewayd")
+    found = {**done, "checked": checked, "before": before, "after": show()}
+    (MAPPINGS / "press-3.yaml").write_text(MORE)
+    return found
+
+
+@step
+def reload_without_control_socket() -> Facts:
+    """By signal, as the drop-in says: asked for, not waited for."""
+    drop_in = Path("/etc/systemd/system/gatewayd.service.d")
+    drop_in.mkdir()
+    example = Path("/usr/share/doc/gatewayd/examples/reload-by-signal.conf")
+    (drop_in / example.name).write_text(example.read_text())
+    sh("systemctl daemon-reload")
+    done = timed("systemctl reload gatewayd")
+    told = wait_for(lambda: "reload" not in show()["StatusText"])
+    (drop_in / example.name).unlink()
+    drop_in.rmdir()
+    sh("systemctl daemon-reload")
+    return {**done, "told": told, "after": show()}
 
 
 @step

@@ -157,6 +157,23 @@ def test_a_reload_with_a_mistake_fails_and_the_old_mapping_runs_on(steps: Facts)
     assert seen["version_of_status_block"] == 1
 
 
+def test_a_reload_that_is_refused_fails_and_says_why(steps: Facts) -> None:
+    """What only the running gateway can know ends in systemctl's exit code too."""
+    seen = steps["reload_that_is_unsafe"]
+    assert seen["checked"] == 0
+    assert seen["code"] != 0
+    assert "reload refused" in seen["after"]["StatusText"]
+    assert is_running(seen["after"])
+    assert seen["after"]["MainPID"] == seen["before"]["MainPID"]
+
+
+def test_a_reload_by_signal_for_those_without_control_socket(steps: Facts) -> None:
+    seen = steps["reload_without_control_socket"]
+    assert seen["code"] == 0, seen["said"]
+    assert seen["told"]
+    assert is_running(seen["after"])
+
+
 def test_a_bare_signal_leaves_the_reason_in_the_status(steps: Facts) -> None:
     seen = steps["reload_with_a_mistake"]
     assert seen["told"]

@@ -58,7 +58,9 @@ def exposure(unit: Path) -> float:
 
 
 @needs_systemd
-@pytest.mark.parametrize("drop_in", [None, "addresses.conf", "unprivileged-ports.conf"])
+@pytest.mark.parametrize(
+    "drop_in", [None, "addresses.conf", "unprivileged-ports.conf", "reload-by-signal.conf"]
+)
 @pytest.mark.parametrize("unit", UNITS)
 def test_systemd_finds_no_mistake(unit: str, drop_in: str | None, tmp_path: Path) -> None:
     name = unit.replace("@", "@press-3")
@@ -103,7 +105,6 @@ def test_the_template_differs_in_what_it_must() -> None:
         "ConditionPathExistsGlob",
         "Description",
         "EnvironmentFile",
-        "ExecReload",
         "ExecStart",
         "ExecStartPre",
         "RuntimeDirectory",
