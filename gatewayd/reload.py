@@ -1,38 +1,35 @@
 """Another mapping for a running gateway: read, check, compare, refuse what is unsafe, swap.
 
-Reading and checking happen beside the running cells. The swap itself is one step without waiting, so that it lies
-between two packages and two requests. Whatever goes wrong before it, the old mapping runs on.
+Reading and checking happen in another process, beside the running cells. The swap itself is one step without waiting,
+so that it lies between two packages and two requests. Whatever goes wrong before it, the old mapping runs on.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Protocol
 
+from gatewayd.compilation import CompilationError, compile_files
 from gatewayd.core.cell import Cell
 from gatewayd.logs import fields
-from gatewayd.mapping.diagnostics import Diagnostic, Severity
+from gatewayd.mapping.compiled import Compiled
+from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.diff import Changes, as_text, compare, objections
-from gatewayd.mapping.loader import load_together, read_bytes
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.server import ListenError, ModbusListener
 from gatewayd.robot.link import RobotLink
-from gatewayd.startup import mapping_files
+from gatewayd.startup import mapping_files, tell_findings
 
 __all__ = ["Outcome", "Reloader", "Result", "Swapping"]
 
 SETTLING_TIME = 0.5
 """Seconds for which a swap waits for a robot link that has just claimed registers."""
-_SWITCH_INTERVAL = 0.0005
-"""Seconds after which the checking thread lets the loop have its turn; Python's own 5 ms are two packages."""
 _SHOWN = 3
 """Reasons that the one-line summary tells."""
 
@@ -192,10 +189,18 @@ class Reloader:
         return outcome
 
     async def _reload(self, *, force: bool) -> Outcome:
-        with _quick_turns():
-            plans, reasons = await asyncio.to_thread(_load, self._paths)
+        files = mapping_files(self._paths)
+        if not files:
+            return Outcome(Result.FAILED, (f"no mapping file in {', '.join(map(str, self._paths))}",))
+        try:
+            compiled = await asyncio.to_thread(compile_files, files)
+        except CompilationError as error:
+            return Outcome(Result.FAILED, (str(error),))
+        tell_findings(compiled.files)
+        reasons = tuple(_reasons(compiled))
         if reasons:
-            return Outcome(Result.FAILED, tuple(reasons))
+            return Outcome(Result.FAILED, reasons)
+        plans = compiled.plans
         differences = self._compare(plans)
         if not differences:
             return Outcome(Result.UNCHANGED)
@@ -274,37 +279,13 @@ def _owned(cell: Cell) -> set[str]:
     return {one.name for one in variables if one.lock is not None and owners[one.lock] is not None}
 
 
-def _load(paths: Sequence[Path]) -> tuple[tuple[Plan, ...], list[str]]:
-    """All plans, or every reason why not all can be served. Runs beside the loop."""
-    files: list[tuple[str, bytes]] = []
-    reasons: list[str] = []
-    for path in mapping_files(paths):
-        try:
-            files.append((str(path), read_bytes(path)))
-        except (OSError, ValueError) as error:
-            reasons.append(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}")
-    if not files and not reasons:
-        reasons.append(f"no mapping file in {', '.join(map(str, paths))}")
-    loaded = load_together(files)
-    for one in loaded:
-        reasons += (_line(finding) for finding in one.diagnostics if finding.severity is Severity.ERROR)
-    for finding in (finding for one in loaded for finding in one.diagnostics):
-        level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
-        rule = f"{finding.rule.id} {finding.rule.slug}"
-        log.log(level, finding.message, extra=fields(at=str(finding.position), rule=rule, hint=finding.hint))
-    return tuple(one.plan for one in loaded if one.plan is not None), reasons
+def _reasons(compiled: Compiled) -> Iterator[str]:
+    """Why not all of it can be served."""
+    for unread in compiled.unreadable:
+        yield f"{unread.name} cannot be read: {unread.reason}"
+    for one in compiled.files:
+        yield from map(_line, one.errors)
 
 
 def _line(finding: Diagnostic) -> str:
     return f"{finding.position}: {finding.rule.id} {finding.rule.slug}: {finding.message}"
-
-
-@contextmanager
-def _quick_turns() -> Iterator[None]:
-    """Let the loop have its turn soon while another thread computes."""
-    former = sys.getswitchinterval()
-    sys.setswitchinterval(_SWITCH_INTERVAL)
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(former)

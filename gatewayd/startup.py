@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os.path import isdir
 from pathlib import Path
 
+from gatewayd.compilation import compile_files
 from gatewayd.logs import fields
+from gatewayd.mapping.compiled import CompiledFile
 from gatewayd.mapping.diagnostics import Severity
-from gatewayd.mapping.loader import Loaded, load_together, read_bytes
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["PATTERN", "Startup", "load_plans", "mapping_files", "state_directory"]
+__all__ = ["PATTERN", "Startup", "load_plans", "mapping_files", "state_directory", "tell_findings"]
 
 PATTERN = "*.yaml"
 """The files of a configuration directory."""
@@ -58,34 +59,24 @@ def mapping_files(paths: Iterable[Path]) -> list[Path]:
     return found
 
 
-def load_plans(paths: Sequence[Path]) -> Startup:
-    """Read and check everything; log what cannot be served and why."""
-    files: list[tuple[str, bytes]] = []
-    unreadable = 0
-    for path in mapping_files(paths):
-        try:
-            files.append((str(path), read_bytes(path)))
-        except OSError as error:
-            unreadable += 1
-            log.error("cannot read the mapping file", extra=fields(file=str(path), reason=error.strerror))  # noqa: TRY400 - the reason says it all
-    loaded = load_together(files)
-    for one in loaded:
-        _tell(one)
-    plans = tuple(one.plan for one in loaded if one.plan is not None)
-    return Startup(plans, unreadable, len(loaded) - len(plans))
+def load_plans(paths: Sequence[Path], meanwhile: Callable[[], object] = lambda: None) -> Startup:
+    """Read and check everything; log what cannot be served and why. Raises CompilationError.
+
+    `meanwhile` is called while another process reads.
+    """
+    compiled = compile_files(mapping_files(paths), meanwhile)
+    for unread in compiled.unreadable:
+        log.error("cannot read the mapping file", extra=fields(file=unread.name, reason=unread.reason))
+    tell_findings(compiled.files)
+    broken = [one for one in compiled.files if one.plan is None]
+    for one in broken:
+        log.error("the cell is not served", extra=fields(file=one.name, remedy=f"gatewayd check {one.name}"))
+    return Startup(compiled.plans, len(compiled.unreadable), len(broken))
 
 
-def _tell(loaded: Loaded) -> None:
-    for finding in loaded.diagnostics:
+def tell_findings(files: Iterable[CompiledFile]) -> None:
+    """Log every finding with its place, rule and remedy."""
+    for finding in (finding for one in files for finding in one.diagnostics):
         level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
-        log.log(
-            level,
-            finding.message,
-            extra=fields(
-                at=str(finding.position), rule=f"{finding.rule.id} {finding.rule.slug}", hint=finding.hint
-            ),
-        )
-    if loaded.plan is None:
-        log.error(
-            "the cell is not served", extra=fields(file=loaded.name, remedy=f"gatewayd check {loaded.name}")
-        )
+        rule = f"{finding.rule.id} {finding.rule.slug}"
+        log.log(level, finding.message, extra=fields(at=str(finding.position), rule=rule, hint=finding.hint))

@@ -23,6 +23,8 @@ FORCED = 130
 """Exit code after a second signal."""
 NOTHING_TO_RUN = 1
 UNREADABLE = 2
+DEFECT = 70
+"""Worth another attempt, unlike the others: the service manager starts it again."""
 
 
 @click.command(
@@ -37,6 +39,7 @@ Exit codes:
   0    stopped by SIGTERM or SIGINT, or by the end of its terminal; SIGHUP otherwise means: reload
   1    no mapping could be served (each reason stands in the log), or --strict and one of them could not
   2    wrong usage, or none of the files could be read
+  70   the process that reads the files could not do so; the log says why
   130  forced by a second signal
 """,
 )
@@ -103,7 +106,7 @@ def command(
     A FILE may also be a directory: all its *.yaml files are meant. Cells with the same `modbus: listen:` share one
     listener and differ by their unit id. Robots, PLCs and interfaces may come and go in any order.
     """
-    from gatewayd.daemon import Daemon
+    from gatewayd.compilation import CompilationError
     from gatewayd.logs import Format, configure
     from gatewayd.startup import load_plans, state_directory
     from gatewayd.status.launch import Settings, SettingsError
@@ -113,14 +116,28 @@ def command(
     except SettingsError as error:
         raise click.UsageError(str(error)) from error
     configure(Format(log_format), logging.getLevelNamesMapping()[log_level.upper()])
-    found = load_plans(files)
+    try:
+        found = load_plans(files, _import_the_daemon)
+    except CompilationError as error:
+        logging.getLogger("gatewayd.startup").error("%s", error)  # noqa: TRY400 - the text says it all
+        return DEFECT
     if not found.plans and not found.broken:
         return UNREADABLE
     if not found.plans or (strict and (found.broken or found.unreadable)):
         return NOTHING_TO_RUN
+    from gatewayd.daemon import Daemon
+
     daemon = Daemon(found.plans, state or state_directory(os.environ))
     asyncio.run(_serve(daemon, files, _notes(found), page=page, control=_socket(control), audit=audit))
     return 0
+
+
+def _import_the_daemon() -> None:
+    """What takes as long as reading the files, and can be done meanwhile."""
+    import gatewayd.daemon
+    import gatewayd.operation
+    import gatewayd.reload
+    import gatewayd.service  # noqa: F401
 
 
 def _socket(named: Path | None) -> Path | None:

@@ -93,8 +93,11 @@ class Codec:
     for another number of bytes than `2 * words`.
     """
 
+    def __reduce__(self) -> tuple[Callable[..., Codec], tuple[object, ...]]:
+        """Between processes it travels as what it was made of: its functions cannot."""
+        return _compiled, (self.type, self.order, self.kind, (self.scale, self.offset), self.struct_code)
 
-@lru_cache(maxsize=4096)
+
 def make_codec(
     type_name: str,
     order: str = "ABCD",
@@ -112,13 +115,20 @@ def make_codec(
     number = TYPES[type_name]
     if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0:
         raise ValueError(f"scale {scale} and offset {offset} cannot be undone")
+    merged = scale == 1 and offset == 0 and order == "ABCD" and _is_lossless(number, kind, low, high)
+    return _compiled(type_name, order, kind, (scale, offset), number.code if merged else None)
+
+
+@lru_cache(maxsize=4096)
+def _compiled(
+    type_name: str, order: str, kind: ValueKind, linear: tuple[float, float], struct_code: str | None
+) -> Codec:
+    number, (scale, offset) = TYPES[type_name], linear
     pack, unpack = _ORDERS[order](number)
-    linear = scale != 1 or offset != 0
-    encode = _encoder(number, pack, scale, offset) if linear else _plain_encoder(number, pack, kind)
-    decode = _decoder(unpack, scale, offset, kind) if linear else _plain_decoder(number, unpack, kind)
-    merged = not linear and order == "ABCD" and _is_lossless(number, kind, low, high)
-    code = number.code if merged else None
-    return Codec(type_name, order, scale, offset, kind, number.words, code, encode, decode)
+    plain = scale == 1 and offset == 0
+    encode = _plain_encoder(number, pack, kind) if plain else _encoder(number, pack, scale, offset)
+    decode = _plain_decoder(number, unpack, kind) if plain else _decoder(unpack, scale, offset, kind)
+    return Codec(type_name, order, scale, offset, kind, number.words, struct_code, encode, decode)
 
 
 def _is_lossless(number: NumberFormat, kind: ValueKind, low: float | None, high: float | None) -> bool:

@@ -13,8 +13,7 @@ from enum import Enum
 from typing import Any
 
 from gatewayd.core.definition import Direction, Fallback, Lock, ValueKind, Variable
-from gatewayd.mapping.plan import ModbusPlan, Placement, Plan
-from gatewayd.mapping.table import AREA_NAMES
+from gatewayd.mapping.plan import AREA_NAMES, ModbusPlan, Placement, Plan
 
 __all__ = ["FOR_PEOPLE", "Facts", "groups", "links", "variables", "writers"]
 

@@ -1,6 +1,7 @@
 """The compiled mapping: everything the links need, worked out once, immutable.
 
-`gatewayd.mapping.compile` makes it; `gatewayd.daemon` hands its parts to the core and to the links.
+`gatewayd.mapping.compile` makes it; `gatewayd.daemon` hands its parts to the core and to the links. It travels between
+processes (pickle), and equals what it was there.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from gatewayd.canopen.plan import CanopenPlan
 from gatewayd.core.definition import CellDefinition
 from gatewayd.mapping.codec import Codec
 
-__all__ = ["Area", "ModbusPlan", "Network", "Placement", "Plan", "RobotPlan", "WatchdogPlan"]
+__all__ = ["AREA_NAMES", "Area", "ModbusPlan", "Network", "Placement", "Plan", "RobotPlan", "WatchdogPlan"]
 
 Network = IPv4Network | IPv6Network
 
@@ -34,6 +35,10 @@ class Area(Enum):
     def notation(self, address: int) -> str:
         """The 4xxxxx form of a protocol address: `Area.HOLDING.notation(0)` is `400001`."""
         return f"{self.value}{address + 1:05d}"
+
+
+AREA_NAMES = {Area.COIL: "coil", Area.DISCRETE: "discrete", Area.INPUT: "input", Area.HOLDING: "holding"}
+"""Areas as the mapping file names them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,11 +13,10 @@ from typing import Any
 from gatewayd.core.definition import Direction, Fallback
 from gatewayd.mapping.expand import ConcretePlacement, ConcreteVariable, ExpandedCell
 from gatewayd.mapping.pdo_table import as_document, load_by_bit_rate, object_place, pdo_rows
-from gatewayd.mapping.plan import Area, Plan
+from gatewayd.mapping.plan import AREA_NAMES, Plan
 from gatewayd.mapping.rules.wording import cob, seconds
 
 __all__ = [
-    "AREA_NAMES",
     "COLUMNS",
     "Row",
     "as_csv",
@@ -29,9 +28,6 @@ __all__ = [
     "policy",
     "rows",
 ]
-
-AREA_NAMES = {Area.COIL: "coil", Area.DISCRETE: "discrete", Area.INPUT: "input", Area.HOLDING: "holding"}
-"""Areas as the mapping file names them."""
 
 
 @dataclass(frozen=True, slots=True)

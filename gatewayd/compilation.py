@@ -1,0 +1,65 @@
+"""Mapping files are read, checked and compiled by a process of their own, which ends with its work.
+
+What is needed for that would be a third of the gateway's memory, and on its loop or beside it the work would take time
+from the robots. Whatever a file does to that process, the gateway goes on with the mapping it has.
+"""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import gatewayd
+from gatewayd.mapping.compiled import Compiled
+
+__all__ = ["LIMIT", "CompilationError", "compile_files"]
+
+LIMIT = 20.0
+"""Seconds that all files together may take; hundreds take two."""
+
+_BOOT = "import sys; sys.path.insert(0, sys.argv.pop(1)); from gatewayd.mapping.worker import main; main()"
+"""Isolated (-I), so that no environment variable and no directory decides what is imported; this very gatewayd is."""
+_ROOT = str(Path(gatewayd.__file__).parents[1])
+
+
+class CompilationError(Exception):
+    """The process could not do its work; the text says what became of it, and what to do."""
+
+
+def compile_files(names: Iterable[Path], meanwhile: Callable[[], object] = lambda: None) -> Compiled:
+    """What the files come to. Waits for the process, and calls `meanwhile` before. Raises CompilationError."""
+    command = [sys.executable, "-I", "-c", _BOOT, _ROOT, *map(str, names)]
+    try:
+        process = subprocess.Popen(  # noqa: S603 - this interpreter and files that are only read
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+    except (OSError, ValueError) as error:
+        raise CompilationError(
+            f"the process that reads the mapping files cannot be started: {error}"
+        ) from error
+    with process:
+        try:
+            meanwhile()
+            answer, said = process.communicate(timeout=LIMIT)
+        except subprocess.TimeoutExpired as error:
+            raise CompilationError(
+                f"reading the mapping files takes longer than {LIMIT:g} s: does `gatewayd check` end?"
+            ) from error
+        finally:
+            process.kill()
+    if process.returncode:
+        last = said.decode("utf-8", "replace").strip().rpartition("\n")[2]
+        raise CompilationError(
+            f"the process that reads the mapping files ended with {_ending(process.returncode)}"
+            f"{f': {last}' if last else ''}; try `gatewayd check`"
+        )
+    compiled = pickle.loads(answer)  # noqa: S301 - written by our own code in our own process
+    assert isinstance(compiled, Compiled)
+    return compiled
+
+
+def _ending(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"exit code {code}"

@@ -1,0 +1,35 @@
+"""The process that compiles mapping files for another one (`gatewayd.compilation`): one pickled `Compiled` to standard
+output, and the end. For people there is `gatewayd check`.
+"""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from gatewayd.mapping.compiled import Compiled, CompiledFile, Unreadable
+from gatewayd.mapping.loader import load_together, read_bytes
+
+__all__ = ["compile_files", "main"]
+
+
+def compile_files(names: Iterable[str]) -> Compiled:
+    """Read, check and compile; the files are to run in one process. Never raises, whatever is named."""
+    files: list[tuple[str, bytes]] = []
+    unreadable: list[Unreadable] = []
+    for name in names:
+        try:
+            files.append((name, read_bytes(Path(name))))
+        except (OSError, ValueError) as error:
+            unreadable.append(Unreadable(name, getattr(error, "strerror", None) or str(error)))
+    loaded = load_together(files)
+    return Compiled(
+        tuple(CompiledFile(one.name, one.diagnostics, one.plan) for one in loaded), tuple(unreadable)
+    )
+
+
+def main() -> None:
+    """Compile what the command line names."""
+    sys.stdout.buffer.write(pickle.dumps(compile_files(sys.argv[1:]), pickle.HIGHEST_PROTOCOL))
