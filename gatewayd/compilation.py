@@ -9,13 +9,14 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Self
 
 import gatewayd
 from gatewayd.mapping.compiled import Compiled
 
-__all__ = ["LIMIT", "CompilationError", "compile_files"]
+__all__ = ["LIMIT", "Compilation", "CompilationError"]
 
 LIMIT = 20.0
 """Seconds that all files together may take; hundreds take two."""
@@ -29,36 +30,51 @@ class CompilationError(Exception):
     """The process could not do its work; the text says what became of it, and what to do."""
 
 
-def compile_files(names: Iterable[Path], meanwhile: Callable[[], object] = lambda: None) -> Compiled:
-    """What the files come to. Waits for the process, and calls `meanwhile` before. Raises CompilationError."""
-    command = [sys.executable, "-I", "-c", _BOOT, _ROOT, *map(str, names)]
-    try:
-        process = subprocess.Popen(  # noqa: S603 - this interpreter and files that are only read
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        )
-    except (OSError, ValueError) as error:
-        raise CompilationError(
-            f"the process that reads the mapping files cannot be started: {error}"
-        ) from error
-    with process:
+class Compilation:
+    """Files on their way to plans: the process runs from the beginning, and not beyond the end of the `with`."""
+
+    def __init__(self, names: Iterable[Path]) -> None:
+        """Raises CompilationError if there can be no such process."""
+        command = [sys.executable, "-I", "-c", _BOOT, _ROOT, *map(str, names)]
         try:
-            meanwhile()
+            self._process = subprocess.Popen(  # noqa: S603 - this interpreter and files that are only read
+                command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+            )
+        except (OSError, ValueError) as error:
+            text = f"the process that reads the mapping files cannot be started: {error}"
+            raise CompilationError(text) from error
+        self._asked = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        # Whoever waits in `result`, maybe in another thread, comes back by this and closes the pipes.
+        self._process.kill()
+        if not self._asked:
+            self._process.communicate()
+
+    def result(self) -> Compiled:
+        """What the files come to. Waits; to be called once. Raises CompilationError."""
+        self._asked = True
+        process = self._process
+        try:
             answer, said = process.communicate(timeout=LIMIT)
         except subprocess.TimeoutExpired as error:
+            process.kill()
+            process.communicate()
             raise CompilationError(
                 f"reading the mapping files takes longer than {LIMIT:g} s: does `gatewayd check` end?"
             ) from error
-        finally:
-            process.kill()
-    if process.returncode:
-        last = said.decode("utf-8", "replace").strip().rpartition("\n")[2]
-        raise CompilationError(
-            f"the process that reads the mapping files ended with {_ending(process.returncode)}"
-            f"{f': {last}' if last else ''}; try `gatewayd check`"
-        )
-    compiled = pickle.loads(answer)  # noqa: S301 - written by our own code in our own process
-    assert isinstance(compiled, Compiled)
-    return compiled
+        if process.returncode:
+            last = said.decode("utf-8", "replace").strip().rpartition("\n")[2]
+            raise CompilationError(
+                f"the process that reads the mapping files ended with {_ending(process.returncode)}"
+                f"{f': {last}' if last else ''}; try `gatewayd check`"
+            )
+        compiled = pickle.loads(answer)  # noqa: S301 - written by our own code in our own process
+        assert isinstance(compiled, Compiled)
+        return compiled
 
 
 def _ending(code: int) -> str:

@@ -15,7 +15,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Protocol
 
-from gatewayd.compilation import CompilationError, compile_files
+from gatewayd.compilation import Compilation, CompilationError
 from gatewayd.core.cell import Cell
 from gatewayd.logs import fields
 from gatewayd.mapping.compiled import Compiled
@@ -193,7 +193,8 @@ class Reloader:
         if not files:
             return Outcome(Result.FAILED, (f"no mapping file in {', '.join(map(str, self._paths))}",))
         try:
-            compiled = await asyncio.to_thread(compile_files, files)
+            with Compilation(files) as compilation:
+                compiled = await asyncio.to_thread(compilation.result)
         except CompilationError as error:
             return Outcome(Result.FAILED, (str(error),))
         tell_findings(compiled.files)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from os.path import isdir
 from pathlib import Path
 
-from gatewayd.compilation import compile_files
+from gatewayd.compilation import Compilation
 from gatewayd.logs import fields
 from gatewayd.mapping.compiled import CompiledFile
 from gatewayd.mapping.diagnostics import Severity
@@ -64,7 +64,9 @@ def load_plans(paths: Sequence[Path], meanwhile: Callable[[], object] = lambda: 
 
     `meanwhile` is called while another process reads.
     """
-    compiled = compile_files(mapping_files(paths), meanwhile)
+    with Compilation(mapping_files(paths)) as compilation:
+        meanwhile()
+        compiled = compilation.result()
     for unread in compiled.unreadable:
         log.error("cannot read the mapping file", extra=fields(file=unread.name, reason=unread.reason))
     tell_findings(compiled.files)

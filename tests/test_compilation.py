@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+import asyncio
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from gatewayd import compilation
-from gatewayd.compilation import CompilationError, compile_files
+from gatewayd.compilation import Compilation, CompilationError
 from gatewayd.mapping import worker
+from gatewayd.mapping.compiled import Compiled
 
 MAPPINGS = sorted((Path(__file__).parents[1] / "mappings").glob("*.yaml"))
 
 
+def compiled(paths: Sequence[Path]) -> Compiled:
+    with Compilation(paths) as one:
+        return one.result()
+
+
 def test_it_comes_to_the_same_as_here() -> None:
-    assert compile_files(MAPPINGS) == worker.compile_files(map(str, MAPPINGS))
-
-
-def test_what_is_done_meanwhile_is_done_once_and_while_it_works() -> None:
-    calls: list[float] = []
-    compile_files(MAPPINGS[:1], lambda: calls.append(time.monotonic()))
-    assert len(calls) == 1
+    assert compiled(MAPPINGS) == worker.compile_files(map(str, MAPPINGS))
 
 
 def test_the_environment_and_the_directory_decide_nothing(
@@ -34,7 +36,7 @@ def test_the_environment_and_the_directory_decide_nothing(
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setenv("PYTHONSTARTUP", str(tmp_path / "json.py"))
     monkeypatch.chdir(tmp_path)
-    assert compile_files(MAPPINGS[:1]).plans
+    assert compiled(MAPPINGS[:1]).plans
 
 
 @pytest.mark.parametrize(
@@ -48,7 +50,7 @@ def test_the_environment_and_the_directory_decide_nothing(
 def test_a_process_that_dies_is_told(program: str, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compilation, "_BOOT", program)
     with pytest.raises(CompilationError) as caught:
-        compile_files(MAPPINGS)
+        compiled(MAPPINGS)
     assert str(caught.value) == f"the process that reads the mapping files {text}"
 
 
@@ -57,23 +59,37 @@ def test_a_process_that_does_not_end_is_ended(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(compilation, "LIMIT", 0.2)
     begin = time.monotonic()
     with pytest.raises(CompilationError, match=r"longer than 0\.2 s"):
-        compile_files(MAPPINGS)
+        compiled(MAPPINGS)
     assert time.monotonic() - begin < 5
 
 
 def test_a_process_that_cannot_be_started_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/nonexistent/python")
     with pytest.raises(CompilationError, match=r"cannot be started: .*No such file or directory"):
-        compile_files(MAPPINGS)
+        compiled(MAPPINGS)
 
 
-def test_it_ends_with_whoever_waits_for_it() -> None:
-    def interrupted() -> None:
+def test_it_ends_with_whoever_needed_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compilation, "_BOOT", "import time; time.sleep(60)")
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), Compilation(MAPPINGS):
         raise KeyboardInterrupt
+    assert time.monotonic() - begin < 5
+
+
+async def test_a_cancellation_does_not_wait_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A gateway that is told to stop during a reload stops; the thread that waits comes back by itself."""
+    monkeypatch.setattr(compilation, "_BOOT", "import time; time.sleep(60)")
+
+    async def reload() -> Compiled:
+        with Compilation(MAPPINGS) as one:
+            return await asyncio.to_thread(one.result)
 
     begin = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        compile_files(MAPPINGS, interrupted)
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(0.2):
+            await reload()
+    await asyncio.get_running_loop().shutdown_default_executor()
     assert time.monotonic() - begin < 5
 
 

@@ -395,7 +395,7 @@ async def test_a_defect_is_told_and_changes_nothing(
         raise RuntimeError("a defect")
 
     async with rigged() as rig:
-        monkeypatch.setattr(reload_module, "compile_files", fail)
+        monkeypatch.setattr(reload_module, "Compilation", fail)
         with caplog.at_level(logging.ERROR):
             outcome = await rig.reloader.reload()
         assert (
