@@ -199,6 +199,22 @@ async def test_nonsense_of_an_adapter_costs_the_connection_and_no_more(
     assert unhandled == []
 
 
+async def test_a_lost_adapter_does_not_stop_the_loop(
+    slcan: tuple[PythonCanBus, Recorder], adapter: Adapter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """pySerial sleeps when a port is closed that is a connection: longer than a robot may be silent."""
+    bus, _recorder = slcan
+    slept: list[float] = []
+    monkeypatch.setattr("time.sleep", slept.append)
+    await until(lambda: "O" in adapter.lines)
+    await adapter.unplug()
+    await until(lambda: bus.state is BusState.ABSENT)
+    await adapter.plug_in()
+    await until(lambda: bus.state is BusState.ACTIVE)
+    bus.close()
+    assert [seconds for seconds in slept if seconds] == []
+
+
 async def test_adapter_that_takes_nothing_does_not_stop_the_loop(
     slcan: tuple[PythonCanBus, Recorder], adapter: Adapter
 ) -> None:
