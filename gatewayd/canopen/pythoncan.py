@@ -12,7 +12,9 @@ import asyncio
 import contextlib
 import logging
 import select
+import socket
 from collections.abc import Iterable
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -187,7 +189,7 @@ class PythonCanBus:
                 elif self._descriptor < 0 or not self._readiness.poll(0):
                     exhausted = True
                     break
-        except (can.CanError, OSError, ValueError) as error:
+        except Exception as error:  # noqa: BLE001 - drivers let through whatever the nonsense of an adapter made of them
             failure = error
         if frames:
             self.counters.received += len(frames)
@@ -307,6 +309,8 @@ class PythonCanBus:
         port = _serial_port(bus)
         if port is not None:
             port.flush = _do_nothing  # it would wait until the wire has carried the frame
+            if _connection(port) is not None:
+                port.close = partial(_hang_up, port)
         return bus
 
     def _filter_in_adapter(self, bus: can.BusABC) -> None:
@@ -350,6 +354,20 @@ def _descriptor(bus: can.BusABC) -> int:
 def _serial_port(bus: can.BusABC) -> Any:
     """The serial port below slcan; None for every other interface."""
     return getattr(bus, "serialPortOrig", None)
+
+
+def _connection(port: Any) -> socket.socket | None:
+    """Of a serial port at the other end of a TCP connection (`socket://`)."""
+    found = getattr(port, "_socket", None)
+    return found if isinstance(found, socket.socket) else None
+
+
+def _hang_up(port: Any) -> None:
+    """Close the connection below the port. The port's own `close` sleeps for 0.3 s then, and the loop with it."""
+    connection = _connection(port)
+    if connection is not None:
+        connection.close()
+    port.is_open = False
 
 
 def _do_nothing() -> None:

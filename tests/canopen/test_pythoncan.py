@@ -183,6 +183,38 @@ async def test_adapter_unplugged_and_plugged_in_again(
     assert bus.counters.opened == 2
 
 
+@pytest.mark.parametrize("nonsense", ["t", "t205", "t2058zz", "tXYZ8", "T0000"])
+async def test_nonsense_of_an_adapter_costs_the_connection_and_no_more(
+    slcan: tuple[PythonCanBus, Recorder], adapter: Adapter, nonsense: str
+) -> None:
+    """What came before is received, no exception reaches the loop, and the bus comes back."""
+    bus, recorder = slcan
+    unhandled: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _loop, context: unhandled.append(context))
+    await until(lambda: "O" in adapter.lines)
+    adapter.say("t2051FF", nonsense)
+    await until(lambda: BusState.ABSENT in recorder.states)
+    await until(lambda: bus.state is BusState.ACTIVE)
+    assert recorder.frames == [Frame(0x205, b"\xff")]
+    assert unhandled == []
+
+
+async def test_a_lost_adapter_does_not_stop_the_loop(
+    slcan: tuple[PythonCanBus, Recorder], adapter: Adapter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """pySerial sleeps when a port is closed that is a connection: longer than a robot may be silent."""
+    bus, _recorder = slcan
+    slept: list[float] = []
+    monkeypatch.setattr("time.sleep", slept.append)
+    await until(lambda: "O" in adapter.lines)
+    await adapter.unplug()
+    await until(lambda: bus.state is BusState.ABSENT)
+    await adapter.plug_in()
+    await until(lambda: bus.state is BusState.ACTIVE)
+    bus.close()
+    assert [seconds for seconds in slept if seconds] == []
+
+
 async def test_adapter_that_takes_nothing_does_not_stop_the_loop(
     slcan: tuple[PythonCanBus, Recorder], adapter: Adapter
 ) -> None:

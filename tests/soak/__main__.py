@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import random
+import shutil
 import signal
 import sys
 import tempfile
@@ -38,14 +39,8 @@ def _main() -> int:
         print(f"soak: NOT GOOD: {one}")
     print(f"soak: logs in {directory}" if found else "soak: all well")
     if not found:
-        _remove(directory)
+        shutil.rmtree(directory)
     return 1 if found else 0
-
-
-def _remove(directory: Path) -> None:
-    for path in directory.iterdir():
-        path.unlink()
-    directory.rmdir()
 
 
 if __name__ == "__main__":

@@ -7,9 +7,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 
+from gatewayd.control.client import ControlError, NoDaemon
 from tests.e2e.processes import wait_for
+from tests.soak.cell import ECHOES
 from tests.soak.faults import FAULTS, bound
-from tests.soak.rig import FIRST, PATIENCE, SECOND, Rig
+from tests.soak.look import descriptors, threads, torn
+from tests.soak.rig import PATIENCE, WRITERS, Rig
 from tests.soak.verdict import Measured, Sample
 
 __all__ = ["PAUSES", "kinds", "soak"]
@@ -52,63 +55,67 @@ def soak(
         _close(rig, measured)
     finally:
         rig.close()
-    if "Traceback" in rig.daemon.text():
-        measured.failures.append(f"the daemon's log has a traceback: {rig.daemon.log}")
+    measured.failures += [f"the daemon's log: {line}" for line in _defects(rig)]
     return measured
+
+
+def _defects(rig: Rig) -> list[str]:
+    """Exceptions that nobody expected, as the log tells them or as Python does."""
+    return rig.daemon.lines(" trace=") + rig.daemon.lines("Traceback")
 
 
 def _one(rig: Rig, kind: str, chance: Random, measured: Measured) -> str:
     """Do it, wait until it is over; what came of it."""
     try:
         FAULTS[kind](rig, chance)
-        before = rig.echoes()
-        took = wait_for(lambda: not rig.ills() and _moved(before, rig.echoes()), "recovery", bound(kind))
-    except (AssertionError, OSError) as error:
-        told = f"{error}; {'; '.join(rig.ills()) or 'all well'}"
+        before = rig.look.echoes()
+        took = wait_for(lambda: _well(rig, before), "recovery", bound(kind))
+    except (AssertionError, OSError, ControlError, NoDaemon) as error:
+        told = f"{error}; {'; '.join(rig.look.ills()) or 'all well'}"
         measured.failures.append(f"{kind}: {told}")
-        _mend(rig)
+        if rig.daemon.running:
+            rig.mend()
+            time.sleep(1)
         return told
     measured.recoveries.setdefault(kind, []).append(took)
     return f"{took * 1000:.0f} ms"
 
 
-def _moved(before: dict[str, object], now: dict[str, object]) -> bool:
-    """Whether what both PLCs write came back anew."""
-    return len(now) == 2 and all(now[name] != before.get(name) for name in now)
-
-
-def _mend(rig: Rig) -> None:
-    """After a fault that stopped half-way: begin the next one with all parts there."""
-    rig.end_simulator()
-    rig.start_simulator()
-    for name in (FIRST, SECOND):
-        if name not in rig.clients:
-            rig.start_client(name)
-    time.sleep(1)
+def _well(rig: Rig, before: dict[str, object]) -> bool:
+    """Whether the daemon has no complaint, shows its page, and what every writer writes came back anew."""
+    if rig.look.ills():
+        return False
+    now = rig.look.echoes()
+    moved = len(now) == ECHOES and all(now[name] != before.get(name) for name in now)
+    return moved and rig.look.page()
 
 
 def _sample(rig: Rig, measured: Measured, begin: float) -> None:
+    process = rig.daemon
+    now = time.monotonic() - begin
     measured.samples.append(
-        Sample(time.monotonic() - begin, rig.daemon.resident_kilobytes(), rig.descriptors())
+        Sample(now, process.resident_kilobytes(), descriptors(process.pid), threads(process.pid))
     )
-    first = set(rig.orphans())
+    first = set(rig.look.orphans())
     if first:
         # Between its two questions a lock may have changed hands; a leaked one is there for longer.
         time.sleep(0.1)
-        measured.leaked += first & set(rig.orphans())
+        measured.leaked += first & set(rig.look.orphans())
 
 
 def _close(rig: Rig, measured: Measured) -> None:
-    """Descriptors come back to what they were; with the last PLC the last lock is free."""
-    first = measured.samples[0].descriptors
+    """Descriptors come back to what they were; with the last writer the last lock is free."""
+    first, process = measured.samples[0].descriptors, rig.daemon.pid
     end = time.monotonic() + _SETTLED
-    while rig.descriptors() > first and time.monotonic() < end:
+    while descriptors(process) > first and time.monotonic() < end:
         time.sleep(0.1)
-    measured.descriptors_at_end = rig.descriptors()
-    for name in (FIRST, SECOND):
+    measured.descriptors_at_end = descriptors(process)
+    measured.failures += rig.complaints()
+    measured.failures += [f"the audit has a torn line: {line[:200]}" for line in torn(rig.audit)]
+    for name in WRITERS:
         rig.end_client(name)
-    for name in (FIRST, SECOND):
+    for name in WRITERS:
         try:
-            wait_for(lambda name=name: not rig.locks_of(name), f"the locks of {name}", PATIENCE)  # type: ignore[misc]
+            wait_for(lambda name=name: not rig.look.locks_of(name), f"the locks of {name}", PATIENCE)  # type: ignore[misc]
         except AssertionError:
-            measured.leaked += rig.locks_of(name)
+            measured.leaked += rig.look.locks_of(name)

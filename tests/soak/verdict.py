@@ -8,14 +8,17 @@ from statistics import linear_regression, median
 
 from tests.benchmarks.report import Table
 
-__all__ = ["MEMORY_BOUND", "Measured", "Sample"]
+__all__ = ["MEMORY_BOUND", "THREADS_BOUND", "Measured", "Sample"]
 
 MEMORY_BOUND = 8 * 1024
 """Kilobytes by which memory may grow from the second quarter of the run to the last."""
+THREADS_BOUND = 4
+"""Threads that may be more at the end than at the beginning: the event loop's pool grows when it is needed."""
 
 _DEFINITION = """\
-Recovery: from the end of the fault until the daemon calls itself healthy, both PLCs are alive and what they write comes
-back from the robot. Memory: VmRSS; growth from the median of the run's second quarter to that of its last."""
+Recovery: from the end of the fault until the daemon calls itself healthy, PLCs and master are alive, what they write
+comes back from the robot, and the status page answers. Memory: VmRSS; growth from the median of the run's second
+quarter to that of its last."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +29,7 @@ class Sample:
     """Seconds since the run began."""
     kilobytes: int
     descriptors: int
+    threads: int
 
 
 @dataclass(slots=True)
@@ -38,7 +42,7 @@ class Measured:
     """Faults that were not recovered in time, in words; the daemon's end."""
     samples: list[Sample] = field(default_factory=list)
     leaked: list[str] = field(default_factory=list)
-    """Locks without a living owner."""
+    """Locks without a living owner, and forces that stayed."""
     descriptors_at_end: int = 0
     """With everything of the run's own gone but what was there at the first sample."""
 
@@ -71,10 +75,13 @@ class Measured:
         first = self.samples[0].descriptors
         if self.descriptors_at_end > first:
             yield f"descriptors grew from {first} to {self.descriptors_at_end}"
+        begun, left = self.samples[0].threads, self.samples[-1].threads
+        if left > begun + THREADS_BOUND:
+            yield f"threads grew from {begun} to {left}"
         if self.growth > MEMORY_BOUND:
             yield f"memory grew by {self.growth:.0f} kB, more than {MEMORY_BOUND}"
         if self.leaked:
-            yield f"locks without a living owner: {', '.join(sorted(set(self.leaked)))}"
+            yield f"locks without a living owner, or forces that stayed: {', '.join(sorted(set(self.leaked)))}"
 
     def tables(self) -> list[Table]:
         """Faults by kind, and the daemon."""
@@ -97,5 +104,7 @@ class Measured:
             )
             greatest = str(max(one.descriptors for one in self.samples))
             daemon.add("descriptors", str(first.descriptors), str(self.descriptors_at_end), greatest)
+            greatest = str(max(one.threads for one in self.samples))
+            daemon.add("threads", str(first.threads), str(last.threads), greatest)
         daemon.add("locks leaked", "", str(len(self.leaked)))
         return [faults, daemon]

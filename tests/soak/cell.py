@@ -1,0 +1,81 @@
+"""The cell of the soak run: its mapping, and who writes and reads what there."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from tests.e2e.plant import HEAD
+from tests.e2e.plc import HMI, LINE, PLC
+from tests.e2e.processes import HOST
+from tests.soak.client import SHARED
+
+__all__ = ["ECHOES", "FIRST", "HELD", "MASTER", "NAME", "NODE", "SECOND", "VARIANTS", "command", "mapping"]
+
+NAME = "cell"
+FIRST, SECOND, MASTER = "first", "second", "master"
+"""The writers: two PLCs, and a CANopen master."""
+ECHOES = 4
+"""Variables that tell what a writer wrote, as it came back from the robot."""
+HELD = "input_int_register_3"
+"""Field that a robot program may hold for itself."""
+
+NODE = 16
+_CELL = f"""\
+canopen:
+  interface: slcan
+  channel: 'socket://{HOST}:{{can}}'
+  bitrate: 1000000
+  node: {NODE}
+  heartbeat: 100ms
+writers:
+  {FIRST}:  {{{{modbus: {PLC}, timeout: 1s}}}}
+  {SECOND}: {{{{modbus: {HMI}, timeout: 1s}}}}
+  {MASTER}: {{{{canopen: any, node: 1, heartbeat: 500ms}}}}
+variables:
+  first_in:    {{{{robot: input_int_register_0, modbus: 0, owner: {FIRST}}}}}
+  second_in:   {{{{robot: input_int_register_1, modbus: 2, owner: {SECOND}, lease: 500ms}}}}
+  shared:      {{{{robot: input_int_register_2, modbus: {SHARED}, owner: [{FIRST}, {SECOND}], lease: 300ms}}}}
+  held:        {{{{robot: {HELD}, modbus: 12}}}}
+  master_in:   {{{{robot: input_int_register_4, canopen: auto, owner: {MASTER}}}}}
+  heard_in:    {{{{robot: input_int_register_5, canopen: auto, owner: {MASTER}}}}}
+  first_echo:  {{{{robot: output_int_register_0, modbus: 100}}}}
+  second_echo: {{{{robot: output_int_register_1, modbus: 102}}}}
+  master_echo: {{{{robot: output_int_register_4, canopen: auto}}}}
+  heard_echo:  {{{{robot: output_int_register_5, canopen: auto}}}}
+  doubles:     {{{{robot: 'output_double_register_0..23', modbus: 200}}}}
+"""
+VARIANTS = {
+    "plain": "",
+    "another place": "  extra: {robot: output_int_register_0, modbus: 110}\n",
+    "another field": "  fresh: {robot: output_int_register_7, modbus: 112}\n",
+}
+"""Mappings that reloads change between: the same recipe or another one."""
+
+
+def mapping(variant: str, robot: int, modbus: int, can: int) -> str:
+    """The mapping file, for these ports of `HOST`."""
+    head = HEAD.format(
+        name=NAME,
+        host=HOST,
+        robot=robot,
+        frequency="0",
+        stale_after="300ms",
+        robot_options="",
+        modbus=modbus,
+        unit=1,
+        modbus_options=", idle_timeout: 3s",
+    )
+    return head + _CELL.format(can=can) + VARIANTS[variant]
+
+
+def command(name: str, modbus: int, can: int, status: int) -> Sequence[str]:
+    """How the client of this name is started: one of the writers, `poller` or `browser`."""
+    module, *arguments = {
+        FIRST: ("client", HOST, PLC, modbus, 0, 100, 0.05),
+        SECOND: ("client", HOST, HMI, modbus, 2, 102, 0.08),
+        MASTER: ("master", f"socket://{HOST}:{can}", NODE, 0.05),
+        "poller": ("client", HOST, LINE, modbus, -1, 0, 1.0),
+        "browser": ("browser", HOST, status, NAME, 0.5),
+    }[name]
+    return [sys.executable, "-m", f"tests.soak.{module}", *map(str, arguments)]

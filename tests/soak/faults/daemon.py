@@ -1,0 +1,80 @@
+"""Faults of the daemon's own house: its process, its mapping file, its audit file."""
+
+from __future__ import annotations
+
+import signal
+import time
+from random import Random
+
+from gatewayd.auditfile import GREATEST_SIZE, KEPT
+from tests.e2e.processes import wait_for
+from tests.soak.cell import VARIANTS
+from tests.soak.faults.common import suspend
+from tests.soak.rig import PATIENCE, Rig
+
+__all__ = ["broken_reload", "full_audit", "reload", "suspend_daemon", "unwritable_audit"]
+
+_TROUBLE, _END = "cannot write the audit file", "the audit file can be written again"
+_UNWRITABLE = ("/dev/full", ".", "/nowhere/audit.jsonl")
+"""A full disk, a directory, a directory that is gone."""
+
+
+def suspend_daemon(rig: Rig, _chance: Random) -> None:
+    suspend(rig.daemon, lambda: time.sleep(1))
+
+
+def reload(rig: Rig, chance: Random) -> None:
+    """Until the other mapping is there; a recipe that changed makes the robot start anew."""
+    present = rig.look.values()
+    now = "another place" if "extra" in present else "another field" if "fresh" in present else "plain"
+    wanted = chance.choice([name for name in VARIANTS if name != now])
+    rig.write_mapping(wanted)
+    rig.daemon.signal(signal.SIGHUP)
+
+    def changed() -> bool:
+        names = rig.look.values()
+        return bool(names) and (("extra" in names), ("fresh" in names)) == (
+            wanted == "another place",
+            wanted == "another field",
+        )
+
+    wait_for(changed, f"the mapping with {wanted}", PATIENCE)
+
+
+def broken_reload(rig: Rig, _chance: Random) -> None:
+    good = rig.mapping.read_text("utf-8")
+    rig.mapping.write_text(good + "variables: again\n", "utf-8")
+    rig.daemon.signal(signal.SIGHUP)
+    wait_for(lambda: any("reload" in ill for ill in rig.look.ills()), "the reload to be refused", PATIENCE)
+    rig.mapping.write_text(good, "utf-8")
+    rig.daemon.signal(signal.SIGHUP)
+
+
+def unwritable_audit(rig: Rig, chance: Random) -> None:
+    """Over when the daemon writes to the former file again, without a record lost."""
+    aside, link = rig.audit.with_suffix(".aside"), rig.audit.with_suffix(".link")
+    troubles, ends = (len(rig.daemon.lines(line)) for line in (_TROUBLE, _END))
+    aside.hardlink_to(rig.audit)
+    link.symlink_to(chance.choice(_UNWRITABLE))
+    # Never a moment without the name: the daemon would begin a file of its own there.
+    link.replace(rig.audit)
+    wait_for(lambda: len(rig.daemon.lines(_TROUBLE)) > troubles, "the audit's trouble", PATIENCE)
+    time.sleep(chance.uniform(0, 2))
+    aside.replace(rig.audit)
+    wait_for(lambda: len(rig.daemon.lines(_END)) > ends, "the audit to go on", PATIENCE)
+    last = rig.daemon.lines(_END)[-1]
+    assert "dropped=0" in last, last
+
+
+def full_audit(rig: Rig, _chance: Random) -> None:
+    """A file of the size at which it is rotated, put in the audit's place; over when a new one is begun."""
+    full = rig.audit.with_suffix(".full")
+    with full.open("wb") as stream:
+        stream.truncate(GREATEST_SIZE)
+    number = full.stat().st_ino
+    full.replace(rig.audit)
+    former = rig.audit.with_name(rig.audit.name + ".1")
+    wait_for(lambda: former.exists() and former.stat().st_ino == number, "the rotation", PATIENCE)
+    wait_for(rig.audit.exists, "the new file", PATIENCE)
+    kept = list(rig.audit.parent.glob(rig.audit.name + ".*"))
+    assert len(kept) <= KEPT, f"{len(kept)} former audit files"

@@ -1,0 +1,46 @@
+"""What the local operator does beside a running cell. None of it is a fault, and none of it may stay."""
+
+from __future__ import annotations
+
+import time
+from random import Random
+
+from tests.e2e.processes import wait_for
+from tests.soak.rig import PATIENCE, Rig
+
+__all__ = ["force", "take_lock"]
+
+_FORCED = ("first_in", "master_in", "second_echo", "heard_echo", "doubles[3]")
+_TAKEN = ("first_in", "second_in", "shared", "master_in", "heard_in")
+_LONGEST = 3600
+"""Seconds of what the operator ends himself."""
+
+
+def force(rig: Rig, chance: Random) -> None:
+    """It ends by its time or by the operator, whether or not the robot was there all the while."""
+    name = chance.choice(_FORCED)
+    path = f"/v1/variables/{name.replace('[', '%5B').replace(']', '%5D')}"
+    seconds = chance.uniform(0.2, 1.5)
+    by_time, robot_cut = chance.random() < 0.5, chance.random() < 0.3
+    rig.control.post(f"{path}/force", {"value": 40_000, "for": seconds if by_time else _LONGEST})
+    assert name in rig.look.forced(), f"{name} is not forced"
+    if robot_cut:
+        rig.simulator.do("drop-clients")
+    time.sleep(seconds)
+    if not by_time:
+        rig.control.post(f"{path}/unforce")
+    wait_for(lambda: not rig.look.forced(), f"the end of the force of {name}", PATIENCE)
+
+
+def take_lock(rig: Rig, chance: Random) -> None:
+    """It is back by its time or by the operator, and its writer was refused until then."""
+    name = chance.choice(_TAKEN)
+    seconds = chance.uniform(0.2, 1.5)
+    by_time = chance.random() < 0.5
+    taken = rig.control.post(f"/v1/locks/{name}/take", {"for": seconds} if by_time else {})
+    assert taken["owner"] == "operator", taken
+    time.sleep(seconds)
+    if not by_time:
+        assert name in rig.look.locks_of("operator"), f"the operator has lost {name}"
+        rig.control.post(f"/v1/locks/{name}/release")
+    wait_for(lambda: not rig.look.locks_of("operator"), f"{name} to be free of the operator", PATIENCE)
