@@ -20,11 +20,10 @@ from datetime import UTC, datetime
 from gatewayd.core.cell import Cell, Written
 from gatewayd.core.definition import Value
 from gatewayd.core.events import Event, EventKind
+from gatewayd.happening import ACCEPTED, Happening
 
-__all__ = ["ACCEPTED", "CAPACITY", "KINDS", "MERGED", "Audit", "Record", "plain_value", "utc"]
+__all__ = ["CAPACITY", "KINDS", "MERGED", "Audit", "Record", "plain_value", "utc"]
 
-ACCEPTED = "write accepted"
-"""What a record of an accepted write says; all others say what the event says."""
 CAPACITY = 2000
 """Records kept in memory, of all cells together."""
 MERGED = 1.0
@@ -48,43 +47,34 @@ PlainValue = bool | int | float | str | None
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One thing that was done, or refused. Names, not indices: it outlives a reload."""
+    """One thing that was done, or refused."""
 
     wall: float
     """Seconds since 1970, UTC."""
     monotonic: float
     """Seconds of the gateway's own clock, which no time server moves; equal for all changes of one request."""
     cell: str
-    what: str
-    """`write accepted`, or the event: `write refused`, `lock taken over`, `value forced` ..."""
-    writer: str | None = None
-    variable: str | None = None
-    lock: str | None = None
-    old: Value | None = None
-    new: Value | None = None
-    times: int = 1
-    """Changes or refusals that it stands for: `old` is of the first, `new` and the time are of the last."""
-    holder: str | None = None
-    """Who held the lock when it was refused, or before it was taken over."""
-    reason: str | None = None
-    detail: str | None = None
+    happening: Happening
+    """Of merged changes `old` is of the first, `new` and both times are of the last."""
 
     def as_json(self) -> dict[str, object]:
         """Plain values for JSON; what does not apply is left out."""
+        told = self.happening
         found: dict[str, object | None] = {
             "time": utc(self.wall),
             "monotonic": round(self.monotonic, 6),
             "cell": self.cell,
-            "what": self.what,
-            "writer": self.writer,
-            "variable": self.variable,
-            "lock": self.lock,
-            "old": plain_value(self.old),
-            "new": plain_value(self.new),
-            "times": self.times if self.times > 1 else None,
-            "holder": self.holder,
-            "reason": self.reason,
-            "detail": self.detail or None,
+            "what": told.what,
+            "writer": told.writer,
+            "variable": told.variable,
+            # A variable's lock goes without saying.
+            "lock": told.lock if told.variable is None else None,
+            "old": plain_value(told.old),
+            "new": plain_value(told.new),
+            "times": told.times if told.times > 1 else None,
+            "holder": told.holder,
+            "reason": told.reason,
+            "detail": told.detail or None,
         }
         return {name: value for name, value in found.items() if value is not None}
 
@@ -235,52 +225,26 @@ class _Watch:
         if event.variable is not None and event.variable in self._series:
             # In their order: what was written before a fallback or a force is told before it.
             self._tell(event.variable, self._series.pop(event.variable), event.time)
-        lock = event.lock if event.variable is None else None
-        self._audit.append(
-            Record(
-                self._audit.wall(),
-                event.time,
-                definition.name,
-                event.kind.value,
-                _name(definition.writer_name, event.writer) or _anonymous(event),
-                definition.variables[event.variable].name if event.variable is not None else None,
-                definition.locks[lock].name if lock is not None else None,
-                event.old,
-                event.new,
-                1 + event.repeats,
-                _name(definition.writer_name, event.other),
-                event.reason.text if event.reason is not None else None,
-                event.detail,
-            )
-        )
+        told = Happening.of(event, definition)
+        self._audit.append(Record(self._audit.wall(), event.time, definition.name, told))
 
     def _tell(self, index: int, one: _Series, now: float) -> None:
         if not one.untold:
             return
         definition = self.cell.definition
-        self._audit.append(
-            Record(
-                self._audit.wall(now - one.last if now < math.inf else 0.0),
-                one.last,
-                definition.name,
-                ACCEPTED,
-                definition.writer_name(one.writer),
-                definition.variables[index].name,
-                None,
-                one.old,
-                one.new,
-                one.untold,
-            )
+        variable = definition.variables[index]
+        told = Happening(
+            ACCEPTED,
+            definition.writer_name(one.writer),
+            variable.name,
+            variable.unit,
+            old=one.old,
+            new=one.new,
+            times=one.untold,
         )
+        wall = self._audit.wall(now - one.last if now < math.inf else 0.0)
+        self._audit.append(Record(wall, one.last, definition.name, told))
         one.untold = 0
-
-
-def _name(name_of: Callable[[int], str], writer: int | None) -> str | None:
-    return None if writer is None else name_of(writer)
-
-
-def _anonymous(event: Event) -> str | None:
-    return {EventKind.REFUSED: "undeclared", EventKind.FALLBACK: "gateway"}.get(event.kind)
 
 
 def plain_value(value: Value | None) -> PlainValue:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.freshness import Source
+from gatewayd.figures import counted
 
 __all__ = ["GREATEST_LIST", "sentence"]
 
@@ -35,9 +36,9 @@ def sentence(cells: Sequence[Cell], troubles: Iterable[str] = ()) -> str:
         parts += map(_told, ill[:GREATEST_LIST])
         more = len(ill) - GREATEST_LIST
         if more > 0:
-            parts.append(f"{_number(more, 'more cell')} with trouble")
+            parts.append(f"{counted(more, 'more cell')} with trouble")
         if well:
-            parts.append(f"{'all' if not ill else 'the other'} {_number(len(well), 'cell')} well")
+            parts.append(f"{'all' if not ill else 'the other'} {counted(len(well), 'cell')} well")
     return "; ".join(parts) or "no cell to serve"
 
 
@@ -56,19 +57,15 @@ def _told(cell: Cell) -> str:
         facts.append(f"CAN bus {cell.health.can_trouble}")
     unavailable = _unavailable(cell)
     if unavailable:
-        facts.append(f"{_number(unavailable, 'variable')} unavailable")
+        facts.append(f"{counted(unavailable, 'variable')} unavailable")
     writers = cell.writers.alive
     if writers:
-        facts.append(f"{sum(writers)} of {_number(len(writers), 'writer')} connected")
+        facts.append(f"{sum(writers)} of {counted(len(writers), 'writer')} connected")
     if cell.ownership.owners:
         held = sum(owner is not None for owner in cell.ownership.owners)
-        facts.append(f"{_number(held, 'lock')} held")
+        facts.append(f"{counted(held, 'lock')} held")
     return f"{cell.definition.name}: {', '.join(facts)}"
 
 
 def _unavailable(cell: Cell) -> int:
     return cell.image.available.count(False)
-
-
-def _number(count: int, noun: str) -> str:
-    return f"{count or 'no'} {noun}{'' if count == 1 else 's'}"

@@ -9,9 +9,10 @@ from itertools import pairwise
 
 import pytest
 
-from gatewayd.audit import ACCEPTED, MERGED, Audit, Record, plain_value, utc
+from gatewayd.audit import MERGED, Audit, Record, plain_value, utc
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
+from gatewayd.happening import ACCEPTED, Happening
 
 NUMBER, REAL = 0, 1
 PLC, HMI = 0, 1
@@ -54,8 +55,12 @@ def audit(cell: Cell, lines: list[str]) -> Audit:
     return audit
 
 
+def happened(audit: Audit) -> list[Happening]:
+    return [record.happening for record in audit]
+
+
 def written(audit: Audit) -> list[tuple[str | None, object, object, int]]:
-    return [(one.writer, one.old, one.new, one.times) for one in audit if one.what == ACCEPTED]
+    return [(one.writer, one.old, one.new, one.times) for one in happened(audit) if one.what == ACCEPTED]
 
 
 def test_a_change_is_recorded_at_once(cell: Cell, audit: Audit, lines: list[str]) -> None:
@@ -71,7 +76,7 @@ def test_a_change_is_recorded_at_once(cell: Cell, audit: Audit, lines: list[str]
         "new": 7,
     }
     assert audit.count == len(audit) == len(lines) == 2
-    assert [one.what for one in audit] == ["lock acquired", "write accepted"]
+    assert [one.what for one in happened(audit)] == ["lock acquired", "write accepted"]
 
 
 def test_a_rewrite_of_the_same_value_is_no_record(cell: Cell, audit: Audit) -> None:
@@ -106,14 +111,14 @@ def test_the_time_of_merged_changes_is_that_of_the_last(cell: Cell, audit: Audit
         assert cell.write(PLC, [Change(NUMBER, value)], now) is None
     audit.tick(1.0 + MERGED)
     last = list(audit)[-1]
-    assert (last.monotonic, last.times) == (1.4, 2)
+    assert (last.monotonic, last.happening.times) == (1.4, 2)
     assert last.wall == pytest.approx(WALL - (MERGED - 0.4))
 
 
 def test_a_refusal_names_reason_and_holder(cell: Cell, audit: Audit) -> None:
     assert cell.write(PLC, [Change(NUMBER, 1)], 1.0) is None
     assert cell.write(HMI, [Change(NUMBER, 2)], 1.1) is not None
-    refused = list(audit)[-1]
+    refused = happened(audit)[-1]
     assert (refused.what, refused.writer, refused.holder, refused.old, refused.new, refused.reason) == (
         "write refused", "hmi", "plc", 1, 2, "held by another owner",
     )  # fmt: skip
@@ -121,7 +126,7 @@ def test_a_refusal_names_reason_and_holder(cell: Cell, audit: Audit) -> None:
 
 def test_an_undeclared_peer_has_a_name_too(cell: Cell, audit: Audit) -> None:
     assert cell.write(None, [Change(NUMBER, 2)], 1.1) is not None
-    assert list(audit)[-1].writer == "undeclared"
+    assert happened(audit)[-1].writer == "undeclared"
 
 
 def test_what_was_written_stands_before_the_fallback(cell: Cell, audit: Audit) -> None:
@@ -129,7 +134,7 @@ def test_what_was_written_stands_before_the_fallback(cell: Cell, audit: Audit) -
         assert cell.write(PLC, [Change(NUMBER, value)], 1.0) is None
     cell.writer_connected(PLC, 1.0)
     cell.writer_disconnected(PLC, 1.1, "closed")
-    told = [(one.what, one.writer, one.old, one.new) for one in audit]
+    told = [(one.what, one.writer, one.old, one.new) for one in happened(audit)]
     assert told[-3:] == [
         ("lock released", "plc", None, None),
         ("write accepted", "plc", 1, 3),
@@ -140,7 +145,7 @@ def test_what_was_written_stands_before_the_fallback(cell: Cell, audit: Audit) -
 def test_the_local_operator_is_in_it(cell: Cell, audit: Audit) -> None:
     assert cell.force(REAL, 2.5, 1.0, 3.0, "by anna") is None
     cell.tick(3.0)
-    told = [(one.what, one.writer, one.new, one.detail) for one in audit]
+    told = [(one.what, one.writer, one.new, one.detail) for one in happened(audit)]
     assert ("value forced", "operator", 2.5, "by anna") in told
     assert ("force ended", "operator", None, "time limit") in told
 
@@ -169,7 +174,7 @@ def test_the_ring_is_bounded(cell: Cell) -> None:
 @pytest.mark.parametrize("value, plain", [(math.nan, "nan"), (-math.inf, "-inf"), (1.5, 1.5), (True, True)])
 def test_values_are_plain_json(value: float, plain: object) -> None:
     assert plain_value(value) == plain
-    record = Record(WALL, 1.0, "press", ACCEPTED, new=value)
+    record = Record(WALL, 1.0, "press", Happening(ACCEPTED, new=value))
     assert json.loads(json.dumps(record.as_json(), allow_nan=False))["new"] == plain
 
 

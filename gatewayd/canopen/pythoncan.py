@@ -20,11 +20,12 @@ from typing import Any
 
 import can
 
-from gatewayd.canopen.bus import DRAIN, BusCounters, BusError, BusHandler, BusState
+from gatewayd.canopen.bus import DRAIN, BusError, BusHandler
 from gatewayd.canopen.cob_ids import BASIC_FRAME
 from gatewayd.canopen.errors import ErrorClass, ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
-from gatewayd.canopen.supervision import LOOK, Event, Supervisor, event_of_error
+from gatewayd.canopen.supervised import SupervisedBus
+from gatewayd.canopen.supervision import LOOK, Event
 
 __all__ = ["ASK", "ASK_LIMIT", "PythonCanBus"]
 
@@ -34,8 +35,6 @@ ASK_LIMIT = 0.008
 """The same after a while without frames."""
 SLICE = 0.005
 """Longest time for reading before the loop has its turn: an adapter may hand over its frames byte by byte."""
-RETRY = 0.001
-"""Seconds to wait where an interface without a file descriptor takes no frame."""
 
 _OPTIONS: dict[str, dict[str, Any]] = {
     # It would sleep two seconds for boards that restart when they are opened, and a millisecond for every read.
@@ -47,33 +46,22 @@ _LIKE_SOCKETCAN = {"socketcan", "socketcand", "udp_multicast", "virtual"}
 logging.getLogger("can").setLevel(logging.CRITICAL)
 
 
-class PythonCanBus:
+class PythonCanBus(SupervisedBus):
     """One channel of one interface. What cannot be opened is tried again, at intervals that grow to two seconds."""
 
     def __init__(self, interface: str, channel: str, bitrate: int, handler: BusHandler) -> None:
-        self.counters = BusCounters()
+        super().__init__(handler)
         self._interface = interface
         self._channel = channel
         self._bitrate = bitrate
-        self._handler = handler
-        self._supervisor = Supervisor()
         self._wanted: frozenset[int] = frozenset()
         self._wanted_remote: frozenset[int] = frozenset()
         self._bus: can.BusABC | None = None
         self._descriptor = -1
-        self._readiness = select.poll()
-        self._room = select.poll()
-        self._full = False
+        self._readiness, self._room = select.poll(), select.poll()
         self._ask = ASK
-        self._loop: asyncio.AbstractEventLoop | None = None
         self._looking: asyncio.TimerHandle | None = None
         self._reading: asyncio.Handle | None = None
-        self._retrying: asyncio.TimerHandle | None = None
-
-    @property
-    def state(self) -> BusState:
-        """As far as the interface tells it."""
-        return self._supervisor.state
 
     @property
     def bitrate(self) -> int | None:
@@ -107,7 +95,7 @@ class PythonCanBus:
             return False
         if self._descriptor >= 0 and not self._room.poll(0):
             self.counters.refused += 1
-            self._wait_for_room()
+            self._wait_for_room(self._descriptor)
             return False
         message = can.Message(
             arbitration_id=frame.can_id,
@@ -122,34 +110,12 @@ class PythonCanBus:
         except (can.CanError, OSError, ValueError) as error:
             self.counters.refused += 1
             if isinstance(error, TimeoutError | BlockingIOError):
-                self._wait_for_room()
+                self._wait_for_room(self._descriptor)
             else:
                 self._lose(error)
             return False
         self.counters.sent += 1
         return True
-
-    # Room in the interface
-
-    def _wait_for_room(self) -> None:
-        assert self._loop is not None
-        self._full = True
-        if self._descriptor >= 0:
-            self._loop.add_writer(self._descriptor, self._writable)
-        else:
-            self._retrying = self._loop.call_later(RETRY, self._writable)
-
-    def _writable(self) -> None:
-        self._forget_waiting()
-        self._handler.on_writable(monotonic())
-
-    def _forget_waiting(self) -> None:
-        self._full = False
-        if self._retrying is not None:
-            self._retrying.cancel()
-            self._retrying = None
-        if self._descriptor >= 0 and self._loop is not None:
-            self._loop.remove_writer(self._descriptor)
 
     # Receiving
 
@@ -213,15 +179,6 @@ class PythonCanBus:
         elif can_id in self._wanted:
             frames.append(Frame(can_id, bytes(message.data)))
 
-    def _take_error(self, report: ErrorFrame, now: float) -> None:
-        self.counters.errors += 1
-        if report.tx_errors is not None and report.rx_errors is not None:
-            self.counters.tx_errors, self.counters.rx_errors = report.tx_errors, report.rx_errors
-        self._handler.on_error(report, now)
-        event = event_of_error(report)
-        if event is not None:
-            self._feed(event, now, f"the controller reports: {report}")
-
     # State
 
     def _look(self) -> None:
@@ -245,16 +202,6 @@ class PythonCanBus:
     @property
     def _name(self) -> str:
         return f"{self._interface} {self._channel}"
-
-    def _feed(self, event: Event, now: float, reason: str) -> None:
-        if not self._supervisor.feed(event, now):
-            return
-        state = self._supervisor.state
-        if state is BusState.BUS_OFF:
-            self.counters.bus_off += 1
-        if not state.carries:
-            self._forget_waiting()
-        self._handler.on_state(state, reason, now)
 
     def _lose(self, error: Exception) -> None:
         """The interface fails: close it, and open it again when it can be."""

@@ -13,11 +13,12 @@ import struct
 from collections.abc import Iterable
 from time import monotonic
 
-from gatewayd.canopen.bus import DRAIN, BusCounters, BusError, BusHandler, BusState
+from gatewayd.canopen.bus import DRAIN, BusError, BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.interface import ControllerState, Interface, InterfaceReader
-from gatewayd.canopen.supervision import LOOK, Event, Supervisor, event_of_errno, event_of_error
+from gatewayd.canopen.supervised import SupervisedBus
+from gatewayd.canopen.supervision import LOOK, Event, event_of_errno
 
 __all__ = ["RECEIVE_BUFFER", "SEND_BUFFER", "SocketCanBus", "filters", "pack", "seen"]
 
@@ -26,8 +27,6 @@ RECEIVE_BUFFER = 2 << 20
 SEND_BUFFER = 3584
 """Bytes of a send buffer that takes about ten frames: so few that a PDO that waits is still ours to replace, and no
 more than the interface's own queue takes (txqueuelen, by default ten), so that the kernel tells when there is room."""
-RETRY = 0.001
-"""Seconds to wait where the interface's queue is full, of whose end the kernel tells nobody."""
 
 _FRAME = struct.Struct("=IB3x8s")
 """struct can_frame: identifier with flags, length, eight bytes."""
@@ -84,30 +83,20 @@ def seen(interface: Interface | None) -> Event:
     return Event.UP if interface.controller is None else _CONTROLLER[interface.controller]
 
 
-class SocketCanBus:
+class SocketCanBus(SupervisedBus):
     """One interface of the kernel, by name."""
 
     def __init__(self, channel: str, handler: BusHandler) -> None:
-        self.counters = BusCounters()
+        super().__init__(handler)
         self.interface: Interface | None = None
         """The last look at it."""
         self._channel = channel
-        self._handler = handler
-        self._supervisor = Supervisor()
         self._filters = b""
         self._socket: socket.socket | None = None
         self._index = 0
         self._lost = 0
-        self._full = False
         self._reader: InterfaceReader | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
         self._looking: asyncio.TimerHandle | None = None
-        self._retrying: asyncio.TimerHandle | None = None
-
-    @property
-    def state(self) -> BusState:
-        """As the kernel shows it."""
-        return self._supervisor.state
 
     @property
     def bitrate(self) -> int | None:
@@ -131,10 +120,9 @@ class SocketCanBus:
 
     def close(self) -> None:
         """Stop."""
-        for timer in (self._looking, self._retrying):
-            if timer is not None:
-                timer.cancel()
-        self._looking = self._retrying = None
+        if self._looking is not None:
+            self._looking.cancel()
+            self._looking = None
         self._release()
         if self._reader is not None:
             self._reader.close()
@@ -156,35 +144,13 @@ class SocketCanBus:
         except OSError as error:
             self.counters.refused += 1
             if error.errno in _NO_ROOM:
-                self._wait_for_room(error.errno == errno.EAGAIN)
+                # Of the end of a full queue of the interface (ENOBUFS) the kernel tells nobody.
+                self._wait_for_room(self._socket.fileno() if error.errno == errno.EAGAIN else -1)
             else:
                 self._failed(error)
             return False
         self.counters.sent += 1
         return True
-
-    # Room in the kernel
-
-    def _wait_for_room(self, kernel_tells: bool) -> None:
-        assert self._loop is not None
-        assert self._socket is not None
-        self._full = True
-        if kernel_tells:
-            self._loop.add_writer(self._socket, self._room)
-        else:
-            self._retrying = self._loop.call_later(RETRY, self._room)
-
-    def _room(self) -> None:
-        self._forget_waiting()
-        self._handler.on_writable(monotonic())
-
-    def _forget_waiting(self) -> None:
-        self._full = False
-        if self._retrying is not None:
-            self._retrying.cancel()
-            self._retrying = None
-        if self._loop is not None and self._socket is not None:
-            self._loop.remove_writer(self._socket)
 
     # Receiving
 
@@ -226,15 +192,6 @@ class SocketCanBus:
             self.counters.lost += lost
             self._handler.on_lost(lost, now)
 
-    def _take_error(self, report: ErrorFrame, now: float) -> None:
-        self.counters.errors += 1
-        if report.tx_errors is not None and report.rx_errors is not None:
-            self.counters.tx_errors, self.counters.rx_errors = report.tx_errors, report.rx_errors
-        self._handler.on_error(report, now)
-        event = event_of_error(report)
-        if event is not None:
-            self._feed(event, now, f"the controller reports: {report}")
-
     # State
 
     def _failed(self, error: OSError) -> None:
@@ -264,16 +221,6 @@ class SocketCanBus:
             assert self._socket is not None
             self._count_lost(self._socket, now)
         self._feed(seen(found), now, self._explain(found))
-
-    def _feed(self, event: Event, now: float, reason: str) -> None:
-        if not self._supervisor.feed(event, now):
-            return
-        state = self._supervisor.state
-        if state is BusState.BUS_OFF:
-            self.counters.bus_off += 1
-        if not state.carries:
-            self._forget_waiting()
-        self._handler.on_state(state, reason, now)
 
     def _explain(self, found: Interface | None) -> str:
         name = self._channel

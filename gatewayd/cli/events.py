@@ -67,7 +67,7 @@ def command(
 
 
 def _print(found: Mapping[str, Any], *, as_json: bool) -> None:
-    from gatewayd.cli import phrases
+    from gatewayd.cli.phrases import clock
 
     if as_json:
         import json
@@ -75,9 +75,5 @@ def _print(found: Mapping[str, Any], *, as_json: bool) -> None:
         # At once: whoever follows through a pipe wants to see it now.
         click.echo(json.dumps(found, ensure_ascii=False))
         return
-    if "what" in found:
-        text, bad = phrases.record(found), found["what"] == "write refused"
-    else:
-        text, bad = phrases.event(found), found["event"] in phrases.BAD_EVENTS
-    text = click.style(text, fg="yellow" if bad else None)
-    click.echo(f"{phrases.clock(found['time'])} {found['cell']}  {text}")
+    text = click.style(found["text"], fg="yellow" if found["bad"] else None)
+    click.echo(f"{clock(found['time'])} {found['cell']}  {text}")

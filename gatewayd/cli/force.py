@@ -44,9 +44,9 @@ def command(name: str, value: str, seconds: float, socket: Path | None, cell: st
     An input: the robot gets the value, and its lock is yours so long. An output: the fieldbus sees the value. Declared
     limits hold. Afterwards an output shows the truth again, and an input its release fallback until its owner writes.
     """
-    from gatewayd.cli.phrases import span
-    from gatewayd.cli.phrases import value as shown
     from gatewayd.control.client import segment
+    from gatewayd.figures import span
+    from gatewayd.figures import value as shown
 
     body: dict[str, Any] = {"value": _parse(value), "for": seconds}
     client = connect(socket)

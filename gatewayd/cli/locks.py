@@ -100,7 +100,7 @@ def _post(
 
 
 def _print(locks: list[dict[str, Any]]) -> None:
-    from gatewayd.cli.phrases import age
+    from gatewayd.figures import age
 
     several = len({lock["cell"] for lock in locks}) > 1
     rows = [("lock", "owner", "left", "may own it", "variables")]

@@ -73,11 +73,12 @@ def _narrowed(answer: Answer, cell: str) -> dict[str, Any]:
 
 
 def _lines(answer: Answer, locks: list[Answer], events: list[Answer]) -> Iterator[str]:
-    from gatewayd.cli import phrases
+    from gatewayd.cli.phrases import clock
+    from gatewayd.figures import span
 
     healthy = answer["healthy"]
     state = click.style("healthy" if healthy else "degraded", fg="green" if healthy else "red", bold=True)
-    yield f"gatewayd {answer['version']} is {state}, up {phrases.span(answer['uptime'])} (pid {answer['pid']})"
+    yield f"gatewayd {answer['version']} is {state}, up {span(answer['uptime'])} (pid {answer['pid']})"
     for problem in answer["problems"]:
         yield click.style(f"  ! {problem}", fg="red")
     for cell in answer["cells"]:
@@ -88,20 +89,19 @@ def _lines(answer: Answer, locks: list[Answer], events: list[Answer]) -> Iterato
         yield click.style("last events", bold=True)
         several = len(answer["cells"]) > 1
         for event in events:
-            bad = event["event"] in phrases.BAD_EVENTS
             where = f"{event['cell']}: " if several else ""
-            text = click.style(f"{where}{phrases.event(event)}", fg="yellow" if bad else None)
-            yield f"  {phrases.clock(event['time'])} {text}"
+            text = click.style(f"{where}{event['text']}", fg="yellow" if event["bad"] else None)
+            yield f"  {clock(event['time'])} {text}"
 
 
 def _cell(cell: Answer, locks: list[Answer]) -> Iterator[str]:
-    from gatewayd.cli.phrases import number
+    from gatewayd.figures import counted
 
     yield click.style(cell["name"], bold=True) + f"  {cell['source']}, mapping {cell['fingerprint']}"
     yield from _part("robot", _robot(cell["robot"]))
     modbus = cell["modbus"]
     if modbus is not None:
-        connections = number(modbus["connections"], "connection")
+        connections = counted(modbus["connections"], "connection")
         yield from _part("modbus", [f"{modbus['listen']} unit {modbus['unit']}, {connections}"])
     canopen = cell["canopen"]
     if canopen is not None:
@@ -130,7 +130,7 @@ _STATES = {
 
 
 def _robot(robot: Answer) -> list[str]:
-    from gatewayd.cli.phrases import age, number
+    from gatewayd.figures import age, counted
 
     words, colour = _STATES[robot["state"]]
     first = f"{robot['address']} {click.style(words, fg=colour)}"
@@ -139,8 +139,8 @@ def _robot(robot: Answer) -> list[str]:
         if not robot["writable"]:
             first += click.style(", not writable yet", fg="yellow")
     first += f", last package {age(robot['age'])} ago" if robot["age"] is not None else ""
-    counts = [number(robot["packages"], "package"), f"{robot['skipped']} skipped", f"{robot['late']} late"]
-    counts += [number(robot["sessions"], "session")]
+    counts = [counted(robot["packages"], "package"), f"{robot['skipped']} skipped", f"{robot['late']} late"]
+    counts += [counted(robot["sessions"], "session")]
     if robot["mismatches"]:
         counts.append(click.style(f"{robot['mismatches']} read back differently", fg="red"))
     if robot["watchdog"] is not None:
@@ -149,7 +149,7 @@ def _robot(robot: Answer) -> list[str]:
 
 
 def _writer(writer: Answer, locks: int) -> str:
-    from gatewayd.cli.phrases import age
+    from gatewayd.figures import age
 
     if writer["alive"]:
         state, colour = f"there, last request {age(writer['age'])} ago", "green"
@@ -168,7 +168,7 @@ def _variables(counts: Answer) -> str:
 
 
 def _locks(locks: list[Answer]) -> list[str]:
-    from gatewayd.cli.phrases import age
+    from gatewayd.figures import age
 
     held = [
         f"{lock['name']}: {lock['owner']}"
@@ -181,12 +181,10 @@ def _locks(locks: list[Answer]) -> list[str]:
 
 
 def _writes(cell: Answer) -> list[str]:
-    from gatewayd.cli.phrases import age
+    from gatewayd.figures import age
 
     writes, last = cell["writes"], cell["last_refusal"]
     lines = [f"{writes['accepted']} accepted, {writes['refused']} refused"]
     if last is not None:
-        who, what = last["writer"] or "an undeclared peer", last["variable"] or "an address"
-        holder = f" ({last['holder']})" if last["holder"] else ""
-        lines.append(f"last refusal {age(last['age'])} ago: {who} wrote {what}: {last['reason']}{holder}")
+        lines.append(f"last refusal {age(last['age'])} ago: {last['text']}")
     return lines

@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from gatewayd.cli import phrases
+from gatewayd.figures import age, counted, value
 
 __all__ = ["KEYS", "Glimpse", "Show", "View", "chosen", "plain", "press", "screen", "settled"]
 
@@ -159,8 +160,8 @@ def plain(glimpse: Glimpse, view: View) -> str:
     for one in chosen(glimpse.variables, view):
         arrow = "->" if one["direction"] == "input" else "<-"
         lines.append(
-            f"  {arrow} {one['name']:<20} {phrases.value(one['value'], one['unit']):>14}  {one['quality']:<11} "
-            f"{phrases.age(one['age']):>9}  {phrases.owner(one)}".rstrip()
+            f"  {arrow} {one['name']:<20} {value(one['value'], one['unit']):>14}  {one['quality']:<11} "
+            f"{age(one['age']):>9}  {phrases.owner(one)}".rstrip()
         )
     return "\n".join([*lines, ""])
 
@@ -194,9 +195,9 @@ def _links(glimpse: Glimpse) -> Iterator[Text]:
 def _link_words(cell: Answer) -> str:
     robot, modbus, writes = cell["robot"], cell["modbus"], cell["writes"]
     rate = f" at {robot['frequency']:g} Hz" if robot["state"] == "fresh" else ""
-    words = [f"robot {robot['state']}{rate}, age {phrases.age(robot['age'])}"]
+    words = [f"robot {robot['state']}{rate}, age {age(robot['age'])}"]
     if modbus is not None:
-        words.append(phrases.number(modbus["connections"], "Modbus connection"))
+        words.append(counted(modbus["connections"], "Modbus connection"))
     there = [writer["name"] for writer in cell["writers"] if writer["alive"]]
     words.append(f"{', '.join(there)} there" if there else "no writer there")
     words.append(f"writes {writes['accepted']} accepted, {writes['refused']} refused")
@@ -226,9 +227,9 @@ def _cells(one: Answer, old: Mapping[Any, Any], width: int, *, several: bool) ->
     name = f"{one['cell']}:{one['name']}" if several else one["name"]
     yield Text(" → " if towards else " ← ", f"bold {colour}").append(name, "bold default")
     changed = old.get((one["cell"], one["name"]), one["value"]) != one["value"]
-    yield Text(phrases.value(one["value"], one["unit"]), "bold yellow" if changed else "bold")
+    yield Text(value(one["value"], one["unit"]), "bold yellow" if changed else "bold")
     yield Text(one["quality"], _QUALITY_STYLES.get(one["quality"], ""))
-    yield Text(phrases.age(one["age"]), "dim")
+    yield Text(age(one["age"]), "dim")
     style = "magenta" if one["forced"] or one["owner"] == "operator" else "yellow" if one["lease"] else ""
     yield Text(phrases.owner(one), style if towards or one["forced"] else "dim")
     if width >= _WIDE:
@@ -255,7 +256,7 @@ def _events(glimpse: Glimpse) -> Iterator[Text]:
     latest = glimpse.events[-_EVENTS:]
     for one in latest:
         text = Text(f" {phrases.clock(one['time'])} ", "dim", no_wrap=True, overflow="ellipsis")
-        yield text.append(phrases.event(one), "yellow" if one["event"] in phrases.BAD_EVENTS else "default")
+        yield text.append(one["text"], "yellow" if one["bad"] else "default")
     yield from (Text("") for _ in range(_EVENTS - len(latest)))
 
 

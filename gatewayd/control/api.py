@@ -15,7 +15,7 @@ from fnmatch import fnmatchcase
 from typing import Any, Protocol
 
 from gatewayd import __version__
-from gatewayd.audit import Audit, utc
+from gatewayd.audit import Audit, Record, utc
 from gatewayd.control.views import (
     Json,
     StationView,
@@ -23,6 +23,7 @@ from gatewayd.control.views import (
     declared_view,
     event_view,
     lock_view,
+    record_view,
     variable_view,
 )
 from gatewayd.core.definition import Value, ValueKind
@@ -170,12 +171,9 @@ class Api:
         limit = _count(query, "limit", 100)
         if "cell" in query:
             self._stations(query["cell"])
-        wanted = [(name, query[name]) for name in ("cell", "variable", "writer") if name in query]
-        found = [
-            record for record in self._audit if all(getattr(record, name) == text for name, text in wanted)
-        ]
+        found = [record for record in self._audit if _is_wanted(record, query)]
         latest = found[max(0, len(found) - limit) :]
-        return {"time": utc(moment.wall), "records": [record.as_json() for record in latest]}
+        return {"time": utc(moment.wall), "records": [record_view(record) for record in latest]}
 
     # -- acts of the local operator ------------------------------------------------------------------------------
 
@@ -284,6 +282,14 @@ def _events(station: StationView, after: int, moment: Moment) -> Iterator[tuple[
     for seq, event in enumerate(ring, ring.count - len(ring) + 1):
         if seq > after:
             yield event.time, event_view(cell, seq, event, moment.now, moment.wall)
+
+
+def _is_wanted(record: Record, query: Mapping[str, str]) -> bool:
+    told = record.happening
+    return all(
+        query.get(name, its) == its
+        for name, its in (("cell", record.cell), ("variable", told.variable), ("writer", told.writer))
+    )
 
 
 def _count(query: Mapping[str, str], name: str, default: int, greatest: int = _MOST) -> int:

@@ -90,6 +90,7 @@ REFUSAL: Fields = {
     "holder": "name of the owner that stood in the way, or null",
     "reason": "why, in words",
     "age": "seconds since then",
+    "text": "the refusal in one sentence",
 }
 VARIABLE: Fields = {
     "cell": "name of the cell",
@@ -129,15 +130,17 @@ EVENT: Fields = {
     "event": "what: `robot lost`, `write refused` ... (all in the reference of the log)",
     "variable": "name of the variable",
     "lock": "name of the lock",
-    "writer": "name of the writer who did it or whom it befell; `undeclared` for a refused stranger",
+    "writer": "name of the writer who did it or whom it befell; `operator`, `undeclared` or `gateway`",
     "other": "former owner of a lock taken over, or holder in a refusal",
     "reason": "why it was refused, in words",
     "old": "value before",
     "new": "value after, or refused",
     "repeats": "further refusals like this one, counted since the last told",
     "detail": "more, in words",
+    "text": "all that in one sentence for people, values with their unit; it may be worded anew at any time",
+    "bad": "somebody should look at it",
 }
-"""Fields that do not apply are left out, but for the first four."""
+"""Fields that do not apply are left out, but for the first four, `text` and `bad`."""
 AUDIT: Fields = {
     "time": "when, UTC; of merged changes, the last one's",
     "monotonic": "seconds of the gateway's own clock; equal for all changes of one request",
@@ -153,5 +156,7 @@ AUDIT: Fields = {
     "holder": "owner that stood in the way, or former owner",
     "reason": "why it was refused, in words",
     "detail": "more, in words",
+    "text": "all that in one sentence, as of an event; the audit's file does not have it",
+    "bad": "somebody should look at it; not in the file either",
 }
-"""Fields that do not apply are left out, but for the first four."""
+"""Fields that do not apply are left out, but for the first four, `text` and `bad`."""

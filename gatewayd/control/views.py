@@ -9,14 +9,16 @@ import math
 import re
 from typing import Any, Protocol
 
-from gatewayd.audit import plain_value, utc
+from gatewayd.audit import Record, plain_value, utc
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import OPERATOR, Direction, Fallback, FallbackKind, Variable
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.health import CAN_BUS, NMT_STATES
 from gatewayd.core.image import Quality
-from gatewayd.mapping.plan import Area, Placement, Plan
+from gatewayd.figures import span
+from gatewayd.happening import Happening
+from gatewayd.mapping.plan import Placement, Plan
 
 __all__ = [
     "Json",
@@ -26,13 +28,13 @@ __all__ = [
     "event_view",
     "lock_view",
     "problems",
+    "record_view",
     "robot_name",
     "variable_view",
 ]
 
 Json = dict[str, Any]
 
-_AREAS = {Area.COIL: "coil", Area.DISCRETE: "discrete", Area.INPUT: "input", Area.HOLDING: "holding"}
 _QUALITIES = tuple(one.name.lower() for one in Quality)
 _BIT_WORD = re.compile(r"(input|output)_bit_registers(\d+)_to_\d+")
 
@@ -186,27 +188,31 @@ def lock_view(cell: Cell, index: int, now: float) -> Json:
 
 def event_view(cell: Cell, seq: int, event: Event, now: float, wall: float) -> Json:
     """One event; what does not apply is left out."""
-    definition = cell.definition
-
-    def name(writer: int | None) -> str | None:
-        return None if writer is None else definition.writer_name(writer)
-
+    told = Happening.of(event, cell.definition)
     found: Json = {
         "seq": seq,
         "time": utc(wall - (now - event.time)),
-        "cell": definition.name,
-        "event": event.kind.value,
-        "variable": definition.variables[event.variable].name if event.variable is not None else None,
-        "lock": definition.locks[event.lock].name if event.lock is not None else None,
-        "writer": name(event.writer) or ("undeclared" if event.kind is EventKind.REFUSED else None),
-        "other": name(event.other),
-        "reason": event.reason.text if event.reason is not None else None,
-        "old": plain_value(event.old),
-        "new": plain_value(event.new),
+        "cell": cell.definition.name,
+        "event": told.what,
+        "variable": told.variable,
+        "lock": told.lock,
+        "writer": told.writer,
+        "other": told.holder,
+        "reason": told.reason,
+        "old": plain_value(told.old),
+        "new": plain_value(told.new),
         "repeats": event.repeats or None,
-        "detail": event.detail or None,
+        "detail": told.detail or None,
+        "text": told.sentence(),
+        "bad": told.bad,
     }
     return {field: value for field, value in found.items() if value is not None}
+
+
+def record_view(record: Record) -> Json:
+    """One record of the audit, as its file has it, and in words."""
+    told = record.happening
+    return {**record.as_json(), "text": told.sentence(), "bad": told.bad}
 
 
 def robot_name(variable: Variable) -> str:
@@ -261,20 +267,32 @@ def _last_refusal(cell: Cell, now: float) -> Json | None:
     last = cell.last_refusal
     if last is None:
         return None
-    definition, refusal = cell.definition, last.refusal
+    refusal, writer = last.refusal, last.writer
+    told = Happening.of(
+        Event(
+            last.time,
+            EventKind.REFUSED,
+            refusal.variable,
+            writer=writer,
+            other=refusal.holder,
+            reason=refusal.reason,
+        ),
+        cell.definition,
+    )
     return {
-        "variable": None if refusal.variable is None else definition.variables[refusal.variable].name,
-        "writer": None if last.writer is None else definition.writer_name(last.writer),
-        "holder": None if refusal.holder is None else definition.writer_name(refusal.holder),
-        "reason": refusal.reason.text,
+        "variable": told.variable,
+        "writer": None if writer is None else told.writer,
+        "holder": told.holder,
+        "reason": told.reason,
         "age": _seconds(now - last.time),
+        "text": told.sentence(),
     }
 
 
 def _place(placement: Placement) -> Json:
     notation = placement.area.notation(placement.address)
     return {
-        "area": _AREAS[placement.area],
+        "area": placement.area.name.lower(),
         "address": placement.address,
         "bit": placement.bit,
         "notation": notation if placement.bit is None else f"{notation}.{placement.bit}",
@@ -311,7 +329,7 @@ def _seconds(seconds: float) -> float | None:
 
 
 def _since(seconds: float) -> str:
-    return f" for {seconds:.0f} s" if math.isfinite(seconds) else ""
+    return f" for {span(seconds)}" if math.isfinite(seconds) else ""
 
 
 def _some(cell: Cell, quality: Quality) -> str:

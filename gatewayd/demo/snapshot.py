@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import Direction, Value
+from gatewayd.core.definition import Direction
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
 from gatewayd.demo.scene import Scene
+from gatewayd.figures import age, value
+from gatewayd.happening import BAD, STRANGER, Happening
 from gatewayd.mapping.table import Row
 
 __all__ = [
     "PDO_REFUSAL_SHOWN",
     "REFUSAL_SHOWN",
-    "Happening",
     "Line",
     "Snapshot",
+    "Told",
     "describe",
-    "number",
     "snapshot",
 ]
 
@@ -88,7 +88,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Happening:
+class Told:
     """One event in words."""
 
     clock: str
@@ -128,7 +128,7 @@ class Snapshot:
     accepted: int
     refused: int
     lines: tuple[Line, ...]
-    happenings: tuple[Happening, ...]
+    happenings: tuple[Told, ...]
     """The latest last."""
 
 
@@ -139,12 +139,12 @@ def snapshot(scene: Scene, now: float) -> Snapshot:
     events = [event for event in cell.events if event.kind not in _UNTOLD][-EVENTS_KEPT:]
     started_at = time.time() - now
     happenings = [
-        Happening(
-            _clock(started_at + event.time), describe(event, cell, scene.can_writer), event.kind in _BAD
+        Told(
+            _clock(started_at + event.time), describe(event, cell, scene.can_writer), event.kind.value in BAD
         )
         for event in events
     ]
-    happenings += [Happening(_clock(started_at + now), problem, bad=True) for problem in scene.problems]
+    happenings += [Told(_clock(started_at + now), problem, bad=True) for problem in scene.problems]
     return Snapshot(
         elapsed=now - scene.started,
         robot=_SOURCES[cell.freshness.state],
@@ -177,53 +177,13 @@ def describe(event: Event, cell: Cell, can_writer: int | None = None) -> str:
 
     `can_writer` is told of refusals by EMCY, everybody else by exceptions.
     """
-    return " ".join(_words(event, cell, can_writer))
-
-
-def number(value: Value, unit: str = "") -> str:
-    """A value for people: at most three decimals, and its unit."""
-    if isinstance(value, bool):
-        return "1" if value else "0"
-    text = f"{value:.3f}".rstrip("0").rstrip(".") if isinstance(value, float) else str(value)
-    return f"{text} {unit}".rstrip()
+    happening = Happening.of(event, cell.definition)
+    if event.reason is None:
+        return happening.sentence()
+    return happening.sentence(f"refused with {_answer(event.reason, event.writer, can_writer)}")
 
 
 _UNTOLD = {EventKind.AVAILABLE}
-_BAD = {
-    EventKind.ROBOT_LOST,
-    EventKind.STALE,
-    EventKind.UNAVAILABLE,
-    EventKind.READ_BACK_DIFFERS,
-    EventKind.REFUSED,
-}
-
-
-def _words(event: Event, cell: Cell, can_writer: int | None) -> Iterator[str]:
-    definition = cell.definition
-    variable = definition.variables[event.variable] if event.variable is not None else None
-    writer = definition.writer_name(event.writer) if event.writer is not None else "a stranger"
-    other = definition.writer_name(event.other) if event.other is not None else ""
-    lock = definition.locks[event.lock].name if event.lock is not None else ""
-    unit = variable.unit if variable is not None else ""
-    if event.kind is EventKind.REFUSED and event.reason is not None:
-        yield f"{writer} wrote {variable.name if variable else 'an address'}"
-        if event.new is not None:
-            yield f"= {number(event.new, unit)}:"
-        yield f"refused with {_answer(event.reason, event.writer, can_writer)},"
-        yield f"held by {other}" if other else event.reason.text
-        yield f"({event.repeats + 1} times)" if event.repeats else ""
-    elif event.kind is EventKind.FALLBACK and variable is not None:
-        yield f"{variable.name} fell back to {number(event.new or 0, unit)}"
-    elif event.kind is EventKind.ACQUIRED:
-        yield f"{writer} took {lock}"
-    elif event.kind is EventKind.TAKEN_OVER:
-        yield f"{writer} took {lock} over from {other}"
-    elif event.kind is EventKind.RELEASED:
-        yield f"{lock} is free again: {event.detail}"
-    elif event.kind in (EventKind.WRITER_CONNECTED, EventKind.WRITER_LOST):
-        yield f"{writer} {'came' if event.kind is EventKind.WRITER_CONNECTED else 'left'}: {event.detail}"
-    else:
-        yield event.kind.value + (f": {event.detail}" if event.detail else "")
 
 
 def _answer(reason: Reason, writer: int | None, can_writer: int | None) -> str:
@@ -247,9 +207,9 @@ def _line(cell: Cell, row: Row, can_writer: int | None, now: float) -> Line:
         address=f"{row.address}" if row.bit is None else f"{row.address}.{row.bit}",
         object=row.object,
         cob_id=row.cob_id,
-        value=number(cell.image.values[index], row.unit),
+        value=value(cell.image.values[index], row.unit),
         quality=cell.image.quality[index],
-        age=_age(cell.image.age(index, now)),
+        age=age(cell.image.age(index, now)),
         owner=owner,
         lease=lease,
         refused=_refused(cell, index, can_writer, now),
@@ -263,16 +223,10 @@ def _refused(cell: Cell, index: int, can_writer: int | None, now: float) -> str:
     by_pdo = last.writer is not None and last.writer == can_writer
     if now - last.time > (PDO_REFUSAL_SHOWN if by_pdo else REFUSAL_SHOWN):
         return ""
-    writer = cell.definition.writer_name(last.writer) if last.writer is not None else "a stranger"
+    writer = cell.definition.writer_name(last.writer) if last.writer is not None else STRANGER
     if by_pdo:
         return f"{writer}: {_EMERGENCIES.get(last.refusal.reason, 'refused')}"
     return f"{writer} refused: {_EXCEPTIONS[last.refusal.reason]}"
-
-
-def _age(seconds: float) -> str:
-    if seconds == math.inf:
-        return "-"
-    return f"{max(0.0, seconds) * 1000:.0f} ms" if seconds < 1 else f"{seconds:.1f} s"
 
 
 def _clock(at: float) -> str:

@@ -11,6 +11,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
+from gatewayd.figures import counted, span
 from gatewayd.status.health import SOURCES
 
 __all__ = ["RECENT", "Level", "Node", "bus", "can_bus", "gateway", "robot", "writers"]
@@ -52,13 +53,13 @@ def robot(cell: Cell, address: str, trouble: str, now: float) -> Node:
     if state is not Source.FRESH:
         level = Level.WARN if state is Source.WAITING else Level.BAD
         age = now - cell.freshness.last_progress
-        since = f", last news {_span(age)} ago" if age < math.inf else ""
+        since = f", last news {span(age)} ago" if age < math.inf else ""
         return Node("Robot", level, SOURCES[state].removeprefix("robot ") + since, facts)
     missing = cell.image.available.count(False)
     if not cell.accepts_writes:
         return Node("Robot", Level.WARN, "fresh, its inputs are not adopted yet", facts)
     if missing:
-        return Node("Robot", Level.WARN, f"fresh, but {_count(missing, 'variable')} unavailable", facts)
+        return Node("Robot", Level.WARN, f"fresh, but {counted(missing, 'variable')} unavailable", facts)
     return Node("Robot", Level.GOOD, "fresh and writable", facts)
 
 
@@ -67,7 +68,7 @@ def _lost(cell: Cell, address: str, trouble: str, now: float) -> str:
     last = next((event for event in reversed(list(cell.events)) if event.kind is EventKind.ROBOT_LOST), None)
     if last is None:
         return f"not connected: {trouble}" if trouble else "not connected yet"
-    return f"lost {_span(now - last.time)} ago: {trouble or last.detail.removeprefix(f'{address}: ')}"
+    return f"lost {span(now - last.time)} ago: {trouble or last.detail.removeprefix(f'{address}: ')}"
 
 
 def gateway(cell: Cell, hanging: Sequence[str], troubles: Sequence[str], now: float) -> Node:
@@ -81,7 +82,7 @@ def gateway(cell: Cell, hanging: Sequence[str], troubles: Sequence[str], now: fl
     if differs:
         return Node("Gateway", Level.WARN, f"read-back differs: {differs}", facts)
     if forced:
-        return Node("Gateway", Level.WARN, f"{_count(forced, 'value')} forced by the local operator", facts)
+        return Node("Gateway", Level.WARN, f"{counted(forced, 'value')} forced by the local operator", facts)
     if troubles:
         return Node("Gateway", Level.WARN, "; ".join(troubles), facts)
     return Node("Gateway", Level.GOOD, "running", facts)
@@ -100,7 +101,7 @@ def bus(name: str, connections: int, *, listening: bool) -> Node:
     """A Modbus listener."""
     if not listening:
         return Node(f"Modbus {name}", Level.BAD, "not listening, see the log")
-    return Node(f"Modbus {name}", Level.GOOD, f"listening, {_count(connections, 'connection')}")
+    return Node(f"Modbus {name}", Level.GOOD, f"listening, {counted(connections, 'connection')}")
 
 
 def can_bus(state: int) -> Node:
@@ -127,7 +128,7 @@ def writers(cell: Cell, now: float) -> list[Node]:
 def _writer(cell: Cell, index: int, now: float) -> Node:
     name = cell.definition.writers[index].name
     held = len(cell.ownership.held_by(index))
-    facts = f"holds {_count(held, 'lock')}" if held else "holds no lock"
+    facts = f"holds {counted(held, 'lock')}" if held else "holds no lock"
     last = cell.last_refusal
     if last is not None and last.writer == index and now - last.time <= RECENT:
         refusal = last.refusal
@@ -141,14 +142,4 @@ def _writer(cell: Cell, index: int, now: float) -> Node:
     silent = now - cell.writers.last_seen[index]
     if silent == math.inf:
         return Node(name, Level.IDLE, "has not come yet", facts)
-    return Node(name, Level.BAD, f"lost, last heard {_span(silent)} ago", facts)
-
-
-def _span(seconds: float) -> str:
-    if seconds < 120:
-        return f"{max(0.0, seconds):.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"
-
-
-def _count(count: int, noun: str) -> str:
-    return f"{count or 'no'} {noun}{'' if count == 1 else 's'}"
+    return Node(name, Level.BAD, f"lost, last heard {span(silent)} ago", facts)

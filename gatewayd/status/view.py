@@ -17,13 +17,13 @@ from gatewayd.core.definition import Direction, Fallback, Lock, Variable
 from gatewayd.core.events import Event
 from gatewayd.core.image import Quality
 from gatewayd.daemon import Daemon
+from gatewayd.happening import Happening
 from gatewayd.mapping.plan import Placement
 from gatewayd.modbus.server import ModbusListener
 from gatewayd.station import Station
 from gatewayd.status import picture
 from gatewayd.status.picture import Level, Node
 from gatewayd.status.probes import Probes
-from gatewayd.status.words import AREAS, BAD, address, describe
 
 __all__ = ["EVENTS", "as_json", "layout", "overview", "state"]
 
@@ -109,9 +109,14 @@ def _variable(variable: Variable, places: Iterable[dict[str, object]]) -> dict[s
 
 
 def _place(place: Placement) -> dict[str, object]:
-    decimal, notation = address(place)
-    kind = "bit" if place.codec is None else f"{place.codec.type} {place.codec.order}".strip()
-    return {"area": AREAS[place.area], "address": decimal, "notation": notation, "type": kind}
+    """Protocol address from 0 and 4xxxxx form, each with the bit where there is one."""
+    bit = "" if place.bit is None else f".{place.bit}"
+    return {
+        "area": place.area.name.lower(),
+        "address": f"{place.address}{bit}",
+        "notation": place.area.notation(place.address) + bit,
+        "type": "bit" if place.codec is None else f"{place.codec.type} {place.codec.order}".strip(),
+    }
 
 
 def _objects(station: Station) -> dict[int, dict[str, object]]:
@@ -193,12 +198,13 @@ def _events(cell: Cell, since: int, now: float) -> list[dict[str, object]]:
 
 
 def _event(event: Event, cell: Cell, number: int, at: float) -> dict[str, object]:
+    told = Happening.of(event, cell.definition)
     return {
         "number": number,
         "time": round(at, 3),
-        "kind": event.kind.value,
-        "bad": event.kind in BAD,
-        "text": describe(event, cell.definition),
+        "kind": told.what,
+        "bad": told.bad,
+        "text": told.sentence(),
         "variable": event.variable,
     }
 

@@ -22,13 +22,13 @@ def test_the_last_ones_in_words(gateway: Running, invoke: Invoke) -> None:
     lines = invoke("events", "--limit", "2").output.splitlines()
     assert [line.split("press  ")[1] for line in lines] == [
         "plc took limit",
-        "plc wrote limit = 999: refused, value out of limits",
+        "plc wrote limit = 999 N: refused, value out of limits",
     ]
 
 
 def test_the_audit(gateway: Running, invoke: Invoke) -> None:
     gateway.do(lambda cell: cell.write(PLC, [Change(LIMIT, 1.5)], 1.0))
-    assert "plc wrote limit: 0 -> 1.5" in invoke("events", "--audit").output
+    assert "plc wrote limit: 0 -> 1.5 N\n" in invoke("events", "--audit").output
     assert invoke("events", "--audit", "--follow").exit_code == 2
 
 

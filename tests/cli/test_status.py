@@ -32,7 +32,7 @@ def test_a_degraded_one_says_why(gateway: Running, invoke: Invoke) -> None:
     assert done.exit_code == 1
     assert "is degraded" in done.output
     assert "! press: robot not connected for" in done.output
-    assert "hmi wrote limit: never writable by this writer" in done.output
+    assert "hmi wrote limit: refused, never writable by this writer" in done.output
     assert "12: 0 good, 12 stale" in done.output
 
 

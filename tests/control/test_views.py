@@ -54,6 +54,24 @@ def test_events_and_records_have_documented_fields_only(api: Api, press: Served)
         for one in told:
             assert one.keys() <= fields.keys()
             assert list(one)[:always] == list(fields)[:always]
+            assert one["text"]
+            assert isinstance(one["bad"], bool)
+
+
+def test_events_records_and_the_last_refusal_are_told_in_the_same_words(api: Api, press: Served) -> None:
+    assert press.cell.write(PLC, [Change(SPEED, 1.0)], 1.0) is None
+    assert press.cell.force(SPEED, 2.0, 1.1, 2.0, "by anna") is None
+    assert press.cell.write(PLC, [Change(LIMIT, 999.0)], 1.2) is not None
+    same = [
+        ("operator forced speed to 2 (by anna)", True),
+        ("plc wrote limit = 999 N: refused, value out of limits", True),
+    ]
+    for told in (api.events({}, at(2.0))["events"], api.audit({}, at(2.0))["records"]):
+        assert [(one["text"], one["bad"]) for one in told][-2:] == same
+    records = api.audit({"writer": "plc", "variable": "speed"}, at(2.0))["records"]
+    assert [(one["text"], one["bad"]) for one in records] == [("plc wrote speed: 0 -> 1", False)]
+    last = api.status(at(2.0))["cells"][0]["last_refusal"]
+    assert last["text"] == "plc wrote limit: refused, value out of limits"
 
 
 def test_a_variable_tells_both_places_and_its_owner(api: Api, press: Served) -> None:

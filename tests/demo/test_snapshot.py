@@ -9,7 +9,7 @@ from pymodbus.client import AsyncModbusTcpClient
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
 from gatewayd.demo.scene import HOST, Scene
-from gatewayd.demo.snapshot import describe, number, snapshot
+from gatewayd.demo.snapshot import describe, snapshot
 
 FEED = 3
 """Index of the variable for which both buses contend."""
@@ -41,7 +41,7 @@ async def test_every_kind_of_event_has_words(scene: Scene) -> None:
         assert describe(event, scene.cell).strip()
     for reason in Reason:
         event = Event(0.0, EventKind.REFUSED, reason=reason)
-        assert "a stranger wrote an address refused with exception 0" in describe(event, scene.cell)
+        assert "an undeclared peer wrote an address: refused with exception 0" in describe(event, scene.cell)
 
 
 async def test_contention_of_the_buses_is_told_on_both(scene: Scene, until) -> None:  # type: ignore[no-untyped-def]
@@ -67,8 +67,3 @@ async def test_state_of_the_node_is_told_as_the_master_hears_it(scene: Scene, un
     assert (shot.node, shot.operational) == ("operational", True)
     later = snapshot(scene, time.monotonic() + 60)
     assert (later.node, later.operational) == ("lost", False)
-
-
-def test_numbers_are_short() -> None:
-    assert [number(value) for value in (True, False, 7, 2.0, 0.12345)] == ["1", "0", "7", "2", "0.123"]
-    assert number(47.5, "N") == "47.5 N"

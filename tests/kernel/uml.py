@@ -22,7 +22,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-__all__ = ["LIMIT", "REPORTS", "Boot", "without_xstate"]
+__all__ = ["LIMIT", "REPORTS", "Boot", "place_of_memory", "without_xstate"]
 
 LIMIT = 90
 """Seconds for one boot with everything that runs in it."""
@@ -118,7 +118,7 @@ class Boot:
             ["/bin/sh", "-c", script, str(self._directory), *kernel],
             preexec_fn=without_xstate,  # noqa: PLW1509 - tests start no threads
             start_new_session=True,
-            env={**os.environ, "TMPDIR": _place_of_memory()},
+            env={**os.environ, "TMPDIR": place_of_memory(MEMORY)},
         )
 
     def reports(self, test: str) -> Iterator[dict[str, Any]]:
@@ -165,11 +165,11 @@ def _kill_all_with(argument: str) -> None:
                 os.kill(int(entry.name), signal.SIGKILL)
 
 
-def _place_of_memory() -> str:
-    """Where the kernel's memory may lie: in shared memory if there is enough, of which containers have little."""
+def place_of_memory(size: int) -> str:
+    """Where a kernel's memory may lie: in shared memory if there is enough, of which containers have little."""
     with contextlib.suppress(OSError):
         place = os.statvfs("/dev/shm")  # noqa: S108 - the question is how big it is
-        if place.f_bavail * place.f_frsize > MEMORY:
+        if place.f_bavail * place.f_frsize > size:
             return "/dev/shm"  # noqa: S108 - user-mode-linux makes its own file in it, and unlinks it
     return "/tmp"  # noqa: S108 - the same
 

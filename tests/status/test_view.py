@@ -15,6 +15,7 @@ from gatewayd.mapping.loader import load
 from gatewayd.station import Station
 from gatewayd.status.probes import Probes
 from gatewayd.status.view import EVENTS, as_json, layout, overview, state
+from tests.control.served import plan
 from tests.status.press import CYCLES, FORCE_LIMIT, PLC, SPARE
 
 
@@ -47,6 +48,13 @@ def test_layout_has_both_addresses_of_every_place(station: Station) -> None:
         "lease": 5.0,
         "variables": ["force_limit"],
     }
+
+
+def test_a_place_without_a_bit_has_none_in_its_addresses(tmp_path: Path) -> None:
+    (door,) = [one for one in plan().cell.variables if one.name == "door"]
+    found = json.loads(as_json(layout(Station(plan(), tmp_path))))["variables"][door.number - 1]
+    place = {"area": "discrete", "address": "64", "notation": "100065", "type": "bit"}
+    assert (found["name"], found["places"]) == ("door", [place])
 
 
 def test_state_has_a_column_entry_for_every_variable(station: Station, probes: Probes) -> None:

@@ -7,14 +7,14 @@ be installed, removed and broken, and nothing of it reaches this machine but the
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
 import shlex
 import shutil
 import signal
-import struct
 import subprocess
 from pathlib import Path
+
+from tests.kernel.uml import Boot, place_of_memory, without_xstate
 
 __all__ = ["LIMIT", "boot", "missing"]
 
@@ -87,10 +87,9 @@ sys.exit(os.strerror(ctypes.get_errno()) if failed else 0)
 
 def missing() -> str:
     """Why there can be no boot; empty if there can."""
-    if shutil.which("linux.uml") is None:
-        return "user-mode-linux is not installed (apt-get install user-mode-linux)"
-    if os.uname().machine != "x86_64":
-        return "user-mode-linux runs on x86_64 only"
+    kernel = Boot.missing()
+    if kernel:
+        return kernel
     if not Path("/lib/systemd/systemd").exists() or shutil.which("systemctl") is None:
         return "systemd is not installed (apt-get install systemd)"
     if shutil.which("dpkg") is None:
@@ -127,9 +126,9 @@ def boot(results: Path, scenario: Path) -> int:
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,
-            preexec_fn=_without_xstate,  # noqa: PLW1509 - tests start no threads
+            preexec_fn=without_xstate,  # noqa: PLW1509 - tests start no threads
             start_new_session=True,
-            env={**os.environ, "TMPDIR": _place_of_memory()},
+            env={**os.environ, "TMPDIR": place_of_memory(MEMORY)},
         )
     try:
         return machine.wait(LIMIT)
@@ -139,38 +138,3 @@ def boot(results: Path, scenario: Path) -> int:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(machine.pid, signal.SIGKILL)
         machine.wait()
-
-
-def _place_of_memory() -> str:
-    """Where the kernel's memory may lie: in shared memory if there is enough, of which containers have little."""
-    place = os.statvfs("/dev/shm") if Path("/dev/shm").is_dir() else None  # noqa: S108 - user-mode-linux unlinks it
-    return "/dev/shm" if place is not None and place.f_bavail * place.f_frsize > MEMORY else "/tmp"  # noqa: S108
-
-
-def _without_xstate() -> None:
-    """Let this process and its children see a machine without PTRACE_GETREGSET (seccomp, no privilege needed).
-
-    Linux 6.1 as user-mode-linux asks for 2.7 kB of extended registers and dies on processors that have more of them
-    (AMX: 11 kB). Where the request fails altogether it is content with those of SSE.
-    """
-    load, equal, answer = 0x20, 0x15, 0x06
-    ptrace, get_register_set, set_register_set = 101, 0x4204, 0x4205
-    refuse, allow = 0x0005_0005, 0x7FFF_0000  # EIO
-    program = b"".join(
-        struct.pack("=HBBI", *instruction)
-        for instruction in (
-            (load, 0, 0, 0),
-            (equal, 0, 4, ptrace),
-            (load, 0, 0, 16),
-            (equal, 1, 0, get_register_set),
-            (equal, 0, 1, set_register_set),
-            (answer, 0, 0, refuse),
-            (answer, 0, 0, allow),
-        )
-    )
-    buffer = ctypes.create_string_buffer(program, len(program))
-    header = ctypes.create_string_buffer(struct.pack("@HP", len(program) // 8, ctypes.addressof(buffer)))
-    libc = ctypes.CDLL(None)
-    set_no_new_privileges, set_seccomp, mode_filter = 38, 22, 2
-    libc.prctl(set_no_new_privileges, 1, 0, 0, 0)
-    libc.prctl(set_seccomp, mode_filter, header, 0, 0)

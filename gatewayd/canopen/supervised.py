@@ -1,0 +1,81 @@
+"""What every driver does alike: keep the state of its bus, count, tell its handler, and wait for room to send."""
+
+from __future__ import annotations
+
+import asyncio
+from time import monotonic
+
+from gatewayd.canopen.bus import BusCounters, BusHandler, BusState
+from gatewayd.canopen.errors import ErrorFrame
+from gatewayd.canopen.supervision import Event, Supervisor, event_of_error
+
+__all__ = ["ROOM_RETRY", "SupervisedBus"]
+
+ROOM_RETRY = 0.001
+"""Seconds to wait for room of which nobody tells."""
+
+
+class SupervisedBus:
+    """The part of a driver that knows no interface. It is used in the loop."""
+
+    def __init__(self, handler: BusHandler) -> None:
+        self.counters = BusCounters()
+        self._handler = handler
+        self._supervisor = Supervisor()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        """Set when the driver is opened."""
+        self._full = False
+        """A frame was refused for want of room, and `on_writable` was not told since."""
+        self._writable = -1
+        """The descriptor that will tell of room; -1 where there is none, or nothing is waited for."""
+        self._retrying: asyncio.TimerHandle | None = None
+
+    @property
+    def state(self) -> BusState:
+        """As far as the interface tells it."""
+        return self._supervisor.state
+
+    def _feed(self, event: Event, now: float, reason: str) -> None:
+        """Judge an event, and tell of the state if it is another one now."""
+        if not self._supervisor.feed(event, now):
+            return
+        state = self._supervisor.state
+        if state is BusState.BUS_OFF:
+            self.counters.bus_off += 1
+        if not state.carries:
+            self._forget_waiting()
+        self._handler.on_state(state, reason, now)
+
+    def _take_error(self, report: ErrorFrame, now: float) -> None:
+        """Tell an error frame, then the state that follows from it."""
+        self.counters.errors += 1
+        if report.tx_errors is not None and report.rx_errors is not None:
+            self.counters.tx_errors, self.counters.rx_errors = report.tx_errors, report.rx_errors
+        self._handler.on_error(report, now)
+        event = event_of_error(report)
+        if event is not None:
+            self._feed(event, now, f"the controller reports: {report}")
+
+    def _wait_for_room(self, descriptor: int) -> None:
+        """Tell when `descriptor` can be written; with -1, after `ROOM_RETRY`."""
+        assert self._loop is not None
+        self._full = True
+        self._writable = descriptor
+        if descriptor >= 0:
+            self._loop.add_writer(descriptor, self._tell_room)
+        else:
+            self._retrying = self._loop.call_later(ROOM_RETRY, self._tell_room)
+
+    def _tell_room(self) -> None:
+        self._forget_waiting()
+        self._handler.on_writable(monotonic())
+
+    def _forget_waiting(self) -> None:
+        """Wait no longer. To be called before the descriptor is closed."""
+        self._full = False
+        if self._retrying is not None:
+            self._retrying.cancel()
+            self._retrying = None
+        if self._writable >= 0 and self._loop is not None:
+            self._loop.remove_writer(self._writable)
+            self._writable = -1

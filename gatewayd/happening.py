@@ -1,0 +1,139 @@
+"""What happened, with names, and in one sentence: `hmi wrote limit = 999 N: refused, held by plc`.
+
+Control interface, commands, status page and demonstration show this sentence; the log has fields instead
+(`gatewayd.eventlog`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gatewayd.core.definition import CellDefinition, Value
+from gatewayd.core.events import Event, EventKind
+from gatewayd.figures import value
+
+__all__ = ["ACCEPTED", "BAD", "GATEWAY", "STRANGER", "UNDECLARED", "Happening"]
+
+ACCEPTED = "write accepted"
+"""What happened when a write was accepted; the core has no event for it."""
+UNDECLARED, GATEWAY = "undeclared", "gateway"
+"""Who did it where no writer did: a peer that no writer stands for, or gatewayd. No writer may have these names."""
+STRANGER = "an undeclared peer"
+"""How a sentence calls `UNDECLARED`."""
+BAD = frozenset(
+    kind.value
+    for kind in (
+        EventKind.ROBOT_LOST,
+        EventKind.STALE,
+        EventKind.UNAVAILABLE,
+        EventKind.READ_BACK_DIFFERS,
+        EventKind.WRITER_LOST,
+        EventKind.REFUSED,
+        EventKind.FORCED,
+    )
+)
+"""What somebody should look at."""
+_NOBODY = {EventKind.REFUSED: UNDECLARED, EventKind.FALLBACK: GATEWAY}
+_REFUSED = EventKind.REFUSED.value
+_SENTENCES = {
+    ACCEPTED: "{writer} wrote {variable}: {old} -> {new}",
+    EventKind.FALLBACK.value: "{variable} fell back from {old} to {new}",
+    EventKind.ACQUIRED.value: "{writer} took {lock}",
+    EventKind.TAKEN_OVER.value: "{writer} took {lock} over from {holder}",
+    EventKind.RELEASED.value: "{writer} no longer holds {lock}",
+    EventKind.FORCED.value: "{writer} forced {variable} to {new}",
+    EventKind.UNFORCED.value: "{variable} is no longer forced",
+    EventKind.WRITER_CONNECTED.value: "writer {writer} connected",
+    EventKind.WRITER_LOST.value: "writer {writer} lost",
+    EventKind.UNAVAILABLE.value: "{variable} is unavailable",
+    EventKind.AVAILABLE.value: "{variable} is available",
+    EventKind.READ_BACK_DIFFERS.value: "read-back of {variable} differs",
+}
+"""What is not told by its name and its detail."""
+_ASIDE = frozenset(
+    {ACCEPTED, _REFUSED, EventKind.ACQUIRED.value, EventKind.TAKEN_OVER.value, EventKind.FORCED.value}
+)
+"""What has its detail in parentheses (by whom, how often); that of all others is the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """An event, or an accepted write. Names, not indices: it outlives a reload. What does not apply is left out."""
+
+    what: str
+    """`write accepted`, or the text of the event's kind."""
+    writer: str | None = None
+    """Who did it, or whom it befell: a writer, `operator`, `undeclared` or `gateway`."""
+    variable: str | None = None
+    unit: str = ""
+    """Unit of the variable."""
+    lock: str | None = None
+    old: Value | None = None
+    new: Value | None = None
+    times: int = 1
+    """Changes or refusals that it stands for."""
+    holder: str | None = None
+    """Who held the lock when it was refused, or before it was taken over."""
+    reason: str | None = None
+    """Why it was refused."""
+    detail: str = ""
+
+    @classmethod
+    def of(cls, event: Event, definition: CellDefinition) -> Happening:
+        """The event of a cell of this definition."""
+        variable = None if event.variable is None else definition.variables[event.variable]
+
+        def name(writer: int | None) -> str | None:
+            return None if writer is None else definition.writer_name(writer)
+
+        return cls(
+            event.kind.value,
+            name(event.writer) or _NOBODY.get(event.kind),
+            None if variable is None else variable.name,
+            "" if variable is None else variable.unit,
+            None if event.lock is None else definition.locks[event.lock].name,
+            event.old,
+            event.new,
+            1 + event.repeats,
+            name(event.other),
+            None if event.reason is None else event.reason.text,
+            event.detail,
+        )
+
+    @property
+    def bad(self) -> bool:
+        """Whether somebody should look at it."""
+        return self.what in BAD
+
+    def sentence(self, refused: str = "refused") -> str:
+        """Who did what, with value and unit, why, who stood in the way and how often. `refused` may say how.
+
+        An event whose variable, lock or writer a reload has removed is told by its kind; the detail has the names.
+        """
+        text = self._refusal(refused) if self.what == _REFUSED else self._told()
+        if self.what not in _ASIDE:
+            return f"{text}: {self.detail}" if self.detail else text
+        often = f"{self.times} {'changes' if self.what == ACCEPTED else 'times'}" if self.times > 1 else ""
+        aside = ", ".join(filter(None, (often, self.detail)))
+        return f"{text} ({aside})" if aside else text
+
+    def _refusal(self, refused: str) -> str:
+        writer = STRANGER if self.writer == UNDECLARED else self.writer
+        wrote = "" if self.new is None else f" = {value(self.new, self.unit)}"
+        why = f"held by {self.holder}" if self.holder else self.reason
+        return f"{writer} wrote {self.variable or 'an address'}{wrote}: {', '.join(filter(None, (refused, why)))}"
+
+    def _told(self) -> str:
+        known = {
+            "writer": self.writer,
+            "variable": self.variable,
+            "lock": self.lock,
+            "holder": self.holder,
+            "old": None if self.old is None else value(self.old),
+            "new": None if self.new is None else value(self.new, self.unit),
+        }
+        names = {name: text for name, text in known.items() if text is not None}
+        try:
+            return _SENTENCES[self.what].format_map(names)
+        except KeyError:
+            return f"{self.what} {self.variable}" if self.variable else self.what

@@ -1,0 +1,97 @@
+"""What all drivers do alike."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Iterator
+
+import pytest
+
+from gatewayd.canopen.bus import BusState
+from gatewayd.canopen.errors import decode
+from gatewayd.canopen.supervised import ROOM_RETRY, SupervisedBus
+from gatewayd.canopen.supervision import Event
+from tests.canopen.recorder import Recorder, until
+
+BUS_OFF = 0x2000_0040
+NOBODY_TELLS = -1
+
+
+@pytest.fixture
+def recorder() -> Recorder:
+    return Recorder()
+
+
+@pytest.fixture
+async def bus(recorder: Recorder) -> SupervisedBus:
+    bus = SupervisedBus(recorder)
+    bus._loop = asyncio.get_running_loop()
+    bus._feed(Event.UP, 0.0, "up")
+    return bus
+
+
+@pytest.fixture
+def full() -> Iterator[tuple[socket.socket, socket.socket]]:
+    """A socket without room, and its other end."""
+    ours, theirs = socket.socketpair()
+    ours.setblocking(False)
+    with contextlib.closing(ours), contextlib.closing(theirs):
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                ours.send(bytes(4096))
+        yield ours, theirs
+
+
+async def test_room_is_told_once_and_when_there_is_some(
+    bus: SupervisedBus, recorder: Recorder, full: tuple[socket.socket, socket.socket]
+) -> None:
+    ours, theirs = full
+    bus._wait_for_room(ours.fileno())
+    await asyncio.sleep(5 * ROOM_RETRY)
+    assert (bus._full, recorder.writable) == (True, 0)
+    theirs.setblocking(False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            theirs.recv(1 << 20)
+    await until(lambda: recorder.writable)
+    await asyncio.sleep(5 * ROOM_RETRY)
+    assert (bus._full, recorder.writable) == (False, 1)
+
+
+async def test_room_of_which_nobody_tells_is_tried_after_a_moment(
+    bus: SupervisedBus, recorder: Recorder
+) -> None:
+    bus._wait_for_room(NOBODY_TELLS)
+    assert bus._full
+    await until(lambda: recorder.writable)
+    assert (bus._full, recorder.writable) == (False, 1)
+
+
+@pytest.mark.parametrize("kernel_tells", [True, False])
+async def test_a_bus_that_carries_nothing_is_not_waited_for(
+    bus: SupervisedBus, recorder: Recorder, kernel_tells: bool
+) -> None:
+    ours, theirs = socket.socketpair()
+    with contextlib.closing(ours), contextlib.closing(theirs):
+        bus._wait_for_room(ours.fileno() if kernel_tells else NOBODY_TELLS)
+        bus._feed(Event.OFF, 1.0, "off")
+        await asyncio.sleep(5 * ROOM_RETRY)
+    assert (bus._full, recorder.writable) == (False, 0)
+
+
+async def test_an_error_frame_is_counted_and_told_with_the_state_that_follows(
+    bus: SupervisedBus, recorder: Recorder
+) -> None:
+    report = decode(BUS_OFF, bytes(8))
+    bus._take_error(report, 1.0)
+    assert recorder.errors == [report]
+    assert bus.state is BusState.BUS_OFF
+    assert recorder.states == [BusState.ACTIVE, BusState.BUS_OFF]
+    assert (bus.counters.errors, bus.counters.bus_off) == (1, 1)
+
+
+async def test_a_state_is_told_when_it_changes(bus: SupervisedBus, recorder: Recorder) -> None:
+    bus._feed(Event.UP, 1.0, "still up")
+    assert (recorder.states, recorder.reasons) == ([BusState.ACTIVE], ["up"])
