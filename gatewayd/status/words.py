@@ -37,14 +37,18 @@ def address(place: Placement) -> tuple[str, str]:
     return f"{place.address}{bit}", place.area.notation(place.address) + bit
 
 
-def describe(event: Event, definition: CellDefinition) -> str:
-    """The event in one sentence: `hmi wrote part_number = 7: refused, held by plc`."""
+def describe(event: Event, definition: CellDefinition, more: int = 0) -> str:
+    """The event in one sentence: `hmi wrote part_number = 7: refused, held by plc`.
+
+    `more` events befell further variables or locks at the same moment: `plc took start and 3 more`.
+    """
     variable = definition.variables[event.variable] if event.variable is not None else None
-    name = variable.name if variable is not None else ""
+    others = f" and {more} more" if more else ""
+    name = variable.name + others if variable is not None else ""
     unit = variable.unit if variable is not None else ""
     writer = definition.writer_name(event.writer) if event.writer is not None else "a stranger"
     other = definition.writer_name(event.other) if event.other is not None else "nobody"
-    lock = definition.locks[event.lock].name if event.lock is not None else ""
+    lock = definition.locks[event.lock].name + others if event.lock is not None else ""
     new = number(event.new, unit) if event.new is not None else "?"
     match event.kind:
         case EventKind.REFUSED:
@@ -53,13 +57,13 @@ def describe(event: Event, definition: CellDefinition) -> str:
             times = f" ({event.repeats + 1} times)" if event.repeats else ""
             return f"{writer} wrote {name or 'an address without a variable'}{value}: refused, {why}{times}"
         case EventKind.FALLBACK:
-            return f"{name} fell back to {new}"
+            return f"{name} fell back" + ("" if more else f" to {new}")
         case EventKind.ACQUIRED:
             return f"{writer} took {lock}"
         case EventKind.TAKEN_OVER:
             return f"{writer} took {lock} over from {other}"
         case EventKind.RELEASED:
-            return f"{lock} is free: {event.detail}"
+            return f"{lock} {'are' if more else 'is'} free: {event.detail}"
         case EventKind.WRITER_CONNECTED | EventKind.WRITER_LOST:
             return f"{event.kind.value.replace('writer', writer)}: {event.detail}"
         case EventKind.FORCED:

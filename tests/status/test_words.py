@@ -48,6 +48,13 @@ def test_an_event_is_one_sentence(cell: Cell, event: Event, text: str) -> None:
     assert describe(event, cell.definition) == text
 
 
+def test_what_befell_several_at_once_is_one_sentence(cell: Cell) -> None:
+    assert (
+        describe(Event(0, EventKind.ACQUIRED, lock=0, writer=0), cell.definition, 3)
+        == "plc took start and 3 more"
+    )
+
+
 @pytest.mark.parametrize("kind", EventKind)
 def test_every_kind_has_a_sentence(cell: Cell, kind: EventKind) -> None:
     assert describe(Event(0, kind), cell.definition)
