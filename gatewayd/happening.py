@@ -6,7 +6,7 @@ Control interface, commands, status page and demonstration show this sentence; t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gatewayd.core.definition import CellDefinition, Value
 from gatewayd.core.events import Event, EventKind
@@ -42,14 +42,16 @@ _SENTENCES = {
     EventKind.TAKEN_OVER.value: "{writer} took {lock} over from {holder}",
     EventKind.RELEASED.value: "{writer} no longer holds {lock}",
     EventKind.FORCED.value: "{writer} forced {variable} to {new}",
-    EventKind.UNFORCED.value: "{variable} is no longer forced",
+    EventKind.UNFORCED.value: "{variable} {are} no longer forced",
     EventKind.WRITER_CONNECTED.value: "writer {writer} connected",
     EventKind.WRITER_LOST.value: "writer {writer} lost",
-    EventKind.UNAVAILABLE.value: "{variable} is unavailable",
-    EventKind.AVAILABLE.value: "{variable} is available",
+    EventKind.UNAVAILABLE.value: "{variable} {are} unavailable",
+    EventKind.AVAILABLE.value: "{variable} {are} available",
     EventKind.READ_BACK_DIFFERS.value: "read-back of {variable} differs",
 }
 """What is not told by its name and its detail."""
+_WITHOUT_VALUES = {EventKind.FALLBACK.value: "{variable} fell back"}
+"""The same where it befell several, each with a value of its own."""
 _ASIDE = frozenset(
     {ACCEPTED, _REFUSED, EventKind.ACQUIRED.value, EventKind.TAKEN_OVER.value, EventKind.FORCED.value}
 )
@@ -77,6 +79,8 @@ class Happening:
     reason: str | None = None
     """Why it was refused."""
     detail: str = ""
+    others: int = 0
+    """Further variables or locks that it befell in the same moment: `plc took start and 3 more`."""
 
     @classmethod
     def of(cls, event: Event, definition: CellDefinition) -> Happening:
@@ -99,6 +103,10 @@ class Happening:
             None if event.reason is None else event.reason.text,
             event.detail,
         )
+
+    def of_several(self, others: int) -> Happening:
+        """The same for so many more variables or locks, whose values are not told."""
+        return replace(self, others=others, old=None, new=None) if others else self
 
     @property
     def bad(self) -> bool:
@@ -124,16 +132,19 @@ class Happening:
         return f"{writer} wrote {self.variable or 'an address'}{wrote}: {', '.join(filter(None, (refused, why)))}"
 
     def _told(self) -> str:
+        others = f" and {self.others} more" if self.others else ""
         known = {
+            "are": "are" if others else "is",
             "writer": self.writer,
-            "variable": self.variable,
-            "lock": self.lock,
+            "variable": self.variable and self.variable + others,
+            "lock": self.lock and self.lock + others,
             "holder": self.holder,
             "old": None if self.old is None else value(self.old),
             "new": None if self.new is None else value(self.new, self.unit),
         }
         names = {name: text for name, text in known.items() if text is not None}
+        sentences = _SENTENCES | _WITHOUT_VALUES if others else _SENTENCES
         try:
-            return _SENTENCES[self.what].format_map(names)
+            return sentences[self.what].format_map(names)
         except KeyError:
             return f"{self.what} {self.variable}" if self.variable else self.what

@@ -89,6 +89,21 @@ def test_an_accepted_write_is_one_too() -> None:
     assert replace(accepted, times=5).sentence() == "plc wrote x: 1 -> 2 N (5 changes)"
 
 
+@pytest.mark.parametrize(
+    "event, text",
+    [
+        (Event(0, EventKind.ACQUIRED, lock=0, writer=0), "plc took start and 3 more"),
+        (Event(0, EventKind.FALLBACK, variable=0, old=True, new=False), "start and 3 more fell back"),
+        (
+            Event(0, EventKind.UNAVAILABLE, variable=0, detail="in use"),
+            "start and 3 more are unavailable: in use",
+        ),
+    ],
+)
+def test_what_befell_several_at_once_is_one_sentence(cell: Cell, event: Event, text: str) -> None:
+    assert Happening.of(event, cell.definition).of_several(3).sentence() == text
+
+
 def test_a_refusal_may_say_how() -> None:
     refused = Happening(
         EventKind.REFUSED.value, "hmi", "x", new=7, holder="plc", reason="held by another owner"

@@ -100,7 +100,7 @@ VARIABLE: Fields = {
     "kind": "`bool`, `int` or `float`",
     "robot": "what it is in the robot: `input_int_register_0`, `actual_TCP_pose[2]`",
     "modbus": "list of its places: `area`, `address` from 0, `bit` or null, `notation` (4xxxxx form)",
-    "canopen": "null, or `object` (2010h:1), `type`, and `cob_id` of the PDO that carries it, null for SDO alone",
+    "canopen": "null, or `object` (2010h:01), `type`, and `cob_id` of the PDO that carries it, null for SDO alone",
     "value": "true or false, or a number in the robot's unit; the texts `nan`, `inf`, `-inf`",
     "unit": "unit of the value, may be empty",
     "quality": "`good`, `stale`, `unavailable`, `never` or `forced`",

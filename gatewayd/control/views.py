@@ -311,7 +311,7 @@ def _objects(plan: Plan) -> dict[int, Json]:
     cob_ids = {entry.variable: pdo.cob_id for pdo in canopen.pdos for entry in pdo.entries}
     return {
         one.variable: {
-            "object": f"{one.index:04X}h:{one.subindex}",
+            "object": f"{one.index:04X}h:{one.subindex:02X}",
             "type": one.type.name,
             "cob_id": cob_ids.get(one.variable),
         }

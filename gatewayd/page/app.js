@@ -1,6 +1,6 @@
 // Asks the gateway four times a second and shows what it says. What is not answered in time is shown as old, at once.
 
-import { MARKS, Picture } from "./picture.js";
+import { LEVELS, MARKS, Picture } from "./picture.js";
 import { Variables } from "./variables.js";
 import { OPERATOR, clock, count, make, put, span } from "./words.js";
 
@@ -47,6 +47,7 @@ async function look() {
   }
   const now = performance.now();
   picture.show(state.picture);
+  showWorst(state.picture);
   variables.update(state, now);
   showLocks(state);
   showEvents(state.events);
@@ -55,6 +56,19 @@ async function look() {
   answeredAt = new Date();
   trouble = "";
   judge();
+}
+
+// In the header, so that trouble stays in sight below the picture and on the other tabs of a phone.
+function showWorst({ robot, gateway, buses, writers }) {
+  const nodes = [robot, gateway, ...buses, ...writers];
+  const level = ["bad", "warn"].find((one) => nodes.some((node) => node.level === one));
+  const worst = byId("worst");
+  worst.hidden = level === undefined;
+  if (level === undefined) return;
+  const names = nodes.filter((node) => node.level === level).map((node) => node.name);
+  worst.dataset.level = level;
+  worst.setAttribute("aria-label", `${LEVELS[level]}: ${names.join(", ")}`);
+  put(worst, `${MARKS[level]} ${names.length > 1 ? `${names.length} in ${level === "bad" ? "trouble" : "question"}` : names[0]}`);
 }
 
 function showLocks(state) {
@@ -99,6 +113,7 @@ function judge() {
   put(byId("contact-words"), { live: "live", lost: "no answer", waiting: "connecting" }[contact]);
   alarm.hidden = contact !== "lost";
   if (contact !== "lost") return;
+  byId("worst").hidden = true;
   const since = answeredAt ? `since ${clock(answeredAt)} (${span(age)})` : "so far";
   document.title = `? ${cell ?? ""} - no answer`;
   put(alarm, `No answer from the gateway ${since}. ${answeredAt ? "Everything below is old." : ""}`);
@@ -125,6 +140,7 @@ function start() {
   byId("cells").addEventListener("change", (event) => {
     location.hash = encodeURIComponent(event.target.value);
   });
+  byId("worst").addEventListener("click", () => scrollTo({ top: 0 }));
   addEventListener("hashchange", () => { layout = null; });
   for (const button of document.querySelectorAll(".tabs button")) {
     button.addEventListener("click", () => {

@@ -3,7 +3,7 @@
 import { make, put } from "./words.js";
 
 export const MARKS = { good: "●", warn: "▲", bad: "■", idle: "○" };
-const LEVELS = { good: "in order", warn: "attention", bad: "trouble", idle: "not there" };
+export const LEVELS = { good: "in order", warn: "attention", bad: "trouble", idle: "not there" };
 
 export class Picture {
   constructor(place) {

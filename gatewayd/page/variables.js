@@ -1,7 +1,7 @@
 // The table of variables: filter, live values, a small plot for each, a large one with all facts for the open one.
 
 import { History } from "./history.js";
-import { OPERATOR, count, make, number, put, quality, span } from "./words.js";
+import { FORCED, OPERATOR, count, make, number, put, quality, span } from "./words.js";
 
 const KINDS = [
   ["all", "All", () => true],
@@ -35,6 +35,7 @@ export class Variables {
       const button = make("button", "kind", title);
       button.type = "button";
       button.setAttribute("aria-pressed", String(id === this.kind));
+      if (id === "odd") this.odd = button;
       button.addEventListener("click", () => {
         this.kind = id;
         for (const one of byId("kinds").children) one.setAttribute("aria-pressed", String(one === button));
@@ -62,6 +63,11 @@ export class Variables {
     this.watch.disconnect();
     this.seen.clear();
     this.open = null;
+    const table = byId("rows").parentElement;
+    const has = (test) => layout.variables.some((one) => one.places.some(test));
+    table.classList.toggle("no-modbus", !has((place) => !isObject(place)));
+    table.classList.toggle("no-canopen", !has(isObject));
+    table.classList.toggle("units", layout.variables.some((one) => one.unit));
     this.rows = layout.variables.map((variable) => new Row(variable, (row) => this.toggle(row)));
     byId("rows").replaceChildren(...this.rows.map((row) => row.element));
     for (const row of this.rows) this.watch.observe(row.element);
@@ -76,6 +82,9 @@ export class Variables {
       const name = owner === null ? "" : owner === OPERATOR ? "operator" : this.layout.writers[owner].name;
       row.update(state.values[index], state.quality[index], state.ages[index], name, left);
     }
+    const odd = this.rows.reduce((sum, row) => sum + (row.code !== 0), 0);
+    put(this.odd, odd ? `Not good ${odd}` : "Not good");
+    this.odd.classList.toggle("some", odd > 0);
     if (this.kind === "owned" || this.kind === "odd" || byId("filter").value) this.filter();
     this.draw(now);
   }
@@ -89,7 +98,7 @@ export class Variables {
       const { variable, detail } = this.open;
       const [low, high] = this.history.range(variable.number - 1, now);
       this.history.draw(detail.canvas, variable.number - 1, now, variable.kind, gap);
-      put(detail.range, `${number(low, variable.kind)} to ${number(high, variable.kind)} ${variable.unit}`.trim());
+      put(detail.range, `lowest ${number(low, variable.kind)}, highest ${number(high, variable.kind)} ${variable.unit}`.trim());
     }
   }
 
@@ -135,14 +144,17 @@ class Row {
     this.canvas.setAttribute("aria-hidden", "true");
     this.quality = make("span", "quality");
     this.holder = make("span", "owner");
+    const modbus = variable.places.filter((place) => !isObject(place)), objects = variable.places.filter(isObject);
     const cells = [
-      ["name", this.button, make("span", "robot muted", `${variable.direction === "input" ? "→" : "←"} ${variable.robot}`)],
+      ["name", this.button, make("span", "robot muted", `${variable.direction === "input" ? "→" : "←"}\u00a0${variable.robot}`)],
       ["value right", this.value, make("span", "unit muted", variable.unit)],
       ["plot", this.canvas],
       ["quality", this.quality],
       ["owner", this.holder],
-      ["address", ...variable.places.map((place) => make("span", "", areaOf(place) + place.address))],
-      ["notation", ...variable.places.map((place) => make("span", "muted", place.notation))],
+      ["address modbus", ...modbus.map((place) => make("span", "", areaOf(place) + place.address))],
+      ["notation modbus", ...modbus.map((place) => make("span", "muted", place.notation))],
+      ["object canopen", ...objects.map((place) => make("span", "", place.address))],
+      ["cob-id canopen", ...objects.map((place) => make("span", "muted", place.notation.replace("COB-ID ", "")))],
     ];
     row.append(...cells.map(([className, ...content]) => {
       const cell = make("td", className);
@@ -155,7 +167,8 @@ class Row {
     put(this.value, number(value, this.variable.kind));
     put(this.quality, quality(code, age));
     const words = owner && left !== null ? `${owner}, ${span(left)}` : owner;
-    put(this.holder, this.variable.direction === "input" ? words || "free" : "robot");
+    const source = code === FORCED ? "operator" : "robot";
+    put(this.holder, this.variable.direction === "input" ? words || "free" : source);
     if (code !== this.code) this.element.dataset.quality = code;
     this.holder.classList.toggle("muted", !owner);
     this.element.classList.toggle("on", value === true);
@@ -166,7 +179,7 @@ class Row {
   expand(layout) {
     const { variable } = this;
     const element = make("tr", "detail"), cell = make("td");
-    cell.colSpan = 7;
+    cell.colSpan = this.element.children.length;
     const canvas = make("canvas", "plot"), range = make("span");
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `${variable.name}, the last 60 seconds`);
@@ -190,20 +203,25 @@ class Row {
   }
 }
 
+function isObject(place) {
+  return place.area === "object";
+}
+
 function areaOf(place) {
   return place.area === "holding" ? "" : `${place.area} `;
 }
 
 function factsOf(variable, layout) {
   const lock = variable.lock === null ? null : layout.locks[variable.lock];
-  const places = variable.places.map((one) => `${one.area} ${one.address} = ${one.notation}, ${one.type}`);
+  const modbus = variable.places.filter((one) => !isObject(one)), objects = variable.places.filter(isObject);
   const input = variable.direction === "input";
   return [
     ["about", variable.comment],
     ["number", `${variable.number} (status block)`],
     ["direction", input ? "input: fieldbus to robot" : "output: robot to fieldbus"],
     ["robot", variable.robot],
-    ["addresses", places.join("; ")],
+    ["Modbus", modbus.map((one) => `${one.area} ${one.address} = ${one.notation}, ${one.type}`).join("; ")],
+    ["CANopen", objects.map((one) => `object ${one.address}, ${one.type}, ${one.notation}`).join("; ")],
     ["limits", variable.limits ? `${variable.limits.join(" to ")} ${variable.unit}`.trim() : ""],
     [input ? "owner lost" : "robot lost", variable.fallback],
     ["may own", lock ? lock.owners.join(lock.takeover ? " before " : ", ") || "nobody" : ""],

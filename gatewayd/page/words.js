@@ -1,6 +1,7 @@
 // Numbers, ages and times in words.
 
 export const QUALITIES = ["good", "stale", "unavailable", "never told", "forced"];
+export const FORCED = 4;
 export const OPERATOR = 254;
 
 export function number(value, kind) {

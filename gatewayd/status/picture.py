@@ -104,10 +104,15 @@ def bus(name: str, connections: int, *, listening: bool) -> Node:
     return Node(f"Modbus {name}", Level.GOOD, f"listening, {counted(connections, 'connection')}")
 
 
-def can_bus(state: int) -> Node:
-    """A CAN bus, by the state that the cell's health tells: 1 absent ... 6 active."""
+def can_bus(channel: str, state: int, node: int, nmt: str) -> Node:
+    """A CAN bus, by the state that the cell's health tells: 1 absent ... 6 active; and what our node on it is up to.
+
+    An active bus alone is not green: before NMT start no PDO goes either way. A node id above 127 is none (LSS).
+    """
     level, words = _CAN_BUS.get(state, (Level.BAD, "in an unknown state"))
-    return Node("CAN bus", level, words)
+    if level is Level.GOOD and nmt != "operational":
+        level, words = Level.WARN, f"{words}, but {nmt}: no PDOs until a master starts the node"
+    return Node(f"CAN {channel}", level, words, f"node {node if node <= 127 else 'without id'}, {nmt}")
 
 
 _CAN_BUS = {

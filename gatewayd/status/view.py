@@ -9,12 +9,13 @@ import json
 import math
 import time
 from collections.abc import Iterable
+from itertools import groupby, islice
 from typing import Any
 
 from gatewayd.control.views import robot_name
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Fallback, Lock, Variable
-from gatewayd.core.events import Event
+from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality
 from gatewayd.daemon import Daemon
 from gatewayd.happening import Happening
@@ -28,7 +29,19 @@ from gatewayd.status.probes import Probes
 __all__ = ["EVENTS", "as_json", "layout", "overview", "state"]
 
 EVENTS = 100
-"""Events told at most in one answer."""
+"""Events told at most in one answer; those of one deed, as many variables as it may concern, are one."""
+
+_IN_RUNS = frozenset(
+    {
+        EventKind.ACQUIRED,
+        EventKind.TAKEN_OVER,
+        EventKind.RELEASED,
+        EventKind.FALLBACK,
+        EventKind.UNAVAILABLE,
+        EventKind.AVAILABLE,
+    }
+)
+"""Kinds of events that befall many variables in one moment."""
 
 
 def as_json(document: object) -> bytes:
@@ -128,7 +141,7 @@ def _objects(station: Station) -> dict[int, dict[str, object]]:
     return {
         one.variable: {
             "area": "object",
-            "address": f"{one.index:04X}h:{one.subindex}",
+            "address": f"{one.index:04X}h:{one.subindex:02X}",
             "notation": cob_ids.get(one.variable, "by SDO"),
             "type": one.type.name,
         }
@@ -188,17 +201,24 @@ def _milliseconds(seconds: float) -> int | None:
 
 def _events(cell: Cell, since: int, now: float) -> list[dict[str, object]]:
     ring = cell.events
-    new = min(ring.count - since if 0 <= since <= ring.count else ring.count, len(ring), EVENTS)
-    latest = list(ring)[len(ring) - new :]
+    new = min(ring.count - since if 0 <= since <= ring.count else ring.count, len(ring))
     wall = time.time() - now
+    latest = islice(enumerate(ring, ring.count - len(ring) + 1), len(ring) - new, None)
+    runs = [list(run) for _, run in groupby(latest, _deed)]
     return [
-        _event(event, cell, ring.count - new + 1 + offset, wall + event.time)
-        for offset, event in enumerate(latest)
+        _event(run[0][1], cell, run[-1][0], wall + run[0][1].time, len(run) - 1) for run in runs[-EVENTS:]
     ]
 
 
-def _event(event: Event, cell: Cell, number: int, at: float) -> dict[str, object]:
-    told = Happening.of(event, cell.definition)
+def _deed(numbered: tuple[int, Event]) -> tuple[object, ...]:
+    """What events that are one deed have in common: a lost PLC must not vanish below its hundred fallbacks."""
+    number, event = numbered
+    one = number if event.kind not in _IN_RUNS else None
+    return event.kind, event.time, event.writer, event.other, event.detail, one
+
+
+def _event(event: Event, cell: Cell, number: int, at: float, more: int) -> dict[str, object]:
+    told = Happening.of(event, cell.definition).of_several(more)
     return {
         "number": number,
         "time": round(at, 3),
@@ -219,9 +239,10 @@ def _picture(station: Station, probes: Probes, now: float) -> dict[str, object]:
     buses = []
     if listener is not None:
         buses.append(picture.bus(listener.name, listener.connections, listening=listener.listening))
-    can_bus: int = getattr(cell.health, "can_bus", 0)
-    if can_bus:
-        buses.append(picture.can_bus(can_bus))
+    can, canopen = station.can, station.plan.canopen
+    if can is not None and canopen is not None:
+        nmt = can.node.nmt.state.name.lower().replace("_", "-")
+        buses.append(picture.can_bus(canopen.channel, cell.health.can_bus, can.node.node_id, nmt))
     writers = picture.writers(cell, now)
     levels = [one.level for one in (robot, gateway, *buses, *writers) if one.level is not Level.IDLE]
     return {

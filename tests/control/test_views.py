@@ -167,7 +167,7 @@ def test_a_variable_on_canopen_tells_its_object_and_pdo() -> None:
     carried = {entry.variable for pdo in plan.canopen.pdos for entry in pdo.entries}
     for one in plan.canopen.objects:
         told = found[plan.cell.variables[one.variable].name]
-        assert told["object"] == f"{one.index:04X}h:{one.subindex}"
+        assert told["object"] == f"{one.index:04X}h:{one.subindex:02X}"
         assert told["type"] == one.type.name
         assert (told["cob_id"] is not None) == (one.variable in carried)
     assert carried

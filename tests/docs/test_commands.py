@@ -31,6 +31,8 @@ ELSEWHERE = {
     r"make soak\b.*": "tests/soak/test_soak.py; tests/test_docs.py knows the target",
     r"\(umask 077; head -c 24 /dev/urandom \| base64 > token\)": "tests/status/test_launch.py reads such files",
     r"curl -X POST .* http://127\.0\.0\.1:9502/api/v1/locks/start/take": "tests/status/test_listener.py",
+    r"promtool check .*": "tests/status/test_promtool.py",
+    r"sudo systemctl reload prometheus": "Prometheus' own",
     r"(sudo )?apt install .*|apt-get install .*": "the system's",
     r"sudo modprobe vcan|sudo ip link .*|ip -details .*": "the system's; tests/kernel sets interfaces up this way",
     r"candump vcan0|(while sleep 0\.4; do )?cansend vcan0 \S+( done)?": "tests/docs/test_canopen_tutorial.py",

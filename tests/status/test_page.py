@@ -30,9 +30,20 @@ variables:
   cycles: {robot: output_int_register_0, modbus: 110, on_stale: hold}
   tcp:    {robot: actual_TCP_pose, modbus: {holding: 130, type: float32}, unit: m}
 """
+BOTH_BUSES = """\
+canopen: {interface: virtual, channel: page, bitrate: 500000, node: 16}
+writers:
+  plc:  {modbus: 127.0.0.2}
+  line: {canopen: rpdo}
+variables:
+  start:  {robot: input_bit_register_0, canopen: auto, owner: line, lease: 2s}
+  part:   {robot: input_int_register_0, modbus: 10, canopen: object, owner: plc}
+  force:  {robot: output_double_register_0, modbus: {holding: 104, type: float32}, canopen: auto, unit: N}
+"""
 LIVE = "document.body.dataset.contact === 'live'"
 LOST = "document.body.dataset.contact === 'lost'"
 NARROW, WIDE = (360, 740), (1280, 800)
+WIDTHS = (360, 390, 820, 840, 1000, 1100, 1290, 1400)
 
 
 @dataclass
@@ -56,10 +67,12 @@ def plant(tmp_path: Path) -> Iterator[Plant]:
 
 
 @asynccontextmanager
-async def showing(plant: Plant, size: tuple[int, int], *, dark: bool = False) -> AsyncIterator[Shown]:
+async def showing(
+    plant: Plant, size: tuple[int, int], *, dark: bool = False, mapping: str = MAPPING
+) -> AsyncIterator[Shown]:
     simulator = plant.simulator()
     port = free_port()
-    daemon = plant.daemon(plant.mapping(MAPPING, simulator.port), "--status", f"{HOST}:{port}")
+    daemon = plant.daemon(plant.mapping(mapping, simulator.port), "--status", f"{HOST}:{port}")
     plc = plant.ready_plc(PLC)
     daemon.wait_for_line("status page")
     async with browsing(plant.directory) as page:
@@ -111,6 +124,54 @@ async def test_a_lost_robot_does_not_look_fresh(plant: Plant) -> None:
         stale = await page.run("getComputedStyle(document.querySelector('#rows span.value')).color")
         assert fresh != stale
         assert await page.run("document.title.startsWith('■')")
+        assert await page.run(text("#worst")) == "■ Robot"
+        assert "Not good 9" in await page.run(text("#kinds"))
+        assert await page.run(CONTRASTS) == []
+        await page.resize(*NARROW)
+        await page.run("scrollTo(0, 1e6)")
+        await page.run("document.getElementById('worst').click()")
+        assert await page.run("scrollY") == 0
+
+
+async def test_each_bus_has_its_columns(plant: Plant) -> None:
+    """Modbus by both addresses, CANopen by object and COB-ID, under headings that say which is which."""
+    async with showing(plant, WIDE, mapping=BOTH_BUSES) as shown:
+        page = shown.page
+        await page.wait(f"{text('.node.bus:nth-child(2) strong')} === 'CAN page'")
+        assert await page.run(row("part", "td.object")) == "2010h:01"
+        assert await page.run(row("part", "td.cob-id")) == "by SDO"
+        assert await page.run(row("start", "td.cob-id")) == "0x210"
+        assert await page.run(row("start", "td.modbus")) == ""
+        assert await page.run(row("force", "td.notation")) == "400105"
+        await page.wait(f"{text('.node.bus:nth-child(2) .state')}.includes('until a master starts the node')")
+        assert await page.run(text("#worst")) == "▲ CAN page"
+        for width in WIDTHS:
+            await page.resize(width, 800)
+            assert await page.run("document.documentElement.scrollWidth") <= width
+            assert await page.run("document.querySelector('table').scrollWidth") <= await page.run(
+                "document.getElementById('variables').clientWidth"
+            ), width
+        assert await page.run(HEADINGS) == 9
+        await page.open(shown.url, *NARROW)
+        await page.wait(f"{LIVE} && {row('part', 'td.object')} === '2010h:01'")
+        labels = "getComputedStyle(document.querySelector('td.object'), '::before').content"
+        assert await page.run(labels) == '"CANopen"'
+        assert page.problems == []
+
+
+async def test_a_thumb_finds_what_it_wants(plant: Plant) -> None:
+    """The whole row opens on a phone; what can be tapped is high enough, and the filter does not enlarge the page."""
+    async with showing(plant, NARROW) as shown:
+        page = shown.page
+        await page.wait("document.querySelector('#rows tr')")
+        await page.run("document.querySelector('#rows td.value').scrollIntoView({block: 'center'})")
+        hit = "(({x, y}) => document.elementFromPoint(x + 3, y + 3).className)"
+        assert await page.run(f"{hit}(document.querySelector('td.value').getBoundingClientRect())") == "name"
+        small = "[...document.querySelectorAll('.kind, .tabs button, #filter')].filter((one) => one.clientHeight < 36)"
+        assert await page.run(f"{small}.length") == 0
+        size = "parseFloat(getComputedStyle(document.getElementById('filter')).fontSize)"
+        assert await page.run(size) >= 16
+        assert await page.run("getComputedStyle(document.querySelector('td.object')).display") == "none"
 
 
 @pytest.mark.parametrize("stopped", [False, True], ids=["killed", "frozen"])
@@ -194,6 +255,7 @@ async def test_nothing_sticks_out_and_everything_can_be_read(plant: Plant) -> No
                 assert await page.run(NAMELESS) == []
 
 
+HEADINGS = "[...document.querySelectorAll('thead th')].filter((one) => one.checkVisibility()).length"
 CONTRASTS = """
 (() => {
   const parts = (color) => color.match(/[\\d.]+/g).map(Number);
@@ -201,6 +263,8 @@ CONTRASTS = """
     .reduce((sum, c, at) => sum + c * [0.2126, 0.7152, 0.0722][at], 0);
   const ground = (element) => {
     for (; element; element = element.parentElement) {
+      const hatch = getComputedStyle(element).backgroundImage.match(/rgb\\([^)]*\\)/);
+      if (hatch) return parts(hatch[0]);
       const color = parts(getComputedStyle(element).backgroundColor);
       if (color.length === 3 || color[3] === 1) return color;
     }

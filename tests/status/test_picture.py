@@ -67,9 +67,17 @@ def test_a_bus_is_red_while_nobody_listens() -> None:
 
 
 def test_a_can_bus_is_green_only_when_active() -> None:
-    levels = [can_bus(state).level for state in range(1, 8)]
+    levels = [can_bus("can0", state, 16, "operational").level for state in range(1, 8)]
     assert levels.index(Level.GOOD) == 5
     assert levels.count(Level.GOOD) == 1
+
+
+def test_an_active_can_bus_is_yellow_until_a_master_starts_the_node() -> None:
+    node = can_bus("can0", 6, 16, "pre-operational")
+    assert (node.name, node.level, node.facts) == ("CAN can0", Level.WARN, "node 16, pre-operational")
+    assert node.words == "active, but pre-operational: no PDOs until a master starts the node"
+    assert can_bus("can0", 1, 255, "initialising").words == "absent: no such interface"
+    assert can_bus("can0", 1, 255, "initialising").facts == "node without id, initialising"
 
 
 def test_writers_by_their_last_deeds(cell: Cell, now: float) -> None:

@@ -16,7 +16,7 @@ from gatewayd.station import Station
 from gatewayd.status.probes import Probes
 from gatewayd.status.view import EVENTS, as_json, layout, overview, state
 from tests.control.served import plan
-from tests.status.press import CYCLES, FORCE_LIMIT, PLC, SPARE
+from tests.status.press import CYCLES, FORCE_LIMIT, PLC, SPARE, START
 
 
 def told(station: Station, probes: Probes, since: int = 0) -> Any:
@@ -100,11 +100,33 @@ def test_only_events_that_are_new_come_again(station: Station, probes: Probes) -
     assert [(one["number"], one["bad"]) for one in again["latest"]] == [(first["count"] + 1, False)]
 
 
+def test_a_lost_plc_is_not_buried_under_its_fallbacks(station: Station, probes: Probes) -> None:
+    """What one deed did to many variables is one entry; another moment or another writer is another."""
+    ring = station.cell.events
+    known = ring.count
+    ring.append(Event(1.0, EventKind.WRITER_LOST, writer=PLC, detail="closed"))
+    for _ in range(2 * EVENTS):
+        ring.append(Event(1.0, EventKind.RELEASED, lock=0, writer=PLC, detail="owner lost: closed"))
+    ring.append(Event(1.0, EventKind.FALLBACK, variable=START, new=False))
+    ring.append(Event(1.0, EventKind.FALLBACK, variable=FORCE_LIMIT, new=0.0))
+    ring.append(Event(1.5, EventKind.FALLBACK, variable=SPARE, old=9, new=7))
+    found = told(station, probes, known)["events"]
+    assert [one["text"] for one in found["latest"]] == [
+        "writer plc lost: closed",
+        f"plc no longer holds start and {2 * EVENTS - 1} more: owner lost: closed",
+        "start and 1 more fell back",
+        "spare fell back from 9 to 7",
+    ]
+    assert found["latest"][-1]["number"] == found["count"] == ring.count
+
+
 @pytest.mark.parametrize("since", [-5, 10**9])
 def test_a_page_from_another_life_of_the_gateway_gets_everything(
     station: Station, probes: Probes, since: int
 ) -> None:
-    assert len(told(station, probes, since)["events"]["latest"]) == station.cell.events.count
+    found = told(station, probes, since)["events"]
+    assert len(found["latest"]) == len(told(station, probes)["events"]["latest"])
+    assert found["latest"][0]["text"].startswith("robot connected")
 
 
 def test_answers_are_bounded(station: Station, probes: Probes) -> None:
@@ -128,3 +150,14 @@ def test_an_object_stands_beside_the_registers(tmp_path: Path) -> None:
     assert {"holding", "object"} <= areas
     objects = [place for one in shown["variables"] for place in one["places"] if place["area"] == "object"]
     assert any(place["notation"].startswith("COB-ID 0x") for place in objects)
+
+
+def test_a_can_bus_is_named_and_tells_its_node(tmp_path: Path) -> None:
+    mapping = Path(__file__).parents[2] / "mappings" / "canopen-only.yaml"
+    plan = load(mapping.read_bytes(), mapping.name).plan
+    assert plan is not None
+    assert plan.canopen is not None
+    daemon = Daemon([plan], tmp_path)
+    [bus] = told(daemon.stations[0], Probes(daemon))["picture"]["buses"]
+    assert (bus["name"], bus["level"]) == (f"CAN {plan.canopen.channel}", "bad")
+    assert bus["facts"] == f"node {plan.canopen.node}, initialising"
