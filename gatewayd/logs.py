@@ -17,9 +17,22 @@ import traceback
 from enum import Enum
 from math import isfinite
 from pathlib import Path
-from typing import TextIO
+from typing import Protocol
 
-__all__ = ["Format", "configure", "fields"]
+__all__ = ["Format", "Stream", "configure", "fields"]
+
+
+class Stream(Protocol):
+    """What lines are written to."""
+
+    def write(self, text: str, /) -> object:
+        """Write one line with its end."""
+
+    def flush(self) -> None:
+        """Write it now."""
+
+    def fileno(self) -> int:
+        """The file behind it; OSError or ValueError if there is none."""
 
 
 class Format(Enum):
@@ -53,12 +66,12 @@ def fields(**values: object) -> dict[str, object]:
     return {"fields": values}
 
 
-def configure(form: Format = Format.AUTO, level: int = logging.INFO, stream: TextIO | None = None) -> None:
+def configure(form: Format = Format.AUTO, level: int = logging.INFO, stream: Stream | None = None) -> None:
     """Send every event of at least `level` to `stream` (default: stderr); replaces what was configured before.
 
     A stream that went away is no reason to stop: the event is lost, and nothing is raised.
     """
-    target = sys.stderr if stream is None else stream
+    target: Stream = sys.stderr if stream is None else stream
     if form is Format.AUTO:
         form = Format.JOURNAL if _is_journal(target) else Format.TEXT
     handler = logging.StreamHandler(target)
@@ -153,7 +166,7 @@ def _escape(text: str) -> str:
     return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
 
 
-def _is_journal(stream: TextIO) -> bool:
+def _is_journal(stream: Stream) -> bool:
     """Whether `stream` is the very file that JOURNAL_STREAM names as "device:inode" (systemd.exec(5))."""
     try:
         status = os.fstat(stream.fileno())

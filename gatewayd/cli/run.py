@@ -6,6 +6,7 @@ import asyncio
 import logging
 import os
 import signal
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -106,16 +107,35 @@ def command(
     A FILE may also be a directory: all its *.yaml files are meant. Cells with the same `modbus: listen:` share one
     listener and differ by their unit id. Robots, PLCs and interfaces may come and go in any order.
     """
-    from gatewayd.compilation import CompilationError
     from gatewayd.logs import Format, configure
-    from gatewayd.startup import load_plans, state_directory
+    from gatewayd.logstream import LogStream
     from gatewayd.status.launch import Settings, SettingsError
 
     try:
         page = Settings(status, token_file) if status else None
     except SettingsError as error:
         raise click.UsageError(str(error)) from error
-    configure(Format(log_format), logging.getLevelNamesMapping()[log_level.upper()])
+    stream = LogStream(_descriptor())
+    configure(Format(log_format), logging.getLevelNamesMapping()[log_level.upper()], stream)
+    try:
+        found = _load(files, strict=strict)
+        if isinstance(found, int):
+            return found
+        return _run(found, files, state, page=page, control=control, audit=audit)
+    finally:
+        stream.close()
+
+
+def _descriptor() -> int:
+    """Standard error; nowhere if the process was started without: its number may belong to a PLC by now."""
+    return os.open(os.devnull, os.O_WRONLY) if sys.stderr is None else sys.stderr.fileno()
+
+
+def _load(files: Sequence[Path], *, strict: bool) -> Startup | int:
+    """What there is to serve, or the exit code."""
+    from gatewayd.compilation import CompilationError
+    from gatewayd.startup import load_plans
+
     try:
         found = load_plans(files, _import_the_daemon)
     except CompilationError as error:
@@ -125,7 +145,20 @@ def command(
         return UNREADABLE
     if not found.plans or (strict and (found.broken or found.unreadable)):
         return NOTHING_TO_RUN
+    return found
+
+
+def _run(
+    found: Startup,
+    files: Sequence[Path],
+    state: Path | None,
+    *,
+    page: Settings | None,
+    control: Path | None,
+    audit: Path | None,
+) -> int:
     from gatewayd.daemon import Daemon
+    from gatewayd.startup import state_directory
 
     daemon = Daemon(found.plans, state or state_directory(os.environ))
     asyncio.run(_serve(daemon, files, _notes(found), page=page, control=_socket(control), audit=audit))

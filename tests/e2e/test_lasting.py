@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ast
+import fcntl
 import json
 import signal
 import socket
 import struct
+import subprocess
 import sys
 import time
 from contextlib import ExitStack
@@ -58,6 +60,14 @@ def descriptors(process: Process) -> int:
 
 def connect(plant: Plant, source: str = STRANGER) -> socket.socket:
     return socket.create_connection((HOST, plant.modbus), 10, (source, 0))
+
+
+def is_listening(plant: Plant) -> bool:
+    try:
+        connect(plant).close()
+    except ConnectionError:
+        return False
+    return True
 
 
 def read_request(address: int, count: int) -> bytes:
@@ -252,6 +262,43 @@ def test_only_what_is_shown_to_people_asks_the_wall_clock() -> None:
             if asks or imports:
                 found.add(path.relative_to(PACKAGE).with_suffix("").as_posix())
     assert found == set(WALL_CLOCK)
+
+
+def test_a_log_that_nobody_reads_stops_nobody(plant: Plant) -> None:
+    """Standard error is a pipe, full after some hundred connections; the daemon goes on, and ends when told to."""
+    simulator = plant.simulator()
+    mapping = plant.mapping(CELL, simulator.port)
+    command = [
+        sys.executable,
+        "-m",
+        "gatewayd",
+        "run",
+        str(mapping),
+        "--control",
+        "none",
+        "--log-level",
+        "debug",
+    ]
+    daemon = subprocess.Popen(command, stderr=subprocess.PIPE, cwd=PACKAGE.parent)
+    assert daemon.stderr is not None
+    capacity = fcntl.fcntl(daemon.stderr, fcntl.F_GETPIPE_SZ)
+    try:
+        wait_for(lambda: is_listening(plant), "the daemon to listen")
+        plc = plant.ready_plc()
+        slowest = 0.0
+        for number in range(1000):
+            connect(plant).close()
+            asked = time.monotonic()
+            assert plc.write_integers(0, number) == 0
+            slowest = max(slowest, time.monotonic() - asked)
+        assert slowest < QUICK
+        assert plc.robot_state == FRESH
+        daemon.terminate()
+        assert daemon.wait(5) == 0
+        assert len(daemon.stderr.read()) > 0.9 * capacity, "the pipe was never full"
+    finally:
+        daemon.kill()
+        daemon.communicate()
 
 
 def test_a_full_disk_stops_the_audit_and_nothing_else(plant: Plant) -> None:
