@@ -61,7 +61,7 @@ class LogStream:
         while not (self._closing.is_set() and self._lines.empty()):
             self._put(self._lines.get())
             untold = self.lost - self._told
-            if untold:
+            if untold and self._lines.empty():  # there is room to tell it
                 self._told += untold
                 log.warning("log lines lost", extra=fields(lines=untold))
 
