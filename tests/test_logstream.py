@@ -75,6 +75,7 @@ def test_a_reader_that_stops_holds_up_nobody(pipe: Pipe) -> None:
     assert time.monotonic() - begin < 2
     assert 89 <= stream.lost <= 91
     os.read(reading, 1 << 20)
+    stream._thread.join(10)
 
 
 @pytest.mark.usefixtures("_root")
