@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import os
 import threading
+from contextlib import suppress
 from queue import Full, Queue
 
 from gatewayd.logs import fields
@@ -52,7 +53,8 @@ class LogStream:
     def close(self, patience: float = 0.5) -> None:
         """Write what waits, for `patience` seconds at most."""
         self._closing.set()
-        self.write("")
+        with suppress(Full):  # then the thread has something to wake it
+            self._lines.put_nowait("")
         self._thread.join(patience)
 
     # -- the thread ----------------------------------------------------------------------------------------------
