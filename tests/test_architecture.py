@@ -19,8 +19,9 @@ PACKAGE = ROOT / "gatewayd"
 
 LAYERS: dict[str, set[str]] = {
     "gatewayd": set(),
+    "aside": set(),
     "core": {"core"},
-    "rtde": {"rtde", "turning"},
+    "rtde": {"aside", "rtde", "turning"},
     "robot": {"core", "logs", "mapping.plan", "robot", "rtde"},
     "robot.availability": {"core", "rtde"},
     "robot.inputs": {"core", "robot.transfer", "rtde"},
@@ -42,6 +43,7 @@ LAYERS: dict[str, set[str]] = {
     "canopen.datatypes": {"core.definition"},
     "canopen.frame": set(),
     "canopen.link": {"canopen", "core", "logs", "turning"},
+    "canopen.pythoncan": {"aside", "canopen"},
     "canopen.plan": {"canopen.datatypes", "core.definition"},
     "canopen.sdo": {"canopen.cob_ids", "canopen.datatypes", "canopen.dictionary", "canopen.sdo"},
     "logs": set(),

@@ -227,7 +227,7 @@ class CanLink(Observer):
             bus.set_filters(self.node.cob_ids(), self.node.remote_ids())
             self._bus = bus
             try:
-                await bus.open()
+                await turning(bus.open(), self._turn, math.inf)
             except BusError as error:
                 self._bus = None
                 if str(error) != told:

@@ -1,9 +1,9 @@
 """Every other interface of python-can on the loop: virtual, slcan, udp_multicast, vendors' adapters.
 
-There is no thread of ours. Where the interface has a file descriptor the loop watches it; where it has none it is
-asked for frames every millisecond while there is traffic, more seldom when there is none. What python-can's
-configuration file says (`~/.canrc`, `/etc/can.conf`) holds for what the mapping does not say, so a vendor's own options
-have a place.
+Opening may take seconds, and is done aside; apart from that there is no thread of ours. Where the interface has a file
+descriptor the loop watches it; where it has none it is asked for frames every millisecond while there is traffic, more
+seldom when there is none. What python-can's configuration file says (`~/.canrc`, `/etc/can.conf`) holds for what the
+mapping does not say, so a vendor's own options have a place.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import Any
 
 import can
 
+from gatewayd.aside import aside
 from gatewayd.canopen.bus import DRAIN, BusError, BusHandler
 from gatewayd.canopen.cob_ids import BASIC_FRAME
 from gatewayd.canopen.errors import ErrorClass, ErrorFrame, decode
@@ -62,6 +63,7 @@ class PythonCanBus(SupervisedBus):
         self._ask = ASK
         self._looking: asyncio.TimerHandle | None = None
         self._reading: asyncio.Handle | None = None
+        self._opening: asyncio.Task[None] | None = None
 
     @property
     def bitrate(self) -> int | None:
@@ -71,7 +73,7 @@ class PythonCanBus(SupervisedBus):
     async def open(self) -> None:
         """Start. BusError if python-can has no such interface, lacks a package for it, or refuses the settings."""
         self._loop = asyncio.get_running_loop()
-        self._acquire(monotonic())
+        await self._acquire()
         self._looking = self._loop.call_later(LOOK, self._look)
 
     def close(self) -> None:
@@ -79,6 +81,9 @@ class PythonCanBus(SupervisedBus):
         if self._looking is not None:
             self._looking.cancel()
             self._looking = None
+        if self._opening is not None:
+            self._opening.cancel()
+            self._opening = None
         self._release()
 
     def set_filters(self, can_ids: Iterable[int], remote_ids: Iterable[int] = ()) -> None:
@@ -186,10 +191,10 @@ class PythonCanBus(SupervisedBus):
         assert self._loop is not None
         now = monotonic()
         self._looking = self._loop.call_later(LOOK, self._look)
-        if self._bus is None and self._supervisor.may_open(now):
-            with contextlib.suppress(BusError):  # it could be used before, so that will pass too
-                self._acquire(now)
-        elif self._bus is not None and type(self._bus).state is not can.BusABC.state:
+        if self._bus is None:
+            if self._opening is None and self._supervisor.may_open(now):
+                self._opening = self._loop.create_task(self._open_again())
+        elif type(self._bus).state is not can.BusABC.state:
             try:
                 off = self._bus.state is can.BusState.ERROR
             except (can.CanError, OSError) as error:
@@ -212,14 +217,22 @@ class PythonCanBus(SupervisedBus):
 
     # The interface
 
-    def _acquire(self, now: float) -> None:
-        assert self._loop is not None
-        self._supervisor.failed(now)  # until it is known better
+    async def _open_again(self) -> None:
         try:
-            self._bus = bus = self._make()
+            with contextlib.suppress(BusError):  # it could be used before, so that will pass too
+                await self._acquire()
+        finally:
+            self._opening = None
+
+    async def _acquire(self) -> None:
+        assert self._loop is not None
+        self._supervisor.failed(monotonic())  # until it is known better
+        try:
+            bus = await aside(self._make, f"open {self._name}", can.BusABC.shutdown)
         except (can.CanInitializationError, can.CanOperationError, OSError) as error:
-            self._feed(Event.GONE, now, f"{self._name} cannot be opened: {error}")
+            self._feed(Event.GONE, monotonic(), f"{self._name} cannot be opened: {error}")
             return
+        self._bus = bus
         self._supervisor.opened()
         self.counters.opened += 1
         self._filter_in_adapter(bus)
@@ -232,7 +245,7 @@ class PythonCanBus(SupervisedBus):
         self._ask = ASK
         read = self._readable if self._descriptor >= 0 else self._look_for_frames
         self._reading = self._loop.call_soon(read)
-        self._feed(Event.UP, now, f"{self._name} is open")
+        self._feed(Event.UP, monotonic(), f"{self._name} is open")
 
     def _make(self) -> can.BusABC:
         try:

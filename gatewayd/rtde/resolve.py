@@ -1,15 +1,12 @@
-"""Host names to addresses without holding up anything, the end of the program included.
-
-asyncio looks names up in its executor, which it waits for when the loop is closed: a name server that does not answer
-would delay the shutdown by many seconds. A daemon thread is left alone.
-"""
+"""Host names to addresses, without holding up anything."""
 
 from __future__ import annotations
 
-import asyncio
 import socket
-import threading
 from contextlib import suppress
+from functools import partial
+
+from gatewayd.aside import aside
 
 __all__ = ["SocketAddress", "resolve"]
 
@@ -31,27 +28,7 @@ async def resolve(host: str, port: int) -> _Found:
     """
     with suppress(socket.gaierror):
         return _lookup(host, port, socket.AI_NUMERICHOST)
-    loop = asyncio.get_running_loop()
-    answer: asyncio.Future[_Found] = loop.create_future()
-
-    def tell(found: _Found | OSError) -> None:
-        if not answer.done():
-            if isinstance(found, OSError):
-                answer.set_exception(found)
-            else:
-                answer.set_result(found)
-
-    def ask() -> None:
-        found: _Found | OSError
-        try:
-            found = _lookup(host, port)
-        except OSError as error:
-            found = error
-        with suppress(RuntimeError):  # the loop was closed meanwhile
-            loop.call_soon_threadsafe(tell, found)
-
-    threading.Thread(target=ask, name=f"resolve {host}", daemon=True).start()
-    return await answer
+    return await aside(partial(_lookup, host, port), f"resolve {host}")
 
 
 def _lookup(host: str, port: int, flags: int = 0) -> _Found:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import threading
+import time
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from uuid import uuid4
 
 import can
@@ -142,7 +145,7 @@ async def test_no_thread_is_started(virtual: tuple[PythonCanBus, Recorder, can.B
     peer.send(can.Message(arbitration_id=0x205, is_extended_id=False))
     await until(lambda: recorder.frames)
     assert bus.send(Frame(0x185))
-    assert threading.active_count() == 1
+    await until(lambda: threading.active_count() == 1)
 
 
 async def test_nothing_is_sent_after_closing(virtual: tuple[PythonCanBus, Recorder, can.BusABC]) -> None:
@@ -246,6 +249,28 @@ async def test_adapter_that_is_not_there_yet_is_waited_for(adapter: Adapter) -> 
         await adapter.plug_in()
         await until(lambda: bus.state is BusState.ACTIVE)
     finally:
+        bus.close()
+
+
+async def test_an_adapter_that_does_not_answer_holds_up_nobody() -> None:
+    """Its host swallows the attempts to connect, for which pySerial waits five seconds each."""
+    with socket.socket() as full, socket.socket() as first, socket.socket() as second:
+        full.bind(("127.0.0.1", 0))
+        full.listen(0)
+        for peer in (first, second):
+            peer.setblocking(False)
+            peer.connect_ex(full.getsockname())
+        bus = PythonCanBus("slcan", f"socket://127.0.0.1:{full.getsockname()[1]}", 250_000, Recorder())
+        opening = asyncio.create_task(bus.open())
+        longest, before = 0.0, time.monotonic()
+        for _ in range(20):
+            await asyncio.sleep(0.01)
+            longest, before = max(longest, time.monotonic() - before), time.monotonic()
+        assert not opening.done()
+        assert longest < 1
+        opening.cancel()
+        with suppress(asyncio.CancelledError):
+            await opening
         bus.close()
 
 
