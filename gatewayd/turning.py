@@ -30,8 +30,10 @@ async def turning(work: Awaitable[_Result], turn: Callable[[], None], limit: flo
             if time.monotonic() < end:
                 turn()
             await asyncio.wait((task,), timeout=TURN)
-    finally:
-        if not task.done():
-            task.cancel()
-            await asyncio.wait((task,))
+    except asyncio.CancelledError:
+        task.cancel()
+        await asyncio.wait((task,))
+        if not task.cancelled():
+            task.exception()  # else asyncio complains that nobody asked for it
+        raise
     return task.result()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 from contextlib import suppress
 
 import pytest
@@ -73,3 +74,20 @@ async def test_a_cancellation_ends_the_work_first() -> None:
     with pytest.raises(asyncio.CancelledError):
         await waiting
     assert ended == ["work"]
+
+
+async def test_an_error_that_comes_with_the_cancellation_is_nobodys(caplog: pytest.LogCaptureFixture) -> None:
+    async def work() -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            raise OSError("at the end")
+
+    waiting = asyncio.create_task(turning(work(), Counter(), 1))
+    await asyncio.sleep(0.02)
+    waiting.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await waiting
+    del waiting
+    gc.collect()
+    assert caplog.records == []
