@@ -59,6 +59,12 @@ METRICS = (
         "gatewayd_parts_hanging", Kind.GAUGE, (), "parts of the gateway that do not turn; /healthz names them"
     ),
     MetricInfo(
+        "gatewayd_troubles",
+        Kind.GAUGE,
+        (),
+        "what is wrong with no cell in particular, say a mapping not served or a reload refused; /readyz names it",
+    ),
+    MetricInfo(
         "gatewayd_loop_lag_seconds",
         Kind.HISTOGRAM,
         (),
@@ -201,11 +207,13 @@ class Exposition:
         """Called for each `text`."""
         now = time.monotonic()
         daemon, probes = self._probes.daemon, self._probes
-        ready, _ = readiness(daemon.cells, probes.late, probes.troubles())
+        troubles = probes.troubles()
+        ready, _ = readiness(daemon.cells, probes.late, troubles)
         samples: dict[str, list[_Sample]] = {
             "gatewayd_info": [((self._version,), 1)],
             "gatewayd_ready": [((), _LEVELS[ready])],
             "gatewayd_parts_hanging": [((), len(probes.late))],
+            "gatewayd_troubles": [((), len(troubles))],
             "gatewayd_modbus_up": [((one.name,), _LEVELS[one.listening]) for one in daemon.listeners],
             "gatewayd_modbus_connections": [((one.name,), one.connections) for one in daemon.listeners],
         }

@@ -10,6 +10,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from gatewayd.core.cell import Cell
+from gatewayd.daemon import Daemon
 from gatewayd.station import Station
 from gatewayd.status.metrics import METRICS, PROCESS_METRICS, Exposition, Kind
 from gatewayd.status.probes import Probes
@@ -115,3 +116,9 @@ def test_counters_of_a_can_node_are_told_by_name(probes: Probes, station: Statio
     samples = read(probes)
     assert one(samples, "gatewayd_can_total", cell="press", counter="received") == 5
     assert one(samples, "gatewayd_can_bus_state", cell="press") == 0
+
+
+def test_troubles_are_counted(daemon: Daemon) -> None:
+    """The listener of a daemon that does not run does not listen."""
+    assert one(read(Probes(daemon)), "gatewayd_troubles") == 1
+    assert one(read(Probes(daemon, lambda: ["1 mapping file not served"])), "gatewayd_troubles") == 2
