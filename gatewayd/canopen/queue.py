@@ -107,10 +107,13 @@ class Transmitter:
 
     def send(self, frame: Frame, priority: Priority) -> None:
         """Hand a frame on; never waits, never fails."""
-        if not self._open:
-            self.discarded += 1
-        elif self.queue or not self._offer(frame):
+        if self._open and not self.queue and self._offer(frame):
+            return
+        # Asked again: a bus that fails at the frame it is offered closes us, and will never tell of room for that one.
+        if self._open:
             self.queue.put(frame, priority)
+        else:
+            self.discarded += 1
 
     def flush(self) -> None:
         """The bus takes frames again: send what waits."""

@@ -159,3 +159,25 @@ def test_transmitter_sends_nothing_old_after_the_bus_was_away() -> None:
     transmitter.flush()
     assert wire.frames == []
     assert transmitter.discarded == 2
+
+
+def test_a_frame_that_the_bus_failed_at_does_not_stop_those_after_it() -> None:
+    """An adapter that is unplugged while it is given a frame: plugged in again, the node must be heard at once."""
+    sent: list[Frame] = []
+    fails = True
+
+    def offer(frame: Frame) -> bool:
+        if fails:
+            transmitter.close()
+            return False
+        sent.append(frame)
+        return True
+
+    transmitter = Transmitter(offer)
+    transmitter.open()
+    transmitter.send(Frame(0x281, b"old"), Priority.PDO)
+    assert (len(transmitter.queue), transmitter.discarded) == (0, 1)
+    fails = False
+    transmitter.open()
+    transmitter.send(Frame(0x701, b"\0"), Priority.ORDERED)
+    assert sent == [Frame(0x701, b"\0")]
