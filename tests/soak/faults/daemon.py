@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+from pathlib import Path
 from random import Random
 
 from gatewayd.auditfile import GREATEST_SIZE, KEPT
@@ -74,7 +75,14 @@ def full_audit(rig: Rig, _chance: Random) -> None:
     number = full.stat().st_ino
     full.replace(rig.audit)
     former = rig.audit.with_name(rig.audit.name + ".1")
-    wait_for(lambda: former.exists() and former.stat().st_ino == number, "the rotation", PATIENCE)
+    wait_for(lambda: _inode(former) == number, "the rotation", PATIENCE)
     wait_for(rig.audit.exists, "the new file", PATIENCE)
     kept = list(rig.audit.parent.glob(rig.audit.name + ".*"))
     assert len(kept) <= KEPT, f"{len(kept)} former audit files"
+
+
+def _inode(path: Path) -> int | None:
+    try:
+        return path.stat().st_ino
+    except FileNotFoundError:  # it is being rotated at this moment
+        return None
