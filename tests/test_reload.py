@@ -7,7 +7,7 @@ import logging
 import socket
 import struct
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +15,14 @@ from pathlib import Path
 import pytest
 
 from gatewayd import reload as reload_module
+from gatewayd import startup as startup_module
+from gatewayd.compilation import Compilation
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.daemon import Daemon
+from gatewayd.mapping.compiled import Compiled
+from gatewayd.mapping.worker import compile_files
 from gatewayd.reload import Outcome, Reloader, Result
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import DEMO, parse
@@ -111,6 +115,25 @@ class Rig:
 
     def happened(self, kind: EventKind) -> int:
         return sum(event.kind is kind for event in self.cell.events)
+
+
+class CompiledHere(Compilation):
+    """In this process, which takes a tenth of the time; tests/e2e/test_reload.py has the other one."""
+
+    def __init__(self, names: Iterable[Path]) -> None:
+        self._names = [str(name) for name in names]
+
+    def __exit__(self, *_exception: object) -> None:
+        pass
+
+    def result(self) -> Compiled:
+        return compile_files(self._names)
+
+
+@pytest.fixture(autouse=True)
+def _here(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (reload_module, startup_module):
+        monkeypatch.setattr(module, "Compilation", CompiledHere)
 
 
 Rigged = Callable[[], AbstractAsyncContextManager[Rig]]
