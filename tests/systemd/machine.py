@@ -18,7 +18,7 @@ from tests.kernel.uml import Boot, place_of_memory, without_xstate
 
 __all__ = ["LIMIT", "boot", "missing"]
 
-LIMIT = 200
+LIMIT = 300
 """Seconds for one boot with everything that runs in it; a machine with nothing else to do needs 60."""
 MEMORY = 1 << 30
 _MODULES = (
