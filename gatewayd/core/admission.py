@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from gatewayd.core.definition import Value, Variable
 from gatewayd.core.image import ProcessImage
-from gatewayd.core.limits import within
+from gatewayd.core.limits import has_no_limits, within
 from gatewayd.core.ownership import MOVES, Act, LockTable, Move, Standing
 from gatewayd.core.refusal import PRECEDENCE, Reason, Refusal
 
@@ -39,12 +39,14 @@ class Verdict:
 class Admission:
     """Judges requests against the definition, the owners and the image."""
 
-    __slots__ = ("_image", "_ownership", "_variables")
+    __slots__ = ("_image", "_locks", "_ownership", "_unlimited", "_variables")
 
     def __init__(self, variables: Sequence[Variable], ownership: LockTable, image: ProcessImage) -> None:
         self._variables = tuple(variables)
         self._ownership = ownership
         self._image = image
+        self._locks = tuple(variable.lock for variable in variables)
+        self._unlimited = tuple(has_no_limits(variable) for variable in variables)
 
     def judge(self, writer: int | None, changes: Sequence[Change], *, adopted: bool) -> Verdict:
         """The verdict on all changes together; `adopted`: the robot is there and its inputs were taken over.
@@ -52,6 +54,9 @@ class Admission:
         If several changes stand in the way, `PRECEDENCE` says which refusal is told. A writer of None is a peer that no
         writer was declared for: it may write nothing.
         """
+        verdict = Verdict()
+        if writer is not None and adopted and self._pass(writer, changes, verdict):
+            return verdict
         verdict = Verdict()
         for change in changes:
             refusal = (
@@ -64,6 +69,26 @@ class Admission:
             ):
                 verdict.refusal = refusal
         return verdict
+
+    def _pass(self, writer: int, changes: Sequence[Change], verdict: Verdict) -> bool:
+        """The usual request: its writer owns all of it, and nothing stands in the way. False: it has to be judged.
+
+        What `_judge` would come to as well, change by change, in a quarter of the time.
+        """
+        locks, unlimited, variables = self._locks, self._unlimited, self._variables
+        owners, available = self._ownership.owners, self._image.available
+        values, moves = verdict.values, verdict.moves
+        for change in changes:
+            index = change.variable
+            lock = locks[index]
+            if lock is None or owners[lock] != writer or not available[index]:
+                return False
+            value = change.value if unlimited[index] else within(variables[index], change.value)
+            if value is None:
+                return False
+            values.append((index, value))
+            moves[lock] = Move.RENEW
+        return True
 
     def _judge(self, writer: int, change: Change, verdict: Verdict, *, adopted: bool) -> Refusal | None:
         index = change.variable

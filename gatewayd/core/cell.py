@@ -350,8 +350,11 @@ class Cell:
         return refusal
 
     def _move(self, writer: int, moves: Mapping[int, Move], now: float) -> None:
+        owners, locks = self.ownership.owners, self.ownership.locks
         for lock, move in moves.items():
-            former = self.ownership.owners[lock]
+            former = owners[lock]
+            if former == writer and locks[lock].lease is None:
+                continue
             self.ownership.apply(lock, writer, move, now)
             if former == writer:
                 continue
@@ -452,10 +455,10 @@ class Cell:
             if new != old:
                 self.events.append(Event(now, EventKind.FALLBACK, variable=index, old=old, new=new))
 
-    def _set_inputs(self, values: Iterable[tuple[int, Value]], now: float) -> None:
-        for index, value in values:
-            self.image.tell(index, value, now)
-            self._due_fallbacks.discard(index)
+    def _set_inputs(self, values: Sequence[tuple[int, Value]], now: float) -> None:
+        self.image.tell_all(values, now)
+        if self._due_fallbacks:
+            self._due_fallbacks.difference_update(index for index, _value in values)
         self._notify(Direction.INPUT)
 
     def _tell_written(self, writer: int, values: Sequence[tuple[int, Value]], now: float) -> None:

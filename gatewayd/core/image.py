@@ -80,10 +80,17 @@ class ProcessImage:
 
     def tell(self, index: int, value: Value, now: float) -> None:
         """Set an input: it was written, fell back, or was adopted."""
-        self.values[index] = value
-        self.times[index] = now
-        if self.available[index]:
-            self.quality[index] = Quality.GOOD
+        self.tell_all(((index, value),), now)
+
+    def tell_all(self, told: Iterable[tuple[int, Value]], now: float) -> None:
+        """Set several inputs of one moment."""
+        values, times, quality, available = self.values, self.times, self.quality, self.available
+        good = Quality.GOOD
+        for index, value in told:
+            values[index] = value
+            times[index] = now
+            if available[index]:
+                quality[index] = good
 
     def inputs_lost(self) -> None:
         """Nobody knows what the controller's inputs hold from now on."""

@@ -6,7 +6,12 @@ import math
 
 from gatewayd.core.definition import Limits, Value, ValueKind, Variable
 
-__all__ = ["within"]
+__all__ = ["has_no_limits", "within"]
+
+
+def has_no_limits(variable: Variable) -> bool:
+    """Whether `within` lets every value pass as it is."""
+    return variable.limits is None and (variable.low is None or variable.high is None)
 
 
 def within(variable: Variable, value: Value) -> Value | None:

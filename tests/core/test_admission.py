@@ -1,8 +1,11 @@
 from __future__ import annotations
 
 import copy
+import math
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from gatewayd.core.admission import Admission, Change, Verdict
 from gatewayd.core.definition import CellDefinition
@@ -87,3 +90,50 @@ def test_an_implied_bit_of_a_lower_owner_is_taken_over_only_to_change_it(
 def test_an_explicit_bit_takes_over_even_unchanged(desk: Desk) -> None:
     desk.ownership.apply(1, HMI, Move.ACQUIRE, 0.0)
     assert desk.judge(PLC, Change(LAMP, False)).moves == {1: Move.TAKE_OVER}
+
+
+class Thorough(Admission):
+    """Judges every request change by change."""
+
+    def _pass(self, *_arguments: object) -> bool:
+        return False
+
+
+def _requests() -> st.SearchStrategy[list[Change]]:
+    real = st.one_of(st.floats(-10, 300), st.just(math.nan))
+    values = {
+        START: st.booleans(),
+        LAMP: st.booleans(),
+        PART: st.integers(-(1 << 33), 1 << 33),
+        PATH: st.integers(-9, 9),
+    }
+    one = st.integers(START, PATH).flatmap(
+        lambda index: st.builds(Change, st.just(index), values.get(index, real), st.booleans())
+    )
+    return st.lists(one, min_size=1, max_size=6)
+
+
+@given(
+    changes=_requests(),
+    writer=st.sampled_from((PLC, HMI, AUX)),
+    owners=st.lists(st.sampled_from((None, PLC, HMI, AUX)), min_size=5, max_size=5),
+    gone=st.sets(st.integers(START, PATH)),
+)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_the_quick_way_comes_to_the_same_as_the_thorough_one(
+    press: CellDefinition,
+    changes: list[Change],
+    writer: int,
+    owners: list[int | None],
+    gone: set[int],
+) -> None:
+    desk, thorough = Desk(press), Desk(press)
+    thorough.admission = Thorough(press.variables, thorough.ownership, thorough.image)
+    for one in (desk, thorough):
+        one.ownership.owners[:] = [
+            owner if owner in lock.owners else None for owner, lock in zip(owners, press.locks, strict=True)
+        ]
+        for index in gone:
+            one.image.set_available(index, available=False)
+    # As texts: NaN equals nothing, itself included.
+    assert repr(desk.judge(writer, *changes)) == repr(thorough.judge(writer, *changes))

@@ -240,8 +240,10 @@ def events() -> list[PeerEvent]:
 
 @pytest.fixture
 def live_cell(new_cell: Callable[[float], Cell]) -> Cell:
-    """For tests with sockets, at the present time."""
-    return new_cell(time.monotonic())
+    """For tests with sockets, at the present time; what a busy machine delays does not become stale."""
+    cell = new_cell(time.monotonic())
+    cell.freshness.stale_after = 3600.0
+    return cell
 
 
 @pytest.fixture
