@@ -74,6 +74,7 @@ class Record:
             "times": told.times if told.times > 1 else None,
             "holder": told.holder,
             "reason": told.reason,
+            "peer": told.peer,
             "detail": told.detail or None,
         }
         return {name: value for name, value in found.items() if value is not None}

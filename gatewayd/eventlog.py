@@ -93,6 +93,7 @@ class EventLog:
             if event.lock is not None and variable is None
             else None,
             "writer": self._writer(event.writer, unknown=event.kind is EventKind.REFUSED),
+            "peer": event.peer or None,
             "holder" if event.kind is EventKind.REFUSED else "former": self._writer(event.other),
             "reason": event.reason.text if event.reason is not None else None,
             "old": event.old,

@@ -12,14 +12,14 @@ from gatewayd.core.definition import CellDefinition, Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.figures import value
 
-__all__ = ["ACCEPTED", "BAD", "GATEWAY", "STRANGER", "UNDECLARED", "Happening"]
+__all__ = ["ACCEPTED", "BAD", "GATEWAY", "STRANGER", "UNDECLARED", "Happening", "stranger"]
 
 ACCEPTED = "write accepted"
 """What happened when a write was accepted; the core has no event for it."""
 UNDECLARED, GATEWAY = "undeclared", "gateway"
 """Who did it where no writer did: a peer that no writer stands for, or gatewayd. No writer may have these names."""
 STRANGER = "an undeclared peer"
-"""How a sentence calls `UNDECLARED`."""
+"""How a sentence calls `UNDECLARED` where its address is not known."""
 BAD = frozenset(
     kind.value
     for kind in (
@@ -78,6 +78,8 @@ class Happening:
     """Who held the lock when it was refused, or before it was taken over."""
     reason: str | None = None
     """Why it was refused."""
+    peer: str | None = None
+    """Address of a peer that no writer stands for."""
     detail: str = ""
     others: int = 0
     """Further variables or locks that it befell in the same moment: `plc took start and 3 more`."""
@@ -101,6 +103,7 @@ class Happening:
             1 + event.repeats,
             name(event.other),
             None if event.reason is None else event.reason.text,
+            event.peer or None,
             event.detail,
         )
 
@@ -126,7 +129,7 @@ class Happening:
         return f"{text} ({aside})" if aside else text
 
     def _refusal(self, refused: str) -> str:
-        writer = STRANGER if self.writer == UNDECLARED else self.writer
+        writer = stranger(self.peer) if self.writer == UNDECLARED else self.writer
         wrote = "" if self.new is None else f" = {value(self.new, self.unit)}"
         why = f"held by {self.holder}" if self.holder else self.reason
         return f"{writer} wrote {self.variable or 'an address'}{wrote}: {', '.join(filter(None, (refused, why)))}"
@@ -148,3 +151,8 @@ class Happening:
             return sentences[self.what].format_map(names)
         except KeyError:
             return f"{self.what} {self.variable}" if self.variable else self.what
+
+
+def stranger(peer: str | None) -> str:
+    """How a sentence calls a peer that no writer stands for: with the address to declare, if it is known."""
+    return f"undeclared peer {peer}" if peer else STRANGER

@@ -72,8 +72,11 @@ def test_a_refusal_names_everybody(cell: Cell, caplog: pytest.LogCaptureFixture)
 
 
 def test_a_peer_without_a_name_is_undeclared(cell: Cell, caplog: pytest.LogCaptureFixture) -> None:
-    cell.events.append(Event(1.0, EventKind.REFUSED, variable=1, reason=Reason.NOT_WRITABLE))
-    assert told(caplog)[2]["writer"] == "undeclared"
+    cell.events.append(
+        Event(1.0, EventKind.REFUSED, variable=1, reason=Reason.NOT_WRITABLE, peer="192.168.1.77")
+    )
+    fields = told(caplog)[2]
+    assert (fields["writer"], fields["peer"]) == ("undeclared", "192.168.1.77")
 
 
 def test_a_takeover_names_the_former_owner(cell: Cell, caplog: pytest.LogCaptureFixture) -> None:

@@ -199,6 +199,7 @@ def event_view(cell: Cell, seq: int, event: Event, now: float, wall: float) -> J
         "writer": told.writer,
         "other": told.holder,
         "reason": told.reason,
+        "peer": told.peer,
         "old": plain_value(told.old),
         "new": plain_value(told.new),
         "repeats": event.repeats or None,
@@ -276,6 +277,7 @@ def _last_refusal(cell: Cell, now: float) -> Json | None:
             writer=writer,
             other=refusal.holder,
             reason=refusal.reason,
+            peer=refusal.peer,
         ),
         cell.definition,
     )

@@ -112,6 +112,7 @@ class Cell:
                 reason=refusal.reason,
                 old=self.image.values[index] if index is not None else None,
                 new=value,
+                peer=refusal.peer,
             )
         )
 

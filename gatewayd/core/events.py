@@ -57,6 +57,8 @@ class Event:
     repeats: int = 0
     """Refusals like this one that were counted but not told since the last."""
     detail: str = ""
+    peer: str = ""
+    """Address of the peer in a refusal, where no writer was declared for it."""
 
 
 class EventRing:

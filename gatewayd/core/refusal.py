@@ -72,3 +72,5 @@ class Refusal:
     """Index of the first variable that stood in the way."""
     holder: int | None = None
     """Index of the writer that owns it, for `Reason.HELD`."""
+    peer: str = ""
+    """Address of a peer that no writer was declared for: who reads it knows what to declare."""

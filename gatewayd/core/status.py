@@ -178,14 +178,17 @@ class StatusBlock:
                 block[2 * (low - first) : 2 * (high - first)] = encoded
         return bytes(block)
 
-    def write(self, writer: int | None, first: int, words: Sequence[int], now: float) -> Refusal | None:
+    def write(
+        self, writer: int | None, first: int, words: Sequence[int], now: float, peer: str = ""
+    ) -> Refusal | None:
         """A writer takes or gives back a lock; any other word of the block is never writable.
 
-        A request that fills both words is refused, because it could succeed by half.
+        A request that fills both words is refused, because it could succeed by half. `peer` is the address of one that
+        no writer was declared for.
         """
         cell = self._cell
         if writer is None or first < REQUEST or first + len(words) > RELEASE + 1:
-            return self._refuse(writer, Reason.NOT_WRITABLE, now)
+            return self._refuse(writer, Refusal(Reason.NOT_WRITABLE, peer=peer), now)
         wanted = [(offset, number) for offset, number in enumerate(words, first) if number]
         if not wanted:
             return None
@@ -194,12 +197,11 @@ class StatusBlock:
             cell.release_all(writer, now)
             return None
         if len(wanted) > 1 or number > len(cell.definition.variables):
-            return self._refuse(writer, Reason.OUT_OF_LIMITS, now)
+            return self._refuse(writer, Refusal(Reason.OUT_OF_LIMITS), now)
         act = cell.request if offset == REQUEST else cell.release
         return act(writer, number - 1, now)
 
-    def _refuse(self, writer: int | None, reason: Reason, now: float) -> Refusal:
-        refusal = Refusal(reason)
+    def _refuse(self, writer: int | None, refusal: Refusal, now: float) -> Refusal:
         self._cell.refuse(writer, refusal, now)
         return refusal
 

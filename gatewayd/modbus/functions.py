@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from enum import IntEnum
 
 from gatewayd.core import status
@@ -60,6 +61,8 @@ class Unit:
         self.image = RegisterImage(plan, cell)
         self.status = status.StatusBlock(cell)
         self.identification = Identification(cell.definition.name, cell.definition.fingerprint)
+        self.stranger = ""
+        """Address of the peer whose request is being answered, if no writer was declared for it."""
 
     def close(self) -> None:
         """Follow the cell no longer."""
@@ -237,7 +240,8 @@ def _write_registers(
 def _write_status(
     unit: Unit, writer: int | None, address: int, words: Sequence[int], now: float
 ) -> ExceptionCode | None:
-    refusal = unit.status.write(writer, address - status.BASE, words, now)
+    peer = unit.stranger if writer is None else ""
+    refusal = unit.status.write(writer, address - status.BASE, words, now, peer)
     return EXCEPTION_OF[refusal.reason] if refusal is not None else None
 
 
@@ -246,7 +250,8 @@ def _apply(
 ) -> ExceptionCode | None:
     """Hand all changes of one request to the cell at once, and every refusal of ours to its records."""
     if isinstance(changes, Refusal):
-        unit.cell.refuse(writer, changes, now)
+        peer = unit.stranger if writer is None else ""
+        unit.cell.refuse(writer, replace(changes, peer=peer), now)
         return EXCEPTION_OF[changes.reason]
     refusal = (
         _refuse_stranger(unit, changes, now) if writer is None else unit.cell.write(writer, changes, now)
@@ -258,7 +263,7 @@ def _refuse_stranger(unit: Unit, changes: list[Change], now: float) -> Refusal:
     """A peer that may write nothing is told so even if it wrote what is there already."""
     variable: int | None = changes[0].variable if changes else None
     value: Value | None = changes[0].value if changes else None
-    refusal = Refusal(Reason.NOT_WRITABLE, variable)
+    refusal = Refusal(Reason.NOT_WRITABLE, variable, peer=unit.stranger)
     unit.cell.refuse(None, refusal, now, value)
     return refusal
 

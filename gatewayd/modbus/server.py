@@ -391,7 +391,7 @@ class ModbusListener:
         """
         address = connection.address
         accesses = {
-            number: Access(unit, writer_of(address, unit.plan.writers))
+            number: Access(unit, writer_of(address, unit.plan.writers), str(address))
             for number, unit in self._units.items()
             if address is not None and may_connect(address, unit.plan)
         }

@@ -31,12 +31,14 @@ _THIS_DEVICE = (0, 255)
 class Access:
     """What a peer may do with one unit."""
 
-    __slots__ = ("unit", "writer", "writer_seen")
+    __slots__ = ("peer", "unit", "writer", "writer_seen")
 
-    def __init__(self, unit: Unit, writer: int | None) -> None:
+    def __init__(self, unit: Unit, writer: int | None, peer: str = "") -> None:
         self.unit = unit
         self.writer = writer
         """The writer of the unit's cell that the peer is, if any."""
+        self.peer = peer
+        """Its address, for refusals."""
         self.writer_seen = unit.cell.writer_seen
 
 
@@ -99,6 +101,8 @@ class Session:
             return exception(pdu[0], ExceptionCode.TARGET_FAILED)
         if access.writer is not None:
             access.writer_seen(access.writer, now)
+        else:
+            access.unit.stranger = access.peer
         return execute(access.unit, access.writer, pdu, now)
 
 

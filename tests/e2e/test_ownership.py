@@ -168,7 +168,7 @@ def test_limits_parts_outputs_and_strangers(cell: Cell, plant: Plant) -> None:
     assert stranger.write_integers(13, 5) == NO_ADDRESS, "also what is there already"
     assert stranger.request(LIMITED) == NO_ADDRESS
     assert stranger.refusal[0] == NOT_WRITABLE
-    daemon.wait_for_line("write refused", "writer=undeclared")
+    daemon.wait_for_line("write refused", "writer=undeclared", f"peer={STRANGER}")
     assert simulator.integer("input_int_register_4") == 5
 
 

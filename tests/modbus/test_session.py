@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.core.cell import Cell
+from gatewayd.core.events import EventKind
 from gatewayd.mapping.plan import ModbusPlan
 from gatewayd.modbus.frames import encode
 from gatewayd.modbus.functions import Unit, execute
@@ -34,6 +35,27 @@ def session(unit: Unit) -> Session:
     session = Session()
     session.serve({1: Access(unit, PLC)})
     return session
+
+
+@pytest.mark.parametrize(
+    "pdu", ["06 000a 0005", "06 ea80 0001", "06 3a98 0001"], ids=["value", "lock", "nothing"]
+)
+def test_a_refused_stranger_is_named_by_its_address(cell: Cell, unit: Unit, pdu: str) -> None:
+    """Whoever mends the mapping has to know what to write under `writers:`."""
+    session = Session()
+    session.serve({1: Access(unit, None, "192.168.1.77")})
+    feed(session, stream(pdu))
+    assert cell.last_refusal is not None
+    assert cell.last_refusal.refusal.peer == "192.168.1.77"
+    assert [event.peer for event in cell.events if event.kind is EventKind.REFUSED] == ["192.168.1.77"]
+
+
+def test_a_writer_is_named_by_its_name_alone(cell: Cell, unit: Unit) -> None:
+    session = Session()
+    session.serve({1: Access(unit, None, "192.168.1.77"), 2: Access(unit, PLC, "192.168.1.20")})
+    feed(session, stream("06 000a 0005", unit=1))
+    feed(session, stream("06 3a98 0001", unit=2))
+    assert [event.peer for event in cell.events if event.kind is EventKind.REFUSED] == ["192.168.1.77", ""]
 
 
 def feed(session: Session, data: bytes, sizes: list[int] | None = None) -> bytes:
