@@ -74,6 +74,8 @@ class AuditFile:
     # -- the thread ----------------------------------------------------------------------------------------------
 
     def _run(self) -> None:
+        # A directory that is missing is told at the start, not at the first write of the week.
+        self._wake.set()
         while not self._closing.is_set():
             self._wake.wait()
             self._closing.wait(_GATHER)
@@ -90,7 +92,7 @@ class AuditFile:
         if untold:
             lines.append(json.dumps({"what": "records dropped", "times": untold}))
         data = "".join(line + "\n" for line in lines).encode()
-        if not data:
+        if not data and (self._descriptor >= 0 or self._closing.is_set()):
             return True
         try:
             self._open()

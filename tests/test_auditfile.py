@@ -68,6 +68,14 @@ def test_it_is_rotated_by_size_and_the_oldest_goes(opened: Opened, tmp_path: Pat
     assert found == {"audit.jsonl": "4", "audit.jsonl.1": "3", "audit.jsonl.2": "2"}
 
 
+def test_trouble_is_told_before_anybody_writes(opened: Opened, tmp_path: Path) -> None:
+    one = opened(tmp_path / "missing" / "audit.jsonl")
+    until(lambda: "No such file" in one.trouble)
+    (tmp_path / "missing").mkdir()
+    until(lambda: not one.trouble)
+    assert one.path.read_bytes() == b""
+
+
 @pytest.mark.parametrize("by", ["delete", "move"])
 def test_a_file_that_vanished_is_begun_anew(opened: Opened, tmp_path: Path, by: str) -> None:
     one = opened()
