@@ -175,10 +175,21 @@ def _import_the_daemon() -> None:
 
 def _socket(named: Path | None) -> Path | None:
     from gatewayd.control.paths import default_socket
+    from gatewayd.logs import fields
 
-    if named is None:
-        return default_socket(os.environ)
-    return None if str(named) == "none" else named
+    if named is not None:
+        return None if str(named) == "none" else named
+    found = default_socket(os.environ)
+    if found is None:
+        log = logging.getLogger("gatewayd.control")
+        log.warning(
+            "no place for a control socket, gatewayd status and watch cannot ask this gateway",
+            extra=fields(
+                reason="neither a service nor a session (XDG_RUNTIME_DIR)",
+                remedy="gatewayd run --control PATH",
+            ),
+        )
+    return found
 
 
 def _notes(found: Startup) -> list[str]:

@@ -47,7 +47,8 @@ def find_socket(named: Path | None, environ: Mapping[str, str]) -> Path:
             raise NoDaemon(f"several run here: name one with --socket: {', '.join(map(str, instances))}")
         places = " or ".join(map(str, usual))
         raise NoDaemon(
-            f"no gatewayd runs here: there is no {places}; start one, or name its socket with --socket"
+            f"no gatewayd runs here: there is no {places}; start one, or name its socket "
+            "with --socket (its log line `listening for control` has it)"
         )
     return found
 
