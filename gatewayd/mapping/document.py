@@ -314,8 +314,7 @@ class _Reader:
     def _has_value(self, key: str, entry: Entry) -> bool:
         if isinstance(entry.value, Scalar) and entry.value.value is None:
             message = f"`{key}` has no value"
-            hint = "write a value, or remove the key; what belongs to it is indented below it"
-            self._find(syntax.WRONG_TYPE, message, entry.key.position, hint)
+            self._find(syntax.WRONG_TYPE, message, entry.key.position, _valueless_hint(key))
             return False
         return True
 
@@ -358,6 +357,8 @@ class _Reader:
             self._choice(name, text, context["expected"], value)
         elif kind in _EXPECTED:
             hint = _TEXT_HINT if kind == "string_type" else f"write {_EXPECTED[kind]}"
+            if name == "limits":
+                hint = "write [least, greatest], for example [0, 150]"
             self._find(syntax.WRONG_TYPE, f"`{name}` is {text}, expected is {_EXPECTED[kind]}", value, hint)
         elif kind in _BOUNDS:
             message = f"`{name}` is {text}, it must be {_BOUNDS[kind][0]} {context[_BOUNDS[kind][1]]}"
@@ -388,7 +389,10 @@ class _Reader:
         choices = [word.strip("' ") for word in expected.replace(" or ", ",").split(",")]
         close = difflib.get_close_matches(text.strip("`").lower(), [word.lower() for word in choices], n=1)
         match = next((word for word in choices if close and word.lower() == close[0]), None)
+        iec = _IEC_TYPES.get(text.strip("`").upper()) if name == "type" else None
         hint = f"did you mean `{match}`?" if match else f"write {', '.join(choices)}"
+        if iec in choices:
+            hint = f"write {iec}: that is {text.strip('`').upper()} here"
         self._find(
             syntax.BAD_CHOICE, f"`{name}` is {text}, it must be one of {', '.join(choices)}", position, hint
         )
@@ -414,6 +418,21 @@ _CUSTOM = {
         syntax.WRONG_TYPE,
     )
 }
+_IEC_TYPES = {
+    "BOOL": "bit",
+    "INT": "int16",
+    "UINT": "uint16",
+    "WORD": "uint16",
+    "DINT": "int32",
+    "UDINT": "uint32",
+    "DWORD": "uint32",
+    "LINT": "int64",
+    "ULINT": "uint64",
+    "LWORD": "uint64",
+    "REAL": "float32",
+    "LREAL": "float64",
+}
+"""What the types of IEC 61131-3, which every PLC programmer has in the fingers, are called here."""
 _BOUNDS = {
     "greater_than": ("greater than", "gt"),
     "greater_than_equal": ("at least", "ge"),
@@ -432,6 +451,18 @@ _SIZES = {
 def _field_hint(model: type[Section], key: str) -> str:
     known = model.model_fields.get(key)
     return f"`{key}`: {known.description}" if known is not None else "see the mapping reference"
+
+
+def _valueless_hint(key: str) -> str:
+    """Three slips of the pen look like a key without a value."""
+    if key.isascii() and key.isdigit():
+        return "a comma ends a value: in a number write a point, such as 0.1 or 100.3"
+    if not key.isprintable():
+        return "there is an invisible character in it, most often a no-break space: type the line anew"
+    name, colon, rest = key.partition(":")
+    if colon:
+        return f"write `{name}: {rest}`, with a space after the colon"
+    return "write a value, or remove the key; what belongs to it is indented below it"
 
 
 def _raw(node: Node) -> Any:

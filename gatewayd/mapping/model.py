@@ -20,6 +20,7 @@ from gatewayd.mapping.scalars import (
     CellName,
     Duration,
     Endpoint,
+    Host,
     Listen,
     Name,
     Names,
@@ -78,9 +79,7 @@ class Watchdog(Section):
 class Robot(Section):
     """The controller and what is asked of it."""
 
-    host: Annotated[str, Field(min_length=1, max_length=253, pattern=r"^[A-Za-z0-9._:%-]+$")] = Field(
-        description="name or IP address of the controller"
-    )
+    host: Host = Field(description="name or IP address of the controller")
     port: Whole = Field(default=DEFAULT_PORT, ge=1, le=65535, description="TCP port of RTDE")
     series: Literal["cb3", "e", "x"] | None = Field(
         default=None, description="controller series; lets `check` know base rate and fields"

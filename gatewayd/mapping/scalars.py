@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
+from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 from typing import Annotated, Any, Final, Literal, NoReturn
 
-from pydantic import BeforeValidator, Field, InstanceOf
+from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf
 from pydantic_core import PydanticCustomError
 
 from gatewayd.core.definition import Fallback, FallbackKind
@@ -27,6 +27,7 @@ __all__ = [
     "CellName",
     "Duration",
     "Endpoint",
+    "Host",
     "Listen",
     "Name",
     "Names",
@@ -66,6 +67,7 @@ _CELL_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 _LONGEST_NAME: Final = 64
 _VERSION = re.compile(r"([0-9]{1,4})(?:\.([0-9]{1,4}))?(?:\.([0-9]{1,9}))?(?:\.[0-9]{1,9})?")
 _LISTEN = re.compile(r"(?:\[(?P<six>[0-9A-Fa-f:.%a-z]+)\]|(?P<four>[^:\[\]\s]+)):(?P<port>[0-9]{1,5})")
+_NUMBERS = re.compile(r"[0-9.]+")
 _GREATEST_PORT: Final = 65535
 
 
@@ -202,6 +204,34 @@ Listen = Annotated[
 """A literal IP address and a port."""
 
 
+def _host(text: str) -> str:
+    """What looks like an address must be one: no name server will know `192.168.1.300`."""
+    if _NUMBERS.fullmatch(text):
+        try:
+            IPv4Address(text)
+        except ValueError:
+            hint = "write four numbers from 0 to 255 without leading zeros, for example 192.168.1.10"
+            refuse(syntax.BAD_NETWORK, f"`{text}` is not an IP address", hint)
+    elif ":" in text:
+        try:
+            IPv6Address(text)
+        except ValueError:
+            host, _, port = text.partition(":")
+            hint = (
+                f"write `host: {host}` and `port: {port}`" if port.isdigit() else "for example 192.168.1.10"
+            )
+            refuse(syntax.BAD_NETWORK, f"`{text}` is neither a host name nor an IP address", hint)
+    return text
+
+
+Host = Annotated[
+    str,
+    Field(min_length=1, max_length=253, pattern=r"^[A-Za-z0-9._:%-]+$"),
+    AfterValidator(_host),
+]
+"""A host name or a literal IP address."""
+
+
 def _network(value: object) -> Network:
     hint = "write an address (192.168.1.20) or a network (192.168.1.0/28)"
     text = scalar(value, "an IP address or network", hint)
@@ -240,7 +270,7 @@ Networks = Annotated[
 
 
 def _name(value: object) -> str:
-    hint = "begin with a letter and go on with letters, digits and `_`"
+    hint = "begin with a letter and go on with letters (a to z), digits and `_`"
     text = scalar(value, "a name", hint)
     if not _NAME.fullmatch(text):
         refuse(syntax.BAD_NAME, f"`{text}` is not a name", hint)

@@ -163,6 +163,10 @@ def parse(data: bytes, name: str) -> Source:
     return Source(name, root, tuple(reader.findings), tuple(text.splitlines()))
 
 
+_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_UTF16_HINT = "this is UTF-16, which Windows calls Unicode: save the file with the encoding UTF-8"
+
+
 def _not_utf8(data: bytes, error: UnicodeDecodeError, name: str) -> Diagnostic:
     before = data[: error.start]
     line = before.count(b"\n") + 1
@@ -170,7 +174,7 @@ def _not_utf8(data: bytes, error: UnicodeDecodeError, name: str) -> Diagnostic:
     return syntax.NOT_UTF8.at(
         Position(name, line, column),
         f"byte 0x{data[error.start]:02X} is not UTF-8 text",
-        hint="save the file with the encoding UTF-8",
+        hint=_UTF16_HINT if data[:2] in _UTF16_MARKS else "save the file with the encoding UTF-8",
     )
 
 
@@ -353,6 +357,8 @@ def _syntax_hint(problem: str) -> str:
         return "indent with spaces, never with tabs"
     if "':'" in problem or "mapping values" in problem:
         return "write `key: value` with a space after the colon, and quote texts that contain `: `"
+    if "'%'" in problem:
+        return "no value begins with %: an address is a number from 0, for example 100 or 100.3"
     return "compare the indentation and the brackets with the lines above"
 
 

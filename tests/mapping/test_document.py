@@ -85,10 +85,39 @@ def test_each_mistake_is_found_once_at_its_place(text: str, slug: str, line: int
         ("variables: {}\nmodbus: {zzz: 1}", "known keys: listen, unit"),
         ("variables: {}\nmodbus: {idle_timeout: 60}", "60s"),
         ("variables: {a: {robot: x, modbus: {holding: 400101}}}", "{holding: 100}"),
+        ("variables: {a: {robot: x, modbus: {holding: 1, scale: 0,1}}}", "write a point, such as 0.1"),
+        ("variables: {a: {robot: x, modbus:1}}", "write `modbus: 1`"),
+        ("variables: {a: {robot: x, modbus:\u00a01}}", "no-break space"),
+        ("variables: {a: {robot: x, limits: 0..9}}", "[least, greatest]"),
+        ("variables: {a: {robot: x, modbus: {holding: 1, type: word}}}", "write uint16: that is WORD here"),
+        ("variables: {a: {robot: x, modbus: {holding: 1, type: DINT}}}", "write int32"),
     ],
 )
 def test_hint_names_the_remedy(line: str, words: str) -> None:
     assert words in str(only(HEAD + line).hint)
+
+
+@pytest.mark.parametrize(
+    "host, hint",
+    [
+        ("192.168.1.300", "four numbers"),
+        ("192.168.1", "four numbers"),
+        ("192.168.1.010", "leading zeros"),
+        ("192.168.1.10:30004", "`port: 30004`"),
+        ("robot:rtde", "192.168.1.10"),
+    ],
+)
+def test_what_looks_like_an_address_must_be_one(host: str, hint: str) -> None:
+    """No name server knows `192.168.1.300`, and the plant would be the first to tell."""
+    finding = only(f"gatewayd: 1\ncell: c\nrobot: {{host: '{host}'}}\nvariables: {{}}")
+    assert place(finding) == ("bad-network-address", 3, 15)
+    assert hint in str(finding.hint)
+
+
+@pytest.mark.parametrize("host", ["192.168.1.10", "fe80::1%eth0", "::1", "ur10-press.plant.local", "ur10"])
+def test_hosts(host: str) -> None:
+    _, findings = read(f"gatewayd: 1\ncell: c\nrobot: {{host: '{host}'}}\nvariables: {{}}")
+    assert findings == ()
 
 
 def test_one_bad_part_hides_no_finding_of_another() -> None:

@@ -128,6 +128,16 @@ def test_other_encodings_are_found(data: bytes, column: int) -> None:
     assert source.root is None
 
 
+def test_what_windows_calls_unicode_is_named() -> None:
+    (finding,) = parse("gatewayd: 1".encode("utf-16"), "cell.yaml").findings
+    assert "UTF-16" in str(finding.hint)
+
+
+def test_an_address_of_the_plc_is_no_value() -> None:
+    (finding,) = parse(b"{modbus: %MW100}", "cell.yaml").findings
+    assert "a number from 0" in str(finding.hint)
+
+
 def test_byte_order_mark_is_no_character() -> None:
     """Editors on Windows begin UTF-8 files with one."""
     assert plain(root("\ufeffa: 1")) == {"a": 1}
