@@ -11,6 +11,7 @@ import signal
 import sys
 import time
 from pathlib import Path
+from shutil import which
 from typing import TYPE_CHECKING
 
 import click
@@ -135,7 +136,8 @@ async def _live(console: Console, scene: Scene, stop: asyncio.Event, seconds: fl
     from gatewayd.demo.view import commands, screen
 
     pokes, without_mbpoll = commands(scene.port, _python())
-    console.print(f"[dim]{without_mbpoll[0]}:[/] {without_mbpoll[1]}", soft_wrap=True)
+    if which("mbpoll") is None:
+        console.print(f"[dim]{without_mbpoll[0]}:[/] {without_mbpoll[1]}", soft_wrap=True)
     before = None
     with Live(console=console, auto_refresh=False, vertical_overflow="crop") as picture:
         while not stop.is_set():

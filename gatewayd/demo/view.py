@@ -59,11 +59,14 @@ def screen(shot: Snapshot, before: Snapshot | None, pokes: Sequence[Poke], width
     fixed = _LINES_OF_LINKS + _FRAME_OF_TABLE + len(shot.lines)
     shown = list(pokes) if height >= fixed + _LEAST_EVENTS + len(pokes) + _FRAME_OF_POKES else []
     room = height - fixed - (len(shown) + _FRAME_OF_POKES if shown else 0) - _ABOVE
-    events = min(max(room, _LEAST_EVENTS), _MOST_EVENTS)
+    # A small window gives one event's line to the hint.
+    events = min(max(room, _LEAST_EVENTS) - (not shown), _MOST_EVENTS)
     links = _links(shot, wide=spacious), _canopen(shot)
     parts: list[RenderableType] = [*links, table, *_events(shot, events)]
     if shown:
         parts.extend(_hints(shown))
+    else:
+        parts.append(_hint(pokes[1]))
     return Group(*parts)
 
 
@@ -89,7 +92,7 @@ def plain(shot: Snapshot) -> str:
 def _links(shot: Snapshot, *, wide: bool) -> Text:
     text = Text(no_wrap=True, overflow="ellipsis")
     text.append(" ● ", "green" if shot.fresh else "red").append("robot ", "bold")
-    text.append(f"{shot.frequency:.1f} Hz" if shot.fresh else shot.robot)
+    text.append(f"{shot.frequency:.1f} Hz" if shot.fresh and shot.frequency else shot.robot)
     text.append(f", {shot.packages} packages, {shot.skipped} skipped")
     text.append("   ● ", "green" if shot.plc_connected else "red").append("PLC ", "bold")
     text.append(f"{shot.handshakes} handshakes, {shot.verified} values right")
@@ -156,7 +159,7 @@ def _cells(line: Line, *, changed: bool, wide: bool, spacious: bool) -> Iterator
 
 def _owner(line: Line) -> str:
     if line.refused:
-        return f"{line.owner} ({line.refused})"
+        return f"{line.owner or 'free'} ({line.refused})"
     return f"{line.owner}, {line.lease} left" if line.lease else line.owner or "free"
 
 
@@ -169,6 +172,12 @@ def _events(shot: Snapshot, count: int) -> Iterator[Text]:
         text = Text(f" {one.clock} ", "dim", no_wrap=True, overflow="ellipsis")
         yield text.append(one.text, "bold red" if one.bad else "default")
     yield from (Text("") for _ in range(count - len(latest)))
+
+
+def _hint(poke: Poke) -> Text:
+    """What a small window has room for."""
+    text = Text(" take part: ", "dim", no_wrap=True, overflow="ellipsis")
+    return text.append(poke[1], "bold cyan").append("   more in a taller window", "dim")
 
 
 def _hints(pokes: Sequence[Poke]) -> Iterator[Text]:

@@ -38,7 +38,8 @@ async def test_picture_fits(shot: Snapshot, width: int, height: int) -> None:
     assert "operational" in text
     assert ("2030h:01" in text and "0x210" in text) is (width >= 100)
     assert ("400001.0" in text) is (width >= 115)
-    assert ("mbpoll" in text) is (height >= 30)
+    assert "mbpoll -0 -p 1502 -r 10 127.0.0.1 50" in text, "how to take part, in every window"
+    assert ("taller window" in text) is (height < 30)
 
 
 async def test_plain_lines_tell_the_same(shot: Snapshot) -> None:
