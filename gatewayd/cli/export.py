@@ -53,6 +53,7 @@ def command() -> None:
 
 @command.command(
     name="eds",
+    short_help="The electronic data sheet, for the master's configurator.",
     epilog=f"""\b
 Examples:
   gatewayd export eds my-cell.yaml -o my-cell.eds
@@ -79,6 +80,7 @@ def eds(context: click.Context, file: str, output: str) -> None:
 
 @command.command(
     name="dcf",
+    short_help="The same with node-ID, bit-rate and values.",
     epilog=f"""\b
 Examples:
   gatewayd export dcf my-cell.yaml -o my-cell.dcf
@@ -103,6 +105,7 @@ def dcf(context: click.Context, file: str, output: str) -> None:
 
 @command.command(
     name="urscript",
+    short_help="The watchdog line of the robot program.",
     epilog=f"""\b
 Examples:
   gatewayd export urscript my-cell.yaml

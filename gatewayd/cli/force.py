@@ -50,7 +50,7 @@ def command(name: str, value: str, seconds: float, socket: Path | None, cell: st
 
     body: dict[str, Any] = {"value": _parse(value), "for": seconds}
     client = connect(socket)
-    with refusals():
+    with refusals(client, name):
         found = client.post(
             f"/v1/variables/{segment(name)}/force", body if cell is None else {**body, "cell": cell}
         )

@@ -57,7 +57,7 @@ def command(context: click.Context, socket: Path | None, cell: str | None, *, as
     _print(locks)
 
 
-@command.command(name="take")
+@command.command(name="take", short_help="Take a lock from whoever holds it.")
 @click.argument("name", shell_complete=complete_locks)
 @click.option(
     "--for", "seconds", type=DURATION, metavar="TIME", help="Give it back after that time: 30s, 10min, 2h."
@@ -72,10 +72,11 @@ def take(
     where = socket or context.obj["socket"], cell or context.obj["cell"]
     lock = _post(where, name, "take", {} if seconds is None else {"for": seconds})
     until = "until you release it" if seconds is None else f"for {seconds:g} s"
-    click.echo(f"{lock['name']} is the operator's {until}: {_members(lock)}")
+    members = "" if lock["members"] == [lock["name"]] else f": {_members(lock)}"
+    click.echo(f"{lock['name']} is the operator's {until}{members}")
 
 
-@command.command(name="release")
+@command.command(name="release", short_help="Release a lock, whoever holds it.")
 @click.argument("name", shell_complete=complete_locks)
 @socket_option
 @cell_option
@@ -93,7 +94,7 @@ def _post(
 
     socket, cell = where
     client = connect(socket)
-    with refusals():
+    with refusals(client, name):
         return client.post(
             f"/v1/locks/{segment(name)}/{act}", body if cell is None else {**body, "cell": cell}
         )

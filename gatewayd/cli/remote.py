@@ -62,8 +62,8 @@ def connect(socket: Path | None) -> Client:
 
 
 @contextmanager
-def refusals() -> Iterator[None]:
-    """Turn what a client raises into an error of the command."""
+def refusals(client: Client | None = None, name: str = "") -> Iterator[None]:
+    """Turn what a client raises into an error of the command; with `client` told what `name` was meant to be."""
     from gatewayd.control.client import ControlError, NoDaemon
 
     try:
@@ -72,7 +72,28 @@ def refusals() -> Iterator[None]:
         raise Unreachable(str(error)) from error
     except ControlError as error:
         # The interface names its field; people type an option.
-        raise Refused(str(error).replace("say which with `cell`", "say which with --cell")) from error
+        text = str(error).replace("say which with `cell`", "say which with --cell")
+        kind = _UNKNOWN.get(error.code)
+        if client is not None and kind is not None:
+            text += _meant(client, kind, name)
+        raise Refused(text) from error
+
+
+_UNKNOWN = {"no_such_variable": "variables", "no_such_lock": "locks"}
+
+
+def _meant(client: Client, kind: str, name: str) -> str:
+    """The names that come closest. Looked for here: the gateway has better things to do."""
+    from difflib import get_close_matches
+
+    from gatewayd.control.client import ControlError, NoDaemon
+
+    try:
+        names = sorted({one["name"] for one in client.get(f"/v1/{kind}")[kind]})
+    except (NoDaemon, ControlError):
+        return ""
+    close = get_close_matches(name, names)
+    return f"; did you mean {' or '.join(close)}?" if close else ""
 
 
 class Duration(click.ParamType):  # type: ignore[type-arg]

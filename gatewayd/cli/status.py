@@ -135,7 +135,8 @@ def _robot(robot: Answer) -> list[str]:
     words, colour = _STATES[robot["state"]]
     first = f"{robot['address']} {click.style(words, fg=colour)}"
     if robot["state"] == "fresh":
-        first += f" at {robot['frequency']:g} Hz"
+        # No rate was measured yet just after the start: 0 Hz would be a lie.
+        first += f" at {robot['frequency']:g} Hz" if robot["frequency"] else ""
         if not robot["writable"]:
             first += click.style(", not writable yet", fg="yellow")
     first += f", last package {age(robot['age'])} ago" if robot["age"] is not None else ""

@@ -37,7 +37,7 @@ def command(name: str | None, socket: Path | None, cell: str | None, *, every: b
     if every == (name is not None):
         raise click.UsageError("name one variable, or use --all")
     client = connect(socket)
-    with refusals():
+    with refusals(client, name or ""):
         if name is not None:
             wanted = [(name, cell)]
         else:

@@ -169,7 +169,7 @@ def plain(glimpse: Glimpse, view: View) -> str:
 def _head(glimpse: Glimpse, view: View) -> Text:
     text = Text(no_wrap=True, overflow="ellipsis")
     if glimpse.lost:
-        return text.append(f" {glimpse.lost}: what stands below is old ", "bold white on red")
+        return text.append(f" what stands below is old: {glimpse.lost} ", "bold white on red")
     status = glimpse.status
     colour = "green" if status["healthy"] else "red"
     text.append(f" gatewayd {status['version']} ", "bold").append(_health(status), f"bold {colour}")
@@ -194,7 +194,7 @@ def _links(glimpse: Glimpse) -> Iterator[Text]:
 
 def _link_words(cell: Answer) -> str:
     robot, modbus, writes = cell["robot"], cell["modbus"], cell["writes"]
-    rate = f" at {robot['frequency']:g} Hz" if robot["state"] == "fresh" else ""
+    rate = f" at {robot['frequency']:g} Hz" if robot["state"] == "fresh" and robot["frequency"] else ""
     words = [f"robot {robot['state']}{rate}, age {age(robot['age'])}"]
     if modbus is not None:
         words.append(counted(modbus["connections"], "Modbus connection"))

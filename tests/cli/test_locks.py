@@ -47,6 +47,7 @@ def test_what_cannot_be_done(invoke: Invoke) -> None:
     for arguments, says in (
         (("release", "motion"), "nobody owns motion"),
         (("take", "cycles"), "there is no lock cycles"),
+        (("take", "motoin"), "there is no lock motoin; did you mean motion?"),
     ):
         done = invoke("locks", *arguments)
         assert (done.exit_code, done.output) == (1, f"Error: {says}\n")

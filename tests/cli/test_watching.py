@@ -61,7 +61,7 @@ def test_owner_lease_and_force(served: Served) -> None:
 
 def test_a_gateway_that_is_gone_is_said_in_the_first_line(served: Served) -> None:
     found = replace(glimpse(served), lost="no gatewayd listens")
-    assert "no gatewayd listens: what stands below is old" in picture(found, View(), 100, 30)[0]
+    assert "what stands below is old: no gatewayd listens" in picture(found, View(), 100, 30)[0]
     assert "no gatewayd listens" in plain(found, View())
 
 
