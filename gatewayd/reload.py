@@ -289,4 +289,6 @@ def _reasons(compiled: Compiled) -> Iterator[str]:
 
 
 def _line(finding: Diagnostic) -> str:
-    return f"{finding.position}: {finding.rule.id} {finding.rule.slug}: {finding.message}"
+    """With the remedy: whoever reloads looks at no log."""
+    hint = f"; {finding.hint}" if finding.hint else ""
+    return f"{finding.position}: {finding.rule.id} {finding.rule.slug}: {finding.message}{hint}"

@@ -276,6 +276,7 @@ async def test_a_renamed_input_goes_on_with_what_the_robot_was_given_last(
 @pytest.mark.parametrize("broken, said", [
     ("  echo: {robot: output_int_register_0, modbus: 100}\n  lamp: {robot: nothing, modbus: 101}\n", "GW3"),
     ("  echo: [\n", "press.yaml:"),
+    ("  echo: {robot: output_int_registr_0, modbus: 100}\n", "did you mean `output_int_register_0`"),
 ])  # fmt: skip
 async def test_a_broken_file_changes_nothing(rigged: Rigged, broken: str, said: str) -> None:
     async with rigged() as rig:

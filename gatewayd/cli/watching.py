@@ -157,7 +157,10 @@ def plain(glimpse: Glimpse, view: View) -> str:
     """One block of lines, for everything that is no terminal."""
     lines = [f"{glimpse.status.get('time', '')} " + (glimpse.lost or _health(glimpse.status))]
     lines += [f"  {cell['name']}: {_link_words(cell)}" for cell in glimpse.status.get("cells", ())]
-    for one in chosen(glimpse.variables, view):
+    variables = chosen(glimpse.variables, view)
+    if not variables and not glimpse.lost:
+        lines.append("  no variable fits")
+    for one in variables:
         arrow = "->" if one["direction"] == "input" else "<-"
         lines.append(
             f"  {arrow} {one['name']:<20} {value(one['value'], one['unit']):>14}  {one['quality']:<11} "

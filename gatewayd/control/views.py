@@ -39,6 +39,14 @@ _QUALITIES = tuple(one.name.lower() for one in Quality)
 _BIT_WORD = re.compile(r"(input|output)_bit_registers(\d+)_to_\d+")
 
 
+class RobotView(Protocol):
+    """The link to the controller."""
+
+    @property
+    def trouble(self) -> str:
+        """Why there is no session, if that is known."""
+
+
 class StationView(Protocol):
     """One cell as the daemon serves it."""
 
@@ -50,13 +58,19 @@ class StationView(Protocol):
     def cell(self) -> Cell:
         """Its state."""
 
+    @property
+    def robot(self) -> RobotView:
+        """Its robot."""
+
 
 def cell_view(station: StationView, now: float) -> Json:
     """One cell of the status."""
     plan, cell = station.plan, station.cell
     health, definition, quality = cell.health, cell.definition, cell.image.quality
     owners = cell.ownership.owners
-    found = problems(cell, now)
+    found = problems(
+        cell, now, station.robot.trouble.removeprefix(f"{_address(plan.robot.host, plan.robot.port)}: ")
+    )
     return {
         "name": definition.name,
         "source": plan.source,
@@ -92,15 +106,18 @@ def cell_view(station: StationView, now: float) -> Json:
     }
 
 
-def problems(cell: Cell, now: float) -> list[str]:
+def problems(cell: Cell, now: float, no_robot: str = "") -> list[str]:
     """What keeps a cell from being healthy, each in words that a maintenance crew understands.
+
+    `no_robot` is why there is no session with the controller, if that is known: cause and remedy.
 
     A writer that has not come yet is no problem: nobody knows whether it should be there. One that was there is.
     """
     found = []
     state, quality = cell.freshness.state, cell.image.quality
     if state is not Source.FRESH:
-        found.append(_SOURCES[state] + _since(now - cell.freshness.last_progress))
+        why = f": {no_robot}" if state is Source.LOST and no_robot else ""
+        found.append(_SOURCES[state] + _since(now - cell.freshness.last_progress) + why)
     elif not cell.accepts_writes:
         found.append("the robot's inputs are not adopted yet, nothing can be written")
     if cell.health.can_trouble:

@@ -28,6 +28,11 @@ def glimpse(served: Served, now: float = 1.0) -> Glimpse:
     )
 
 
+def test_lines_without_a_match_say_so(served: Served) -> None:
+    assert "no variable fits" in plain(glimpse(served), View(filter="zzz"))
+    assert "no variable fits" not in plain(glimpse(served), View())
+
+
 def picture(found: Glimpse, view: View, width: int, height: int, before: Glimpse | None = None) -> list[str]:
     console = Console(width=width, height=height, record=True, file=None, force_terminal=False, quiet=False)
     with console.capture() as captured:

@@ -40,11 +40,19 @@ START, LIMIT, SPEED, PATH, CYCLES = range(5)
 
 
 @dataclass
+class ServedRobot:
+    """A link to a controller."""
+
+    trouble: str = ""
+
+
+@dataclass
 class Served:
     """A station."""
 
     plan: Plan
     cell: Cell
+    robot: ServedRobot = field(default_factory=ServedRobot)
 
 
 @dataclass

@@ -116,6 +116,13 @@ class TestProblems:
         press.cell.robot_lost("gone", 1.0)
         assert problems(press.cell, 8.0) == ["robot not connected for 8 s"]
 
+    def test_why_the_robot_cannot_be_reached(self, api: Api, press: Served) -> None:
+        """Cause and remedy, without the address that stands beside it."""
+        press.cell.robot_lost("gone", 1.0)
+        press.robot.trouble = "192.168.1.10:30004: connection refused: the robot is booting"
+        (cell,) = api.status(at(8.0))["cells"]
+        assert cell["problems"] == ["robot not connected for 8 s: connection refused: the robot is booting"]
+
     def test_inputs_that_are_not_adopted(self, press: Served) -> None:
         press.cell.robot_connected(1.0)
         assert press.cell.package_arrived(1.0, 1.0)
