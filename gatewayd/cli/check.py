@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import click
+from click.shell_completion import CompletionItem
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,6 +19,20 @@ CLEAN, FOUND, UNREADABLE = 0, 1, 2
 
 STDIN = "-"
 """The file name that stands for standard input."""
+
+
+def _complete_rules(
+    _context: click.Context, _param: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Ids and names of rules that begin with `incomplete`, with what they find."""
+    from gatewayd.mapping.rules.catalogue import complete
+
+    return [
+        CompletionItem(name, help=rule.summary)
+        for rule in complete()
+        for name in (rule.id, rule.slug)
+        if incomplete and name.casefold().startswith(incomplete.casefold())
+    ]
 
 
 @click.command(
@@ -59,7 +74,12 @@ Exit codes:
 @click.option(
     "--separately", is_flag=True, help="Check each file by itself: the cells will not run in one gateway."
 )
-@click.option("--explain", metavar="RULE", help="Explain a rule by its id or name, or list `all`, and stop.")
+@click.option(
+    "--explain",
+    metavar="RULE",
+    shell_complete=_complete_rules,
+    help="Explain a rule by its id or name, or list `all`, and stop.",
+)
 @click.pass_context
 def command(
     context: click.Context,

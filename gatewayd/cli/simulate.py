@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -191,7 +193,10 @@ def command(
     try:
         asyncio.run(serve(simulator, control=control is not None))
     except OSError as error:
-        reason = error.strerror or str(error)
+        # asyncio's own text says "error while attempting to bind" and repeats the address.
+        reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+        if error.errno == errno.EADDRINUSE:
+            reason += "; stop the simulator that runs there, or let --port 0 take a free one"
         click.echo(f"gatewayd: cannot listen on {host}:{port}: {reason}", err=True)
         return CANNOT_SERVE
     return 0

@@ -123,7 +123,7 @@ def _table(lines: Sequence[Line], old: dict[int, str], *, wide: bool, spacious: 
     if wide:
         table.add_column("CANopen", no_wrap=True)
         table.add_column("PDO", no_wrap=True)
-    table.add_column("value", justify="right", no_wrap=True, min_width=8)
+    table.add_column("value", justify="right", no_wrap=True, min_width=7)
     table.add_column("quality" if spacious else "state", no_wrap=True, min_width=5)
     table.add_column("age", justify="right", no_wrap=True, min_width=6)
     table.add_column("owner", no_wrap=True, min_width=16)

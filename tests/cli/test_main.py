@@ -81,6 +81,10 @@ def test_unknown_command_is_wrong_usage(run: Run) -> None:
     assert "No such command 'frobnicate'" in done.stderr
 
 
+def test_a_misspelt_command_is_answered_with_the_right_one(run: Run) -> None:
+    assert "Did you mean 'check'?" in run("chekc").stderr
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_listed_command_can_be_imported_and_has_help(name: str) -> None:
     command = import_module(f"gatewayd.cli.{name}").command
@@ -108,6 +112,13 @@ def test_completion_prints_a_script_and_how_to_keep_it(run: Run, shell: str) -> 
 def test_completion_offers_commands_without_importing_them(run: Run) -> None:
     done = run(_GATEWAYD_COMPLETE="bash_complete", COMP_WORDS="gatewayd c", COMP_CWORD="1")
     assert done.stdout.split() == ["plain,check", "plain,completion"]
+
+
+def test_rules_are_completed_by_id_and_by_name(run: Run) -> None:
+    for begun, whole in (("gw21", "GW214"), ("bit-in", "bit-in-number")):
+        words = f"gatewayd check --explain {begun}"
+        done = run(_GATEWAYD_COMPLETE="bash_complete", COMP_WORDS=words, COMP_CWORD="3")
+        assert f"plain,{whole}" in done.stdout.split()
 
 
 BROKEN = """

@@ -22,6 +22,8 @@ def test_a_port_in_use_is_one_clear_line() -> None:
         result = run("--port", str(port))
     assert (result.returncode, result.stdout) == (1, "")
     assert result.stderr.startswith(f"gatewayd: cannot listen on 127.0.0.1:{port}: ")
+    assert "Address already in use; " in result.stderr
+    assert "--port 0" in result.stderr
     assert len(result.stderr.splitlines()) == 1
 
 
