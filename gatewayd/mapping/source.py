@@ -201,8 +201,10 @@ class _Reader:
         self.name = name
         self.findings: list[Diagnostic] = []
         self._anchors: dict[str, Position] = {}
+        self._lines: list[str] = []
 
     def read(self, text: str) -> Table | None:
+        self._lines = text.splitlines()
         try:
             root = self._document(YAML(typ="safe", pure=True).parse(text))
         except _TooDeepError as error:
@@ -318,7 +320,9 @@ class _Reader:
         problem = problem.replace("'<stream end>'", "the end of the file")
         if problem.startswith("expected <block end>"):
             problem = "the indentation of this line fits none of the lines above"
-        self._find(syntax.YAML_SYNTAX, problem, position, _syntax_hint(problem), related)
+        rest = self._lines[position.line - 1 : position.line]
+        hint = _syntax_hint(problem, rest[0][position.column - 1 :] if rest else "")
+        self._find(syntax.YAML_SYNTAX, problem, position, hint, related)
 
     def _unprintable(self, text: str, offset: int) -> None:
         lines = text[: offset + 1].splitlines()
@@ -337,6 +341,7 @@ class _Reader:
         return Position(self.name, event.start_mark.line + 1, event.start_mark.column + 1)
 
 
+_COMMENTS: Final = ("//", "(*", "/*", ";")
 _CONTEXTS: Final = {
     "while parsing a flow sequence": "the list `[` begins here",
     "while parsing a flow mapping": "the table `{` begins here",
@@ -352,9 +357,16 @@ class _TooDeepError(Exception):
         self.position = position
 
 
-def _syntax_hint(problem: str) -> str:
+def _syntax_hint(problem: str, rest: str) -> str:
+    """What to do, from the parser's words and the rest of the line where it stopped."""
+    if rest.startswith(_COMMENTS):
+        return "a comment begins with # and a space in front of it"
     if "\\t" in problem:
         return "indent with spaces, never with tabs"
+    if "but got '['" in problem:
+        return "put quotes around what has brackets: robot: 'actual_TCP_pose[2]'"
+    if "but got ':'" in problem:
+        return "a comma or a closing bracket is missing before this place; a text that contains `: ` needs quotes"
     if "':'" in problem or "mapping values" in problem:
         return "write `key: value` with a space after the colon, and quote texts that contain `: `"
     if "'%'" in problem:

@@ -12,7 +12,7 @@ import pytest
 from gatewayd.core import status
 from gatewayd.mapping.diagnostics import Diagnostic, Rule
 from gatewayd.mapping.loader import load, load_together
-from gatewayd.mapping.rules import bounds, catalogue, places
+from gatewayd.mapping.rules import bounds, catalogue, places, wording
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
@@ -29,6 +29,12 @@ writers:
 variables:
   keep: {robot: input_bit_register_63, modbus: 999.15, owner: [plc, hmi]}
 """
+
+
+def test_a_name_in_another_case_is_recognised() -> None:
+    """PLC programmers write PLC."""
+    assert wording.did_you_mean("PLC", frozenset({"plc", "hmi"}), "no") == "did you mean `plc`?"
+    assert wording.did_you_mean("xyz", ["plc", "hmi"], "no") == "no"
 
 
 def examples(rule: Rule, kind: str) -> list[Path]:

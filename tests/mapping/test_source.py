@@ -133,6 +133,20 @@ def test_what_windows_calls_unicode_is_named() -> None:
     assert "UTF-16" in str(finding.hint)
 
 
+@pytest.mark.parametrize(
+    "line, hint",
+    [
+        ("a: {robot: actual_q[0]}", "put quotes"),
+        ("a: {robot: x, owner: plc limits: [0, 1]}", "a comma or a closing bracket"),
+        ("a: {robot: x} // parts", "a comment begins with #"),
+        ("a: {robot: x} (* parts *)", "a comment begins with #"),
+    ],
+)
+def test_a_slip_of_the_pen_has_its_own_hint(line: str, hint: str) -> None:
+    (finding,) = parse(f"variables:\n  {line}\n  b: {{}}\n".encode(), "cell.yaml").findings
+    assert hint in str(finding.hint)
+
+
 def test_an_address_of_the_plc_is_no_value() -> None:
     (finding,) = parse(b"{modbus: %MW100}", "cell.yaml").findings
     assert "a number from 0" in str(finding.hint)

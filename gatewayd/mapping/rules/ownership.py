@@ -35,7 +35,7 @@ def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         return
     inputs = [variable for variable in cell.variables if variable.direction is Direction.INPUT]
     if inputs:
-        more = f" and {len(inputs) - 1} more inputs" if len(inputs) > 1 else ""
+        more = f" and {len(inputs) - 1} more input{'s' if len(inputs) > 2 else ''}" if len(inputs) > 1 else ""
         message = f"nobody can write `{inputs[0].name}`{more}: the file declares no writers"
         on_can = cell.document.modbus is None and cell.canopen is not None
         known_by = "canopen: rpdo, node: 1, heartbeat: 1s" if on_can else "modbus: 192.168.1.20, timeout: 1s"

@@ -63,8 +63,10 @@ def one_and_more(names: Sequence[str]) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
-    """A hint that names the nearest known name, or else says `otherwise`."""
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
+    """A hint that names the nearest known name, in whatever case it was written, or else says `otherwise`."""
+    names = list(known)
+    same = [one for one in names if one.casefold() == name.casefold()]
+    close = same or difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"did you mean `{close[0]}`?" if close else otherwise
 
 
