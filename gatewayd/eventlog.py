@@ -11,8 +11,9 @@ import re
 from collections.abc import Iterable, Sequence
 
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import OPERATOR
+from gatewayd.core.definition import OPERATOR, Variable
 from gatewayd.core.events import Event, EventKind
+from gatewayd.core.refusal import Reason
 from gatewayd.logs import fields
 
 __all__ = ["LEVELS", "EventLog"]
@@ -96,6 +97,7 @@ class EventLog:
             "peer": event.peer or None,
             "holder" if event.kind is EventKind.REFUSED else "former": self._writer(event.other),
             "reason": event.reason.text if event.reason is not None else None,
+            "limits": _limits(event, variable),
             "old": event.old,
             "new": event.new,
             "repeats": event.repeats or None,
@@ -107,6 +109,12 @@ class EventLog:
         if index is None:
             return "undeclared" if unknown else None
         return self._definition.writer_name(index)
+
+
+def _limits(event: Event, variable: Variable | None) -> str | None:
+    """What would have been allowed, where a value was out of it."""
+    limits = None if variable is None or event.reason is not Reason.OUT_OF_LIMITS else variable.limits
+    return None if limits is None else f"{limits.low:g}..{limits.high:g}"
 
 
 def _level(event: Event) -> int:

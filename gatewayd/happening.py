@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 
 from gatewayd.core.definition import CellDefinition, Value
 from gatewayd.core.events import Event, EventKind
+from gatewayd.core.refusal import Reason
 from gatewayd.figures import value
 
-__all__ = ["ACCEPTED", "BAD", "GATEWAY", "STRANGER", "UNDECLARED", "Happening", "stranger"]
+__all__ = ["ACCEPTED", "BAD", "GATEWAY", "STRANGER", "UNDECLARED", "Happening", "limits_of", "stranger"]
 
 ACCEPTED = "write accepted"
 """What happened when a write was accepted; the core has no event for it."""
@@ -78,6 +79,8 @@ class Happening:
     """Who held the lock when it was refused, or before it was taken over."""
     reason: str | None = None
     """Why it was refused."""
+    limits: str = ""
+    """What would have been allowed, where the value was out of it: `0..150`."""
     peer: str | None = None
     """Address of a peer that no writer stands for."""
     detail: str = ""
@@ -103,6 +106,7 @@ class Happening:
             1 + event.repeats,
             name(event.other),
             None if event.reason is None else event.reason.text,
+            limits_of(event, definition),
             event.peer or None,
             event.detail,
         )
@@ -132,7 +136,8 @@ class Happening:
         writer = stranger(self.peer) if self.writer == UNDECLARED else self.writer
         wrote = "" if self.new is None else f" = {value(self.new, self.unit)}"
         why = f"held by {self.holder}" if self.holder else self.reason
-        return f"{writer} wrote {self.variable or 'an address'}{wrote}: {', '.join(filter(None, (refused, why)))}"
+        told = ", ".join(filter(None, (refused, why, self.limits)))
+        return f"{writer} wrote {self.variable or 'an address'}{wrote}: {told}"
 
     def _told(self) -> str:
         others = f" and {self.others} more" if self.others else ""
@@ -151,6 +156,14 @@ class Happening:
             return sentences[self.what].format_map(names)
         except KeyError:
             return f"{self.what} {self.variable}" if self.variable else self.what
+
+
+def limits_of(event: Event, definition: CellDefinition) -> str:
+    """The declared limits that a refused value was out of: whoever reads it need not look for the mapping."""
+    limits = None if event.variable is None else definition.variables[event.variable].limits
+    if limits is None or event.reason is not Reason.OUT_OF_LIMITS:
+        return ""
+    return f"{value(limits.low)}..{value(limits.high)}"
 
 
 def stranger(peer: str | None) -> str:

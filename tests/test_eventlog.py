@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from dataclasses import replace
 
 import pytest
 
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
+from gatewayd.core.definition import CellDefinition, Direction, Limits, Lock, ValueKind, Variable, Writer
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
 from gatewayd.eventlog import LEVELS, EventLog
@@ -77,6 +78,15 @@ def test_a_peer_without_a_name_is_undeclared(cell: Cell, caplog: pytest.LogCaptu
     )
     fields = told(caplog)[2]
     assert (fields["writer"], fields["peer"]) == ("undeclared", "192.168.1.77")
+
+
+def test_a_value_out_of_limits_is_told_with_them(cell: Cell, caplog: pytest.LogCaptureFixture) -> None:
+    count = replace(cell.definition.variables[1], limits=Limits(0.0, 150.0))
+    cell.events.listeners = [EventLog(Cell(replace(cell.definition, variables=(count,))))]
+    cell.events.append(
+        Event(1.0, EventKind.REFUSED, variable=0, writer=0, reason=Reason.OUT_OF_LIMITS, new=999)
+    )
+    assert told(caplog)[2]["limits"] == "0..150"
 
 
 def test_a_takeover_names_the_former_owner(cell: Cell, caplog: pytest.LogCaptureFixture) -> None:

@@ -33,7 +33,7 @@ def cell() -> Cell:
         ),
         (
             Event(0, EventKind.REFUSED, LIMIT, 1, PLC, reason=Reason.OUT_OF_LIMITS, new=999.0, repeats=2),
-            "plc wrote limit = 999 N: refused, value out of limits (3 times)",
+            "plc wrote limit = 999 N: refused, value out of limits, 0..150 (3 times)",
         ),
         (
             Event(

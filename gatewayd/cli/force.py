@@ -71,4 +71,6 @@ def _parse(text: str) -> bool | int | float:
             return kind(text)
         except ValueError:
             continue
-    raise click.BadParameter(f"{text!r} is no number, and neither on nor off", param_hint="VALUE")
+    raise click.BadParameter(
+        f"{text!r} is no number, and neither on nor off: write 7, 0.5, on or off", param_hint="VALUE"
+    )

@@ -57,7 +57,15 @@ def command(context: click.Context, socket: Path | None, cell: str | None, *, as
     _print(locks)
 
 
-@command.command(name="take", short_help="Take a lock from whoever holds it.")
+@command.command(
+    name="take",
+    short_help="Take a lock from whoever holds it.",
+    epilog="""\b
+Examples:
+  gatewayd locks take start                the PLC's writes to it are refused until you release it
+  gatewayd locks take motion --for 10min   given back by itself
+""",
+)
 @click.argument("name", shell_complete=complete_locks)
 @click.option(
     "--for", "seconds", type=DURATION, metavar="TIME", help="Give it back after that time: 30s, 10min, 2h."
@@ -76,7 +84,14 @@ def take(
     click.echo(f"{lock['name']} is the operator's {until}{members}")
 
 
-@command.command(name="release", short_help="Release a lock, whoever holds it.")
+@command.command(
+    name="release",
+    short_help="Release a lock, whoever holds it.",
+    epilog="""\b
+Examples:
+  gatewayd locks release motion
+""",
+)
 @click.argument("name", shell_complete=complete_locks)
 @socket_option
 @cell_option

@@ -22,7 +22,7 @@ def test_the_last_ones_in_words(gateway: Running, invoke: Invoke) -> None:
     lines = invoke("events", "--limit", "2").output.splitlines()
     assert [line.split("press  ")[1] for line in lines] == [
         "plc took limit",
-        "plc wrote limit = 999 N: refused, value out of limits",
+        "plc wrote limit = 999 N: refused, value out of limits, 0..150",
     ]
 
 

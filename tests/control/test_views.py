@@ -64,14 +64,14 @@ def test_events_records_and_the_last_refusal_are_told_in_the_same_words(api: Api
     assert press.cell.write(PLC, [Change(LIMIT, 999.0)], 1.2) is not None
     same = [
         ("operator forced speed to 2 (by anna)", True),
-        ("plc wrote limit = 999 N: refused, value out of limits", True),
+        ("plc wrote limit = 999 N: refused, value out of limits, 0..150", True),
     ]
     for told in (api.events({}, at(2.0))["events"], api.audit({}, at(2.0))["records"]):
         assert [(one["text"], one["bad"]) for one in told][-2:] == same
     records = api.audit({"writer": "plc", "variable": "speed"}, at(2.0))["records"]
     assert [(one["text"], one["bad"]) for one in records] == [("plc wrote speed: 0 -> 1", False)]
     last = api.status(at(2.0))["cells"][0]["last_refusal"]
-    assert last["text"] == "plc wrote limit: refused, value out of limits"
+    assert last["text"] == "plc wrote limit: refused, value out of limits, 0..150"
 
 
 def test_a_variable_tells_both_places_and_its_owner(api: Api, press: Served) -> None:
