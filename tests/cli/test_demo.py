@@ -64,8 +64,11 @@ def test_terminal_gets_a_live_table_and_ctrl_c_ends_it() -> None:
         if not interrupted and b"plc took start" in seen:
             interrupted = True
             demo.send_signal(signal.SIGINT)
-    assert demo.wait(PATIENCE) == 0
-    os.close(main)
+    try:
+        assert demo.wait(PATIENCE) == 0
+    finally:
+        demo.kill()
+        os.close(main)
     text = seen.decode()
     assert "input_bit_register_0" in text
     assert "\x1b[?1049h" not in text, "the alternate screen would take the result away"
