@@ -48,6 +48,7 @@ EXCEPTION_OF = {
     Reason.PARTIAL_VALUE: ExceptionCode.ILLEGAL_VALUE,
     Reason.ROBOT_LOST: ExceptionCode.TARGET_FAILED,
     Reason.CLAIMED_ELSEWHERE: ExceptionCode.PATH_UNAVAILABLE,
+    Reason.HEARTBEAT_LOST: ExceptionCode.TARGET_FAILED,
 }
 
 

@@ -23,9 +23,11 @@ class Desk:
         self.ownership = LockTable(press.locks)
         self.admission = Admission(press.variables, self.ownership, self.image)
 
-    def judge(self, writer: int | None, *changes: Change, adopted: bool = True) -> Verdict:
+    def judge(
+        self, writer: int | None, *changes: Change, adopted: bool = True, heard: bool = True
+    ) -> Verdict:
         before = copy.deepcopy((self.image.values, self.image.quality, self.ownership.owners))
-        verdict = self.admission.judge(writer, changes, adopted=adopted)
+        verdict = self.admission.judge(writer, changes, adopted=adopted, heard=heard)
         assert before == (self.image.values, self.image.quality, self.ownership.owners)
         return verdict
 
@@ -87,3 +89,20 @@ def test_an_implied_bit_of_a_lower_owner_is_taken_over_only_to_change_it(
 def test_an_explicit_bit_takes_over_even_unchanged(desk: Desk) -> None:
     desk.ownership.apply(1, HMI, Move.ACQUIRE, 0.0)
     assert desk.judge(PLC, Change(LAMP, False)).moves == {1: Move.TAKE_OVER}
+
+
+def test_who_is_not_heard_is_refused_by_his_first_variable_unless_it_can_never_work(desk: Desk) -> None:
+    desk.ownership.apply(2, PLC, Move.ACQUIRE, 0.0)
+    force, held, wild = Change(FORCE, 1.0), Change(PART, 1), Change(SPEED, 2.0)
+    lost = Refusal(Reason.HEARTBEAT_LOST, FORCE)
+    assert desk.judge(HMI, force, held, heard=False).refusal == lost
+    assert desk.judge(HMI, force, held, heard=False, adopted=False).refusal == lost
+    assert desk.judge(HMI, force, wild, heard=False).refusal == Refusal(Reason.OUT_OF_LIMITS, SPEED)
+    assert desk.judge(None, force, heard=False).refusal == Refusal(Reason.NOT_WRITABLE, FORCE)
+    assert desk.judge(HMI, heard=False).refusal == Refusal(Reason.HEARTBEAT_LOST)
+
+
+def test_not_even_an_unchanged_implied_bit_passes_from_who_is_not_heard(desk: Desk) -> None:
+    desk.ownership.apply(1, PLC, Move.ACQUIRE, 0.0)
+    verdict = desk.judge(HMI, Change(LAMP, False, implied=True), heard=False)
+    assert verdict.refusal == Refusal(Reason.HEARTBEAT_LOST, LAMP)
