@@ -46,6 +46,7 @@ class ErrorCode(IntEnum):
     WRITE_ROBOT_LOST = 0xFF03
     WRITE_CLAIMED_ELSEWHERE = 0xFF04
     WRITE_NEVER = 0xFF05
+    WRITE_HEARTBEAT_LOST = 0xFF06
 
 
 class Register(IntFlag):

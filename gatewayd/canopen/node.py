@@ -5,7 +5,8 @@ What befalls the node, and what follows:
 | happening | writers of the cell | NMT (1029h = 0 / 1 / 2) | EMCY |
 |---|---|---|---|
 | RPDO in OPERATIONAL, SDO request | the writer is alive | | |
-| heartbeat of a watched node lost | its writer is lost | PRE-OPERATIONAL / as it is / STOPPED | 8130h till it is back |
+| heartbeat of a watched node lost, or owed and not come | its writer is lost, and refused till it is back \
+| PRE-OPERATIONAL / as it is / STOPPED | 8130h till it is back |
 | watched node boots | its writer is lost | as it is | |
 | guarding stays away | | PRE-OPERATIONAL / as it is / STOPPED | 8130h until it is back |
 | RPDO deadline passes | the RPDO writer is lost | as it is | 8250h until it is received |
@@ -37,7 +38,7 @@ from gatewayd.canopen.dictionary import Dictionary, Entry, Object
 from gatewayd.canopen.emergency import Emergency, ErrorCode
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.guarding import NodeGuarding
-from gatewayd.canopen.heartbeat import HeartbeatConsumer, HeartbeatProducer, Watch
+from gatewayd.canopen.heartbeat import HeartbeatConsumer, HeartbeatProducer
 from gatewayd.canopen.identity import ErrorBehaviour, Identity, identity_objects
 from gatewayd.canopen.lss import LssSlave
 from gatewayd.canopen.nmt import ALLOWED, UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
@@ -128,12 +129,9 @@ class Node:
         self._observer = observer if observer is not None else Observer()
         self._now = 0.0
         self._started = False
-        self._fell = False
-        self._was_off = False
+        self._fell = self._was_off = False
         self._store_damaged = False
         self._overrun_until = math.inf
-        self._peers = Peers(cell)
-        self._writers = {consumer.node: consumer.writer for consumer in plan.consumers}
         self._routes: dict[int, tuple[Service, Handler]] = {}
         self._handlers: dict[int, Handler] = {}
         self._synchronous: frozenset[int] = frozenset()
@@ -167,6 +165,7 @@ class Node:
             booted=self._peer_booted,
             changed=self._route,
         )
+        self._peers = Peers(cell, plan.consumers, self.consumer)
         self.guarding = NodeGuarding(
             self._send,
             self._node,
@@ -357,8 +356,8 @@ class Node:
         if frame.can_id in self._synchronous and not self.sync.window_open(now):
             self.counters.outside_window += 1
             return
-        self._peers.connect(self.plan.rpdo_writer, "RPDO", now)
-        self.receive_pdos.receive(frame.can_id, frame.data, now)
+        heard = self._peers.connect(self.plan.rpdo_writer, "RPDO", now)
+        self.receive_pdos.receive(frame.can_id, frame.data, now, heard=heard)
 
     def _receive_sdo(self, frame: Frame, now: float) -> None:
         if not frame.remote and len(frame.data) == SDO_LENGTH:
@@ -367,9 +366,7 @@ class Node:
 
     def _receive_heartbeat(self, frame: Frame, now: float) -> None:
         self.consumer.receive(frame, now)
-        node = frame.can_id - Function.ERROR_CONTROL
-        if self.consumer.state(node) is Watch.ALIVE:
-            self._peers.heartbeat(self._writers.get(node), now)
+        self._peers.heartbeat(frame.can_id - Function.ERROR_CONTROL, now)
 
     def _answer(self, answers: Iterable[bytes]) -> None:
         for data in answers:
@@ -437,14 +434,16 @@ class Node:
 
     def _heartbeat_lost(self, node: int, now: float) -> None:
         self.emergency.raise_error(ErrorCode.HEARTBEAT, now, bytes([node]), instance=node)
-        self._lose(self._writers.get(node), f"no heartbeat of node {node}", now)
+        for writer in self._peers.of(node):
+            self._lose(writer, f"no heartbeat of node {node}", now)
         self._communication_error(now)
 
     def _heartbeat_back(self, node: int, now: float) -> None:
         self.emergency.clear(ErrorCode.HEARTBEAT, now, instance=node)
 
     def _peer_booted(self, node: int, now: float) -> None:
-        self._lose(self._writers.get(node), f"node {node} has restarted", now)
+        for writer in self._peers.of(node):
+            self._lose(writer, f"node {node} has restarted", now)
 
     def _guarding_lost(self, now: float) -> None:
         self.emergency.raise_error(ErrorCode.HEARTBEAT, now)
@@ -512,6 +511,7 @@ class Node:
 
     def _objects(self, identity: Identity) -> Iterable[Object]:
         status = StatusBlock(self.cell)
+        heard = partial(self._peers.believed, self.plan.sdo_writer)
         yield from identity_objects(identity, lambda: int.from_bytes(status.read(1, 1, self._now), "big"))
         yield from server_parameter(self.parameters.node)
         for service in (
@@ -524,8 +524,8 @@ class Node:
             self.producer,
             self.behaviour,
             self.pdos,
-            VariableObjects(self.plan, self.cell, self._clock),
-            StatusObjects(self.cell, self.plan.sdo_writer, self._clock),
+            VariableObjects(self.plan, self.cell, self._clock, heard),
+            StatusObjects(self.cell, self.plan.sdo_writer, self._clock, heard),
         ):
             yield from service.objects()
 

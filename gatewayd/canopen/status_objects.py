@@ -38,12 +38,18 @@ _TYPES = {1: CanType.UNSIGNED16, 2: CanType.UNSIGNED32}
 class StatusObjects:
     """The objects of one cell's status block."""
 
-    def __init__(self, cell: Cell, writer: int | None, clock: Callable[[], float]) -> None:
-        """`writer`: who SDO clients are; `clock`: the moment of the request that is being served."""
+    def __init__(
+        self, cell: Cell, writer: int | None, clock: Callable[[], float], heard: Callable[[], bool]
+    ) -> None:
+        """`writer`: who SDO clients are; `clock`: the moment of the request that is being served.
+
+        `heard`: whether the writer is (`Cell.write`).
+        """
         self._block = StatusBlock(cell)
         self._definition = cell.definition
         self._writer = writer
         self._clock = clock
+        self._heard = heard
 
     def objects(self) -> Iterator[Object]:
         """5F00h and the tables that have entries."""
@@ -97,6 +103,6 @@ class StatusObjects:
 
     def _write(self, offset: int, data: bytes) -> None:
         word = int.from_bytes(data, "little")
-        refusal = self._block.write(self._writer, offset, (word,), self._clock())
+        refusal = self._block.write(self._writer, offset, (word,), self._clock(), heard=self._heard())
         if refusal is not None:
             raise Abort(ABORT_OF[refusal.reason])

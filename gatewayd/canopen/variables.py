@@ -42,6 +42,7 @@ ABORT_OF: Final = {
     Reason.PARTIAL_VALUE: AbortCode.LENGTH,
     Reason.ROBOT_LOST: AbortCode.DEVICE_STATE,
     Reason.CLAIMED_ELSEWHERE: AbortCode.DEVICE_STATE,
+    Reason.HEARTBEAT_LOST: AbortCode.DEVICE_STATE,
 }
 """What an SDO client is told when the cell refuses."""
 
@@ -49,11 +50,14 @@ ABORT_OF: Final = {
 class VariableObjects:
     """The objects of one cell's variables."""
 
-    def __init__(self, plan: CanopenPlan, cell: Cell, clock: Callable[[], float]) -> None:
-        """`clock`: the moment of the request that is being served."""
+    def __init__(
+        self, plan: CanopenPlan, cell: Cell, clock: Callable[[], float], heard: Callable[[], bool]
+    ) -> None:
+        """`clock`: the moment of the request that is being served; `heard`: whether its writer is (`Cell.write`)."""
         self._plan = plan
         self._cell = cell
         self._clock = clock
+        self._heard = heard
         self._received = {
             entry.variable
             for pdo in plan.pdos
@@ -131,7 +135,7 @@ class VariableObjects:
         if refusal is not None:
             self._cell.refuse(writer, refusal, now, value)
         elif value is not None:
-            refusal = self._cell.write(writer, [Change(item.variable, value)], now)
+            refusal = self._cell.write(writer, [Change(item.variable, value)], now, heard=self._heard())
         if refusal is not None:
             raise Abort(_abort_code(refusal, one, value))
 

@@ -78,7 +78,7 @@ CANOPEN: Fields = {
 }
 WRITER: Fields = {
     "name": "name of the writer",
-    "alive": "connected, and heard within its time-out",
+    "alive": "connected, and heard in time (`timeout`, `heartbeat`)",
     "connections": "its open connections",
     "age": "seconds since its last request, or null",
     "timeout": "seconds without a request after which it counts as lost, or null",

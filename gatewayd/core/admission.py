@@ -48,14 +48,17 @@ class Admission:
         self._locks = tuple(variable.lock for variable in variables)
         self._unlimited = tuple(has_no_limits(variable) for variable in variables)
 
-    def judge(self, writer: int | None, changes: Sequence[Change], *, adopted: bool) -> Verdict:
+    def judge(
+        self, writer: int | None, changes: Sequence[Change], *, adopted: bool, heard: bool = True
+    ) -> Verdict:
         """The verdict on all changes together; `adopted`: the robot is there and its inputs were taken over.
 
         If several changes stand in the way, `PRECEDENCE` says which refusal is told. A writer of None is a peer that no
-        writer was declared for: it may write nothing.
+        writer was declared for: it may write nothing. One that is not `heard` has promised a heartbeat that stays away:
+        nothing of its request is applied, not even what would change nothing.
         """
         verdict = Verdict()
-        if writer is not None and adopted and self._pass(writer, changes, verdict):
+        if writer is not None and adopted and heard and self._pass(writer, changes, verdict):
             return verdict
         verdict = Verdict()
         for change in changes:
@@ -64,10 +67,10 @@ class Admission:
                 if writer is None
                 else self._judge(writer, change, verdict, adopted=adopted)
             )
-            if refusal is not None and (
-                verdict.refusal is None or PRECEDENCE[refusal.reason] < PRECEDENCE[verdict.refusal.reason]
-            ):
-                verdict.refusal = refusal
+            verdict.refusal = _graver(verdict.refusal, refusal)
+        if not heard:
+            first = changes[0].variable if changes else None
+            verdict.refusal = _graver(verdict.refusal, Refusal(Reason.HEARTBEAT_LOST, first))
         return verdict
 
     def _pass(self, writer: int, changes: Sequence[Change], verdict: Verdict) -> bool:
@@ -117,3 +120,10 @@ class Admission:
             verdict.moves[lock] = MOVES[standing, Act.WRITE]
         verdict.values.append((index, value))
         return None
+
+
+def _graver(told: Refusal | None, other: Refusal | None) -> Refusal | None:
+    """Which of two refusals is told; of equal ones the first."""
+    if told is None or other is None:
+        return told or other
+    return other if PRECEDENCE[other.reason] < PRECEDENCE[told.reason] else told

@@ -77,12 +77,18 @@ class Cell:
 
     # -- fieldbus side -------------------------------------------------------------------------------------------
 
-    def write(self, writer: int | None, changes: Sequence[Change], now: float) -> Refusal | None:
-        """Apply all changes, or none and return why not. A writer of None is a peer that no writer was declared for."""
+    def write(
+        self, writer: int | None, changes: Sequence[Change], now: float, *, heard: bool = True
+    ) -> Refusal | None:
+        """Apply all changes, or none and return why not. A writer of None is a peer that no writer was declared for.
+
+        `heard` is the link's word that the writer keeps what it promised. If it does not (its heartbeat stays away),
+        the request is refused and is no sign of life either. The same writer may be heard by another link.
+        """
         self._release_expired(now)
-        if writer is not None:
+        if writer is not None and heard:
             self.writer_seen(writer, now)
-        verdict = self._admission.judge(writer, changes, adopted=self._adopted)
+        verdict = self._admission.judge(writer, changes, adopted=self._adopted, heard=heard)
         refusal = verdict.refusal
         if refusal is not None:
             if writer is not None and refusal.reason.renews:
@@ -116,13 +122,16 @@ class Cell:
             )
         )
 
-    def request(self, writer: int | None, variable: int, now: float) -> Refusal | None:
-        """Take the lock that guards `variable` (and with it its whole group) without writing a value."""
-        return self._act(writer, variable, Act.REQUEST, now)
+    def request(self, writer: int | None, variable: int, now: float, *, heard: bool = True) -> Refusal | None:
+        """Take the lock that guards `variable` (and with it its whole group) without writing a value.
 
-    def release(self, writer: int | None, variable: int, now: float) -> Refusal | None:
-        """Give the lock that guards `variable` back; its release fallback applies."""
-        return self._act(writer, variable, Act.RELEASE, now)
+        `heard` is as in `write`.
+        """
+        return self._act(writer, variable, Act.REQUEST, now, heard=heard)
+
+    def release(self, writer: int | None, variable: int, now: float, *, heard: bool = True) -> Refusal | None:
+        """Give the lock that guards `variable` back; its release fallback applies. `heard` is as in `write`."""
+        return self._act(writer, variable, Act.RELEASE, now, heard=heard)
 
     def release_all(self, writer: int, now: float, detail: str = "released by its owner") -> None:
         """Give every lock of `writer` back."""
@@ -326,27 +335,27 @@ class Cell:
 
     # -- inside --------------------------------------------------------------------------------------------------
 
-    def _act(self, writer: int | None, variable: int, act: Act, now: float) -> Refusal | None:
+    def _act(self, writer: int | None, variable: int, act: Act, now: float, *, heard: bool) -> Refusal | None:
         self._release_expired(now)
-        if writer is not None:
+        if writer is not None and heard:
             self.writer_seen(writer, now)
         lock = self.definition.variables[variable].lock
         if writer is None or lock is None:
             refusal = Refusal(Reason.NOT_WRITABLE, variable)
         else:
             move = self.ownership.decide(lock, writer, act)
-            if move is Move.RELEASE:
-                self._free([lock], now, "released by its owner")
-            elif move < Move.REFUSE_HELD:
-                self._move(writer, {lock: move}, now)
-            if move < Move.REFUSE_HELD:
+            if move is Move.REFUSE_NEVER:
+                refusal = Refusal(Reason.NOT_WRITABLE, variable)
+            elif not heard:
+                refusal = Refusal(Reason.HEARTBEAT_LOST, variable)
+            elif move is Move.REFUSE_HELD:
+                refusal = Refusal(Reason.HELD, variable, self.ownership.owners[lock])
+            else:
+                if move is Move.RELEASE:
+                    self._free([lock], now, "released by its owner")
+                else:
+                    self._move(writer, {lock: move}, now)
                 return None
-            held = move is Move.REFUSE_HELD
-            refusal = Refusal(
-                Reason.HELD if held else Reason.NOT_WRITABLE,
-                variable,
-                self.ownership.owners[lock] if held else None,
-            )
         self.refuse(writer, refusal, now)
         return refusal
 

@@ -25,6 +25,8 @@ class Reason(IntEnum):
     """The robot is not connected, or its inputs were not yet adopted."""
     CLAIMED_ELSEWHERE = 7
     """The controller gave the register to another client, or does not have it."""
+    HEARTBEAT_LOST = 8
+    """The writer promised a heartbeat, and it stays away."""
 
     @property
     def text(self) -> str:
@@ -49,6 +51,7 @@ _TEXTS = {
     Reason.PARTIAL_VALUE: "only a part of a value was written",
     Reason.ROBOT_LOST: "robot not connected",
     Reason.CLAIMED_ELSEWHERE: "register claimed elsewhere",
+    Reason.HEARTBEAT_LOST: "its heartbeat stays away",
 }
 
 PRECEDENCE = {
@@ -56,11 +59,13 @@ PRECEDENCE = {
     Reason.NOT_WRITABLE: 1,
     Reason.PARTIAL_VALUE: 2,
     Reason.OUT_OF_LIMITS: 3,
-    Reason.ROBOT_LOST: 4,
-    Reason.CLAIMED_ELSEWHERE: 5,
-    Reason.HELD: 6,
+    Reason.HEARTBEAT_LOST: 4,
+    Reason.ROBOT_LOST: 5,
+    Reason.CLAIMED_ELSEWHERE: 6,
+    Reason.HELD: 7,
 }
-"""Which reason is told when several apply: what can never work first, what may pass soon last."""
+"""Which reason is told when several apply: what can never work first, what may pass soon last. A lost heartbeat stands
+before the robot's absence, which leaves an owner its lease: who is not heard keeps nothing alive."""
 
 
 @dataclass(frozen=True, slots=True)

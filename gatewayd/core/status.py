@@ -179,12 +179,19 @@ class StatusBlock:
         return bytes(block)
 
     def write(
-        self, writer: int | None, first: int, words: Sequence[int], now: float, peer: str = ""
+        self,
+        writer: int | None,
+        first: int,
+        words: Sequence[int],
+        now: float,
+        *,
+        peer: str = "",
+        heard: bool = True,
     ) -> Refusal | None:
         """A writer takes or gives back a lock; any other word of the block is never writable.
 
         A request that fills both words is refused, because it could succeed by half. `peer` is the address of one that
-        no writer was declared for.
+        no writer was declared for, `heard` is as in `Cell.write`.
         """
         cell = self._cell
         if writer is None or first < REQUEST or first + len(words) > RELEASE + 1:
@@ -194,12 +201,14 @@ class StatusBlock:
             return None
         offset, number = wanted[0]
         if offset == RELEASE and number == RELEASE_ALL:
+            if not heard:
+                return self._refuse(writer, Reason.HEARTBEAT_LOST, now)
             cell.release_all(writer, now)
             return None
         if len(wanted) > 1 or number > len(cell.definition.variables):
             return self._refuse(writer, Refusal(Reason.OUT_OF_LIMITS), now)
         act = cell.request if offset == REQUEST else cell.release
-        return act(writer, number - 1, now)
+        return act(writer, number - 1, now, heard=heard)
 
     def _refuse(self, writer: int | None, refusal: Refusal, now: float) -> Refusal:
         self._cell.refuse(writer, refusal, now)

@@ -43,6 +43,7 @@ _EXCEPTIONS = {
     Reason.PARTIAL_VALUE: "03",
     Reason.ROBOT_LOST: "0B",
     Reason.CLAIMED_ELSEWHERE: "0A",
+    Reason.HEARTBEAT_LOST: "0B",
 }
 _EMERGENCIES = {
     Reason.NOT_WRITABLE: "FF05h",
@@ -50,6 +51,7 @@ _EMERGENCIES = {
     Reason.OUT_OF_LIMITS: "FF02h",
     Reason.ROBOT_LOST: "FF03h",
     Reason.CLAIMED_ELSEWHERE: "FF04h",
+    Reason.HEARTBEAT_LOST: "FF06h",
 }
 _STATES = {
     None: "not heard yet",

@@ -145,7 +145,9 @@ class WriterSpec(Section):
         default=None, ge=1, le=127, description="node-ID whose heartbeat tells whether it lives (CANopen)"
     )
     heartbeat: MillisecondTime = Field(
-        default=None, description="time without a heartbeat of `node` after which the writer is lost"
+        default=None,
+        description="time without a heartbeat of `node`, from the writer's first sign on, after which it is lost "
+        "and writes nothing by CANopen until it is heard",
     )
     timeout: OptionalDuration = Field(
         default=None,

@@ -49,6 +49,7 @@ EXCEPTION_OF = {
     Reason.PARTIAL_VALUE: ExceptionCode.ILLEGAL_VALUE,
     Reason.ROBOT_LOST: ExceptionCode.TARGET_FAILED,
     Reason.CLAIMED_ELSEWHERE: ExceptionCode.PATH_UNAVAILABLE,
+    Reason.HEARTBEAT_LOST: ExceptionCode.TARGET_FAILED,
 }
 
 
@@ -241,7 +242,7 @@ def _write_status(
     unit: Unit, writer: int | None, address: int, words: Sequence[int], now: float
 ) -> ExceptionCode | None:
     peer = unit.stranger if writer is None else ""
-    refusal = unit.status.write(writer, address - status.BASE, words, now, peer)
+    refusal = unit.status.write(writer, address - status.BASE, words, now, peer=peer)
     return EXCEPTION_OF[refusal.reason] if refusal is not None else None
 
 

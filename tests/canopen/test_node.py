@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import UTC, datetime
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -16,8 +17,10 @@ from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
 from gatewayd.canopen.node import OVERRUN_TIME, Node, Observer
 from gatewayd.canopen.plan import CanopenPlan, Consumer, ObjectPlan, PdoEntry, PdoPlan, SyncPlan
 from gatewayd.canopen.storage import MemoryStore, Saved, Store
-from gatewayd.core.cell import Cell
+from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, Value, ValueKind, Variable, Writer
+from gatewayd.core.refusal import Reason
+from gatewayd.core.succession import succeed
 from tests.canopen.wire import Wire
 
 NODE = 5
@@ -453,6 +456,7 @@ def test_what_a_lost_writer_left_for_sync_is_never_written(loss: str) -> None:
         plant.bus(BusState.ACTIVE)
     assert plant.state is NmtState.OPERATIONAL
     assert not _line_alive(plant)
+    plant.heartbeat()
     plant.part(1)
     plant.hear(0x80)
     assert (plant.cell.image.values[PART], plant.cell.image.values[SPEED]) == (1, 0.0)
@@ -515,6 +519,192 @@ def test_heartbeat_feeds_a_writer_that_sends_only_changes() -> None:
         plant.run(0.4)
         cell.tick(plant.now)
     assert _line_alive(plant)
+
+
+# -- a promised heartbeat --------------------------------------------------------------------------------------------
+
+
+def _promised(behaviour: int = 1, **changes: Any) -> Plant:
+    """Operational, and staying so whatever 8130h: the master, node 1, is both writers unless `changes` say more."""
+    plant = Plant(replace(PLAN, sdo_writer=LINE, **changes)).power_on()
+    plant.node.dictionary.write(0x1029, 1, bytes([behaviour]))
+    plant.hear(0, START)
+    plant.take()
+    return plant
+
+
+def _refused_for(plant: Plant) -> Reason | None:
+    last = plant.cell.last_refusal
+    return last.refusal.reason if last is not None else None
+
+
+@pytest.mark.parametrize("service", ["RPDO", "SDO", "lock"])
+def test_a_writer_that_never_tells_its_heartbeat_is_lost_after_the_time(service: str) -> None:
+    plant = _promised()
+    if service == "RPDO":
+        plant.part(7)
+    elif service == "SDO":
+        assert plant.write(0x2001, 1, 7) == 0
+    else:
+        assert plant.write(0x5F00, 26, PART + 1, 2) == 0
+    assert _emergencies(plant.run(0.49)) == []
+    assert plant.cell.ownership.owners == [LINE, None]
+    assert _emergencies(plant.run(0.02)) == [0x8130]
+    assert not _line_alive(plant)
+    assert plant.cell.ownership.owners == [None, None]
+    assert plant.cell.image.values[PART] == 0
+    assert plant.node.counters.communication_errors == 1
+
+
+@pytest.mark.parametrize(
+    "behaviour, state",
+    [(0, NmtState.PRE_OPERATIONAL), (1, NmtState.OPERATIONAL), (2, NmtState.STOPPED)],
+)
+def test_a_heartbeat_that_never_came_is_a_communication_error_like_a_lost_one(
+    behaviour: int, state: NmtState
+) -> None:
+    plant = _promised(behaviour)
+    plant.part(7)
+    plant.run(0.6)
+    assert (plant.state, _line_alive(plant)) == (state, False)
+
+
+def test_a_watched_node_that_uses_nothing_is_not_missed() -> None:
+    plant = _promised()
+    plant.hear(0x80)
+    assert _emergencies(plant.run(9.0)) == []
+
+
+def test_a_writer_that_promised_nothing_is_not_missed() -> None:
+    plant = Plant(replace(PLAN, consumers=(Consumer(MASTER, 500, None),))).operational()
+    plant.part(7)
+    assert _emergencies(plant.run(9.0)) == []
+    assert plant.cell.ownership.owners == [LINE, None]
+
+
+def test_what_a_lost_writer_goes_on_sending_is_refused_until_its_heartbeat_is_back() -> None:
+    plant = _promised()
+    plant.heartbeat()
+    plant.part(7)
+    plant.run(0.6)
+    seen = set()
+    told = []
+    for _ in range(20):
+        told += _emergencies(plant.part(7)) + _emergencies(plant.run(0.1))
+        seen.add(plant.cell.image.values[PART])
+        assert (plant.cell.writers.alive, plant.cell.writers.connections) == ([False, False], [0, 0])
+    assert (seen, told) == ({0}, [0xFF06])
+    assert plant.node.receive_pdos.refused == 20
+    assert plant.cell.ownership.owners == [None, None]
+    assert plant.read(0x5F00, 0x15) == Reason.HEARTBEAT_LOST
+    assert _emergencies(plant.heartbeat()) == []
+    assert _emergencies(plant.part(7)) == [0], "both errors have gone"
+    assert (plant.cell.image.values[PART], plant.cell.ownership.owners[0]) == (7, LINE)
+
+
+def test_sdo_of_a_lost_writer_reads_and_configures_but_neither_writes_nor_locks() -> None:
+    plant = _promised()
+    plant.part(7)
+    plant.run(0.6)
+    assert plant.write(0x2001, 1, 9) == -0x0800_0022
+    assert _refused_for(plant) is Reason.HEARTBEAT_LOST
+    assert plant.write(0x5F00, 26, PART + 1, 2) == -0x0800_0022
+    assert plant.write(0x5F00, 27, 0xFFFF, 2) == -0x0800_0022
+    assert plant.read(0x2001, 1) == 0
+    assert plant.write(0x1017, 0, 100, 2) == 0
+    assert not _line_alive(plant)
+    plant.heartbeat()
+    assert plant.write(0x2001, 1, 9) == 0
+
+
+def test_a_synchronous_rpdo_of_a_lost_writer_is_refused_and_not_kept() -> None:
+    plant = _promised()
+    plant.hear(0x305, CanType.REAL32.pack(2.5))
+    plant.run(0.6)
+    assert _emergencies(plant.hear(0x305, CanType.REAL32.pack(2.5))) == [0xFF06]
+    plant.heartbeat()
+    plant.hear(0x80)
+    assert plant.cell.image.values[SPEED] == 0.0
+
+
+def test_being_started_again_is_no_heartbeat() -> None:
+    """A lost heartbeat ends OPERATIONAL; the master that starts the node is not heard by that."""
+    plant = _promised(behaviour=0)
+    plant.part(7)
+    plant.run(0.6)
+    plant.hear(0, START)
+    assert plant.state is NmtState.OPERATIONAL
+    assert _emergencies(plant.part(7)) == [0xFF06]
+    assert plant.cell.image.values[PART] == 0
+
+
+@pytest.mark.parametrize("command", [RESET_NODE, RESET_COMMUNICATION])
+def test_after_a_reset_the_heartbeat_is_waited_for_anew(command: bytes) -> None:
+    plant = _promised()
+    plant.part(7)
+    plant.run(0.6)
+    plant.hear(0, command)
+    plant.hear(0, START)
+    plant.part(8)
+    assert plant.cell.image.values[PART] == 8
+    assert _emergencies(plant.run(0.6)) == [0x8130]
+    assert plant.cell.image.values[PART] == 0
+
+
+def test_a_deadline_that_was_missed_over_and_over_does_not_put_off_the_loss() -> None:
+    """A writer that comes and goes is believed for one heartbeat time, not for one at each return."""
+    first, *others = PLAN.pdos
+    plant = _promised(pdos=(replace(first, event=50), *others))
+    for _ in range(10):
+        plant.part(7)
+        plant.run(0.1)
+    assert plant.cell.last_refusal is not None
+    assert _refused_for(plant) is Reason.HEARTBEAT_LOST
+
+
+def test_a_master_that_restarts_before_its_first_heartbeat_is_lost_as_a_writer() -> None:
+    plant = _promised()
+    plant.part(7)
+    assert plant.heartbeat(0) == []
+    assert not _line_alive(plant)
+    assert _emergencies(plant.run(9.0)) == [], "it owes nothing before it is there again"
+
+
+def test_the_modbus_side_of_a_writer_is_not_bound_by_its_heartbeat() -> None:
+    """Its lock stays with the connection that is left, and moves for nothing that comes by CANopen."""
+    plant = _promised()
+    plant.cell.writer_connected(LINE, plant.now, "Modbus")
+    plant.part(7)
+    plant.run(0.6)
+    assert (_line_alive(plant), plant.cell.writers.connections) == (True, [1, 0])
+    assert plant.cell.ownership.owners == [LINE, None]
+    assert _emergencies(plant.part(8)) == [0xFF06]
+    assert plant.write(0x5F00, 27, PART + 1, 2) == -0x0800_0022
+    assert plant.cell.image.values[PART] == 7
+    assert plant.cell.write(LINE, [Change(PART, 9)], plant.now) is None
+    plant.cell.writer_disconnected(LINE, plant.now, "hung up")
+    assert plant.cell.ownership.owners == [None, None]
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_the_node_of_a_succeeding_cell_goes_on_with_what_is_owed_and_what_is_lost(lost: bool) -> None:
+    plant = _promised()
+    plant.part(7)
+    plant.run(0.6 if lost else 0.3)
+    former = plant.node
+    plant.cell = succeed(plant.cell, _CELL, plant.now).cell
+    plant.node = Node(former.plan, plant.cell, plant.wire.send, MemoryStore(), lambda _now: True)
+    plant.node.resume(former, plant.now)
+    plant.take()
+    plant.part(8)
+    assert plant.cell.image.values[PART] == (0 if lost else 8)
+    plant.run(0.3)
+    assert (_line_alive(plant), plant.cell.image.values[PART]) == (False, 0)
+    plant.part(8)
+    assert _refused_for(plant) is Reason.HEARTBEAT_LOST
+    plant.heartbeat()
+    plant.part(8)
+    assert plant.cell.image.values[PART] == 8
 
 
 # -- bus -------------------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Pd
 from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES, StatusObjects
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
+from gatewayd.core.refusal import Reason
 from gatewayd.core.status import FIELDS, LENGTH, RELEASE_ALL, TABLES, StatusBlock
 
 LINE, HMI = range(2)
@@ -51,7 +52,10 @@ class Node:
         self.cell = Cell(_definition())
         self.cell.robot_connected(0.0)
         self.cell.adopt(dict.fromkeys(range(COUNT), 0), 0.0)
-        self.dictionary = Dictionary(StatusObjects(self.cell, writer, lambda: self.now).objects())
+        self.heard = True
+        self.dictionary = Dictionary(
+            StatusObjects(self.cell, writer, lambda: self.now, lambda: self.heard).objects()
+        )
         self.subindices = {
             entry.name: entry.subindex
             for one in self.dictionary
@@ -103,9 +107,9 @@ def test_indices_are_fixed_and_apart() -> None:
         "quality": 0x5F40,
     }
     largest = Cell(_definition(1024, tuple(f"w{number}" for number in range(32))))
-    indices = [one.index for one in StatusObjects(largest, None, float).objects()]
+    indices = [one.index for one in StatusObjects(largest, None, float, bool).objects()]
     assert len(indices) == len(set(indices)) == 3 + 4 * 5
-    assert all(len(one.entries) <= 255 for one in StatusObjects(largest, None, float).objects())
+    assert all(len(one.entries) <= 255 for one in StatusObjects(largest, None, float, bool).objects())
 
 
 def test_every_word_is_that_of_the_block(node: Node) -> None:
@@ -146,7 +150,7 @@ def test_entries_are_named_after_variables_and_writers(node: Node) -> None:
 
 def test_a_cell_without_writers_has_no_table_of_them() -> None:
     bare = Cell(CellDefinition("bare", 1, (), (), (), 0.1))
-    assert [one.index for one in StatusObjects(bare, None, float).objects()] == [HEADER]
+    assert [one.index for one in StatusObjects(bare, None, float, bool).objects()] == [HEADER]
 
 
 def test_tables_are_read_only(node: Node) -> None:
@@ -191,3 +195,13 @@ def test_an_undeclared_sdo_client_takes_no_lock() -> None:
     node = Node(writer=None)
     assert node.put("request", 2) is AbortCode.READ_ONLY
     assert node.cell.health.writes_refused == 1
+
+
+def test_an_sdo_client_that_is_not_heard_moves_no_lock_and_reads_on(node: Node) -> None:
+    assert node.put("request", 2) is None
+    node.heard = False
+    assert node.put("request", 3) is AbortCode.DEVICE_STATE
+    assert node.put("release", 2) is AbortCode.DEVICE_STATE
+    assert node.put("release", RELEASE_ALL) is AbortCode.DEVICE_STATE
+    assert (node.entry("owner", 2), node.entry("owner", 3)) == (LINE + 1, 0)
+    assert node.field("refusal_reason") == Reason.HEARTBEAT_LOST

@@ -120,7 +120,10 @@ class Node:
     def __init__(self, plan: CanopenPlan = PLAN, definition: CellDefinition = DEFINITION) -> None:
         self.now = 1.0
         self.cell = Cell(definition)
-        self.dictionary = Dictionary(VariableObjects(plan, self.cell, lambda: self.now).objects())
+        self.heard = True
+        self.dictionary = Dictionary(
+            VariableObjects(plan, self.cell, lambda: self.now, lambda: self.heard).objects()
+        )
         self.server = SdoServer(self.dictionary)
 
     def connect(self) -> None:
@@ -163,7 +166,9 @@ def test_objects_are_arrays_by_index_named_as_in_the_mapping(node: Node) -> None
 
 def test_further_indices_of_a_type_are_numbered() -> None:
     first, second = (ObjectPlan(index, 0x2010 + index, 1, CanType.INTEGER32) for index in (PART, STRANGE))
-    objects = list(VariableObjects(replace(PLAN, objects=(first, second)), Cell(DEFINITION), float).objects())
+    objects = list(
+        VariableObjects(replace(PLAN, objects=(first, second)), Cell(DEFINITION), float, bool).objects()
+    )
     assert [one.name for one in objects] == ["Input INTEGER32", "Input INTEGER32 2"]
 
 
@@ -173,7 +178,7 @@ def test_an_index_of_several_types_is_a_record_and_one_of_subindex_0_a_variable(
         ObjectPlan(PART, 0x2100, 2, CanType.INTEGER32),
         ObjectPlan(CYCLES, 0x2101, 0, CanType.INTEGER32),
     )
-    objects = list(VariableObjects(replace(PLAN, objects=mixed), Cell(DEFINITION), float).objects())
+    objects = list(VariableObjects(replace(PLAN, objects=mixed), Cell(DEFINITION), float, bool).objects())
     assert [one.code for one in objects] == [ObjectCode.RECORD, ObjectCode.VAR]
     assert [one.name for one in objects] == ["Input BOOLEAN INTEGER32", "cycles"]
 
@@ -288,6 +293,10 @@ def claimed(node: Node) -> None:
     node.cell.set_availability([PART], False, "in use", node.now)
 
 
+def unheard(node: Node) -> None:
+    node.heard = False
+
+
 def nothing(_node: Node) -> None:
     pass
 
@@ -298,6 +307,9 @@ def nothing(_node: Node) -> None:
         pytest.param(nothing, 0x2010, 2, bytes(4), AbortCode.READ_ONLY, Reason.NOT_WRITABLE, id="never"),
         pytest.param(held, 0x2010, 1, bytes(4), AbortCode.LOCAL_CONTROL, Reason.HELD, id="held"),
         pytest.param(lost, 0x2010, 1, bytes(4), AbortCode.DEVICE_STATE, Reason.ROBOT_LOST, id="robot lost"),
+        pytest.param(
+            unheard, 0x2010, 1, bytes(4), AbortCode.DEVICE_STATE, Reason.HEARTBEAT_LOST, id="not heard"
+        ),
         pytest.param(
             claimed, 0x2010, 1, bytes(4), AbortCode.DEVICE_STATE, Reason.CLAIMED_ELSEWHERE, id="claimed"
         ),

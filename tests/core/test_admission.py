@@ -26,9 +26,11 @@ class Desk:
         self.ownership = LockTable(press.locks)
         self.admission = Admission(press.variables, self.ownership, self.image)
 
-    def judge(self, writer: int | None, *changes: Change, adopted: bool = True) -> Verdict:
+    def judge(
+        self, writer: int | None, *changes: Change, adopted: bool = True, heard: bool = True
+    ) -> Verdict:
         before = copy.deepcopy((self.image.values, self.image.quality, self.ownership.owners))
-        verdict = self.admission.judge(writer, changes, adopted=adopted)
+        verdict = self.admission.judge(writer, changes, adopted=adopted, heard=heard)
         assert before == (self.image.values, self.image.quality, self.ownership.owners)
         return verdict
 
@@ -137,3 +139,26 @@ def test_the_quick_way_comes_to_the_same_as_the_thorough_one(
             one.image.set_available(index, available=False)
     # As texts: NaN equals nothing, itself included.
     assert repr(desk.judge(writer, *changes)) == repr(thorough.judge(writer, *changes))
+
+
+def test_who_is_not_heard_is_refused_by_his_first_variable_unless_it_can_never_work(desk: Desk) -> None:
+    desk.ownership.apply(2, PLC, Move.ACQUIRE, 0.0)
+    force, held, wild = Change(FORCE, 1.0), Change(PART, 1), Change(SPEED, 2.0)
+    lost = Refusal(Reason.HEARTBEAT_LOST, FORCE)
+    assert desk.judge(HMI, force, held, heard=False).refusal == lost
+    assert desk.judge(HMI, force, held, heard=False, adopted=False).refusal == lost
+    assert desk.judge(HMI, force, wild, heard=False).refusal == Refusal(Reason.OUT_OF_LIMITS, SPEED)
+    assert desk.judge(None, force, heard=False).refusal == Refusal(Reason.NOT_WRITABLE, FORCE)
+    assert desk.judge(HMI, heard=False).refusal == Refusal(Reason.HEARTBEAT_LOST)
+
+
+def test_not_even_an_unchanged_implied_bit_passes_from_who_is_not_heard(desk: Desk) -> None:
+    desk.ownership.apply(1, PLC, Move.ACQUIRE, 0.0)
+    verdict = desk.judge(HMI, Change(LAMP, False, implied=True), heard=False)
+    assert verdict.refusal == Refusal(Reason.HEARTBEAT_LOST, LAMP)
+
+
+def test_who_owns_it_all_has_to_be_heard_as_well(desk: Desk) -> None:
+    desk.ownership.apply(2, PLC, Move.ACQUIRE, 0.0)
+    assert desk.judge(PLC, Change(PART, 1)).refusal is None
+    assert desk.judge(PLC, Change(PART, 1), heard=False).refusal == Refusal(Reason.HEARTBEAT_LOST, PART)

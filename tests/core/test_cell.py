@@ -222,6 +222,37 @@ def test_a_register_claimed_elsewhere_costs_what_depends_on_it(cell: Cell) -> No
     assert write(cell, PLC, FORCE, 1.0, 1.0) is None
 
 
+# -- a writer that is not heard ----------------------------------------------------------------------------------
+
+
+def test_what_is_not_heard_moves_no_lock_and_makes_nobody_alive(cell: Cell) -> None:
+    assert cell.write(PLC, [Change(PART, 5)], 1.0, heard=False) == Refusal(Reason.HEARTBEAT_LOST, PART)
+    assert cell.request(PLC, PART, 1.0, heard=False) == Refusal(Reason.HEARTBEAT_LOST, PART)
+    assert cell.release(PLC, PART, 1.0, heard=False) == Refusal(Reason.HEARTBEAT_LOST, PART)
+    assert owner(cell, 2) is None
+    assert not cell.writers.alive[PLC]
+    assert cell.image.values[PART] != 5
+    assert cell.health.writes_refused == 3
+    assert [event.reason for event in told(cell, EventKind.REFUSED)] == [Reason.HEARTBEAT_LOST]
+
+
+def test_what_is_not_heard_neither_renews_nor_gives_back_what_another_link_holds(cell: Cell) -> None:
+    write(cell, PLC, PART, 5, 1.0)
+    for now, lost in ((2.0, False), (2.5, True)):
+        if lost:
+            cell.robot_lost("unplugged", now)
+        refusal = cell.write(PLC, [Change(PART, 6)], now, heard=False)
+        assert refusal == Refusal(Reason.HEARTBEAT_LOST, PART)
+    assert cell.release(PLC, PART, 2.5, heard=False) is not None
+    assert owner(cell, 2) == PLC
+    cell.tick(3.0)
+    assert owner(cell, 2) is None, "the lease of its last accepted write has ended"
+
+
+def test_who_may_never_own_it_is_told_that_first(cell: Cell) -> None:
+    assert cell.request(HMI, START, 1.0, heard=False) == Refusal(Reason.NOT_WRITABLE, START)
+
+
 # -- releasing ---------------------------------------------------------------------------------------------------
 
 

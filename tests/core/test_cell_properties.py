@@ -108,12 +108,14 @@ LOCK_OF = {member: number for number, lock in enumerate(LOCKS) for member in loc
 TELLING_ORDER = [
     Reason.NOT_WRITABLE,
     Reason.OUT_OF_LIMITS,
+    Reason.HEARTBEAT_LOST,
     Reason.ROBOT_LOST,
     Reason.CLAIMED_ELSEWHERE,
     Reason.HELD,
 ]
 
 writers = st.integers(0, 3)
+mostly = st.sampled_from([True, True, True, False])
 anybody = st.one_of(st.none(), writers)
 steps = st.sampled_from([0.0, 0.125, 0.25, 0.5])
 numbers = st.sampled_from([0, 1, -6, -5, 10, 11, 2**31 - 1, 2**31, True, 1.0, 1.5, math.nan])
@@ -280,10 +282,12 @@ class Model:
         own_or_free = self.may(writer, index) and self.owner[LOCK_OF[index]] in (None, writer)
         return self.untouched(change) and not own_or_free
 
-    def write(self, writer: int | None, request: list[Change], now: float) -> Refusal | None:
+    def write(self, writer: int | None, request: list[Change], now: float, *, heard: bool) -> Refusal | None:
         self.expire(now)
-        self.hear(writer, now)
+        self.hear(writer if heard else None, now)
         refusals = [refusal for change in request if (refusal := self.judge(writer, change)) is not None]
+        if not heard:
+            refusals.append(Refusal(Reason.HEARTBEAT_LOST, request[0].variable))
         if refusals:
             refusal = min(refusals, key=lambda one: TELLING_ORDER.index(one.reason))
             if refusal.reason is Reason.ROBOT_LOST and writer is not None:
@@ -312,11 +316,13 @@ class Model:
         self.last = (refusal, writer, now)
         return refusal
 
-    def act(self, writer: int | None, index: int, now: float, *, take: bool) -> Refusal | None:
+    def act(self, writer: int | None, index: int, now: float, *, take: bool, heard: bool) -> Refusal | None:
         self.expire(now)
-        self.hear(writer, now)
+        self.hear(writer if heard else None, now)
         if writer is None or not self.may(writer, index):
             return self.refuse(writer, Refusal(Reason.NOT_WRITABLE, index), now)
+        if not heard:
+            return self.refuse(writer, Refusal(Reason.HEARTBEAT_LOST, index), now)
         lock = LOCK_OF[index]
         holder = self.owner[lock]
         if holder in (None, writer) or (take and self.outranks(writer, lock)):
@@ -457,9 +463,12 @@ class CellMachine(RuleBasedStateMachine):
 
     # Writers.
 
-    @rule(writer=anybody, request=changes())
-    def write(self, writer: int | None, request: list[Change]) -> None:
-        self.both(lambda c: c.write(writer, request, self.now), lambda m: m.write(writer, request, self.now))
+    @rule(writer=anybody, request=changes(), heard=mostly)
+    def write(self, writer: int | None, request: list[Change], heard: bool) -> None:
+        self.both(
+            lambda c: c.write(writer, request, self.now, heard=heard),
+            lambda m: m.write(writer, request, self.now, heard=heard),
+        )
         assert not self.ended_leases()
 
     @rule(data=st.data(), index=st.sampled_from(INPUTS), value=st.sampled_from([0, 1]), implied=st.booleans())
@@ -467,17 +476,27 @@ class CellMachine(RuleBasedStateMachine):
         """Owners on one variable, so that they meet."""
         kind = (bool, int, float)[VARIABLES[index].kind]
         self.write(
-            data.draw(st.sampled_from(LOCKS[LOCK_OF[index]].owners)), [Change(index, kind(value), implied)]
+            data.draw(st.sampled_from(LOCKS[LOCK_OF[index]].owners)),
+            [Change(index, kind(value), implied)],
+            heard=data.draw(mostly),
         )
 
-    @rule(writer=anybody, index=st.integers(0, len(VARIABLES) - 1), take=st.booleans(), by_word=st.booleans())
-    def ask(self, writer: int | None, index: int, take: bool, by_word: bool) -> None:
+    @rule(
+        writer=anybody,
+        index=st.integers(0, len(VARIABLES) - 1),
+        take=st.booleans(),
+        by_word=st.booleans(),
+        heard=mostly,
+    )
+    def ask(self, writer: int | None, index: int, take: bool, by_word: bool, heard: bool) -> None:
         """Directly, or through the words of the status block."""
         if by_word and writer is not None:
-            refusal = self.status.write(writer, REQUEST if take else RELEASE, [index + 1], self.now)
+            word = REQUEST if take else RELEASE
+            refusal = self.status.write(writer, word, [index + 1], self.now, heard=heard)
         else:
-            refusal = (self.cell.request if take else self.cell.release)(writer, index, self.now)
-        assert refusal == self.model.act(writer, index, self.now, take=take)
+            act = self.cell.request if take else self.cell.release
+            refusal = act(writer, index, self.now, heard=heard)
+        assert refusal == self.model.act(writer, index, self.now, take=take, heard=heard)
 
     @rule(writer=writers)
     def release_all(self, writer: int) -> None:

@@ -12,6 +12,7 @@ def test_the_numbers_of_the_status_block_stay() -> None:
         ("PARTIAL_VALUE", 5),
         ("ROBOT_LOST", 6),
         ("CLAIMED_ELSEWHERE", 7),
+        ("HEARTBEAT_LOST", 8),
     ]
 
 
@@ -21,8 +22,12 @@ def test_every_reason_has_a_text_and_a_place_of_its_own() -> None:
 
 
 def test_what_can_never_work_is_told_before_what_may_pass() -> None:
-    passing = {Reason.ROBOT_LOST, Reason.CLAIMED_ELSEWHERE, Reason.HELD}
-    assert set(sorted(Reason, key=PRECEDENCE.__getitem__)[-3:]) == passing
+    passing = {Reason.HEARTBEAT_LOST, Reason.ROBOT_LOST, Reason.CLAIMED_ELSEWHERE, Reason.HELD}
+    assert set(sorted(Reason, key=PRECEDENCE.__getitem__)[-4:]) == passing
+
+
+def test_who_is_not_heard_is_told_so_before_what_would_leave_him_his_lease() -> None:
+    assert all(PRECEDENCE[Reason.HEARTBEAT_LOST] < PRECEDENCE[reason] for reason in Reason if reason.renews)
 
 
 def test_only_a_lost_robot_leaves_an_owner_its_lease() -> None:

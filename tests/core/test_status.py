@@ -179,3 +179,12 @@ def test_what_cannot_be_asked_is_refused_counted_and_changes_nothing(
     assert refusal.reason is reason
     assert cell.health.writes_refused == 1
     assert cell.ownership.owners == [None] * 5
+
+
+@pytest.mark.parametrize("offset, word", [(REQUEST, PART + 1), (RELEASE, PART + 1), (RELEASE, RELEASE_ALL)])
+def test_locks_move_for_nobody_that_is_not_heard(cell: Cell, offset: int, word: int) -> None:
+    cell.request(HMI, PART, 0.5)
+    refusal = StatusBlock(cell).write(HMI, offset, [word], 1.0, heard=False)
+    assert refusal is not None
+    assert refusal.reason is Reason.HEARTBEAT_LOST
+    assert cell.ownership.held_by(HMI) == [cell.definition.variables[PART].lock]

@@ -245,6 +245,7 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.WRITE_ROBOT_LOST: "an RPDO was dropped: the robot is not connected",
     ErrorCode.WRITE_CLAIMED_ELSEWHERE: "an RPDO was dropped: the controller gave a register to another client",
     ErrorCode.WRITE_NEVER: "an RPDO was dropped: this writer may never write a variable of it",
+    ErrorCode.WRITE_HEARTBEAT_LOST: "an RPDO was dropped: the heartbeat that its writer promised stays away",
 }
 
 

@@ -103,6 +103,19 @@ class Master:
             pdo.transmit()
         return len(touched)
 
+    def repeat(self, values: dict[str, Any], period: float) -> int:
+        """Set mapped objects and send their RPDOs every `period` seconds from now on; how many those are."""
+        chosen = []
+        for pdo in self._node.rpdo.values():
+            ours = [one for one in pdo.map if self._key(one) in values]
+            for one in ours:
+                one.raw = values[self._key(one)]
+            if ours:
+                chosen.append(pdo)
+        for pdo in chosen:
+            pdo.start(period)
+        return len(chosen)
+
     def read(self, index: int, subindex: int) -> Any:
         """Upload: the value; or the abort code as text."""
         return self._sdo(lambda: self._entry(index, subindex).raw)

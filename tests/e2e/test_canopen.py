@@ -64,7 +64,7 @@ COMMAND, SETPOINT, KEPT, CLEARED, HELD, VALUED, EXCEPTED = (
     "2420:2",
 )
 NOBODY, THE_PLC, THE_MASTER = 0, 1, 2
-CAN_BUS, NMT_STATE, HEARTBEAT = 27, 28, 4
+CAN_BUS, NMT_STATE, HEARTBEAT, REFUSED, MASTER_ALIVE = 27, 28, 4, 23, 128 + THE_MASTER - 1
 """Words of the status block."""
 ABSENT, ACTIVE = 1, 6
 OPERATIONAL, PRE_OPERATIONAL = 5, 127
@@ -74,12 +74,14 @@ LOCAL_CONTROL, DEVICE_STATE = "08000021", "08000022"
 class Cell:
     """Everything that runs."""
 
-    def __init__(self, plant: Plant, text: str) -> None:
+    def __init__(self, plant: Plant, text: str, *, beats: bool = True) -> None:
+        """Without `beats` nobody has heard the master yet."""
         self.plant = plant
         self.bus, self.port = start_bus(plant)
         self.simulator: Simulator = plant.simulator()
         self.mapping: Path = plant.mapping(text.format(port=self.port), self.simulator.port)
         self.master: Master = start_master(plant, self.mapping, "slcan", f"socket://{HOST}:{self.port}")
+        self.master.ask("beat", beats)
         self.daemon: Daemon = plant.daemon(self.mapping, "--state", plant.directory)
         self.plc: Plc = plant.ready_plc()
         self.master.becomes(OPERATIONAL)
@@ -300,4 +302,72 @@ def test_everything_that_can_be_lost_is_lost_and_comes_back(plant: Plant) -> Non
     master.ask("inputs", {COMMAND: 5})
     wait_for(lambda: simulator.integer("input_int_register_0") == 5, "the master's value again")
     wait_for(lambda: master.output(CLEARED) == 5, "its echo")
+    assert "Traceback" not in cell.daemon.text()
+
+
+def _stays_locked_out(cell: Cell) -> None:
+    """While 50 RPDOs are refused, nothing of the master is seen: no value, no owner, no life, no fallback."""
+    plc, told = cell.plc, len(cell.daemon.lines("fallback applied", "variable=command"))
+    first, seen = plc.status(REFUSED), set()
+
+    def refused() -> bool:
+        seen.add((cell.robot("input_int_register_0")[0], plc.owner(1), plc.status(MASTER_ALIVE)))
+        return plc.status(REFUSED) >= first + 50
+
+    took = wait_for(refused, "50 refused RPDOs")
+    print(f"locked out for {took:.1f} s, {len(seen)} pictures seen")
+    assert seen == {(0, NOBODY, 0)}
+    assert len(cell.daemon.lines("fallback applied", "variable=command")) == told
+    assert plc.refusal == (8, 1, THE_MASTER, NOBODY)
+
+
+def test_a_master_is_believed_only_while_its_promised_heartbeat_is_heard(plant: Plant) -> None:
+    cell = Cell(plant, SMALL, beats=False)
+    master, plc, simulator = cell.master, cell.plc, cell.simulator
+
+    # It never tells a heartbeat: one RPDO, and the lock without a lease is not its own for ever.
+    assert master.ask("inputs", {COMMAND: 7, KEPT: 8}) == 1
+    wait_for(lambda: simulator.integer("input_int_register_0") == 7, "its value")
+    took = wait_for(lambda: plc.owner(1) == NOBODY, "the loss of the master")
+    print(f"first sign, heartbeat time 1 s -> lost: {took * 1000:.0f} ms")
+    wait_for(lambda: simulator.integer("input_int_register_0") == 0, "the fallback")
+    assert simulator.integer("input_int_register_1") == 8, "on_release: hold"
+    assert master.emergency(0x8130) == (0x8130, 0x11, "0100000000")
+    cell.daemon.wait_for_line("writer lost", "writer=master", "no heartbeat of node 1")
+    assert plc.status(NMT_STATE) == PRE_OPERATIONAL
+
+    # It starts the node and goes on. Nothing is taken; reading is allowed.
+    master.ask("nmt", "OPERATIONAL")
+    wait_for(lambda: plc.status(NMT_STATE) == OPERATIONAL, "the master's start")
+    assert master.ask("repeat", {COMMAND: 9, KEPT: 10}, 0.02) == 1
+    assert master.emergency(0xFF06)[1] == 0x91, "beside the lost heartbeat"
+    _stays_locked_out(cell)
+    assert master.ask("write", 0x2010, 1, 9) == DEVICE_STATE
+    request, release = _lock_words(master)
+    assert master.ask("write", 0x5F00, request, 2) == DEVICE_STATE
+    assert master.ask("write", 0x5F00, release, 0xFFFF) == DEVICE_STATE
+    assert master.ask("read", 0x2010, 1) == 0
+    cell.daemon.wait_for_line(
+        "write refused", "variable=command", "writer=master", "its heartbeat stays away"
+    )
+    assert plc.write_integers(0, 1) == 0, "others go on"
+    assert plc.release(1) == 0
+
+    # Heard, it writes. Then its heartbeat stops, and its RPDOs do not.
+    assert master.ask("write", 0x1029, 1, 1) is None
+    master.ask("beat", True)
+    wait_for(lambda: cell.robot("input_int_register_0", "input_int_register_1") == [9, 10], "its values")
+    master.emergency(0)
+    assert (plc.owner(1), plc.status(MASTER_ALIVE)) == (THE_MASTER, 1)
+    master.ask("beat", False)
+    took = wait_for(lambda: plc.owner(1) == NOBODY, "the loss of the master")
+    print(f"heartbeat stops, RPDOs go on -> lost: {took * 1000:.0f} ms")
+    wait_for(lambda: simulator.integer("input_int_register_0") == 0, "the fallback")
+    assert plc.status(NMT_STATE) == OPERATIONAL, "1029h = 1"
+    master.emergency(0xFF06)
+    _stays_locked_out(cell)
+    master.ask("beat", True)
+    wait_for(lambda: cell.robot("input_int_register_0") == [9], "its value again")
+    master.emergency(0)
+    assert plc.owner(1) == THE_MASTER
     assert "Traceback" not in cell.daemon.text()

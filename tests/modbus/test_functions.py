@@ -32,6 +32,7 @@ def test_every_reason_has_its_exception() -> None:
         "PARTIAL_VALUE": 0x03,
         "ROBOT_LOST": 0x0B,
         "CLAIMED_ELSEWHERE": 0x0A,
+        "HEARTBEAT_LOST": 0x0B,
     }
 
 

@@ -8,10 +8,11 @@ with the next SYNC, if its writer still lives. Both only in OPERATIONAL.
 | shorter than the mapping | dropped | 8210h |
 | longer than the mapping | its first bytes are used | 8220h |
 | none for the event time, after a first one | | 8250h |
-| the cell refuses the write | dropped | FF01h-FF05h by reason |
+| the cell refuses the write | dropped | FF01h-FF06h by reason |
 
 Each fault is told once per PDO. It is cleared by the opposite: a frame of the right length, any usable frame, a write
-that succeeds; and when the PDO is no longer received (configured anew, OPERATIONAL left).
+that succeeds; and when the PDO is no longer received (configured anew, OPERATIONAL left). While the writer's heartbeat
+stays away its frames are refused as they come, whatever the type: none is kept for SYNC.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ class Fault(Enum):
     ROBOT_LOST = 0xFF03
     CLAIMED_ELSEWHERE = 0xFF04
     NOT_WRITABLE = 0xFF05
+    HEARTBEAT_LOST = 0xFF06
 
     @property
     def is_refusal(self) -> bool:
@@ -52,6 +54,7 @@ _FAULTS: Final = {
     Reason.ROBOT_LOST: Fault.ROBOT_LOST,
     Reason.CLAIMED_ELSEWHERE: Fault.CLAIMED_ELSEWHERE,
     Reason.NOT_WRITABLE: Fault.NOT_WRITABLE,
+    Reason.HEARTBEAT_LOST: Fault.HEARTBEAT_LOST,
 }
 """The reasons that a write of whole, mapped variables can be refused for."""
 
@@ -91,8 +94,8 @@ class ReceiveEngine:
     """All RPDOs of a node.
 
     They write as `writer`; None stands for nobody, and every write is refused. Each frame of the right length is a
-    sign of life of the writer, whether its write is refused or not. `raised` and `cleared` are told of each fault of
-    each PDO; a fault of one PDO may have been cleared while `standing` still has it for another.
+    sign of life of the writer if it is heard, whether its write is refused or not. `raised` and `cleared` are told of
+    each fault of each PDO; a fault of one PDO may have been cleared while `standing` still has it for another.
     """
 
     def __init__(self, cell: Cell, writer: int | None, raised: Tell, cleared: Tell) -> None:
@@ -158,15 +161,15 @@ class ReceiveEngine:
             self._clear(pdo, tuple(pdo.faults), now)
         self._deadline = math.inf
 
-    def receive(self, can_id: int, data: bytes, now: float) -> bool:
-        """A data frame. Returns whether an RPDO has this identifier."""
+    def receive(self, can_id: int, data: bytes, now: float, *, heard: bool = True) -> bool:
+        """A data frame. Returns whether an RPDO has this identifier. `heard` is as in `Cell.write`."""
         pdos = self._by_can_id.get(can_id)
         if pdos is None:
             return False
         self._now = now
         if self.is_operational:
             for pdo in pdos:
-                self._take(pdo, data, now)
+                self._take(pdo, data, now, heard=heard)
         return True
 
     def on_sync(self, now: float) -> None:
@@ -204,7 +207,7 @@ class ReceiveEngine:
 
     # -- inside --------------------------------------------------------------------------------------------------
 
-    def _take(self, pdo: ReceivePdo, data: bytes, now: float) -> None:
+    def _take(self, pdo: ReceivePdo, data: bytes, now: float, *, heard: bool) -> None:
         self.received += 1
         pdo.received += 1
         if len(data) != pdo.size and not self._use_long(pdo, data, now):
@@ -221,13 +224,13 @@ class ReceiveEngine:
             pdo.due = now + event
             if self._deadline is not None:
                 self._deadline = min(self._deadline, pdo.due)
-        if self._writer is not None:
+        if self._writer is not None and heard:
             self._cell.writer_seen(self._writer, now)
         data = data[: pdo.size]
-        if pdo.configuration.is_synchronous:
+        if pdo.configuration.is_synchronous and heard:
             pdo.latched = data
         else:
-            self._write(pdo, data, now)
+            self._write(pdo, data, now, heard=heard)
 
     def _use_long(self, pdo: ReceivePdo, data: bytes, now: float) -> bool:
         """Tell of a wrong length. Returns whether the frame can be used all the same."""
@@ -236,13 +239,13 @@ class ReceiveEngine:
         self._raise(pdo, Fault.LONG if is_long else Fault.SHORT, now)
         return is_long
 
-    def _write(self, pdo: ReceivePdo, data: bytes, now: float) -> None:
+    def _write(self, pdo: ReceivePdo, data: bytes, now: float, *, heard: bool = True) -> None:
         changes = pdo.meaning(data)
         if isinstance(changes, Refusal):
             refusal: Refusal | None = changes
             self._cell.refuse(self._writer, changes, now)
         else:
-            refusal = self._cell.write(self._writer, changes, now)
+            refusal = self._cell.write(self._writer, changes, now, heard=heard)
         if refusal is not None:
             self.refused += 1
             self._raise(pdo, _FAULTS[refusal.reason], now)

@@ -337,7 +337,8 @@ def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "a watched heartbeat without a node, a time, or CANopen",
     """
 The heartbeat of a CANopen writer is watched when both are known: `node`, its node-ID, and `heartbeat`, the time
-after which it is lost. The time must be longer than the heartbeat time of the device, better twice as long.
+after which it is lost. The time must be longer than the heartbeat time of the device, better twice as long. A writer
+that never tells its heartbeat is lost so long after its first PDO or SDO request.
 """,
 )
 def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

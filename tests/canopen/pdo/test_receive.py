@@ -41,9 +41,9 @@ class Receiver:
         parameters = {"number": number, "can_id": 0x205, **parameters}
         self.engine.configure(number, self.bench.configuration(Direction.INPUT, names, **parameters))
 
-    def receive(self, data: str, after: float = 0.0, can_id: int = 0x205) -> list[str]:
+    def receive(self, data: str, after: float = 0.0, can_id: int = 0x205, *, heard: bool = True) -> list[str]:
         """What was told of this frame."""
-        self.engine.receive(can_id, bytes.fromhex(data), T + after)
+        self.engine.receive(can_id, bytes.fromhex(data), T + after, heard=heard)
         return self.take()
 
     def take(self) -> list[str]:
@@ -297,3 +297,17 @@ def test_bits_beyond_the_mapping_in_the_last_byte_mean_nothing(bench: Bench) -> 
     receiver = Receiver(bench, "in_bit_0", "in_bit_1", "in_bit_2")
     assert receiver.receive("fa") == []
     assert [receiver.value(f"in_bit_{bit}") for bit in range(4)] == [False, True, False, False]
+
+
+@pytest.mark.parametrize("transmission", [1, 255])
+def test_rpdo_of_a_writer_that_is_not_heard_is_refused_as_it_comes(bench: Bench, transmission: int) -> None:
+    receiver = Receiver(bench, "in_int_0", transmission=transmission)
+    assert receiver.receive("01000000", heard=False) == ["+HEARTBEAT_LOST 1"]
+    assert receiver.receive("02000000", heard=False) == []
+    receiver.engine.on_sync(T)
+    assert (receiver.value("in_int_0"), receiver.engine.refused) == (0, 2)
+    assert not bench.cell.writers.alive[LINE]
+    told = receiver.receive("03000000")
+    receiver.engine.on_sync(T)
+    assert told + receiver.take() == ["-HEARTBEAT_LOST 1"]
+    assert receiver.value("in_int_0") == 3
