@@ -202,7 +202,7 @@ class StatusBlock:
         offset, number = wanted[0]
         if offset == RELEASE and number == RELEASE_ALL:
             if not heard:
-                return self._refuse(writer, Reason.HEARTBEAT_LOST, now)
+                return self._refuse(writer, Refusal(Reason.HEARTBEAT_LOST), now)
             cell.release_all(writer, now)
             return None
         if len(wanted) > 1 or number > len(cell.definition.variables):
