@@ -30,7 +30,7 @@ class Wire:
         self.now = 0.0
         self.lost: Callable[[bool, bytes], bool] = lambda _by_client, _frame: False
         self.client: Any = cast("Any", SdoClient)(0x601, 0x581, canopen.ObjectDictionary())  # type: ignore[no-untyped-call]
-        self.client.RESPONSE_TIMEOUT = 0.01
+        self.client.RESPONSE_TIMEOUT = 0.1
         self.client.network = self
 
     def send_message(self, _can_id: int, data: bytes, _remote: bool = False) -> None:

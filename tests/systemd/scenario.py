@@ -36,6 +36,9 @@ TURNED = MORE.replace("output_int_register_0", "input_int_register_1")
 """A value that the PLC reads becomes one that it writes."""
 BROKEN = MAPPING + "  cycles: {robot: output_int_register_0, modbus: 100}\n"
 
+BROKEN_OTHERWISE = MAPPING + "  other:  {robot: no_such_register, modbus: 120}\n"
+"""Another mistake, so that its reason in the status is not the one that stands there already."""
+
 DPKG = (
     "dpkg --force-unsafe-io --force-confold "
     # A third of the files, which the service never opens.
@@ -266,8 +269,10 @@ def reload_with_a_mistake() -> Facts:
     (MAPPINGS / "press-3.yaml").write_text(BROKEN)
     done = timed("systemctl reload gatewayd")
     after = show()
+    (MAPPINGS / "press-3.yaml").write_text(BROKEN_OTHERWISE)
     os.kill(int(before["MainPID"]), signal.SIGHUP)
-    told = wait_for(lambda: "reload" in show()["StatusText"])
+    told = wait_for(lambda: "no_such_register" in show()["StatusText"])
+    wait_for(lambda: show()["ActiveState"] == "active")
     found = {
         **done,
         "before": before,
@@ -302,6 +307,7 @@ def reload_without_control_socket() -> Facts:
     sh("systemctl daemon-reload")
     done = timed("systemctl reload gatewayd")
     told = wait_for(lambda: "reload" not in show()["StatusText"])
+    wait_for(lambda: show()["ActiveState"] == "active")
     (drop_in / example.name).unlink()
     drop_in.rmdir()
     sh("systemctl daemon-reload")
