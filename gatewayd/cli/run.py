@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import os
 import signal
@@ -109,12 +108,8 @@ def command(
     """
     from gatewayd.logs import Format, configure
     from gatewayd.logstream import LogStream
-    from gatewayd.status.launch import Settings, SettingsError
 
-    try:
-        page = Settings(status, token_file) if status else None
-    except SettingsError as error:
-        raise click.UsageError(str(error)) from error
+    page = _settings(status, token_file) if status else None
     stream = LogStream(_descriptor())
     configure(Format(log_format), logging.getLevelNamesMapping()[log_level.upper()], stream)
     try:
@@ -124,6 +119,16 @@ def command(
         return _run(found, files, state, page=page, control=control, audit=audit)
     finally:
         stream.close()
+
+
+def _settings(status: str, token_file: Path | None) -> Settings:
+    # Its import brings the daemon's, which otherwise happens while the mapping files are read.
+    from gatewayd.status.launch import Settings, SettingsError
+
+    try:
+        return Settings(status, token_file)
+    except SettingsError as error:
+        raise click.UsageError(str(error)) from error
 
 
 def _descriptor() -> int:
@@ -157,6 +162,8 @@ def _run(
     control: Path | None,
     audit: Path | None,
 ) -> int:
+    import asyncio
+
     from gatewayd.daemon import Daemon
     from gatewayd.startup import state_directory
 
@@ -207,6 +214,8 @@ async def _serve(
     control: Path | None,
     audit: Path | None,
 ) -> None:
+    import asyncio
+
     from gatewayd.operation import Operation
     from gatewayd.reload import Reloader
     from gatewayd.service import Service
