@@ -189,7 +189,7 @@ class Reloader:
         return outcome
 
     async def _reload(self, *, force: bool) -> Outcome:
-        files = mapping_files(self._paths)
+        files = await asyncio.to_thread(mapping_files, self._paths)
         if not files:
             return Outcome(Result.FAILED, (f"no mapping file in {', '.join(map(str, self._paths))}",))
         try:

@@ -26,7 +26,7 @@ from gatewayd.canopen.storage import Store
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.logs import fields
-from gatewayd.turning import TURN, turning
+from gatewayd.turning import turning
 
 __all__ = ["CORE_TIME", "GAP", "LOSS_INTERVAL", "RETRY", "CanLink"]
 
@@ -212,12 +212,11 @@ class CanLink(Observer):
 
     async def _turn_until(self, moment: float) -> None:
         """Wait for that moment, or for a switch of the bit rate, and count meanwhile."""
-        while not self._switching.is_set() and (rest := moment - time.monotonic()) > 0:
-            self._turn()
-            # Not wait_for: Python 3.11's can swallow a cancellation that comes with the time-out.
-            with suppress(TimeoutError):
-                async with asyncio.timeout(min(rest, TURN)):
-                    await self._switching.wait()
+        rest = moment - time.monotonic()
+        # Not wait_for: Python 3.11's can swallow a cancellation that comes with the time-out.
+        with suppress(TimeoutError):
+            async with asyncio.timeout(None if rest == math.inf else rest):
+                await turning(self._switching.wait(), self._turn, math.inf)
 
     async def _open(self, bit_rate: int) -> None:
         """Open the bus; a set-up that cannot work is told once and tried again, in case it is repaired."""

@@ -57,9 +57,10 @@ class Admission:
         writer was declared for: it may write nothing. One that is not `heard` has promised a heartbeat that stays away:
         nothing of its request is applied, not even what would change nothing.
         """
-        verdict = Verdict()
-        if writer is not None and adopted and heard and self._pass(writer, changes, verdict):
-            return verdict
+        if writer is not None and adopted and heard:
+            usual = self._usual(writer, changes)
+            if usual is not None:
+                return usual
         verdict = Verdict()
         for change in changes:
             refusal = (
@@ -73,25 +74,26 @@ class Admission:
             verdict.refusal = _graver(verdict.refusal, Refusal(Reason.HEARTBEAT_LOST, first))
         return verdict
 
-    def _pass(self, writer: int, changes: Sequence[Change], verdict: Verdict) -> bool:
-        """The usual request: its writer owns all of it, and nothing stands in the way. False: it has to be judged.
+    def _usual(self, writer: int, changes: Sequence[Change]) -> Verdict | None:
+        """The usual request: its writer owns all of it, and nothing stands in the way. None: it has to be judged.
 
         What `_judge` would come to as well, change by change, in a quarter of the time.
         """
         locks, unlimited, variables = self._locks, self._unlimited, self._variables
         owners, available = self._ownership.owners, self._image.available
+        verdict = Verdict()
         values, moves = verdict.values, verdict.moves
         for change in changes:
             index = change.variable
             lock = locks[index]
             if lock is None or owners[lock] != writer or not available[index]:
-                return False
+                return None
             value = change.value if unlimited[index] else within(variables[index], change.value)
             if value is None:
-                return False
+                return None
             values.append((index, value))
             moves[lock] = Move.RENEW
-        return True
+        return verdict
 
     def _judge(self, writer: int, change: Change, verdict: Verdict, *, adopted: bool) -> Refusal | None:
         index = change.variable

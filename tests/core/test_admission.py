@@ -97,8 +97,8 @@ def test_an_explicit_bit_takes_over_even_unchanged(desk: Desk) -> None:
 class Thorough(Admission):
     """Judges every request change by change."""
 
-    def _pass(self, *_arguments: object) -> bool:
-        return False
+    def _usual(self, *_arguments: object) -> None:
+        return None
 
 
 def _requests() -> st.SearchStrategy[list[Change]]:
