@@ -1,4 +1,4 @@
-"""What all tests share: how hypothesis behaves.
+"""What all tests share: how hypothesis behaves, and a plant of real processes.
 
 The ordinary profile makes the same examples every time, so a red run can be repeated; `--hypothesis-profile=thorough`
 looks for new ones, and for longer.
@@ -6,7 +6,13 @@ looks for new ones, and for longer.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
 from hypothesis import HealthCheck, settings
+
+from tests.e2e.plant import Plant
 
 # A shared machine may stop a test for longer than any deadline.
 settings.register_profile(
@@ -14,3 +20,13 @@ settings.register_profile(
 )
 settings.register_profile("thorough", settings.get_profile("ordinary"), derandomize=False, max_examples=5000)
 settings.load_profile("ordinary")
+
+
+@pytest.fixture
+def plant(tmp_path: Path) -> Iterator[Plant]:
+    """Its processes end with the test."""
+    built = Plant(tmp_path)
+    try:
+        yield built
+    finally:
+        built.stop()

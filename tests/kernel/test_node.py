@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -37,15 +36,6 @@ PATIENCE = 20.0
 BOOT_UP = "t710100"
 EMERGENCY = "t0908"
 """As an adapter writes the frames of this node."""
-
-
-@pytest.fixture
-def plant(tmp_path: Path) -> Iterator[Plant]:
-    built = Plant(tmp_path)
-    try:
-        yield built
-    finally:
-        built.stop()
 
 
 def _start(plant: Plant, channel: str) -> tuple[Simulator, Path]:

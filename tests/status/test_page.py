@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 
@@ -55,15 +54,6 @@ class Shown:
     daemon: Daemon
     plc: Plc
     url: str
-
-
-@pytest.fixture
-def plant(tmp_path: Path) -> Iterator[Plant]:
-    built = Plant(tmp_path)
-    try:
-        yield built
-    finally:
-        built.stop()
 
 
 @asynccontextmanager

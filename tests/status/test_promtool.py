@@ -6,7 +6,6 @@ import re
 import shutil
 import subprocess
 import urllib.request
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -42,15 +41,6 @@ def promtool(*arguments: str | Path, text: str = "") -> str:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout + done.stderr
-
-
-@pytest.fixture
-def plant(tmp_path: Path) -> Iterator[Plant]:
-    built = Plant(tmp_path)
-    try:
-        yield built
-    finally:
-        built.stop()
 
 
 @with_promtool
