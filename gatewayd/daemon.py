@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -17,6 +16,7 @@ from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell
 from gatewayd.logs import fields
 from gatewayd.mapping.plan import ModbusPlan, Plan
@@ -84,6 +84,7 @@ class Daemon:
 
     async def run(self, stop: asyncio.Event) -> None:
         """Serve until `stop` is set; then release every lock, give the robots the fallbacks, and close."""
+        clock.on_gap(self._after_gap)
         async with asyncio.TaskGroup() as group:
             self._group = group
             for station in self.stations:
@@ -96,6 +97,14 @@ class Daemon:
             for task in list(self._tasks.values()):
                 task.cancel()
         log.info("stopped")
+
+    def _after_gap(self, gap: clock.Gap) -> None:
+        """The process stood still; nothing that waited meanwhile has been served yet."""
+        log.warning("the gateway stood still", extra=fields(seconds=round(gap.length, 3)))
+        for station in self.stations:
+            station.gap(gap.since, gap.until)
+        for listener in self.listeners:
+            listener.gap(gap.since, gap.until)
 
     # -- another mapping ---------------------------------------------------------------------------------------------
 
@@ -262,7 +271,7 @@ class Daemon:
     async def _close(self) -> None:
         """First nobody writes any more, then the robots get what the policies declare, then the links close."""
         await asyncio.gather(*(listener.close() for listener in self.listeners))
-        now = time.monotonic()
+        now = clock.now()
         for station in self.stations:
             station.cell.stop(now, "the gateway stops")
         with suppress(TimeoutError):
@@ -272,7 +281,7 @@ class Daemon:
 
 async def _tick(station: Station) -> None:
     while True:
-        station.cell.tick(time.monotonic())
+        station.cell.tick(clock.now())
         await asyncio.sleep(TICK)
 
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Protocol
 
+from gatewayd import clock
 from gatewayd.compilation import Compilation, CompilationError
 from gatewayd.core.cell import Cell
 from gatewayd.logs import fields
@@ -227,10 +227,10 @@ class Reloader:
             if objected:
                 return Outcome(Result.REFUSED, objected)
             return Outcome(Result.FAILED, ("the gateway stops",))
-        now = time.monotonic()
+        now = clock.now()
         stranded = self._daemon.swap(plans, now, opened)
         left = tuple(f"the robot keeps what it holds in {name}" for name in stranded)
-        return Outcome(Result.APPLIED, left, swap=time.monotonic() - now)
+        return Outcome(Result.APPLIED, left, swap=clock.now() - now)
 
     def _compare(self, plans: Sequence[Plan]) -> list[Changes | str]:
         """What differs, by cell; a cell that is new or gone in one sentence."""
@@ -260,8 +260,8 @@ class Reloader:
 
     async def _settle(self) -> None:
         """Wait for links that have just claimed registers, so that their last fallbacks can still be sent."""
-        end = time.monotonic() + SETTLING_TIME
-        while time.monotonic() < end and not all(  # noqa: ASYNC110
+        end = clock.now() + SETTLING_TIME
+        while clock.now() < end and not all(  # noqa: ASYNC110
             one.robot.settled for one in self._daemon.stations
         ):
             await asyncio.sleep(0.002)

@@ -22,6 +22,7 @@ _SOURCES = {
     Source.FRESH: "robot fresh",
     Source.SILENT: "robot silent",
     Source.FROZEN: "robot frozen, its clock stands still",
+    Source.LATE: "robot values come too late",
 }
 
 

@@ -25,6 +25,9 @@ class Link(Protocol):
     async def run(self) -> None:
         """Work until cancelled."""
 
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`; called before anything that waited is served."""
+
     async def close(self) -> None:
         """Send what is still due; `run` is cancelled afterwards."""
 
@@ -49,6 +52,12 @@ class Station:
     def links(self) -> tuple[Link, ...]:
         """What is to be run."""
         return (self.robot,) if self.can is None else (self.robot, self.can)
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`: the cell judges the time first, then its links."""
+        self.cell.gap(since, now)
+        for link in self.links:
+            link.gap(since, now)
 
     def succeed(self, plan: Plan, now: float) -> tuple[str, ...]:
         """Go on with another plan, by the same links if that can be; names of inputs left as they were.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Awaitable, Callable
 from typing import TypeVar
+
+from gatewayd import clock
 
 __all__ = ["GRACE", "TURN", "turning"]
 
@@ -24,10 +25,10 @@ async def turning(work: Awaitable[_Result], turn: Callable[[], None], limit: flo
     cancellation ends the work first.
     """
     task = asyncio.ensure_future(work)
-    end = time.monotonic() + limit + GRACE
+    end = clock.now() + limit + GRACE
     try:
         while not task.done():
-            if time.monotonic() < end:
+            if clock.now() < end:
                 turn()
             await asyncio.wait((task,), timeout=TURN)
     except asyncio.CancelledError:

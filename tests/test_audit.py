@@ -12,6 +12,7 @@ import pytest
 from gatewayd.audit import MERGED, Audit, Record, plain_value, utc
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
+from gatewayd.core.requester import Requester
 from gatewayd.happening import ACCEPTED, Happening
 
 NUMBER, REAL = 0, 1
@@ -64,7 +65,7 @@ def written(audit: Audit) -> list[tuple[str | None, object, object, int]]:
 
 
 def test_a_change_is_recorded_at_once(cell: Cell, audit: Audit, lines: list[str]) -> None:
-    assert cell.write(PLC, [Change(NUMBER, 7)], 1.5) is None
+    assert cell.write(Requester(PLC), [Change(NUMBER, 7)], 1.5) is None
     assert json.loads(lines[-1]) == {
         "time": "2027-01-15T08:00:00.000Z",
         "monotonic": 1.5,
@@ -81,7 +82,7 @@ def test_a_change_is_recorded_at_once(cell: Cell, audit: Audit, lines: list[str]
 
 def test_a_rewrite_of_the_same_value_is_no_record(cell: Cell, audit: Audit) -> None:
     for turn in range(50):
-        assert cell.write(PLC, [Change(NUMBER, 7)], 1 + turn / 10) is None
+        assert cell.write(Requester(PLC), [Change(NUMBER, 7)], 1 + turn / 10) is None
         audit.tick(1 + turn / 10)
     assert written(audit) == [("plc", 0, 7, 1)]
 
@@ -90,7 +91,7 @@ def test_a_value_that_keeps_changing_is_told_once_a_second(cell: Cell, audit: Au
     for turn in range(1, 301):
         now = 1 + turn / 100
         audit.tick(now)
-        assert cell.write(PLC, [Change(NUMBER, turn)], now) is None
+        assert cell.write(Requester(PLC), [Change(NUMBER, turn)], now) is None
     audit.tick(100.0)
     told = written(audit)
     assert told[0] == ("plc", 0, 1, 1)
@@ -102,13 +103,13 @@ def test_a_value_that_keeps_changing_is_told_once_a_second(cell: Cell, audit: Au
 
 def test_another_writer_ends_what_was_merged(cell: Cell, audit: Audit) -> None:
     for writer, value in ((HMI, 1), (HMI, 2), (PLC, 3)):
-        assert cell.write(writer, [Change(NUMBER, value)], 1.0) is None
+        assert cell.write(Requester(writer), [Change(NUMBER, value)], 1.0) is None
     assert written(audit) == [("hmi", 0, 1, 1), ("hmi", 1, 2, 1), ("plc", 2, 3, 1)]
 
 
 def test_the_time_of_merged_changes_is_that_of_the_last(cell: Cell, audit: Audit) -> None:
     for now, value in ((1.0, 1), (1.2, 2), (1.4, 3)):
-        assert cell.write(PLC, [Change(NUMBER, value)], now) is None
+        assert cell.write(Requester(PLC), [Change(NUMBER, value)], now) is None
     audit.tick(1.0 + MERGED)
     last = list(audit)[-1]
     assert (last.monotonic, last.happening.times) == (1.4, 2)
@@ -116,8 +117,8 @@ def test_the_time_of_merged_changes_is_that_of_the_last(cell: Cell, audit: Audit
 
 
 def test_a_refusal_names_reason_and_holder(cell: Cell, audit: Audit) -> None:
-    assert cell.write(PLC, [Change(NUMBER, 1)], 1.0) is None
-    assert cell.write(HMI, [Change(NUMBER, 2)], 1.1) is not None
+    assert cell.write(Requester(PLC), [Change(NUMBER, 1)], 1.0) is None
+    assert cell.write(Requester(HMI), [Change(NUMBER, 2)], 1.1) is not None
     refused = happened(audit)[-1]
     assert (refused.what, refused.writer, refused.holder, refused.old, refused.new, refused.reason) == (
         "write refused", "hmi", "plc", 1, 2, "held by another owner",
@@ -125,15 +126,15 @@ def test_a_refusal_names_reason_and_holder(cell: Cell, audit: Audit) -> None:
 
 
 def test_an_undeclared_peer_has_a_name_too(cell: Cell, audit: Audit) -> None:
-    assert cell.write(None, [Change(NUMBER, 2)], 1.1) is not None
+    assert cell.write(Requester(None), [Change(NUMBER, 2)], 1.1) is not None
     assert happened(audit)[-1].writer == "undeclared"
 
 
 def test_what_was_written_stands_before_the_fallback(cell: Cell, audit: Audit) -> None:
     for value in (1, 2, 3):
-        assert cell.write(PLC, [Change(NUMBER, value)], 1.0) is None
-    cell.writer_connected(PLC, 1.0)
-    cell.writer_disconnected(PLC, 1.1, "closed")
+        assert cell.write(Requester(PLC), [Change(NUMBER, value)], 1.0) is None
+    cell.writer_connected(Requester(PLC), 1.0)
+    cell.writer_disconnected(Requester(PLC), 1.1, "closed")
     told = [(one.what, one.writer, one.old, one.new) for one in happened(audit)]
     assert told[-3:] == [
         ("lock released", "plc", None, None),
@@ -153,11 +154,11 @@ def test_the_local_operator_is_in_it(cell: Cell, audit: Audit) -> None:
 def test_unwatching_tells_the_rest_and_ends_it(cell: Cell, audit: Audit) -> None:
     audit.watch(cell)
     for value in (1, 2):
-        assert cell.write(PLC, [Change(NUMBER, value)], 1.0) is None
+        assert cell.write(Requester(PLC), [Change(NUMBER, value)], 1.0) is None
     audit.unwatch(cell)
     audit.unwatch(cell)
     assert written(audit) == [("plc", 0, 1, 1), ("plc", 1, 2, 1)]
-    assert cell.write(PLC, [Change(NUMBER, 9)], 9.0) is None
+    assert cell.write(Requester(PLC), [Change(NUMBER, 9)], 9.0) is None
     audit.tick(99.0)
     assert audit.count == 3
     assert not cell.write_listeners
@@ -167,7 +168,7 @@ def test_the_ring_is_bounded(cell: Cell) -> None:
     audit = Audit(capacity=3)
     audit.watch(cell)
     for value in range(10):
-        assert cell.write(PLC, [Change(NUMBER, value + 1)], value * 10.0) is None
+        assert cell.write(Requester(PLC), [Change(NUMBER, value + 1)], value * 10.0) is None
     assert (len(audit), audit.count) == (3, 11)
 
 
@@ -197,7 +198,7 @@ async def test_it_keeps_up_with_the_gateway_and_tells_the_rest_at_the_end(cell: 
     running = asyncio.create_task(audit.run(lambda: [cell]))
     await asyncio.sleep(0)
     for value in (1, 2):
-        assert cell.write(PLC, [Change(NUMBER, value)], 1.0) is None
+        assert cell.write(Requester(PLC), [Change(NUMBER, value)], 1.0) is None
     assert written(audit) == [("plc", 0, 1, 1)]
     running.cancel()
     await asyncio.wait((running,))

@@ -11,6 +11,7 @@ from gatewayd.control.client import Client
 from gatewayd.control.views import StationView
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
+from gatewayd.core.requester import Requester
 from gatewayd.operation import Operation
 
 
@@ -52,7 +53,7 @@ async def until(condition: Callable[[], bool]) -> None:
 async def test_the_first_write_is_in_the_file_at_the_end(tmp_path: Path) -> None:
     gateway = Gateway()
     operation = Operation(gateway, None, tmp_path / "audit.jsonl")
-    assert gateway.cell.write(0, [Change(0, 7)], 1.0) is None
+    assert gateway.cell.write(Requester(0), [Change(0, 7)], 1.0) is None
     task = asyncio.create_task(operation.run())
     await asyncio.sleep(0)
     task.cancel()
@@ -66,7 +67,7 @@ async def test_a_file_that_cannot_be_written_makes_the_gateway_unhealthy_and_not
 ) -> None:
     gateway = Gateway()
     operation = Operation(gateway, None, tmp_path / "missing" / "audit.jsonl")
-    assert gateway.cell.write(0, [Change(0, 7)], 1.0) is None
+    assert gateway.cell.write(Requester(0), [Change(0, 7)], 1.0) is None
     moment = Moment(1.0, 2.0)
     await until(lambda: not operation.api.status(moment)["healthy"])
     assert operation.api.status(moment)["problems"] == [

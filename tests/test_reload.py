@@ -20,6 +20,7 @@ from gatewayd.compilation import Compilation
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
+from gatewayd.core.requester import Requester
 from gatewayd.daemon import Daemon
 from gatewayd.mapping.compiled import Compiled
 from gatewayd.mapping.worker import compile_files
@@ -98,7 +99,7 @@ class Rig:
 
     def set(self, variable: str, value: float) -> None:
         names = [one.name for one in self.cell.definition.variables]
-        refusal = self.cell.write(PLC, [Change(names.index(variable), value)], time.monotonic())
+        refusal = self.cell.write(Requester(PLC), [Change(names.index(variable), value)], time.monotonic())
         assert refusal is None, refusal
 
     def value(self, variable: str) -> object:

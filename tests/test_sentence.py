@@ -6,6 +6,7 @@ import pytest
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
+from gatewayd.core.requester import Requester
 from gatewayd.sentence import sentence
 
 
@@ -38,13 +39,13 @@ def fresh(one: Cell) -> Cell:
 def all_well(name: str = "press-3") -> Cell:
     made = fresh(cell(name))
     for writer in range(2):
-        made.writer_connected(writer, 1.0)
+        made.writer_connected(Requester(writer), 1.0)
     return made
 
 
 def test_a_good_cell() -> None:
     one = all_well()
-    one.request(0, 0, 1.0)
+    one.request(Requester(0), 0, 1.0)
     assert sentence([one]) == "press-3: robot fresh at 500 Hz, 2 of 2 writers connected, 1 lock held"
 
 
@@ -78,7 +79,7 @@ def test_what_is_wrong_with_a_robot(condition: str, words: str) -> None:
 
 def test_missing_writers_are_counted() -> None:
     one = fresh(cell())
-    one.writer_connected(1, 1.0)
+    one.writer_connected(Requester(1), 1.0)
     assert "1 of 2 writers connected" in sentence([one])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gatewayd.core.requester import Requester
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 from gatewayd.station import Station
@@ -60,7 +61,7 @@ def test_other_objects_need_another_node(tmp_path: Path) -> None:
     """Its dictionary is that of one mapping: it boots, and who wrote on the former one is lost."""
     station = Station(plan(), tmp_path)
     can = station.can
-    station.cell.writer_connected(0, 0.5)
+    station.cell.writer_connected(Requester(0), 0.5)
     station.succeed(plan(placed="object"), 1.0)
     assert station.can is not None
     assert station.can is not can

@@ -47,6 +47,8 @@ class ErrorCode(IntEnum):
     WRITE_CLAIMED_ELSEWHERE = 0xFF04
     WRITE_NEVER = 0xFF05
     WRITE_HEARTBEAT_LOST = 0xFF06
+    WRITE_PARTIAL_TAKEOVER = 0xFF07
+    WRITE_WAITED = 0xFF08
 
 
 class Register(IntFlag):

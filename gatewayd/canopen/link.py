@@ -9,10 +9,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import time
 from contextlib import suppress
 from datetime import datetime
 
+from gatewayd import clock
 from gatewayd.canopen.bus import Bus, BusError, BusState
 from gatewayd.canopen.drivers import make_bus
 from gatewayd.canopen.errors import ErrorFrame
@@ -28,12 +28,10 @@ from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.logs import fields
 from gatewayd.turning import turning
 
-__all__ = ["CORE_TIME", "GAP", "LOSS_INTERVAL", "RETRY", "CanLink"]
+__all__ = ["CORE_TIME", "LOSS_INTERVAL", "RETRY", "CanLink"]
 
 CORE_TIME = 0.5
 """Seconds without a count of the core's heartbeat after which the core counts as stuck."""
-GAP = 0.05
-"""Seconds without a frame after which the process may have been suspended."""
 RETRY = 2.0
 """Seconds between two attempts at a bus that cannot be used as it is set up."""
 LOSS_INTERVAL = 10.0
@@ -58,7 +56,6 @@ class CanLink(Observer):
         self._started = False
         self._beat = (-1, -math.inf)
         self._offset = math.inf
-        self._last_frames = -math.inf
         self._lost = 0
         self._lost_told = -math.inf
         self._other_bit_rate: int | None = None
@@ -80,7 +77,7 @@ class CanLink(Observer):
         self._runs = True
         try:
             await self._open(self.node.bit_rate)
-            now = time.monotonic()
+            now = clock.now()
             if not self._started:
                 self._started = True
                 self.node.start(now)
@@ -89,7 +86,7 @@ class CanLink(Observer):
                 await self._turn_until(math.inf)
                 self._switching.clear()
                 bit_rate, silence = self._switch
-                await self._turn_until(time.monotonic() + silence)
+                await self._turn_until(clock.now() + silence)
                 await self._open(bit_rate)
         finally:
             self._leave()
@@ -115,13 +112,13 @@ class CanLink(Observer):
         """Send what still waits, as far as the bus takes it."""
         self._transmitter.flush()
 
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`: frames that are read now may have waited that long."""
+
     # -- called by the driver ------------------------------------------------------------------------------------
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
-        """Received frames. After a suspension they come before the timers, so the cell's clock is asked first."""
-        if now - self._last_frames > GAP:
-            self._cell.tick(now)
-        self._last_frames = now
+        """Received frames."""
         receive = self.node.receive
         for frame in frames:
             receive(frame, now)
@@ -212,7 +209,7 @@ class CanLink(Observer):
 
     async def _turn_until(self, moment: float) -> None:
         """Wait for that moment, or for a switch of the bit rate, and count meanwhile."""
-        rest = moment - time.monotonic()
+        rest = moment - clock.now()
         # Not wait_for: Python 3.11's can swallow a cancellation that comes with the time-out.
         with suppress(TimeoutError):
             async with asyncio.timeout(None if rest == math.inf else rest):
@@ -253,7 +250,7 @@ class CanLink(Observer):
         bus, self._bus = self._bus, None
         if bus is not None:
             bus.close()
-            self.on_state(BusState.DOWN, reason, time.monotonic())
+            self.on_state(BusState.DOWN, reason, clock.now())
 
     def _leave(self) -> None:
         self._runs = False
@@ -264,7 +261,7 @@ class CanLink(Observer):
         self._switching.clear()
 
     def _on_image(self, direction: Direction) -> None:
-        now = time.monotonic()
+        now = clock.now()
         self.node.image_changed(direction, now)
         self._schedule(now)
 
@@ -279,7 +276,7 @@ class CanLink(Observer):
         self._timer = asyncio.get_running_loop().call_at(due, self._tick)
 
     def _tick(self) -> None:
-        now = time.monotonic()
+        now = clock.now()
         self._timer, self._due = None, math.inf
         self.node.tick(now)
         self._schedule(now)

@@ -184,7 +184,9 @@ class Node:
         )
         self.time = TimeConsumer(on_time=self._observer.time_told, changed=self._route)
         self.transmit = TransmitEngine(cell, self._send)
-        self.receive_pdos = ReceiveEngine(cell, plan.rpdo_writer, self._fault_raised, self._fault_cleared)
+        self.receive_pdos = ReceiveEngine(
+            cell, partial(self._peers.requester, plan.rpdo_writer), self._fault_raised, self._fault_cleared
+        )
         self.pdos = PdoTable(
             replace(plan, node=node),
             cell.definition.variables,
@@ -356,8 +358,8 @@ class Node:
         if frame.can_id in self._synchronous and not self.sync.window_open(now):
             self.counters.outside_window += 1
             return
-        heard = self._peers.connect(self.plan.rpdo_writer, "RPDO", now)
-        self.receive_pdos.receive(frame.can_id, frame.data, now, heard=heard)
+        self._peers.connect(self.plan.rpdo_writer, "RPDO", now)
+        self.receive_pdos.receive(frame.can_id, frame.data, now)
 
     def _receive_sdo(self, frame: Frame, now: float) -> None:
         if not frame.remote and len(frame.data) == SDO_LENGTH:
@@ -511,7 +513,7 @@ class Node:
 
     def _objects(self, identity: Identity) -> Iterable[Object]:
         status = StatusBlock(self.cell)
-        heard = partial(self._peers.believed, self.plan.sdo_writer)
+        requester = partial(self._peers.requester, self.plan.sdo_writer)
         yield from identity_objects(identity, lambda: int.from_bytes(status.read(1, 1, self._now), "big"))
         yield from server_parameter(self.parameters.node)
         for service in (
@@ -524,8 +526,8 @@ class Node:
             self.producer,
             self.behaviour,
             self.pdos,
-            VariableObjects(self.plan, self.cell, self._clock, heard),
-            StatusObjects(self.cell, self.plan.sdo_writer, self._clock, heard),
+            VariableObjects(self.plan, self.cell, self._clock, requester),
+            StatusObjects(self.cell, self._clock, requester),
         ):
             yield from service.objects()
 

@@ -8,10 +8,12 @@ One that is not believed is neither alive nor connected here, and what it asks o
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from gatewayd.canopen.heartbeat import HeartbeatConsumer, Watch
 from gatewayd.canopen.plan import Consumer
 from gatewayd.core.cell import Cell
+from gatewayd.core.requester import Requester, new_connection
 
 __all__ = ["Peers"]
 
@@ -28,12 +30,20 @@ class Peers:
         self._watch = watch
         self._nodes = {one.writer: one.node for one in promises if one.writer is not None}
         self._alive: set[int] = set()
+        self._requesters = {
+            writer: Requester(writer, connection=new_connection())
+            for writer in (None, *range(len(cell.definition.writers)))
+        }
 
     def resume(self, former: Peers) -> None:
         """The living writers of the cell that this one succeeded, by name; the cell has them counted already."""
         names = {one.name: index for index, one in enumerate(self._cell.definition.writers)}
         before = former._cell.definition.writers
         self._alive = {names[before[writer].name] for writer in former._alive if before[writer].name in names}
+        for writer, requester in former._requesters.items():
+            index = None if writer is None else names.get(before[writer].name)
+            if (writer is None) is (index is None):
+                self._requesters[index] = replace(requester, writer=index)
 
     def of(self, node: int) -> Iterator[int]:
         """The writers that promised this node's heartbeat."""
@@ -44,6 +54,11 @@ class Peers:
         node = self._nodes.get(writer) if writer is not None else None
         return node is None or self._watch.state(node) is not Watch.LOST
 
+    def requester(self, writer: int | None) -> Requester:
+        """The writer as a sender of requests, with what can be vouched for now."""
+        requester = self._requesters[writer]
+        return requester if self.believed(writer) else replace(requester, trusted=False)
+
     def connect(self, writer: int | None, service: str, now: float) -> bool:
         """The writer uses a service: it is alive from now on, if it is believed. Returns whether it is."""
         if writer is None:
@@ -53,26 +68,26 @@ class Peers:
             return False
         if writer not in self._alive:
             self._alive.add(writer)
-            self._cell.writer_connected(writer, now, f"CANopen {service}")
+            self._cell.writer_connected(self._requesters[writer], now, f"CANopen {service}")
         return True
 
     def heard(self, writer: int | None, service: str, now: float) -> None:
         """The writer uses a service that does not feed its supervision by itself."""
         if self.connect(writer, service, now) and writer is not None:
-            self._cell.writer_seen(writer, now)
+            self._cell.writer_seen(self._requesters[writer], now)
 
     def heartbeat(self, node: int, now: float) -> None:
         """A frame of the node's error control: its writers still live. It makes no writer of one who wrote nothing."""
         if self._watch.state(node) is Watch.ALIVE:
             for writer in self.of(node):
                 if writer in self._alive:
-                    self._cell.writer_seen(writer, now)
+                    self._cell.writer_seen(self._requesters[writer], now)
 
     def lose(self, writer: int | None, reason: str, now: float) -> None:
         """The writer is lost; its locks are released and the fallbacks apply."""
         if writer is not None and writer in self._alive:
             self._alive.discard(writer)
-            self._cell.writer_disconnected(writer, now, reason)
+            self._cell.writer_disconnected(self._requesters[writer], now, reason)
 
     def lose_all(self, reason: str, now: float) -> None:
         """No writer can be heard any more."""

@@ -15,11 +15,11 @@ import select
 import socket
 from collections.abc import Iterable
 from functools import partial
-from time import monotonic
 from typing import Any
 
 import can
 
+from gatewayd import clock
 from gatewayd.aside import aside
 from gatewayd.canopen.bus import DRAIN, BusError, BusHandler
 from gatewayd.canopen.cob_ids import BASIC_FRAME
@@ -147,13 +147,13 @@ class PythonCanBus(SupervisedBus):
 
     def _read(self, bus: can.BusABC) -> bool:
         """Read for a while; whether there is no more."""
-        now = monotonic()
+        now = clock.now()
         frames: list[Frame] = []
         errors: list[ErrorFrame] = []
         failure: Exception | None = None
         exhausted = False
         try:
-            while len(frames) < DRAIN and monotonic() - now < SLICE:
+            while len(frames) < DRAIN and clock.now() - now < SLICE:
                 message = bus.recv(0)
                 if message is not None:
                     self._take(message, frames, errors)
@@ -189,7 +189,7 @@ class PythonCanBus(SupervisedBus):
     def _look(self) -> None:
         """Open what is closed, ask an adapter that knows its state for it, and come again."""
         assert self._loop is not None
-        now = monotonic()
+        now = clock.now()
         self._looking = self._loop.call_later(LOOK, self._look)
         if self._bus is None:
             if self._opening is None and self._supervisor.may_open(now):
@@ -210,7 +210,7 @@ class PythonCanBus(SupervisedBus):
 
     def _lose(self, error: Exception) -> None:
         """The interface fails: close it, and open it again when it can be."""
-        now = monotonic()
+        now = clock.now()
         self._release(broken=True)
         self._supervisor.failed(now)
         self._feed(Event.GONE, now, f"{self._name}: {error}")
@@ -226,11 +226,11 @@ class PythonCanBus(SupervisedBus):
 
     async def _acquire(self) -> None:
         assert self._loop is not None
-        self._supervisor.failed(monotonic())  # until it is known better
+        self._supervisor.failed(clock.now())  # until it is known better
         try:
             bus = await aside(self._make, f"open {self._name}", can.BusABC.shutdown)
         except (can.CanInitializationError, can.CanOperationError, OSError) as error:
-            self._feed(Event.GONE, monotonic(), f"{self._name} cannot be opened: {error}")
+            self._feed(Event.GONE, clock.now(), f"{self._name} cannot be opened: {error}")
             return
         self._bus = bus
         self._supervisor.opened()
@@ -245,7 +245,7 @@ class PythonCanBus(SupervisedBus):
         self._ask = ASK
         read = self._readable if self._descriptor >= 0 else self._look_for_frames
         self._reading = self._loop.call_soon(read)
-        self._feed(Event.UP, monotonic(), f"{self._name} is open")
+        self._feed(Event.UP, clock.now(), f"{self._name} is open")
 
     def _make(self) -> can.BusABC:
         try:

@@ -11,8 +11,8 @@ import errno
 import socket
 import struct
 from collections.abc import Iterable
-from time import monotonic
 
+from gatewayd import clock
 from gatewayd.canopen.bus import DRAIN, BusError, BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
@@ -156,7 +156,7 @@ class SocketCanBus(SupervisedBus):
 
     def _readable(self) -> None:
         assert self._socket is not None
-        now = monotonic()
+        now = clock.now()
         frames: list[Frame] = []
         errors: list[ErrorFrame] = []
         failure: OSError | None = None
@@ -196,7 +196,7 @@ class SocketCanBus(SupervisedBus):
 
     def _failed(self, error: OSError) -> None:
         """A send or receive failed: believe it, and look at once, for the reason may be gone already."""
-        now = monotonic()
+        now = clock.now()
         self._feed(event_of_errno(error.errno or 0) or Event.GONE, now, f"{self._channel}: {error.strerror}")
         if event_of_errno(error.errno or 0) is not Event.DOWN:
             self._release()
@@ -205,7 +205,7 @@ class SocketCanBus(SupervisedBus):
         """Look at the interface, open it if it is another one, and come again."""
         assert self._loop is not None
         assert self._reader is not None
-        now = monotonic()
+        now = clock.now()
         self._looking = self._loop.call_later(LOOK, self._look)
         try:
             self.interface = found = self._reader.read(self._channel)

@@ -14,6 +14,7 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, Access, Entry, Object, array, record
 from gatewayd.canopen.variables import ABORT_OF
 from gatewayd.core.cell import Cell
+from gatewayd.core.requester import Requester
 from gatewayd.core.status import FIELDS, RELEASE, REQUEST, TABLES, StatusBlock, StatusField, StatusTable
 
 __all__ = ["HEADER", "TABLE_INDICES", "StatusObjects"]
@@ -38,18 +39,12 @@ _TYPES = {1: CanType.UNSIGNED16, 2: CanType.UNSIGNED32}
 class StatusObjects:
     """The objects of one cell's status block."""
 
-    def __init__(
-        self, cell: Cell, writer: int | None, clock: Callable[[], float], heard: Callable[[], bool]
-    ) -> None:
-        """`writer`: who SDO clients are; `clock`: the moment of the request that is being served.
-
-        `heard`: whether the writer is (`Cell.write`).
-        """
+    def __init__(self, cell: Cell, clock: Callable[[], float], requester: Callable[[], Requester]) -> None:
+        """`clock`: the moment of the request that is being served; `requester`: who SDO clients are now."""
         self._block = StatusBlock(cell)
         self._definition = cell.definition
-        self._writer = writer
         self._clock = clock
-        self._heard = heard
+        self._requester = requester
 
     def objects(self) -> Iterator[Object]:
         """5F00h and the tables that have entries."""
@@ -103,6 +98,6 @@ class StatusObjects:
 
     def _write(self, offset: int, data: bytes) -> None:
         word = int.from_bytes(data, "little")
-        refusal = self._block.write(self._writer, offset, (word,), self._clock(), heard=self._heard())
+        refusal = self._block.write(self._requester(), offset, (word,), self._clock())
         if refusal is not None:
             raise Abort(ABORT_OF[refusal.reason])

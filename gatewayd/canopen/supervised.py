@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from time import monotonic
 
+from gatewayd import clock
 from gatewayd.canopen.bus import BusCounters, BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.supervision import Event, Supervisor, event_of_error
@@ -68,7 +68,7 @@ class SupervisedBus:
 
     def _tell_room(self) -> None:
         self._forget_waiting()
-        self._handler.on_writable(monotonic())
+        self._handler.on_writable(clock.now())
 
     def _forget_waiting(self) -> None:
         """Wait no longer. To be called before the descriptor is closed."""

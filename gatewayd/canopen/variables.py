@@ -31,6 +31,7 @@ from gatewayd.canopen.plan import CanopenPlan, ObjectPlan
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Direction, Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
 
 __all__ = ["ABORT_OF", "VariableObjects"]
 
@@ -43,6 +44,9 @@ ABORT_OF: Final = {
     Reason.ROBOT_LOST: AbortCode.DEVICE_STATE,
     Reason.CLAIMED_ELSEWHERE: AbortCode.DEVICE_STATE,
     Reason.HEARTBEAT_LOST: AbortCode.DEVICE_STATE,
+    Reason.PARTIAL_TAKEOVER: AbortCode.LENGTH,
+    Reason.WAITED: AbortCode.DEVICE_STATE,
+    Reason.NOT_MEANT: AbortCode.LOCAL_CONTROL,
 }
 """What an SDO client is told when the cell refuses."""
 
@@ -51,13 +55,13 @@ class VariableObjects:
     """The objects of one cell's variables."""
 
     def __init__(
-        self, plan: CanopenPlan, cell: Cell, clock: Callable[[], float], heard: Callable[[], bool]
+        self, plan: CanopenPlan, cell: Cell, clock: Callable[[], float], requester: Callable[[], Requester]
     ) -> None:
-        """`clock`: the moment of the request that is being served; `heard`: whether its writer is (`Cell.write`)."""
+        """`clock`: the moment of the request that is being served; `requester`: who SDO clients are now."""
         self._plan = plan
         self._cell = cell
         self._clock = clock
-        self._heard = heard
+        self._requester = requester
         self._received = {
             entry.variable
             for pdo in plan.pdos
@@ -126,16 +130,16 @@ class VariableObjects:
             return item.type.pack(fit(value, item.type))
 
     def _write(self, item: ObjectPlan, data: bytes) -> None:
-        one, writer, now = (
+        one, requester, now = (
             self._cell.definition.variables[item.variable],
-            self._plan.sdo_writer,
+            self._requester(),
             self._clock(),
         )
         refusal, value = self._meaning(item, data, one)
         if refusal is not None:
-            self._cell.refuse(writer, refusal, now, value)
+            self._cell.refuse(requester, refusal, now, value)
         elif value is not None:
-            refusal = self._cell.write(writer, [Change(item.variable, value)], now, heard=self._heard())
+            refusal = self._cell.write(requester, [Change(item.variable, value)], now)
         if refusal is not None:
             raise Abort(_abort_code(refusal, one, value))
 

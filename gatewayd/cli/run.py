@@ -164,11 +164,13 @@ def _run(
 ) -> int:
     import asyncio
 
+    from gatewayd import clock
     from gatewayd.daemon import Daemon
     from gatewayd.startup import state_directory
 
     daemon = Daemon(found.plans, state or state_directory(os.environ))
-    asyncio.run(_serve(daemon, files, _notes(found), page=page, control=_socket(control), audit=audit))
+    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+        runner.run(_serve(daemon, files, _notes(found), page=page, control=_socket(control), audit=audit))
     return 0
 
 

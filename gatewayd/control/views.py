@@ -247,6 +247,7 @@ _SOURCES = {
     Source.WAITING: "robot connected, but it sends no data yet",
     Source.SILENT: "robot silent",
     Source.FROZEN: "robot frozen, its clock stands still",
+    Source.LATE: "robot values come too late",
 }
 _LISTED = 3
 """Names told one by one."""
@@ -294,7 +295,7 @@ def _last_refusal(cell: Cell, now: float) -> Json | None:
             writer=writer,
             other=refusal.holder,
             reason=refusal.reason,
-            peer=refusal.peer,
+            peer=last.peer,
         ),
         cell.definition,
     )

@@ -10,6 +10,7 @@ from gatewayd.core.image import ProcessImage
 from gatewayd.core.limits import has_no_limits, within
 from gatewayd.core.ownership import MOVES, Act, LockTable, Move, Standing
 from gatewayd.core.refusal import PRECEDENCE, Reason, Refusal
+from gatewayd.core.requester import Requester
 
 __all__ = ["Admission", "Change", "Verdict"]
 
@@ -48,16 +49,15 @@ class Admission:
         self._locks = tuple(variable.lock for variable in variables)
         self._unlimited = tuple(has_no_limits(variable) for variable in variables)
 
-    def judge(
-        self, writer: int | None, changes: Sequence[Change], *, adopted: bool, heard: bool = True
-    ) -> Verdict:
+    def judge(self, requester: Requester, changes: Sequence[Change], *, adopted: bool) -> Verdict:
         """The verdict on all changes together; `adopted`: the robot is there and its inputs were taken over.
 
-        If several changes stand in the way, `PRECEDENCE` says which refusal is told. A writer of None is a peer that no
-        writer was declared for: it may write nothing. One that is not `heard` has promised a heartbeat that stays away:
-        nothing of its request is applied, not even what would change nothing.
+        If several changes stand in the way, `PRECEDENCE` says which refusal is told. A peer that no writer
+        is declared for may write nothing. Of a writer that is not trusted nothing is applied, not even what would
+        change nothing.
         """
-        if writer is not None and adopted and heard:
+        writer, trusted = requester.writer, requester.trusted
+        if writer is not None and adopted and trusted:
             usual = self._usual(writer, changes)
             if usual is not None:
                 return usual
@@ -69,7 +69,7 @@ class Admission:
                 else self._judge(writer, change, verdict, adopted=adopted)
             )
             verdict.refusal = _graver(verdict.refusal, refusal)
-        if not heard:
+        if not trusted:
             first = changes[0].variable if changes else None
             verdict.refusal = _graver(verdict.refusal, Refusal(Reason.HEARTBEAT_LOST, first))
         return verdict

@@ -21,6 +21,7 @@ from gatewayd.core.limits import within
 from gatewayd.core.ownership import Act, LockTable, Move
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.refusal_log import REFUSAL_INTERVAL, RefusalLog
+from gatewayd.core.requester import LOCAL_OPERATOR, Requester
 from gatewayd.core.supervision import WriterTable
 
 __all__ = ["HEARTBEAT_PERIOD", "REFUSAL_INTERVAL", "Cell", "Change", "LastRefusal", "Written"]
@@ -40,6 +41,8 @@ class LastRefusal:
     refusal: Refusal
     writer: int | None
     time: float
+    peer: str = ""
+    """Address of the peer, where no writer is declared for it."""
 
 
 class Cell:
@@ -77,23 +80,16 @@ class Cell:
 
     # -- fieldbus side -------------------------------------------------------------------------------------------
 
-    def write(
-        self, writer: int | None, changes: Sequence[Change], now: float, *, heard: bool = True
-    ) -> Refusal | None:
-        """Apply all changes, or none and return why not. A writer of None is a peer that no writer was declared for.
-
-        `heard` is the link's word that the writer keeps what it promised. If it does not (its heartbeat stays away),
-        the request is refused and is no sign of life either. The same writer may be heard by another link.
-        """
+    def write(self, requester: Requester, changes: Sequence[Change], now: float) -> Refusal | None:
+        """Apply all changes, or none and return why not."""
         self._release_expired(now)
-        if writer is not None and heard:
-            self.writer_seen(writer, now)
-        verdict = self._admission.judge(writer, changes, adopted=self._adopted, heard=heard)
-        refusal = verdict.refusal
+        self.writer_seen(requester, now, wrote=True)
+        verdict = self._admission.judge(requester, changes, adopted=self._adopted)
+        writer, refusal = requester.writer, verdict.refusal
         if refusal is not None:
             if writer is not None and refusal.reason.renews:
                 self._renew(writer, verdict.moves, now)
-            self.refuse(writer, refusal, now, _value_for(changes, refusal.variable))
+            self.refuse(requester, refusal, now, _value_for(changes, refusal.variable))
             return refusal
         if writer is not None:
             self._move(writer, verdict.moves, now)
@@ -102,10 +98,11 @@ class Cell:
         self.health.writes_accepted += 1
         return None
 
-    def refuse(self, writer: int | None, refusal: Refusal, now: float, value: Value | None = None) -> None:
-        """Count and record a refusal; equal ones are told once per `REFUSAL_INTERVAL`."""
+    def refuse(self, requester: Requester, refusal: Refusal, now: float, value: Value | None = None) -> None:
+        """Count and record a refusal; equal ones are reported once per `REFUSAL_INTERVAL`."""
         self.health.writes_refused += 1
-        self.last_refusal = LastRefusal(refusal, writer, now)
+        peer = requester.peer if requester.writer is None else ""
+        self.last_refusal = LastRefusal(refusal, requester.writer, now, peer)
         index = refusal.variable
         self._refusals.add(
             Event(
@@ -113,43 +110,44 @@ class Cell:
                 EventKind.REFUSED,
                 variable=index,
                 lock=self.definition.variables[index].lock if index is not None else None,
-                writer=writer,
+                writer=requester.writer,
                 other=refusal.holder,
                 reason=refusal.reason,
                 old=self.image.values[index] if index is not None else None,
                 new=value,
-                peer=refusal.peer,
+                peer=peer,
             )
         )
 
-    def request(self, writer: int | None, variable: int, now: float, *, heard: bool = True) -> Refusal | None:
-        """Take the lock that guards `variable` (and with it its whole group) without writing a value.
+    def request(self, requester: Requester, variable: int, now: float) -> Refusal | None:
+        """Take the lock that guards `variable` (and with it its whole group) without writing a value."""
+        return self._act(requester, variable, Act.REQUEST, now)
 
-        `heard` is as in `write`.
-        """
-        return self._act(writer, variable, Act.REQUEST, now, heard=heard)
+    def release(self, requester: Requester, variable: int, now: float) -> Refusal | None:
+        """Give the lock that guards `variable` back; its release fallback applies."""
+        return self._act(requester, variable, Act.RELEASE, now)
 
-    def release(self, writer: int | None, variable: int, now: float, *, heard: bool = True) -> Refusal | None:
-        """Give the lock that guards `variable` back; its release fallback applies. `heard` is as in `write`."""
-        return self._act(writer, variable, Act.RELEASE, now, heard=heard)
+    def release_all(self, requester: Requester, now: float, detail: str = "released by its owner") -> None:
+        """Give every lock of the requester's writer back."""
+        if requester.writer is not None:
+            self._free(self.ownership.held_by(requester.writer), now, detail)
 
-    def release_all(self, writer: int, now: float, detail: str = "released by its owner") -> None:
-        """Give every lock of `writer` back."""
-        self._free(self.ownership.held_by(writer), now, detail)
-
-    def writer_connected(self, writer: int, now: float, detail: str = "") -> None:
+    def writer_connected(self, requester: Requester, now: float, detail: str = "") -> None:
         """One more connection of the writer."""
-        if self.writers.connected(writer, now):
+        writer = requester.writer
+        if writer is not None and self.writers.connected(writer, now):
             self.events.append(Event(now, EventKind.WRITER_CONNECTED, writer=writer, detail=detail))
 
-    def writer_seen(self, writer: int, now: float) -> None:
-        """Any request of the writer feeds its supervision, a read as well."""
-        if self.writers.seen(writer, now):
+    def writer_seen(self, requester: Requester, now: float, *, wrote: bool = False) -> None:
+        """Any request of a trusted writer feeds its supervision, a read as well."""
+        writer = requester.writer
+        if writer is not None and requester.trusted and self.writers.seen(writer, now):
             self.events.append(Event(now, EventKind.WRITER_CONNECTED, writer=writer, detail="heard again"))
 
-    def writer_disconnected(self, writer: int, now: float, reason: str) -> None:
+    def writer_disconnected(self, requester: Requester, now: float, reason: str) -> None:
         """One connection less; with the last one the writer is lost and its locks are released."""
-        if self.writers.disconnected(writer):
+        writer = requester.writer
+        if writer is not None and self.writers.disconnected(writer):
             self._writer_lost(writer, now, reason)
 
     # -- local operator ------------------------------------------------------------------------------------------
@@ -191,13 +189,13 @@ class Cell:
         declared = self.definition.variables[variable]
         is_input = declared.direction is Direction.INPUT
         if is_input:
-            verdict = self._admission.judge(OPERATOR, [Change(variable, value)], adopted=self._adopted)
+            verdict = self._admission.judge(LOCAL_OPERATOR, [Change(variable, value)], adopted=self._adopted)
             allowed, refusal = dict(verdict.values).get(variable), verdict.refusal
         else:
             allowed, refusal = within(declared, value), None
         if allowed is None:
             refusal = refusal or Refusal(Reason.OUT_OF_LIMITS, variable)
-            self.refuse(OPERATOR, refusal, now, value)
+            self.refuse(LOCAL_OPERATOR, refusal, now, value)
             return refusal
         old = self.image.values[variable]
         self.forcing.lift()
@@ -333,20 +331,24 @@ class Cell:
         self._refusals.tick(now)
         self._beat(now)
 
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`; called before anything that waited is served."""
+        self.health.gaps += 1
+        self.tick(now)
+
     # -- inside --------------------------------------------------------------------------------------------------
 
-    def _act(self, writer: int | None, variable: int, act: Act, now: float, *, heard: bool) -> Refusal | None:
+    def _act(self, requester: Requester, variable: int, act: Act, now: float) -> Refusal | None:
         self._release_expired(now)
-        if writer is not None and heard:
-            self.writer_seen(writer, now)
-        lock = self.definition.variables[variable].lock
+        self.writer_seen(requester, now, wrote=True)
+        writer, lock = requester.writer, self.definition.variables[variable].lock
         if writer is None or lock is None:
             refusal = Refusal(Reason.NOT_WRITABLE, variable)
         else:
             move = self.ownership.decide(lock, writer, act)
             if move is Move.REFUSE_NEVER:
                 refusal = Refusal(Reason.NOT_WRITABLE, variable)
-            elif not heard:
+            elif not requester.trusted:
                 refusal = Refusal(Reason.HEARTBEAT_LOST, variable)
             elif move is Move.REFUSE_HELD:
                 refusal = Refusal(Reason.HELD, variable, self.ownership.owners[lock])
@@ -356,7 +358,7 @@ class Cell:
                 else:
                     self._move(writer, {lock: move}, now)
                 return None
-        self.refuse(writer, refusal, now)
+        self.refuse(requester, refusal, now)
         return refusal
 
     def _move(self, writer: int, moves: Mapping[int, Move], now: float) -> None:

@@ -120,6 +120,12 @@ class Variable:
     """Index of the lock that guards it (inputs; None for outputs)."""
     deadband: float = 0.0
     """Least change of a real that makes an event-driven PDO send."""
+    shown: tuple[float, float] | None = None
+    """Least and greatest value that every place of it can show; None: all of them."""
+    shows_nan: bool = True
+    """Whether every place of it can show what is no number."""
+    valid_running: bool = False
+    """Outputs that mean something only while the robot program runs."""
     unit: str = ""
     comment: str = ""
 
@@ -136,6 +142,8 @@ class Lock:
     """A writer named earlier takes the lock from one named later."""
     lease: float | None = None
     """Seconds for which the owner holds it without renewing; None: until release, disconnect or time-out."""
+    whole: bool = False
+    """A takeover by writing has to write every member."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +153,12 @@ class Writer:
     name: str
     timeout: float | None = None
     """Seconds without any request after which the writer counts as lost; None: the connection alone decides."""
+    grace: float = 0.0
+    """Seconds for which what it owned by a connection stays its own after the connection has ended."""
+    counts_writes: bool = False
+    """Only writes and lock requests feed `timeout`, reads do not."""
+    heartbeat: float | None = None
+    """Seconds without its heartbeat after which the writer is lost, where it promised one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +175,9 @@ class CellDefinition:
     """Seconds without a fresh package after which outputs are stale."""
     clear_on_connect: bool = False
     """After adopting the controller's inputs, give ownerless inputs their release fallback at once."""
+    adopt_for: float | None = None
+    """Seconds, counted once per process, after which adopted inputs that nobody owns take their release fallback; None:
+    they keep what the controller held."""
 
     def writer_name(self, writer: int) -> str:
         """The name of a declared writer; `operator` for the local operator."""

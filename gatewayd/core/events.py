@@ -36,6 +36,10 @@ class EventKind(Enum):
     REFUSED = "write refused"
     FORCED = "value forced"
     UNFORCED = "force ended"
+    ADOPTION_ENDS = "adopted values fall back soon"
+    DIFFERS = "robot holds something else"
+    FOLLOWED = "image follows the robot"
+    STOOD_STILL = "gateway stood still"
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,8 @@ class Source(IntEnum):
     """Connected, but no package came for longer than `stale_after`."""
     FROZEN = 4
     """Packages come, but the controller's timestamp stands still."""
+    LATE = 5
+    """Packages come, but so late that what they tell is too old."""
 
 
 class Happening(Enum):
@@ -29,6 +31,7 @@ class Happening(Enum):
     PROGRESS = "package with a new timestamp"
     NO_PACKAGE = "no package for too long"
     NO_PROGRESS = "timestamp unchanged for too long"
+    TOO_LATE = "package that is older than stale_after"
     LOST = "connection lost"
 
 
@@ -36,16 +39,24 @@ TRANSITIONS: dict[tuple[Source, Happening], Source] = {
     (Source.LOST, Happening.CONNECTED): Source.WAITING,
     (Source.WAITING, Happening.PROGRESS): Source.FRESH,
     (Source.WAITING, Happening.NO_PROGRESS): Source.FROZEN,
+    (Source.WAITING, Happening.TOO_LATE): Source.LATE,
     (Source.WAITING, Happening.LOST): Source.LOST,
     (Source.FRESH, Happening.NO_PACKAGE): Source.SILENT,
     (Source.FRESH, Happening.NO_PROGRESS): Source.FROZEN,
+    (Source.FRESH, Happening.TOO_LATE): Source.LATE,
     (Source.FRESH, Happening.LOST): Source.LOST,
     (Source.SILENT, Happening.PROGRESS): Source.FRESH,
     (Source.SILENT, Happening.NO_PROGRESS): Source.FROZEN,
+    (Source.SILENT, Happening.TOO_LATE): Source.LATE,
     (Source.SILENT, Happening.LOST): Source.LOST,
     (Source.FROZEN, Happening.PROGRESS): Source.FRESH,
     (Source.FROZEN, Happening.NO_PACKAGE): Source.SILENT,
+    (Source.FROZEN, Happening.TOO_LATE): Source.LATE,
     (Source.FROZEN, Happening.LOST): Source.LOST,
+    (Source.LATE, Happening.PROGRESS): Source.FRESH,
+    (Source.LATE, Happening.NO_PACKAGE): Source.SILENT,
+    (Source.LATE, Happening.NO_PROGRESS): Source.FROZEN,
+    (Source.LATE, Happening.LOST): Source.LOST,
 }
 """A pair that is not listed leaves the state as it is."""
 

@@ -30,6 +30,18 @@ class Health:
     sessions: int = 0
     """Sessions with the controller; the first one is no reconnect."""
     read_back_mismatches: int = 0
+    unadopted: int = 0
+    """Inputs whose content in the robot is not known."""
+    differing: int = 0
+    """Inputs for which the robot holds something else than it was given."""
+    lag: float = 0.0
+    """Seconds by which the newest package is later than the quickest ones were."""
+    adoption: float = 0.0
+    """Seconds until adopted inputs without an owner fall back; 0: none will."""
+    program: int | None = None
+    """The controller's runtime_state; None where it is not known."""
+    gaps: int = 0
+    """Times the gateway stood still."""
     watchdog_fed: bool = False
     writes_accepted: int = 0
     writes_refused: int = 0

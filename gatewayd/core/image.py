@@ -23,6 +23,12 @@ class Quality(IntEnum):
     """No value has come since the gateway started, or since the controller has the field."""
     FORCED = 4
     """The local operator put the value there (`gatewayd.core.forcing`)."""
+    DIFFERS = 5
+    """The robot holds something else than it was given."""
+    OUT_OF_RANGE = 6
+    """One of its places on a fieldbus cannot show the value."""
+    NOT_RUNNING = 7
+    """It is valid only while the robot program runs, and the program does not."""
 
 
 class ProcessImage:

@@ -27,6 +27,12 @@ class Reason(IntEnum):
     """The controller gave the register to another client, or does not have it."""
     HEARTBEAT_LOST = 8
     """The writer promised a heartbeat, and it stays away."""
+    PARTIAL_TAKEOVER = 9
+    """The request would take a group over from its owner and write only a part of it."""
+    WAITED = 10
+    """The request waited while the gateway stood still, for longer than its writer may be silent."""
+    NOT_MEANT = 11
+    """It would change a bit that only shares a register with what the writer owns."""
 
     @property
     def text(self) -> str:
@@ -52,6 +58,9 @@ _TEXTS = {
     Reason.ROBOT_LOST: "robot not connected",
     Reason.CLAIMED_ELSEWHERE: "register claimed elsewhere",
     Reason.HEARTBEAT_LOST: "its heartbeat stays away",
+    Reason.PARTIAL_TAKEOVER: "the group is taken over whole or not at all",
+    Reason.WAITED: "it waited while the gateway stood still",
+    Reason.NOT_MEANT: "bit of a shared register that the writer does not own",
 }
 
 PRECEDENCE = {
@@ -60,9 +69,12 @@ PRECEDENCE = {
     Reason.PARTIAL_VALUE: 2,
     Reason.OUT_OF_LIMITS: 3,
     Reason.HEARTBEAT_LOST: 4,
-    Reason.ROBOT_LOST: 5,
-    Reason.CLAIMED_ELSEWHERE: 6,
-    Reason.HELD: 7,
+    Reason.WAITED: 5,
+    Reason.ROBOT_LOST: 6,
+    Reason.CLAIMED_ELSEWHERE: 7,
+    Reason.PARTIAL_TAKEOVER: 8,
+    Reason.HELD: 9,
+    Reason.NOT_MEANT: 10,
 }
 """Which reason is told when several apply: what can never work first, what may pass soon last. A lost heartbeat stands
 before the robot's absence, which leaves an owner its lease: who is not heard keeps nothing alive."""
@@ -77,5 +89,3 @@ class Refusal:
     """Index of the first variable that stood in the way."""
     holder: int | None = None
     """Index of the writer that owns it, for `Reason.HELD`."""
-    peer: str = ""
-    """Address of a peer that no writer was declared for: who reads it knows what to declare."""

@@ -15,6 +15,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
 
 __all__ = [
     "BASE",
@@ -180,38 +181,34 @@ class StatusBlock:
 
     def write(
         self,
-        writer: int | None,
+        requester: Requester,
         first: int,
         words: Sequence[int],
         now: float,
-        *,
-        peer: str = "",
-        heard: bool = True,
     ) -> Refusal | None:
         """A writer takes or gives back a lock; any other word of the block is never writable.
 
-        A request that fills both words is refused, because it could succeed by half. `peer` is the address of one that
-        no writer was declared for, `heard` is as in `Cell.write`.
+        A request that fills both words is refused, because it could succeed by half.
         """
         cell = self._cell
-        if writer is None or first < REQUEST or first + len(words) > RELEASE + 1:
-            return self._refuse(writer, Refusal(Reason.NOT_WRITABLE, peer=peer), now)
+        if requester.writer is None or first < REQUEST or first + len(words) > RELEASE + 1:
+            return self._refuse(requester, Refusal(Reason.NOT_WRITABLE), now)
         wanted = [(offset, number) for offset, number in enumerate(words, first) if number]
         if not wanted:
             return None
         offset, number = wanted[0]
         if offset == RELEASE and number == RELEASE_ALL:
-            if not heard:
-                return self._refuse(writer, Refusal(Reason.HEARTBEAT_LOST), now)
-            cell.release_all(writer, now)
+            if not requester.trusted:
+                return self._refuse(requester, Refusal(Reason.HEARTBEAT_LOST), now)
+            cell.release_all(requester, now)
             return None
         if len(wanted) > 1 or number > len(cell.definition.variables):
-            return self._refuse(writer, Refusal(Reason.OUT_OF_LIMITS), now)
+            return self._refuse(requester, Refusal(Reason.OUT_OF_LIMITS), now)
         act = cell.request if offset == REQUEST else cell.release
-        return act(writer, number - 1, now, heard=heard)
+        return act(requester, number - 1, now)
 
-    def _refuse(self, writer: int | None, refusal: Refusal, now: float) -> Refusal:
-        self._cell.refuse(writer, refusal, now)
+    def _refuse(self, requester: Requester, refusal: Refusal, now: float) -> Refusal:
+        self._cell.refuse(requester, refusal, now)
         return refusal
 
     def _header(self, now: float) -> bytes:

@@ -204,7 +204,7 @@ def _take_history(old: Cell, new: Cell, match: _Match) -> None:
             variable=_at(match.variables, last.refusal.variable),
             holder=_at(match.writers, last.refusal.holder),
         )
-        new.last_refusal = LastRefusal(refusal, _at(match.writers, last.writer), last.time)
+        new.last_refusal = LastRefusal(refusal, _at(match.writers, last.writer), last.time, last.peer)
     for (writer, variable, reason), told in old._refusals._told.items():
         if (writer is None or writer in match.writers) and (variable is None or variable in match.variables):
             key = _at(match.writers, writer), _at(match.variables, variable), reason

@@ -44,6 +44,9 @@ _EXCEPTIONS = {
     Reason.ROBOT_LOST: "0B",
     Reason.CLAIMED_ELSEWHERE: "0A",
     Reason.HEARTBEAT_LOST: "0B",
+    Reason.PARTIAL_TAKEOVER: "03",
+    Reason.WAITED: "06",
+    Reason.NOT_MEANT: "06",
 }
 _EMERGENCIES = {
     Reason.NOT_WRITABLE: "FF05h",
@@ -52,6 +55,8 @@ _EMERGENCIES = {
     Reason.ROBOT_LOST: "FF03h",
     Reason.CLAIMED_ELSEWHERE: "FF04h",
     Reason.HEARTBEAT_LOST: "FF06h",
+    Reason.PARTIAL_TAKEOVER: "FF07h",
+    Reason.WAITED: "FF08h",
 }
 _STATES = {
     None: "not heard yet",
@@ -66,6 +71,7 @@ _SOURCES = {
     Source.FRESH: "fresh",
     Source.SILENT: "silent",
     Source.FROZEN: "frozen",
+    Source.LATE: "late",
 }
 
 

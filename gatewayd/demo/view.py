@@ -23,6 +23,9 @@ _QUALITY_STYLES = {
     Quality.UNAVAILABLE: "red",
     Quality.NEVER: "dim",
     Quality.FORCED: "magenta",
+    Quality.DIFFERS: "red",
+    Quality.OUT_OF_RANGE: "yellow",
+    Quality.NOT_RUNNING: "yellow",
 }
 _WIDE = 98
 """Columns of a terminal that has room for the CANopen side too."""

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from enum import IntEnum
 
 from gatewayd.core import status
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Value
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
 from gatewayd.mapping.plan import ModbusPlan
 from gatewayd.modbus import identification
 from gatewayd.modbus.identification import Identification
@@ -50,6 +50,9 @@ EXCEPTION_OF = {
     Reason.ROBOT_LOST: ExceptionCode.TARGET_FAILED,
     Reason.CLAIMED_ELSEWHERE: ExceptionCode.PATH_UNAVAILABLE,
     Reason.HEARTBEAT_LOST: ExceptionCode.TARGET_FAILED,
+    Reason.PARTIAL_TAKEOVER: ExceptionCode.ILLEGAL_VALUE,
+    Reason.WAITED: ExceptionCode.BUSY,
+    Reason.NOT_MEANT: ExceptionCode.BUSY,
 }
 
 
@@ -62,8 +65,6 @@ class Unit:
         self.image = RegisterImage(plan, cell)
         self.status = status.StatusBlock(cell)
         self.identification = Identification(cell.definition.name, cell.definition.fingerprint)
-        self.stranger = ""
-        """Address of the peer whose request is being answered, if no writer was declared for it."""
 
     def close(self) -> None:
         """Follow the cell no longer."""
@@ -71,7 +72,7 @@ class Unit:
 
 
 Answer = bytes | ExceptionCode
-_Function = Callable[[Unit, int | None, bytes, float], Answer]
+_Function = Callable[[Unit, Requester, bytes, float], Answer]
 
 _GREATEST_WRITTEN_BITS = 1968
 _GREATEST_WRITTEN_REGISTERS = 123
@@ -85,10 +86,10 @@ _WRITE_MULTIPLE = struct.Struct(">HHB")
 _READ_WRITE = struct.Struct(">HHHHB")
 
 
-def execute(unit: Unit, writer: int | None, pdu: bytes, now: float) -> bytes:
-    """The answer to a request of `writer`, None for a peer that no writer was declared for."""
+def execute(unit: Unit, requester: Requester, pdu: bytes, now: float) -> bytes:
+    """The answer to a request of `requester`."""
     function = _FUNCTIONS.get(pdu[0])
-    answer = ExceptionCode.ILLEGAL_FUNCTION if function is None else function(unit, writer, pdu, now)
+    answer = ExceptionCode.ILLEGAL_FUNCTION if function is None else function(unit, requester, pdu, now)
     return exception(pdu[0], answer) if isinstance(answer, ExceptionCode) else answer
 
 
@@ -100,19 +101,19 @@ def exception(function: int, code: ExceptionCode) -> bytes:
 # -- reading ----------------------------------------------------------------------------------------------------------
 
 
-def _read_coils(unit: Unit, _writer: int | None, pdu: bytes, _now: float) -> Answer:
+def _read_coils(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
     return _read_bits(unit.image.coils, pdu)
 
 
-def _read_discrete(unit: Unit, _writer: int | None, pdu: bytes, _now: float) -> Answer:
+def _read_discrete(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
     return _read_bits(unit.image.discrete, pdu)
 
 
-def _read_holding(unit: Unit, _writer: int | None, pdu: bytes, now: float) -> Answer:
+def _read_holding(unit: Unit, _requester: Requester, pdu: bytes, now: float) -> Answer:
     return _read_registers(unit, unit.image.holding, pdu, now)
 
 
-def _read_input(unit: Unit, _writer: int | None, pdu: bytes, now: float) -> Answer:
+def _read_input(unit: Unit, _requester: Requester, pdu: bytes, now: float) -> Answer:
     return _read_registers(unit, unit.image.input, pdu, now)
 
 
@@ -165,23 +166,23 @@ def _of_status(address: int, count: int) -> bool:
 # -- writing ----------------------------------------------------------------------------------------------------------
 
 
-def _write_coil(unit: Unit, writer: int | None, pdu: bytes, now: float) -> Answer:
+def _write_coil(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
     if len(pdu) != 5:
         return ExceptionCode.ILLEGAL_VALUE
     address, value = _TWO_WORDS.unpack_from(pdu, 1)
     if value not in {0, _COIL_ON}:
         return ExceptionCode.ILLEGAL_VALUE
-    return _apply(unit, writer, unit.image.coils.changes(address, [value == _COIL_ON]), now) or pdu
+    return _apply(unit, requester, unit.image.coils.changes(address, [value == _COIL_ON]), now) or pdu
 
 
-def _write_register(unit: Unit, writer: int | None, pdu: bytes, now: float) -> Answer:
+def _write_register(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
     if len(pdu) != 5:
         return ExceptionCode.ILLEGAL_VALUE
     (address, _value) = _TWO_WORDS.unpack_from(pdu, 1)
-    return _write_registers(unit, writer, address, pdu[3:], now) or pdu
+    return _write_registers(unit, requester, address, pdu[3:], now) or pdu
 
 
-def _write_coils(unit: Unit, writer: int | None, pdu: bytes, now: float) -> Answer:
+def _write_coils(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
     if len(pdu) < 6:
         return ExceptionCode.ILLEGAL_VALUE
     address, count, size = _WRITE_MULTIPLE.unpack_from(pdu, 1)
@@ -189,30 +190,30 @@ def _write_coils(unit: Unit, writer: int | None, pdu: bytes, now: float) -> Answ
         return ExceptionCode.ILLEGAL_VALUE
     packed = int.from_bytes(pdu[6:], "little")
     bits = [bool(packed >> position & 1) for position in range(count)]
-    return _apply(unit, writer, unit.image.coils.changes(address, bits), now) or pdu[:5]
+    return _apply(unit, requester, unit.image.coils.changes(address, bits), now) or pdu[:5]
 
 
-def _write_multiple(unit: Unit, writer: int | None, pdu: bytes, now: float) -> Answer:
+def _write_multiple(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
     if len(pdu) < 6:
         return ExceptionCode.ILLEGAL_VALUE
     address, count, size = _WRITE_MULTIPLE.unpack_from(pdu, 1)
     if not 1 <= count <= _GREATEST_WRITTEN_REGISTERS or size != 2 * count or len(pdu) != 6 + size:
         return ExceptionCode.ILLEGAL_VALUE
-    return _write_registers(unit, writer, address, pdu[6:], now) or pdu[:5]
+    return _write_registers(unit, requester, address, pdu[6:], now) or pdu[:5]
 
 
-def _mask_write(unit: Unit, writer: int | None, pdu: bytes, now: float) -> Answer:
+def _mask_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
     if len(pdu) != 7:
         return ExceptionCode.ILLEGAL_VALUE
     address, and_mask, or_mask = _MASK.unpack_from(pdu, 1)
     if _of_status(address, 1):
         present = int.from_bytes(unit.status.read(address - status.BASE, 1, now), "big")
         word = (present & and_mask) | (or_mask & ~and_mask & 0xFFFF)
-        return _write_status(unit, writer, address, [word], now) or pdu
-    return _apply(unit, writer, unit.image.holding.masked(address, and_mask, or_mask), now) or pdu
+        return _write_status(unit, requester, address, [word], now) or pdu
+    return _apply(unit, requester, unit.image.holding.masked(address, and_mask, or_mask), now) or pdu
 
 
-def _read_write(unit: Unit, writer: int | None, pdu: bytes, now: float) -> Answer:
+def _read_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
     if len(pdu) < 10:
         return ExceptionCode.ILLEGAL_VALUE
     first, count, address, written, size = _READ_WRITE.unpack_from(pdu, 1)
@@ -223,53 +224,52 @@ def _read_write(unit: Unit, writer: int | None, pdu: bytes, now: float) -> Answe
     table = unit.image.holding
     refused = _refuse_registers(table, first, count)
     if refused is None:
-        refused = _write_registers(unit, writer, address, pdu[10:], now)
+        refused = _write_registers(unit, requester, address, pdu[10:], now)
     if refused is not None:
         return refused
     return bytes((pdu[0], 2 * count)) + _registers(unit, table, first, count, now)
 
 
 def _write_registers(
-    unit: Unit, writer: int | None, address: int, data: bytes, now: float
+    unit: Unit, requester: Requester, address: int, data: bytes, now: float
 ) -> ExceptionCode | None:
     if _of_status(address, len(data) // 2):
         words = struct.unpack(f">{len(data) // 2}H", data)
-        return _write_status(unit, writer, address, words, now)
-    return _apply(unit, writer, unit.image.holding.changes(address, data), now)
+        return _write_status(unit, requester, address, words, now)
+    return _apply(unit, requester, unit.image.holding.changes(address, data), now)
 
 
 def _write_status(
-    unit: Unit, writer: int | None, address: int, words: Sequence[int], now: float
+    unit: Unit, requester: Requester, address: int, words: Sequence[int], now: float
 ) -> ExceptionCode | None:
-    peer = unit.stranger if writer is None else ""
-    refusal = unit.status.write(writer, address - status.BASE, words, now, peer=peer)
+    refusal = unit.status.write(requester, address - status.BASE, words, now)
     return EXCEPTION_OF[refusal.reason] if refusal is not None else None
 
 
 def _apply(
-    unit: Unit, writer: int | None, changes: list[Change] | Refusal, now: float
+    unit: Unit, requester: Requester, changes: list[Change] | Refusal, now: float
 ) -> ExceptionCode | None:
     """Hand all changes of one request to the cell at once, and every refusal of ours to its records."""
     if isinstance(changes, Refusal):
-        peer = unit.stranger if writer is None else ""
-        unit.cell.refuse(writer, replace(changes, peer=peer), now)
+        unit.cell.refuse(requester, changes, now)
         return EXCEPTION_OF[changes.reason]
-    refusal = (
-        _refuse_stranger(unit, changes, now) if writer is None else unit.cell.write(writer, changes, now)
-    )
+    if requester.writer is None:
+        refusal: Refusal | None = _refuse_undeclared(unit, requester, changes, now)
+    else:
+        refusal = unit.cell.write(requester, changes, now)
     return EXCEPTION_OF[refusal.reason] if refusal is not None else None
 
 
-def _refuse_stranger(unit: Unit, changes: list[Change], now: float) -> Refusal:
+def _refuse_undeclared(unit: Unit, requester: Requester, changes: list[Change], now: float) -> Refusal:
     """A peer that may write nothing is told so even if it wrote what is there already."""
     variable: int | None = changes[0].variable if changes else None
     value: Value | None = changes[0].value if changes else None
-    refusal = Refusal(Reason.NOT_WRITABLE, variable, peer=unit.stranger)
-    unit.cell.refuse(None, refusal, now, value)
+    refusal = Refusal(Reason.NOT_WRITABLE, variable)
+    unit.cell.refuse(requester, refusal, now, value)
     return refusal
 
 
-def _identify(unit: Unit, _writer: int | None, pdu: bytes, _now: float) -> Answer:
+def _identify(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
     if len(pdu) > 1 and pdu[1] != identification.MEI_TYPE:
         return ExceptionCode.ILLEGAL_FUNCTION
     answer = unit.identification.answer(pdu)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import select
-import time
 from collections.abc import Callable
+
+from gatewayd import clock
 
 __all__ = ["ReadPoller"]
 
@@ -17,19 +18,12 @@ _MOST_EVENTS = 32
 """Sockets looked at together."""
 _LONGEST_TURN = 0.0002
 """Seconds after which other work of the loop has its turn, though more may have come in."""
-_LONGEST_GAP = 0.05
-"""Seconds between two turns after which the process may have been suspended: due timers run later."""
 
 
 class ReadPoller:
-    """Calls a function for every socket that can be read; level-triggered.
+    """Calls a function for every socket that can be read; level-triggered."""
 
-    `after_a_gap` is called with the time before the first of them if there was no turn for a while.
-    """
-
-    def __init__(self, after_a_gap: Callable[[float], None] = lambda _now: None) -> None:
-        self._after_a_gap = after_a_gap
-        self._last_turn = time.monotonic()
+    def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._epoll = select.epoll()
         self._readers: dict[int, Callable[[float], None]] = {}
@@ -54,9 +48,7 @@ class ReadPoller:
 
     def _turn(self) -> None:
         readers = self._readers
-        now = time.monotonic()
-        if now - self._last_turn > _LONGEST_GAP:
-            self._after_a_gap(now)
+        now = clock.now()
         end = now + _LONGEST_TURN
         # A client that waits for nothing has its next request under way by now: a look is cheaper than a sleep.
         while now < end and (events := self._epoll.poll(0, _MOST_EVENTS)):
@@ -64,5 +56,4 @@ class ReadPoller:
                 reader = readers.get(descriptor)
                 if reader is not None:
                     reader(now)
-            now = time.monotonic()
-        self._last_turn = now
+            now = clock.now()

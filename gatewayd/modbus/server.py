@@ -12,12 +12,14 @@ import logging
 import os
 import socket
 import sys
-import time
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, cast
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell
+from gatewayd.core.requester import Requester, new_connection
 from gatewayd.logs import fields
 from gatewayd.mapping.plan import ModbusPlan
 from gatewayd.modbus.functions import Unit
@@ -86,6 +88,7 @@ class _Connection(ServerRequestHandler):
         self.owner = server.owner
         self.poller = server.poller
         self.session = Session()
+        self.number = new_connection()
         self.peer = ""
         self.address: Address | None = None
         self.accesses: dict[int, Access] = {}
@@ -114,7 +117,7 @@ class _Connection(ServerRequestHandler):
         sock = self.wire.get_extra_info("socket")
         self.descriptor = sock.fileno()
         _set_options(sock)
-        self.last_request = time.monotonic()
+        self.last_request = clock.now()
         if self.owner.connected(self):
             self.poller.add(self.descriptor, self.readable)
             asyncio.get_running_loop().call_soon(self._pause_again)
@@ -163,7 +166,7 @@ class _Connection(ServerRequestHandler):
 
     def pause_writing(self) -> None:
         """The peer does not read its answers: take no more requests."""
-        self.stalled_since = time.monotonic()
+        self.stalled_since = clock.now()
         self.poller.remove(self.descriptor)
 
     def resume_writing(self) -> None:
@@ -200,7 +203,7 @@ class _Server(ModbusTcpServer):
     def __init__(self, owner: ModbusListener, host: str, port: int) -> None:
         super().__init__(SimDevice(1, [SimData(0)]), address=(host, port))
         self.owner = owner
-        self.poller = ReadPoller(owner.catch_up)
+        self.poller = ReadPoller()
 
     def callback_new_connection(self) -> _Connection:
         """Called for every accepted connection."""
@@ -329,7 +332,7 @@ class ModbusListener:
                 kept = Unit(plan, cell)
             units_now[number] = kept
         self._units = units_now
-        now = time.monotonic()
+        now = clock.now()
         for connection in list(self._connections):
             if not self._admit(connection, now, "unit no longer served", successors):
                 connection.abort("not on the access list any more")
@@ -339,16 +342,14 @@ class ModbusListener:
                 unit.close()
         self._count()
 
-    # -- called by connections ------------------------------------------------------------------------------------
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`: what is in the sockets may have waited that long."""
 
-    def catch_up(self, now: float) -> None:
-        """Notice what only time brings before a request is answered: after a suspension requests come before timers."""
-        for unit in self._units.values():
-            unit.cell.tick(now)
+    # -- called by connections ------------------------------------------------------------------------------------
 
     def connected(self, connection: _Connection) -> bool:
         """A peer has connected: returns whether it is to be served; if not, it was refused."""
-        now = time.monotonic()
+        now = clock.now()
         address = connection.address
         if address is None or not any(may_connect(address, unit.plan) for unit in self._units.values()):
             self._refuse(connection, PeerEventKind.DENIED, now)
@@ -368,11 +369,11 @@ class ModbusListener:
             return
         del self._connections[connection]
         names = _names(connection)
-        now = time.monotonic()
+        now = clock.now()
         accesses, connection.accesses = connection.accesses, {}
         connection.session.serve({})
-        for cell, writer in _writers(accesses):
-            cell.writer_disconnected(writer, now, connection.reason)
+        for cell, requester in _writers(accesses):
+            cell.writer_disconnected(requester, now, connection.reason)
         self._count()
         self._observe(PeerEvent(PeerEventKind.DISCONNECTED, connection.peer, names, connection.reason))
 
@@ -391,19 +392,21 @@ class ModbusListener:
         """
         address = connection.address
         accesses = {
-            number: Access(unit, writer_of(address, unit.plan.writers), str(address))
+            number: Access(
+                unit, Requester(writer_of(address, unit.plan.writers), str(address), connection.number)
+            )
             for number, unit in self._units.items()
             if address is not None and may_connect(address, unit.plan)
         }
         before, after = _succeeded(_writers(connection.accesses), successors), _writers(accesses)
         connection.accesses = accesses
         connection.session.serve(accesses)
-        for cell, writer in after:
-            if (cell, writer) not in before:
-                cell.writer_connected(writer, now, connection.peer)
-        for cell, writer in before:
-            if (cell, writer) not in after:
-                cell.writer_disconnected(writer, now, reason)
+        for cell, requester in after:
+            if (cell, requester) not in before:
+                cell.writer_connected(requester, now, connection.peer)
+        for cell, requester in before:
+            if (cell, requester) not in after:
+                cell.writer_disconnected(requester, now, reason)
         return bool(accesses)
 
     def _refuse(self, connection: _Connection, kind: PeerEventKind, now: float) -> None:
@@ -436,7 +439,7 @@ class ModbusListener:
 
     def _sweep(self) -> None:
         self.turns += 1
-        now = time.monotonic()
+        now = clock.now()
         idle = self._idle_timeout()
         for connection in list(self._connections):
             if connection.stalled_since is not None and now - connection.stalled_since > STALLED_AFTER:
@@ -464,27 +467,41 @@ def _set_options(sock: Any) -> None:
         return
 
 
-def _writers(accesses: dict[int, Access]) -> list[tuple[Cell, int]]:
-    return [(access.unit.cell, access.writer) for access in accesses.values() if access.writer is not None]
+_Writers = list[tuple[Cell, Requester]]
+"""The writers that a connection is, each in its cell."""
 
 
-def _succeeded(
-    writers: Iterable[tuple[Cell, int]], successors: Mapping[Cell, Cell]
-) -> list[tuple[Cell, int]]:
+def _writers(accesses: dict[int, Access]) -> _Writers:
+    return [
+        (access.unit.cell, access.requester)
+        for access in accesses.values()
+        if access.requester.writer is not None
+    ]
+
+
+def _succeeded(writers: _Writers, successors: Mapping[Cell, Cell]) -> _Writers:
     """The same writers in the cells that go on; without those that are declared no more."""
     found = []
-    for cell, writer in writers:
-        successor = successors.get(cell, cell)
-        name = cell.definition.writers[writer].name
-        index = next((i for i, one in enumerate(successor.definition.writers) if one.name == name), None)
+    for cell, requester in writers:
+        successor, name = successors.get(cell, cell), _name(cell, requester)
+        indices = (i for i, writer in enumerate(successor.definition.writers) if writer.name == name)
+        index = next(indices, None)
         if index is not None:
-            found.append((successor, index))
+            found.append((successor, replace(requester, writer=index)))
     return found
 
 
+def _name(cell: Cell, requester: Requester) -> str:
+    return "" if requester.writer is None else cell.definition.writers[requester.writer].name
+
+
 def _names(connection: _Connection) -> tuple[str, ...]:
-    return tuple(cell.definition.writers[writer].name for cell, writer in _writers(connection.accesses))
+    return tuple(_name(cell, requester) for cell, requester in _writers(connection.accesses))
 
 
 def _owns_anything(connection: _Connection) -> bool:
-    return any(cell.ownership.held_by(writer) for cell, writer in _writers(connection.accesses))
+    return any(
+        cell.ownership.held_by(requester.writer)
+        for cell, requester in _writers(connection.accesses)
+        if requester.writer is not None
+    )

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+from gatewayd.core.requester import Requester
 from gatewayd.modbus.frames import FrameBuffer, FramingError, encode, split
 from gatewayd.modbus.functions import ExceptionCode, Unit, exception, execute
 from gatewayd.modbus.registers import GREATEST_REGISTERS
@@ -31,14 +32,12 @@ _THIS_DEVICE = (0, 255)
 class Access:
     """What a peer may do with one unit."""
 
-    __slots__ = ("peer", "unit", "writer", "writer_seen")
+    __slots__ = ("requester", "unit", "writer_seen")
 
-    def __init__(self, unit: Unit, writer: int | None, peer: str = "") -> None:
+    def __init__(self, unit: Unit, requester: Requester) -> None:
         self.unit = unit
-        self.writer = writer
-        """The writer of the unit's cell that the peer is, if any."""
-        self.peer = peer
-        """Its address, for refusals."""
+        self.requester = requester
+        """The peer as a writer of the unit's cell, or as an undeclared one."""
         self.writer_seen = unit.cell.writer_seen
 
 
@@ -73,8 +72,7 @@ class Session:
             if read is not None and length == _READ_LENGTH and not protocol:
                 reach, image, heads, access = read
                 if 0 < quantity <= reach[address]:
-                    if access.writer is not None:
-                        access.writer_seen(access.writer, now)
+                    access.writer_seen(access.requester, now)
                     first = 2 * address
                     answer: bytes = transaction + heads[quantity] + image[first : first + 2 * quantity]
                     return answer
@@ -99,11 +97,8 @@ class Session:
         access = self._accesses.get(unit)
         if access is None:
             return exception(pdu[0], ExceptionCode.TARGET_FAILED)
-        if access.writer is not None:
-            access.writer_seen(access.writer, now)
-        else:
-            access.unit.stranger = access.peer
-        return execute(access.unit, access.writer, pdu, now)
+        access.writer_seen(access.requester, now)
+        return execute(access.unit, access.requester, pdu, now)
 
 
 @cache

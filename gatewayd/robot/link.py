@@ -10,10 +10,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Value
 from gatewayd.core.events import Event, EventKind
@@ -106,7 +106,10 @@ class RobotLink:
     async def close(self) -> None:
         """Send what is still due. Cancelling `run` afterwards ends the connection; what was sent is delivered."""
         self._closing = True
-        self.flush(time.monotonic())
+        self.flush(clock.now())
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`. The packages that waited tell their own time."""
 
     def flush(self, now: float) -> None:
         """Send what is still due at once."""
@@ -156,7 +159,7 @@ class RobotLink:
 
     def session_started(self, session: Session) -> None:
         """The set-up is complete; the first package follows."""
-        now = time.monotonic()
+        now = clock.now()
         variables = self._cell.definition.variables
         self._slots = session.outputs.slots
         self._has_timestamp = "timestamp" in self._slots
@@ -198,7 +201,7 @@ class RobotLink:
 
     def session_lost(self, loss: Loss) -> None:
         """The session has ended, or an attempt at one has failed."""
-        now = time.monotonic()
+        now = clock.now()
         self._inputs = ClaimedInputs((), {})
         self._session = None
         self._cell.health.watchdog_fed = False
@@ -259,7 +262,7 @@ class RobotLink:
     def _on_change(self, direction: Direction) -> None:
         if direction is Direction.OUTPUT or self._session is not None or self._pending:
             return
-        now = time.monotonic()
+        now = clock.now()
         if now >= self._next_send:
             self._send(now)
         else:
@@ -268,7 +271,7 @@ class RobotLink:
 
     def _send_pending(self) -> None:
         self._pending = None
-        self._send(time.monotonic())
+        self._send(clock.now())
 
     def _send(self, now: float) -> None:
         """Send every recipe of which something was written or has changed."""

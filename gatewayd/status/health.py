@@ -15,6 +15,7 @@ SOURCES = {
     Source.FRESH: "robot fresh",
     Source.SILENT: "robot silent: connected, but no data comes",
     Source.FROZEN: "robot frozen: data comes, but its clock stands still",
+    Source.LATE: "robot late: data comes, but too late to count as fresh",
 }
 """The state of the robot in words."""
 

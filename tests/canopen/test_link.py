@@ -21,7 +21,6 @@ from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.plan import CanopenPlan
 from gatewayd.canopen.storage import MemoryStore
 from gatewayd.core.cell import Cell
-from gatewayd.core.freshness import Source
 from gatewayd.core.succession import succeed
 from tests.canopen.conformance.bench import compiled
 from tests.canopen.recorder import until
@@ -242,18 +241,3 @@ async def test_another_cell_takes_over_unnoticed_by_the_bus(station: Station) ->
 def test_a_node_with_another_heartbeat_is_another_node(station: Station) -> None:
     plan = station.link.node.plan
     assert not station.link.fits(replace(plan, heartbeat=11), station.cell.definition)
-
-
-async def test_after_a_suspension_nothing_is_told_fresh_that_is_not(station: Station) -> None:
-    """Frames that waited are handed over before any timer of the loop has run."""
-    station.cell.freshness.stale_after = 0.1
-    async with running(station):
-        await until(lambda: station.frames(HEARTBEAT))
-        now = time.monotonic()
-        station.cell.package_arrived(2.0, now)
-        station.cell.outputs_written(now)
-        station.link.on_frames([], now + 0.05)
-        seen = [station.cell.freshness.state]
-        station.link.on_frames([], now + 10)
-        seen.append(station.cell.freshness.state)
-        assert seen == [Source.FRESH, Source.SILENT]

@@ -20,6 +20,7 @@ from gatewayd.canopen.storage import MemoryStore, Saved, Store
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, Value, ValueKind, Variable, Writer
 from gatewayd.core.refusal import Reason
+from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
 from tests.canopen.wire import Wire
 
@@ -353,7 +354,7 @@ def test_refused_write_is_an_emergency_until_one_succeeds() -> None:
     assert plant.write(0x2001, 1, 9) == 0
     assert _emergencies(plant.part(7)) == [0xFF01]
     assert plant.cell.image.values[PART] == 9
-    plant.cell.release(TOOL, PART, plant.now)
+    plant.cell.release(Requester(TOOL), PART, plant.now)
     assert _emergencies(plant.part(7)) == [0]
 
 
@@ -673,7 +674,7 @@ def test_a_master_that_restarts_before_its_first_heartbeat_is_lost_as_a_writer()
 def test_the_modbus_side_of_a_writer_is_not_bound_by_its_heartbeat() -> None:
     """Its lock stays with the connection that is left, and moves for nothing that comes by CANopen."""
     plant = _promised()
-    plant.cell.writer_connected(LINE, plant.now, "Modbus")
+    plant.cell.writer_connected(Requester(LINE), plant.now, "Modbus")
     plant.part(7)
     plant.run(0.6)
     assert (_line_alive(plant), plant.cell.writers.connections) == (True, [1, 0])
@@ -681,8 +682,8 @@ def test_the_modbus_side_of_a_writer_is_not_bound_by_its_heartbeat() -> None:
     assert _emergencies(plant.part(8)) == [0xFF06]
     assert plant.write(0x5F00, 27, PART + 1, 2) == -0x0800_0022
     assert plant.cell.image.values[PART] == 7
-    assert plant.cell.write(LINE, [Change(PART, 9)], plant.now) is None
-    plant.cell.writer_disconnected(LINE, plant.now, "hung up")
+    assert plant.cell.write(Requester(LINE), [Change(PART, 9)], plant.now) is None
+    plant.cell.writer_disconnected(Requester(LINE), plant.now, "hung up")
     assert plant.cell.ownership.owners == [None, None]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 
 from gatewayd.canopen.datatypes import CanType
@@ -10,6 +12,7 @@ from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES, StatusObjects
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.refusal import Reason
+from gatewayd.core.requester import Requester
 from gatewayd.core.status import FIELDS, LENGTH, RELEASE_ALL, TABLES, StatusBlock
 
 LINE, HMI = range(2)
@@ -54,7 +57,9 @@ class Node:
         self.cell.adopt(dict.fromkeys(range(COUNT), 0), 0.0)
         self.heard = True
         self.dictionary = Dictionary(
-            StatusObjects(self.cell, writer, lambda: self.now, lambda: self.heard).objects()
+            StatusObjects(
+                self.cell, lambda: self.now, lambda: Requester(writer, trusted=self.heard)
+            ).objects()
         )
         self.subindices = {
             entry.name: entry.subindex
@@ -107,18 +112,20 @@ def test_indices_are_fixed_and_apart() -> None:
         "quality": 0x5F40,
     }
     largest = Cell(_definition(1024, tuple(f"w{number}" for number in range(32))))
-    indices = [one.index for one in StatusObjects(largest, None, float, bool).objects()]
+    indices = [one.index for one in StatusObjects(largest, float, partial(Requester, None)).objects()]
     assert len(indices) == len(set(indices)) == 3 + 4 * 5
-    assert all(len(one.entries) <= 255 for one in StatusObjects(largest, None, float, bool).objects())
+    assert all(
+        len(one.entries) <= 255 for one in StatusObjects(largest, float, partial(Requester, None)).objects()
+    )
 
 
 def test_every_word_is_that_of_the_block(node: Node) -> None:
     """Whatever the state of the cell, both buses show the same."""
     cell = node.cell
-    cell.writer_connected(LINE, 0.5)
+    cell.writer_connected(Requester(LINE), 0.5)
     for index in (1, 20, 299):
-        assert cell.write(LINE, [Change(index, 3)], 0.5 + index / 1000) is None
-    assert cell.write(HMI, [Change(20, 4)], 0.9) is not None
+        assert cell.write(Requester(LINE), [Change(index, 3)], 0.5 + index / 1000) is None
+    assert cell.write(Requester(HMI), [Change(20, 4)], 0.9) is not None
     cell.set_availability([7], False, "in use", 0.9)
     block = StatusBlock(cell).read(0, LENGTH, node.now)
 
@@ -150,7 +157,7 @@ def test_entries_are_named_after_variables_and_writers(node: Node) -> None:
 
 def test_a_cell_without_writers_has_no_table_of_them() -> None:
     bare = Cell(CellDefinition("bare", 1, (), (), (), 0.1))
-    assert [one.index for one in StatusObjects(bare, None, float, bool).objects()] == [HEADER]
+    assert [one.index for one in StatusObjects(bare, float, partial(Requester, None)).objects()] == [HEADER]
 
 
 def test_tables_are_read_only(node: Node) -> None:
@@ -183,7 +190,7 @@ def test_0_requests_nothing(node: Node) -> None:
 
 
 def test_refused_requests_are_aborted(node: Node) -> None:
-    node.cell.request(HMI, 1, node.now)
+    node.cell.request(Requester(HMI), 1, node.now)
     assert node.put("request", 2) is AbortCode.LOCAL_CONTROL
     assert node.put("release", 2) is AbortCode.LOCAL_CONTROL
     assert node.put("request", 1) is AbortCode.READ_ONLY

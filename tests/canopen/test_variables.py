@@ -6,6 +6,7 @@ import math
 import struct
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -29,6 +30,7 @@ from gatewayd.core.definition import (
     Writer,
 )
 from gatewayd.core.refusal import Reason
+from gatewayd.core.requester import Requester
 
 LINE, HMI = range(2)
 LOW, HIGH = -(2.0**31), 2.0**31 - 1
@@ -119,12 +121,16 @@ class Node:
 
     def __init__(self, plan: CanopenPlan = PLAN, definition: CellDefinition = DEFINITION) -> None:
         self.now = 1.0
+        self.plan = plan
         self.cell = Cell(definition)
         self.heard = True
         self.dictionary = Dictionary(
-            VariableObjects(plan, self.cell, lambda: self.now, lambda: self.heard).objects()
+            VariableObjects(plan, self.cell, lambda: self.now, self._requester).objects()
         )
         self.server = SdoServer(self.dictionary)
+
+    def _requester(self) -> Requester:
+        return Requester(self.plan.sdo_writer, trusted=self.heard)
 
     def connect(self) -> None:
         inputs = range(5)
@@ -167,7 +173,9 @@ def test_objects_are_arrays_by_index_named_as_in_the_mapping(node: Node) -> None
 def test_further_indices_of_a_type_are_numbered() -> None:
     first, second = (ObjectPlan(index, 0x2010 + index, 1, CanType.INTEGER32) for index in (PART, STRANGE))
     objects = list(
-        VariableObjects(replace(PLAN, objects=(first, second)), Cell(DEFINITION), float, bool).objects()
+        VariableObjects(
+            replace(PLAN, objects=(first, second)), Cell(DEFINITION), float, partial(Requester, None)
+        ).objects()
     )
     assert [one.name for one in objects] == ["Input INTEGER32", "Input INTEGER32 2"]
 
@@ -178,7 +186,11 @@ def test_an_index_of_several_types_is_a_record_and_one_of_subindex_0_a_variable(
         ObjectPlan(PART, 0x2100, 2, CanType.INTEGER32),
         ObjectPlan(CYCLES, 0x2101, 0, CanType.INTEGER32),
     )
-    objects = list(VariableObjects(replace(PLAN, objects=mixed), Cell(DEFINITION), float, bool).objects())
+    objects = list(
+        VariableObjects(
+            replace(PLAN, objects=mixed), Cell(DEFINITION), float, partial(Requester, None)
+        ).objects()
+    )
     assert [one.code for one in objects] == [ObjectCode.RECORD, ObjectCode.VAR]
     assert [one.name for one in objects] == ["Input BOOLEAN INTEGER32", "cycles"]
 
@@ -282,7 +294,7 @@ def test_writing_clamps_where_the_mapping_says_so(node: Node) -> None:
 
 
 def held(node: Node) -> None:
-    assert node.cell.request(HMI, PART, node.now) is None
+    assert node.cell.request(Requester(HMI), PART, node.now) is None
 
 
 def lost(node: Node) -> None:

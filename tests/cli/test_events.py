@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from gatewayd.core.cell import Change
+from gatewayd.core.requester import Requester
 from tests.cli.conftest import Invoke, Running
 from tests.control.served import LIMIT
 
@@ -17,8 +18,8 @@ PLC, HMI = 0, 1
 
 
 def test_the_last_ones_in_words(gateway: Running, invoke: Invoke) -> None:
-    gateway.do(lambda cell: cell.write(PLC, [Change(LIMIT, 1.0)], 1.0))
-    gateway.do(lambda cell: cell.write(PLC, [Change(LIMIT, 999.0)], 1.1))
+    gateway.do(lambda cell: cell.write(Requester(PLC), [Change(LIMIT, 1.0)], 1.0))
+    gateway.do(lambda cell: cell.write(Requester(PLC), [Change(LIMIT, 999.0)], 1.1))
     lines = invoke("events", "--limit", "2").output.splitlines()
     assert [line.split("press  ")[1] for line in lines] == [
         "plc took limit",
@@ -27,7 +28,7 @@ def test_the_last_ones_in_words(gateway: Running, invoke: Invoke) -> None:
 
 
 def test_the_audit(gateway: Running, invoke: Invoke) -> None:
-    gateway.do(lambda cell: cell.write(PLC, [Change(LIMIT, 1.5)], 1.0))
+    gateway.do(lambda cell: cell.write(Requester(PLC), [Change(LIMIT, 1.5)], 1.0))
     assert "plc wrote limit: 0 -> 1.5 N\n" in invoke("events", "--audit").output
     assert invoke("events", "--audit", "--follow").exit_code == 2
 

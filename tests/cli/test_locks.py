@@ -8,6 +8,7 @@ import pytest
 
 from gatewayd.core.cell import Change
 from gatewayd.core.definition import OPERATOR
+from gatewayd.core.requester import Requester
 from tests.cli.conftest import Invoke, Running
 from tests.control.served import SPEED
 
@@ -16,7 +17,7 @@ MOTION = 2
 
 
 def test_the_table(gateway: Running, invoke: Invoke) -> None:
-    gateway.do(lambda cell: cell.write(PLC, [Change(SPEED, 0.5)], 1.0))
+    gateway.do(lambda cell: cell.write(Requester(PLC), [Change(SPEED, 0.5)], 1.0))
     lines = invoke("locks").output.splitlines()
     assert [line.split()[0] for line in lines] == ["lock", "start", "limit", "motion"]
     assert lines[3].split("  ")[0] == "motion"

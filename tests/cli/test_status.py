@@ -7,6 +7,7 @@ import json
 import pytest
 
 from gatewayd.core.cell import Change
+from gatewayd.core.requester import Requester
 from tests.cli.conftest import Invoke, Running
 from tests.control.served import CYCLES, LIMIT, SPEED
 
@@ -14,7 +15,7 @@ PLC, HMI = 0, 1
 
 
 def test_a_healthy_gateway(gateway: Running, invoke: Invoke) -> None:
-    gateway.do(lambda cell: cell.write(PLC, [Change(SPEED, 0.5)], 1.0))
+    gateway.do(lambda cell: cell.write(Requester(PLC), [Change(SPEED, 0.5)], 1.0))
     done = invoke("status")
     assert done.exit_code == 0
     for words in (
@@ -27,7 +28,7 @@ def test_a_healthy_gateway(gateway: Running, invoke: Invoke) -> None:
 
 def test_a_degraded_one_says_why(gateway: Running, invoke: Invoke) -> None:
     gateway.do(lambda cell: cell.robot_lost("gone", 1.0))
-    gateway.do(lambda cell: cell.write(HMI, [Change(LIMIT, 1.0)], 1.0))
+    gateway.do(lambda cell: cell.write(Requester(HMI), [Change(LIMIT, 1.0)], 1.0))
     done = invoke("status")
     assert done.exit_code == 1
     assert "is degraded" in done.output

@@ -11,6 +11,7 @@ from gatewayd.audit import Audit
 from gatewayd.cli.watching import KEYS, Glimpse, Show, View, chosen, plain, press, screen, settled
 from gatewayd.control.api import Api
 from gatewayd.core.cell import Cell, Change
+from gatewayd.core.requester import Requester
 from tests.control.served import CYCLES, SPEED, FixedGateway, Served, at, bring_up, plan
 
 
@@ -54,7 +55,7 @@ def test_wide_ones_show_both_places(served: Served) -> None:
 
 
 def test_owner_lease_and_force(served: Served) -> None:
-    assert served.cell.write(0, [Change(SPEED, 0.5)], 1.0) is None
+    assert served.cell.write(Requester(0), [Change(SPEED, 0.5)], 1.0) is None
     assert served.cell.force(CYCLES, 99, 1.0, 31.0) is None
     lines = picture(glimpse(served), View(), 100, 30)
     (speed,) = [line for line in lines if " speed " in line]
@@ -81,7 +82,7 @@ def test_degraded_with_the_first_reason(served: Served) -> None:
 
 class TestKeys:
     def test_filtering_by_name_register_and_owner(self, served: Served) -> None:
-        assert served.cell.write(0, [Change(SPEED, 0.5)], 0.9) is None
+        assert served.cell.write(Requester(0), [Change(SPEED, 0.5)], 0.9) is None
         found = glimpse(served)
         view = View()
         for key in "/", "T", "c", "p":

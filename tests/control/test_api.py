@@ -11,6 +11,7 @@ from gatewayd.control.api import Api, ApiError, Cursor
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import OPERATOR
 from gatewayd.core.image import Quality
+from gatewayd.core.requester import Requester
 from tests.control.served import LIMIT, SPEED, FixedGateway, Served, at, bring_up, plan
 
 PLC = 0
@@ -67,7 +68,7 @@ class TestQuestions:
         assert api.variables({"name": "parts"}, at(1.0))["variables"]
 
     def test_locks(self, api: Api, press: Served) -> None:
-        assert press.cell.write(PLC, [Change(SPEED, 1.0)], 1.0) is None
+        assert press.cell.write(Requester(PLC), [Change(SPEED, 1.0)], 1.0) is None
         locks = {one["name"]: one for one in api.locks({}, at(1.5))["locks"]}
         assert locks["motion"] == {
             "cell": "press",
@@ -83,7 +84,7 @@ class TestQuestions:
 
     def test_the_audit_is_filtered_and_limited(self, api: Api, press: Served) -> None:
         for turn in range(5):
-            assert press.cell.write(PLC, [Change(LIMIT, float(turn + 1))], turn * 10.0) is None
+            assert press.cell.write(Requester(PLC), [Change(LIMIT, float(turn + 1))], turn * 10.0) is None
         records = api.audit({"variable": "limit", "writer": "plc", "limit": "2"}, at(50.0))["records"]
         assert [(one["old"], one["new"]) for one in records] == [(3.0, 4.0), (4.0, 5.0)]
         assert api.audit({"limit": "0"}, at(50.0))["records"] == []
@@ -128,7 +129,7 @@ class TestEvents:
 
 class TestLocks:
     def test_take_names_who_did_it(self, api: Api, press: Served) -> None:
-        assert press.cell.write(PLC, [Change(SPEED, 1.0)], 1.0) is None
+        assert press.cell.write(Requester(PLC), [Change(SPEED, 1.0)], 1.0) is None
         lock = api.take("motion", {"for": 10}, BY, at(1.0))
         assert (lock["owner"], lock["remaining"]) == ("operator", 10.0)
         assert [event.detail for event in press.cell.events][-1] == BY
@@ -138,7 +139,7 @@ class TestLocks:
         assert press.cell.ownership.owners[2] == OPERATOR
 
     def test_release_applies_the_fallback(self, api: Api, press: Served) -> None:
-        assert press.cell.write(PLC, [Change(SPEED, 1.0)], 1.0) is None
+        assert press.cell.write(Requester(PLC), [Change(SPEED, 1.0)], 1.0) is None
         assert api.release("motion", {}, BY, at(1.0))["owner"] is None
         assert press.cell.image.values[SPEED] == 0.5
 

@@ -14,6 +14,7 @@ from gatewayd.control import documented
 from gatewayd.control.api import Api
 from gatewayd.control.views import cell_view, declared_view, problems
 from gatewayd.core.cell import Change
+from gatewayd.core.requester import Requester
 from gatewayd.mapping.loader import load
 from gatewayd.sentence import sentence
 from gatewayd.station import Station
@@ -23,7 +24,7 @@ PLC, HMI = 0, 1
 
 
 def test_the_status_has_the_documented_fields(api: Api, press: Served) -> None:
-    assert press.cell.write(PLC, [Change(LIMIT, 999.0)], 0.5) is not None
+    assert press.cell.write(Requester(PLC), [Change(LIMIT, 999.0)], 0.5) is not None
     status = api.status(at(1.0))
     (cell,) = status["cells"]
     assert status.keys() == documented.STATUS.keys()
@@ -42,8 +43,8 @@ def test_variables_and_locks_have_the_documented_fields(api: Api) -> None:
 
 def test_events_and_records_have_documented_fields_only(api: Api, press: Served) -> None:
     cell = press.cell
-    assert cell.write(PLC, [Change(LIMIT, 1.0)], 1.0) is None
-    assert cell.write(HMI, [Change(LIMIT, 2.0)], 1.1) is not None
+    assert cell.write(Requester(PLC), [Change(LIMIT, 1.0)], 1.0) is None
+    assert cell.write(Requester(HMI), [Change(LIMIT, 2.0)], 1.1) is not None
     assert cell.force(CYCLES, 5, 1.2, 2.0, "by anna") is None
     cell.take_lock(2, 1.3, detail="by anna")
     cell.robot_lost("gone", 1.4)
@@ -59,9 +60,9 @@ def test_events_and_records_have_documented_fields_only(api: Api, press: Served)
 
 
 def test_events_records_and_the_last_refusal_are_told_in_the_same_words(api: Api, press: Served) -> None:
-    assert press.cell.write(PLC, [Change(SPEED, 1.0)], 1.0) is None
+    assert press.cell.write(Requester(PLC), [Change(SPEED, 1.0)], 1.0) is None
     assert press.cell.force(SPEED, 2.0, 1.1, 2.0, "by anna") is None
-    assert press.cell.write(PLC, [Change(LIMIT, 999.0)], 1.2) is not None
+    assert press.cell.write(Requester(PLC), [Change(LIMIT, 999.0)], 1.2) is not None
     same = [
         ("operator forced speed to 2 (by anna)", True),
         ("plc wrote limit = 999 N: refused, value out of limits, 0..150", True),
@@ -75,7 +76,7 @@ def test_events_records_and_the_last_refusal_are_told_in_the_same_words(api: Api
 
 
 def test_a_variable_tells_both_places_and_its_owner(api: Api, press: Served) -> None:
-    assert press.cell.write(PLC, [Change(SPEED, 1.5)], 1.0) is None
+    assert press.cell.write(Requester(PLC), [Change(SPEED, 1.5)], 1.0) is None
     (speed,) = api.variables({"name": "speed"}, at(1.5))["variables"]
     assert speed["robot"] == "input_double_register_1"
     assert speed["modbus"] == [{"area": "holding", "address": 24, "bit": None, "notation": "400025"}]
@@ -140,8 +141,8 @@ class TestProblems:
         ]
 
     def test_a_writer_that_was_there_but_not_one_that_never_came(self, press: Served) -> None:
-        press.cell.writer_connected(HMI, 0.0)
-        press.cell.writer_disconnected(HMI, 0.0, "closed")
+        press.cell.writer_connected(Requester(HMI), 0.0)
+        press.cell.writer_disconnected(Requester(HMI), 0.0, "closed")
         assert problems(press.cell, 0.0) == ["writer hmi lost for 0 s"]
 
 
@@ -155,7 +156,7 @@ def _texts(value: object) -> list[object]:
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
 def test_odd_reals_are_still_json(api: Api, press: Served, odd: float) -> None:
-    assert press.cell.write(PLC, [Change(SPEED, odd)], 1.0) is None
+    assert press.cell.write(Requester(PLC), [Change(SPEED, odd)], 1.0) is None
     answers: list[dict[str, Any]] = [
         api.status(at(1.0)),
         api.variables({}, at(1.0)),

@@ -12,6 +12,7 @@ from gatewayd.core.definition import CellDefinition
 from gatewayd.core.image import ProcessImage
 from gatewayd.core.ownership import LockTable, Move
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
 
 PLC, HMI, AUX = range(3)
 START, LAMP, PART, FORCE, SPEED, PATH = range(6)
@@ -30,7 +31,7 @@ class Desk:
         self, writer: int | None, *changes: Change, adopted: bool = True, heard: bool = True
     ) -> Verdict:
         before = copy.deepcopy((self.image.values, self.image.quality, self.ownership.owners))
-        verdict = self.admission.judge(writer, changes, adopted=adopted, heard=heard)
+        verdict = self.admission.judge(Requester(writer, trusted=heard), changes, adopted=adopted)
         assert before == (self.image.values, self.image.quality, self.ownership.owners)
         return verdict
 

@@ -12,6 +12,7 @@ from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
 
 PLC, HMI, AUX = range(3)
 START, LAMP, PART, FORCE, SPEED, PATH, CYCLES, LEVEL, MODE, ALARM = range(10)
@@ -33,7 +34,7 @@ def quality(cell: Cell, variable: int) -> Quality:
 
 
 def write(cell: Cell, writer: int | None, variable: int, value: Value, now: float) -> Refusal | None:
-    return cell.write(writer, [Change(variable, value)], now)
+    return cell.write(Requester(writer), [Change(variable, value)], now)
 
 
 # -- writing -----------------------------------------------------------------------------------------------------
@@ -52,7 +53,7 @@ def test_a_write_takes_the_lock_and_sets_value_time_and_quality(cell: Cell) -> N
 
 def test_a_refused_request_changes_neither_values_nor_locks(cell: Cell) -> None:
     before = list(cell.image.values)
-    refusal = cell.write(HMI, [Change(PART, 9), Change(FORCE, 20.0), Change(START, True)], 1.0)
+    refusal = cell.write(Requester(HMI), [Change(PART, 9), Change(FORCE, 20.0), Change(START, True)], 1.0)
     assert refusal == Refusal(Reason.NOT_WRITABLE, START)
     assert cell.image.values == before
     assert cell.ownership.owners == [None] * 5
@@ -62,7 +63,7 @@ def test_a_refused_request_changes_neither_values_nor_locks(cell: Cell) -> None:
 def test_an_undeclared_peer_may_write_nothing_not_even_what_is_there(
     cell: Cell, changes: list[Change]
 ) -> None:
-    refusal = cell.write(None, changes, 1.0)
+    refusal = cell.write(Requester(None), changes, 1.0)
     assert refusal is not None
     assert refusal.reason is Reason.NOT_WRITABLE
     assert cell.health.writes_refused == 1
@@ -73,7 +74,7 @@ def test_an_output_is_writable_by_nobody(cell: Cell) -> None:
 
 
 def test_the_last_of_two_values_for_one_variable_counts(cell: Cell) -> None:
-    assert cell.write(PLC, [Change(PART, 1), Change(PART, 2)], 1.0) is None
+    assert cell.write(Requester(PLC), [Change(PART, 1), Change(PART, 2)], 1.0) is None
     assert cell.image.values[PART] == 2
 
 
@@ -91,7 +92,7 @@ def test_a_lease_ends_exactly_at_its_time_without_a_tick(cell: Cell) -> None:
 def test_values_of_one_request_are_told_to_the_listeners_at_once(cell: Cell) -> None:
     seen: list[tuple[Direction, list[Value]]] = []
     cell.listeners.append(lambda direction: seen.append((direction, cell.image.values[START:CYCLES])))
-    cell.write(PLC, [Change(START, True), Change(PART, 3), Change(SPEED, 0.5)], 1.0)
+    cell.write(Requester(PLC), [Change(START, True), Change(PART, 3), Change(SPEED, 0.5)], 1.0)
     assert seen == [(Direction.INPUT, [True, False, 3, 0.0, 0.5, 0])]
 
 
@@ -103,7 +104,7 @@ def test_a_nan_passes_only_where_no_limits_are_and_falls_back_like_any_value(
     connect(free, 0.0)
     assert write(free, PLC, SPEED, math.nan, 1.0) is None
     assert write(free, PLC, FORCE, math.nan, 1.0) == Refusal(Reason.OUT_OF_LIMITS, FORCE)
-    free.release(PLC, SPEED, 1.5)
+    free.release(Requester(PLC), SPEED, 1.5)
     assert free.image.values[SPEED] == 0.0
 
 
@@ -112,7 +113,7 @@ def test_a_held_nan_is_no_change(press: CellDefinition, connect: Connect) -> Non
     free = Cell(replace(press, variables=(*press.variables[:SPEED], speed, *press.variables[SPEED + 1 :])))
     connect(free, 0.0)
     write(free, PLC, SPEED, math.nan, 1.0)
-    free.release(PLC, SPEED, 1.5)
+    free.release(Requester(PLC), SPEED, 1.5)
     assert [event.variable for event in told(free, EventKind.FALLBACK)] == [PATH]
     assert free.image.times[SPEED] == 1.0
 
@@ -122,7 +123,10 @@ def test_a_held_nan_is_no_change(press: CellDefinition, connect: Connect) -> Non
 
 def test_an_implied_bit_that_is_free_is_taken_and_written(cell: Cell) -> None:
     assert (
-        cell.write(PLC, [Change(START, True, implied=True), Change(LAMP, False, implied=True)], 1.0) is None
+        cell.write(
+            Requester(PLC), [Change(START, True, implied=True), Change(LAMP, False, implied=True)], 1.0
+        )
+        is None
     )
     assert cell.ownership.owners[:2] == [PLC, PLC]
     assert cell.image.values[START] is True
@@ -130,43 +134,55 @@ def test_an_implied_bit_that_is_free_is_taken_and_written(cell: Cell) -> None:
 
 def test_an_implied_bit_of_somebody_else_may_pass_unchanged(cell: Cell) -> None:
     write(cell, PLC, START, True, 1.0)
-    assert cell.write(HMI, [Change(START, True, implied=True), Change(LAMP, True, implied=True)], 1.5) is None
+    assert (
+        cell.write(Requester(HMI), [Change(START, True, implied=True), Change(LAMP, True, implied=True)], 1.5)
+        is None
+    )
     assert cell.ownership.owners[:2] == [PLC, HMI]
     assert cell.image.times[START] == 1.0
 
 
 def test_an_implied_changed_bit_that_the_writer_may_never_write_refuses_all(cell: Cell) -> None:
-    refusal = cell.write(HMI, [Change(START, True, implied=True), Change(LAMP, True, implied=True)], 1.0)
+    refusal = cell.write(
+        Requester(HMI), [Change(START, True, implied=True), Change(LAMP, True, implied=True)], 1.0
+    )
     assert refusal == Refusal(Reason.NOT_WRITABLE, START)
     assert cell.image.values[LAMP] is False
 
 
 def test_an_implied_bit_of_a_higher_owner_must_keep_its_value(cell: Cell) -> None:
     write(cell, PLC, LAMP, True, 1.0)
-    assert cell.write(HMI, [Change(LAMP, True, implied=True)], 1.5) is None
-    assert cell.write(HMI, [Change(LAMP, False, implied=True)], 1.5) == Refusal(Reason.HELD, LAMP, PLC)
+    assert cell.write(Requester(HMI), [Change(LAMP, True, implied=True)], 1.5) is None
+    assert cell.write(Requester(HMI), [Change(LAMP, False, implied=True)], 1.5) == Refusal(
+        Reason.HELD, LAMP, PLC
+    )
     assert owner(cell, 1) == PLC
     assert cell.image.values[LAMP] is True
 
 
 def test_an_implied_bit_takes_a_lock_over_only_to_change_it(cell: Cell) -> None:
     write(cell, HMI, LAMP, True, 1.0)
-    assert cell.write(PLC, [Change(LAMP, True, implied=True)], 1.5) is None
+    assert cell.write(Requester(PLC), [Change(LAMP, True, implied=True)], 1.5) is None
     assert owner(cell, 1) == HMI
-    assert cell.write(PLC, [Change(LAMP, False, implied=True)], 1.5) is None
+    assert cell.write(Requester(PLC), [Change(LAMP, False, implied=True)], 1.5) is None
     assert owner(cell, 1) == PLC
     assert cell.image.values[LAMP] is False
 
 
 def test_an_implied_bit_of_a_robot_output_may_pass_unchanged(cell: Cell) -> None:
-    assert cell.write(PLC, [Change(ALARM, True, implied=True), Change(START, True)], 1.0) is None
-    assert cell.write(PLC, [Change(ALARM, False, implied=True)], 1.0) == Refusal(Reason.NOT_WRITABLE, ALARM)
+    assert cell.write(Requester(PLC), [Change(ALARM, True, implied=True), Change(START, True)], 1.0) is None
+    assert cell.write(Requester(PLC), [Change(ALARM, False, implied=True)], 1.0) == Refusal(
+        Reason.NOT_WRITABLE, ALARM
+    )
 
 
 def test_an_implied_unchanged_bit_in_a_register_that_is_gone_is_let_pass(cell: Cell) -> None:
     cell.set_availability([LAMP], False, "claimed", 1.0)
     assert (
-        cell.write(PLC, [Change(START, True, implied=True), Change(LAMP, False, implied=True)], 1.0) is None
+        cell.write(
+            Requester(PLC), [Change(START, True, implied=True), Change(LAMP, False, implied=True)], 1.0
+        )
+        is None
     )
     assert cell.ownership.owners[:2] == [PLC, None]
 
@@ -175,7 +191,7 @@ def test_an_implied_unchanged_bit_in_a_register_that_is_gone_is_let_pass(cell: C
 
 
 def test_a_group_is_taken_over_as_a_whole(cell: Cell) -> None:
-    cell.write(HMI, [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
+    cell.write(Requester(HMI), [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
     assert write(cell, PLC, PATH, 4, 1.5) is None
     assert write(cell, HMI, SPEED, 0.1, 1.6) == Refusal(Reason.HELD, SPEED, PLC)
     assert cell.image.values[SPEED : PATH + 1] == [0.4, 4]
@@ -184,8 +200,8 @@ def test_a_group_is_taken_over_as_a_whole(cell: Cell) -> None:
 
 
 def test_a_list_without_takeover_keeps_its_holder(cell: Cell) -> None:
-    cell.request(HMI, PART, 1.0)
-    assert cell.request(PLC, PART, 1.5) == Refusal(Reason.HELD, PART, HMI)
+    cell.request(Requester(HMI), PART, 1.0)
+    assert cell.request(Requester(PLC), PART, 1.5) == Refusal(Reason.HELD, PART, HMI)
 
 
 # -- refusals for the robot's sake -------------------------------------------------------------------------------
@@ -202,7 +218,7 @@ def test_a_write_refused_for_the_robots_sake_renews_the_lease(cell: Cell) -> Non
 
 
 def test_a_write_refused_for_the_robots_sake_takes_nothing(cell: Cell) -> None:
-    cell.request(HMI, LAMP, 0.5)
+    cell.request(Requester(HMI), LAMP, 0.5)
     cell.robot_lost("unplugged", 1.0)
     for variable, value in ((LAMP, True), (FORCE, 1.0)):
         assert write(cell, PLC, variable, value, 1.0) == Refusal(Reason.ROBOT_LOST, variable)
@@ -226,9 +242,11 @@ def test_a_register_claimed_elsewhere_costs_what_depends_on_it(cell: Cell) -> No
 
 
 def test_what_is_not_heard_moves_no_lock_and_makes_nobody_alive(cell: Cell) -> None:
-    assert cell.write(PLC, [Change(PART, 5)], 1.0, heard=False) == Refusal(Reason.HEARTBEAT_LOST, PART)
-    assert cell.request(PLC, PART, 1.0, heard=False) == Refusal(Reason.HEARTBEAT_LOST, PART)
-    assert cell.release(PLC, PART, 1.0, heard=False) == Refusal(Reason.HEARTBEAT_LOST, PART)
+    assert cell.write(Requester(PLC, trusted=False), [Change(PART, 5)], 1.0) == Refusal(
+        Reason.HEARTBEAT_LOST, PART
+    )
+    assert cell.request(Requester(PLC, trusted=False), PART, 1.0) == Refusal(Reason.HEARTBEAT_LOST, PART)
+    assert cell.release(Requester(PLC, trusted=False), PART, 1.0) == Refusal(Reason.HEARTBEAT_LOST, PART)
     assert owner(cell, 2) is None
     assert not cell.writers.alive[PLC]
     assert cell.image.values[PART] != 5
@@ -241,24 +259,24 @@ def test_what_is_not_heard_neither_renews_nor_gives_back_what_another_link_holds
     for now, lost in ((2.0, False), (2.5, True)):
         if lost:
             cell.robot_lost("unplugged", now)
-        refusal = cell.write(PLC, [Change(PART, 6)], now, heard=False)
+        refusal = cell.write(Requester(PLC, trusted=False), [Change(PART, 6)], now)
         assert refusal == Refusal(Reason.HEARTBEAT_LOST, PART)
-    assert cell.release(PLC, PART, 2.5, heard=False) is not None
+    assert cell.release(Requester(PLC, trusted=False), PART, 2.5) is not None
     assert owner(cell, 2) == PLC
     cell.tick(3.0)
     assert owner(cell, 2) is None, "the lease of its last accepted write has ended"
 
 
 def test_who_may_never_own_it_is_told_that_first(cell: Cell) -> None:
-    assert cell.request(HMI, START, 1.0, heard=False) == Refusal(Reason.NOT_WRITABLE, START)
+    assert cell.request(Requester(HMI, trusted=False), START, 1.0) == Refusal(Reason.NOT_WRITABLE, START)
 
 
 # -- releasing ---------------------------------------------------------------------------------------------------
 
 
 def test_a_release_applies_every_members_policy(cell: Cell) -> None:
-    cell.write(PLC, [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
-    assert cell.release(PLC, SPEED, 1.5) is None
+    cell.write(Requester(PLC), [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
+    assert cell.release(Requester(PLC), SPEED, 1.5) is None
     assert cell.image.values[SPEED : PATH + 1] == [0.0, 7]
     assert [(event.variable, event.old, event.new) for event in told(cell, EventKind.FALLBACK)] == [
         (SPEED, 0.4, 0.0),
@@ -268,22 +286,22 @@ def test_a_release_applies_every_members_policy(cell: Cell) -> None:
 
 def test_hold_keeps_the_value_and_its_time(cell: Cell) -> None:
     write(cell, PLC, PART, 3, 1.0)
-    cell.release(PLC, PART, 1.5)
+    cell.release(Requester(PLC), PART, 1.5)
     assert (cell.image.values[PART], cell.image.times[PART]) == (3, 1.0)
 
 
 def test_releasing_what_is_free_does_nothing_and_what_another_holds_is_refused(cell: Cell) -> None:
-    assert cell.release(HMI, LAMP, 1.0) is None
+    assert cell.release(Requester(HMI), LAMP, 1.0) is None
     write(cell, HMI, LAMP, True, 1.0)
-    assert cell.release(PLC, LAMP, 1.0) == Refusal(Reason.HELD, LAMP, HMI)
-    assert cell.release(HMI, START, 1.0) == Refusal(Reason.NOT_WRITABLE, START)
-    assert cell.release(None, LAMP, 1.0) == Refusal(Reason.NOT_WRITABLE, LAMP)
+    assert cell.release(Requester(PLC), LAMP, 1.0) == Refusal(Reason.HELD, LAMP, HMI)
+    assert cell.release(Requester(HMI), START, 1.0) == Refusal(Reason.NOT_WRITABLE, START)
+    assert cell.release(Requester(None), LAMP, 1.0) == Refusal(Reason.NOT_WRITABLE, LAMP)
 
 
 def test_a_release_without_a_robot_falls_back_once_when_it_is_back(cell: Cell) -> None:
     write(cell, PLC, FORCE, 99.0, 1.0)
     cell.robot_lost("unplugged", 1.1)
-    cell.release(PLC, FORCE, 1.2)
+    cell.release(Requester(PLC), FORCE, 1.2)
     assert cell.image.values[FORCE] == 99.0
     cell.robot_connected(2.0)
     cell.adopt({FORCE: 99.0}, 2.0)
@@ -297,8 +315,8 @@ def test_a_release_without_a_robot_falls_back_once_when_it_is_back(cell: Cell) -
 def test_a_due_fallback_comes_even_if_the_lock_was_taken_meanwhile(cell: Cell) -> None:
     write(cell, PLC, FORCE, 99.0, 1.0)
     cell.robot_lost("unplugged", 1.1)
-    cell.release(PLC, FORCE, 1.2)
-    cell.request(HMI, FORCE, 1.3)
+    cell.release(Requester(PLC), FORCE, 1.2)
+    cell.request(Requester(HMI), FORCE, 1.3)
     cell.robot_connected(2.0)
     cell.adopt({FORCE: 99.0}, 2.0)
     assert cell.image.values[FORCE] == 10.0
@@ -308,7 +326,7 @@ def test_a_due_fallback_comes_even_if_the_lock_was_taken_meanwhile(cell: Cell) -
 def test_a_due_fallback_comes_even_if_the_controller_does_not_tell_the_input(cell: Cell) -> None:
     write(cell, PLC, FORCE, 99.0, 1.0)
     cell.robot_lost("unplugged", 1.1)
-    cell.release(PLC, FORCE, 1.2)
+    cell.release(Requester(PLC), FORCE, 1.2)
     cell.robot_connected(2.0)
     cell.adopt({}, 2.0)
     assert (cell.image.values[FORCE], cell.image.quality[FORCE]) == (10.0, Quality.GOOD)
@@ -317,7 +335,7 @@ def test_a_due_fallback_comes_even_if_the_controller_does_not_tell_the_input(cel
 def test_a_fallback_waits_for_a_register_that_is_gone(cell: Cell) -> None:
     write(cell, PLC, FORCE, 99.0, 1.0)
     cell.set_availability([FORCE], False, "claimed", 1.1)
-    cell.release(PLC, FORCE, 1.2)
+    cell.release(Requester(PLC), FORCE, 1.2)
     cell.adopt({}, 1.3)
     assert cell.image.values[FORCE] == 99.0
     cell.set_availability([FORCE], True, "freed", 2.0)
@@ -328,7 +346,7 @@ def test_a_fallback_waits_for_a_register_that_is_gone(cell: Cell) -> None:
 def test_a_due_fallback_does_not_undo_a_later_write(cell: Cell) -> None:
     write(cell, PLC, FORCE, 99.0, 1.0)
     cell.set_availability([FORCE], False, "claimed", 1.1)
-    cell.release(PLC, FORCE, 1.2)
+    cell.release(Requester(PLC), FORCE, 1.2)
     cell.set_availability([FORCE], True, "freed", 2.0)
     assert write(cell, HMI, FORCE, 33.0, 2.1) is None
     cell.adopt({START: False}, 2.2)
@@ -337,7 +355,7 @@ def test_a_due_fallback_does_not_undo_a_later_write(cell: Cell) -> None:
 
 def test_clear_on_connect_spares_what_is_owned(press: CellDefinition) -> None:
     cell = Cell(replace(press, clear_on_connect=True))
-    cell.request(PLC, PATH, 0.5)
+    cell.request(Requester(PLC), PATH, 0.5)
     cell.robot_connected(0.5)
     cell.adopt({START: True, PART: 5, PATH: 6}, 0.5)
     assert cell.image.values[START : PATH + 1] == [False, False, 5, 10.0, 0.0, 6]
@@ -361,28 +379,28 @@ def test_adopting_takes_over_what_the_controller_holds(press: CellDefinition) ->
 
 
 def test_the_last_of_two_connections_releases(cell: Cell) -> None:
-    cell.writer_connected(HMI, 1.0)
-    cell.writer_connected(HMI, 1.0)
+    cell.writer_connected(Requester(HMI), 1.0)
+    cell.writer_connected(Requester(HMI), 1.0)
     write(cell, HMI, LAMP, True, 1.0)
-    cell.writer_disconnected(HMI, 1.1, "reset")
+    cell.writer_disconnected(Requester(HMI), 1.1, "reset")
     assert owner(cell, 1) == HMI
-    cell.writer_disconnected(HMI, 1.2, "reset")
+    cell.writer_disconnected(Requester(HMI), 1.2, "reset")
     assert owner(cell, 1) is None
     assert cell.image.values[LAMP] is False
     assert len(told(cell, EventKind.WRITER_LOST)) == 1
 
 
 def test_a_silent_writer_loses_its_locks_once_and_may_come_back(cell: Cell) -> None:
-    cell.writer_connected(AUX, 1.0)
+    cell.writer_connected(Requester(AUX), 1.0)
     write(cell, AUX, FORCE, 50.0, 1.0)
     cell.tick(2.0)
     assert owner(cell, 3) == AUX
     cell.tick(2.01)
     assert owner(cell, 3) is None
-    cell.writer_seen(AUX, 2.5)
+    cell.writer_seen(Requester(AUX), 2.5)
     assert cell.writers.alive[AUX]
     write(cell, AUX, FORCE, 60.0, 2.5)
-    cell.writer_disconnected(AUX, 2.6, "closed")
+    cell.writer_disconnected(Requester(AUX), 2.6, "closed")
     assert owner(cell, 3) is None
     assert len(told(cell, EventKind.WRITER_LOST)) == 2
 
@@ -392,7 +410,7 @@ def test_whoever_acts_is_supervised_even_if_no_link_announced_him(cell: Cell, ac
     if act == "write":
         write(cell, AUX, FORCE, 50.0, 1.0)
     else:
-        cell.request(AUX, FORCE, 1.0)
+        cell.request(Requester(AUX), FORCE, 1.0)
     cell.tick(2.5)
     assert owner(cell, 3) is None
 
@@ -401,7 +419,7 @@ def test_release_all_leaves_the_locks_of_others(cell: Cell) -> None:
     write(cell, PLC, START, True, 1.0)
     write(cell, PLC, PART, 2, 1.0)
     write(cell, HMI, LAMP, True, 1.0)
-    cell.release_all(PLC, 1.1)
+    cell.release_all(Requester(PLC), 1.1)
     assert cell.ownership.owners == [None, HMI, None, None, None]
     assert cell.image.values[START] is False
 
@@ -559,8 +577,8 @@ def test_counted_refusals_are_told_by_the_tick(cell: Cell) -> None:
 
 
 def test_a_refusal_of_a_link_is_recorded_too(cell: Cell) -> None:
-    cell.refuse(None, Refusal(Reason.PARTIAL_VALUE, SPEED), 1.0, 3)
+    cell.refuse(Requester(None), Refusal(Reason.PARTIAL_VALUE, SPEED), 1.0, 3)
     (event,) = told(cell, EventKind.REFUSED)
     assert (event.writer, event.variable, event.new) == (None, SPEED, 3)
-    cell.refuse(PLC, Refusal(Reason.NO_SUCH_ADDRESS), 1.0)
+    cell.refuse(Requester(PLC), Refusal(Reason.NO_SUCH_ADDRESS), 1.0)
     assert cell.health.writes_refused == 2

@@ -29,6 +29,7 @@ from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
 from gatewayd.core.status import LENGTH, RELEASE, RELEASE_ALL, REQUEST, StatusBlock
 
 CLEAR, HOLD = Fallback(), Fallback(FallbackKind.HOLD)
@@ -466,7 +467,7 @@ class CellMachine(RuleBasedStateMachine):
     @rule(writer=anybody, request=changes(), heard=mostly)
     def write(self, writer: int | None, request: list[Change], heard: bool) -> None:
         self.both(
-            lambda c: c.write(writer, request, self.now, heard=heard),
+            lambda c: c.write(Requester(writer, trusted=heard), request, self.now),
             lambda m: m.write(writer, request, self.now, heard=heard),
         )
         assert not self.ended_leases()
@@ -492,15 +493,15 @@ class CellMachine(RuleBasedStateMachine):
         """Directly, or through the words of the status block."""
         if by_word and writer is not None:
             word = REQUEST if take else RELEASE
-            refusal = self.status.write(writer, word, [index + 1], self.now, heard=heard)
+            refusal = self.status.write(Requester(writer, trusted=heard), word, [index + 1], self.now)
         else:
             act = self.cell.request if take else self.cell.release
-            refusal = act(writer, index, self.now, heard=heard)
+            refusal = act(Requester(writer, trusted=heard), index, self.now)
         assert refusal == self.model.act(writer, index, self.now, take=take, heard=heard)
 
     @rule(writer=writers)
     def release_all(self, writer: int) -> None:
-        assert self.status.write(writer, RELEASE, [RELEASE_ALL], self.now) is None
+        assert self.status.write(Requester(writer), RELEASE, [RELEASE_ALL], self.now) is None
         for lock in range(len(LOCKS)):
             if self.model.owner[lock] == writer:
                 self.model.free(lock, self.now)
@@ -509,23 +510,23 @@ class CellMachine(RuleBasedStateMachine):
     @rule(writer=anybody, index=st.integers(0, len(VARIABLES) - 1))
     def link_refuses(self, writer: int | None, index: int) -> None:
         refusal = Refusal(Reason.PARTIAL_VALUE, index)
-        self.cell.refuse(writer, refusal, self.now, 1)
+        self.cell.refuse(Requester(writer), refusal, self.now, 1)
         self.model.refuse(writer, refusal, self.now)
 
     @rule(writer=writers)
     def connect(self, writer: int) -> None:
-        self.cell.writer_connected(writer, self.now)
+        self.cell.writer_connected(Requester(writer), self.now)
         self.model.connections[writer] += 1
         self.model.hear(writer, self.now)
 
     @rule(writer=writers)
     def seen(self, writer: int) -> None:
-        self.cell.writer_seen(writer, self.now)
+        self.cell.writer_seen(Requester(writer), self.now)
         self.model.hear(writer, self.now)
 
     @rule(writer=writers)
     def disconnect(self, writer: int) -> None:
-        self.cell.writer_disconnected(writer, self.now, "closed")
+        self.cell.writer_disconnected(Requester(writer), self.now, "closed")
         self.model.connections[writer] = max(0, self.model.connections[writer] - 1)
         if not self.model.connections[writer]:
             self.model.lose(writer, self.now)

@@ -15,6 +15,7 @@ from gatewayd.core.events import EventKind
 from gatewayd.core.forcing import Force, Forcing
 from gatewayd.core.image import ProcessImage, Quality
 from gatewayd.core.refusal import Reason
+from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 
 PLC, HMI, AUX = range(3)
@@ -38,9 +39,9 @@ def package(cell: Cell, now: float, cycles: int, *, alarm: bool = False) -> None
 class TestLocks:
     def test_the_operator_takes_a_lock_from_any_owner_and_keeps_it(self, cell: Cell) -> None:
         """No priority of the mapping outranks him, and no lease of it ends his."""
-        assert cell.write(PLC, [Change(PART, 7)], 1.0) is None
+        assert cell.write(Requester(PLC), [Change(PART, 7)], 1.0) is None
         cell.take_lock(PART, 1.1, detail="by anna")
-        refusal = cell.write(PLC, [Change(PART, 8)], 100.0)
+        refusal = cell.write(Requester(PLC), [Change(PART, 8)], 100.0)
         assert refusal is not None
         assert (refusal.reason, refusal.holder) == (Reason.HELD, OPERATOR)
         assert cell.image.values[PART] == 7
@@ -49,7 +50,7 @@ class TestLocks:
 
     def test_not_even_the_first_of_a_takeover_list_gets_it_back(self, cell: Cell) -> None:
         cell.take_lock(MOTION, 1.0)
-        assert cell.request(PLC, SPEED, 1.1) is not None
+        assert cell.request(Requester(PLC), SPEED, 1.1) is not None
         assert cell.ownership.owners[MOTION] == OPERATOR
 
     def test_a_taken_lock_is_free_after_its_time_limit(self, cell: Cell) -> None:
@@ -57,7 +58,7 @@ class TestLocks:
         assert cell.ownership.remaining(LAMP, 1.5) == 0.5
         cell.tick(2.0)
         assert cell.ownership.owners[LAMP] is None
-        assert cell.write(HMI, [Change(LAMP, True)], 2.0) is None
+        assert cell.write(Requester(HMI), [Change(LAMP, True)], 2.0) is None
 
     def test_taking_again_changes_the_time_limit(self, cell: Cell) -> None:
         cell.take_lock(LAMP, 1.0, until=2.0)
@@ -67,7 +68,7 @@ class TestLocks:
         assert kinds(cell).count(EventKind.ACQUIRED) == 1
 
     def test_he_releases_any_lock_and_its_fallback_applies(self, cell: Cell) -> None:
-        assert cell.write(HMI, [Change(FORCE, 99.0)], 1.0) is None
+        assert cell.write(Requester(HMI), [Change(FORCE, 99.0)], 1.0) is None
         assert cell.free_lock(FORCE, 1.5, "by anna")
         assert cell.ownership.owners[FORCE] is None
         assert cell.image.values[FORCE] == 10.0
@@ -86,7 +87,7 @@ class TestLocks:
     def test_the_end_of_the_gateway_releases_his_locks_too(self, cell: Cell) -> None:
         cell.take_lock(PART, 1.0)
         assert cell.force(CYCLES, 9, 1.0, SECOND) is None
-        assert cell.write(HMI, [Change(LAMP, True)], 1.0) is None
+        assert cell.write(Requester(HMI), [Change(LAMP, True)], 1.0) is None
         cell.stop(2.0, "the gateway stops")
         assert cell.ownership.owners == [None] * 5
         assert (cell.image.values[LAMP], cell.image.values[CYCLES]) == (False, 5)
@@ -96,7 +97,7 @@ class TestForcedInput:
     def test_the_robot_gets_it_and_the_plc_is_refused(self, cell: Cell) -> None:
         assert cell.force(FORCE, 42.0, 1.0, 31.0) is None
         assert (cell.image.values[FORCE], cell.image.quality[FORCE]) == (42.0, Quality.FORCED)
-        refusal = cell.write(PLC, [Change(FORCE, 1.0)], 2.0)
+        refusal = cell.write(Requester(PLC), [Change(FORCE, 1.0)], 2.0)
         assert refusal is not None
         assert refusal.reason is Reason.HELD
         assert cell.image.values[FORCE] == 42.0
@@ -110,7 +111,7 @@ class TestForcedInput:
             assert cell.unforce(FORCE, 30.0)
         assert (cell.image.values[FORCE], cell.image.quality[FORCE]) == (10.0, Quality.GOOD)
         assert cell.ownership.owners[FORCE] is None
-        assert cell.write(PLC, [Change(FORCE, 1.0)], 31.0) is None
+        assert cell.write(Requester(PLC), [Change(FORCE, 1.0)], 31.0) is None
         assert kinds(cell).count(EventKind.UNFORCED) == 1
 
     @pytest.mark.parametrize(
@@ -313,7 +314,7 @@ OPERATING: dict[str, Callable[[Cell, float, int, float], object]] = {
     "take": lambda cell, now, lock, limit: cell.take_lock(lock, now, now + limit),
     "free": lambda cell, now, lock, _: cell.free_lock(lock, now),
     "write": lambda cell, now, index, writer: cell.write(
-        int(writer), [Change(index, zero(cell, index))], now
+        Requester(int(writer)), [Change(index, zero(cell, index))], now
     ),
     "lost": lambda cell, now, _first, _second: cell.robot_lost("gone", now),
     "tick": lambda cell, now, _first, _second: cell.tick(now),

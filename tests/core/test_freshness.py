@@ -11,6 +11,7 @@ IGNORED = {
     (Source.LOST, Happening.PROGRESS),
     (Source.LOST, Happening.NO_PACKAGE),
     (Source.LOST, Happening.NO_PROGRESS),
+    (Source.LOST, Happening.TOO_LATE),
     (Source.LOST, Happening.LOST),
     (Source.WAITING, Happening.CONNECTED),
     (Source.WAITING, Happening.NO_PACKAGE),
@@ -20,6 +21,8 @@ IGNORED = {
     (Source.SILENT, Happening.NO_PACKAGE),
     (Source.FROZEN, Happening.CONNECTED),
     (Source.FROZEN, Happening.NO_PROGRESS),
+    (Source.LATE, Happening.CONNECTED),
+    (Source.LATE, Happening.TOO_LATE),
 }
 """Pairs that change nothing."""
 

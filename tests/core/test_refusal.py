@@ -13,6 +13,9 @@ def test_the_numbers_of_the_status_block_stay() -> None:
         ("ROBOT_LOST", 6),
         ("CLAIMED_ELSEWHERE", 7),
         ("HEARTBEAT_LOST", 8),
+        ("PARTIAL_TAKEOVER", 9),
+        ("WAITED", 10),
+        ("NOT_MEANT", 11),
     ]
 
 
@@ -22,8 +25,8 @@ def test_every_reason_has_a_text_and_a_place_of_its_own() -> None:
 
 
 def test_what_can_never_work_is_told_before_what_may_pass() -> None:
-    passing = {Reason.HEARTBEAT_LOST, Reason.ROBOT_LOST, Reason.CLAIMED_ELSEWHERE, Reason.HELD}
-    assert set(sorted(Reason, key=PRECEDENCE.__getitem__)[-4:]) == passing
+    never = {Reason.NO_SUCH_ADDRESS, Reason.NOT_WRITABLE, Reason.PARTIAL_VALUE, Reason.OUT_OF_LIMITS}
+    assert set(sorted(Reason, key=PRECEDENCE.__getitem__)[: len(never)]) == never
 
 
 def test_who_is_not_heard_is_told_so_before_what_would_leave_him_his_lease() -> None:

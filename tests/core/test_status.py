@@ -8,6 +8,7 @@ import pytest
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
 from gatewayd.core.status import (
     FIELDS,
     HEADER_WORDS,
@@ -49,7 +50,7 @@ def test_fields_and_tables_lie_one_after_the_other() -> None:
 
 
 def test_any_part_is_a_slice_of_the_whole(cell: Cell, status: StatusBlock) -> None:
-    cell.write(HMI, [Change(SPEED, 0.5)], 0.5)
+    cell.write(Requester(HMI), [Change(SPEED, 0.5)], 0.5)
     whole = status.read(0, LENGTH, 1.0)
     for first, count in (
         (0, 64),
@@ -79,9 +80,9 @@ def test_the_header_tells_the_state(cell: Cell, status: StatusBlock) -> None:
 
 def test_flags_follow_the_state_bit_by_bit(cell: Cell, status: StatusBlock) -> None:
     assert words(status, "flags", 0.0) == (0b111,)
-    cell.write(PLC, [Change(START, True)], 0.0)
+    cell.write(Requester(PLC), [Change(START, True)], 0.0)
     assert words(status, "flags", 0.0) == (0b1111,)
-    cell.write(HMI, [Change(START, True)], 0.0)
+    cell.write(Requester(HMI), [Change(START, True)], 0.0)
     cell.health.read_back_mismatches = 1
     cell.health.watchdog_fed = True
     assert words(status, "flags", 0.0) == (0b1111111,)
@@ -100,7 +101,7 @@ def test_before_anything_happened_ages_are_endless_and_nothing_was_refused(press
 
 def test_long_times_saturate_and_counters_wrap(cell: Cell, status: StatusBlock) -> None:
     cell.tick(0.0)
-    cell.write(PLC, [Change(START, True)], 0.0)
+    cell.write(Requester(PLC), [Change(START, True)], 0.0)
     cell.health.packages = 2**32 + 5
     cell.health.sessions = 2**16 + 1
     assert long(status, "robot_age", 1e10) == 0xFFFF_FFFF
@@ -110,16 +111,16 @@ def test_long_times_saturate_and_counters_wrap(cell: Cell, status: StatusBlock) 
 
 
 def test_the_last_refusal_names_everybody_from_one(cell: Cell, status: StatusBlock) -> None:
-    cell.write(HMI, [Change(PART, 1)], 1.0)
-    cell.write(PLC, [Change(PART, 2)], 1.0)
+    cell.write(Requester(HMI), [Change(PART, 1)], 1.0)
+    cell.write(Requester(PLC), [Change(PART, 2)], 1.0)
     assert words(status, "refusal_reason", 1.25, 6) == (3, PART + 1, PLC + 1, HMI + 1, 0, 250)
-    cell.refuse(None, Refusal(Reason.NO_SUCH_ADDRESS), 1.0)
+    cell.refuse(Requester(None), Refusal(Reason.NO_SUCH_ADDRESS), 1.0)
     assert words(status, "refusal_reason", 1.25, 4) == (1, 0, 0, 0)
 
 
 def test_owners_and_leases_stand_at_every_variable_of_a_group(cell: Cell, status: StatusBlock) -> None:
-    cell.write(HMI, [Change(PATH, 1)], 1.0)
-    cell.write(PLC, [Change(START, True)], 1.0)
+    cell.write(Requester(HMI), [Change(PATH, 1)], 1.0)
+    cell.write(Requester(PLC), [Change(START, True)], 1.0)
     assert words(status, "owner", 1.5, 8) == (1, 0, 0, 0, 2, 2, 0, 0)
     assert words(status, "lease", 1.5, 8) == (0xFFFF, 0, 0, 0, 1500, 1500, 0, 0)
 
@@ -131,27 +132,27 @@ def test_good_bits_count_from_the_least_significant(cell: Cell, status: StatusBl
 
 
 def test_writers_alive(cell: Cell, status: StatusBlock) -> None:
-    cell.writer_connected(HMI, 0.0)
+    cell.writer_connected(Requester(HMI), 0.0)
     assert words(status, "writers_alive", 0.0, 4) == (0, 1, 0, 0)
 
 
 def test_a_lock_is_taken_and_given_back_by_the_number_of_its_variable(status: StatusBlock) -> None:
-    assert status.write(HMI, REQUEST, [SPEED + 1], 1.0) is None
+    assert status.write(Requester(HMI), REQUEST, [SPEED + 1], 1.0) is None
     assert words(status, "owner", 1.0, 6)[4:] == (2, 2)
-    assert status.write(HMI, REQUEST, [0, PATH + 1], 1.0) is None
+    assert status.write(Requester(HMI), REQUEST, [0, PATH + 1], 1.0) is None
     assert words(status, "owner", 1.0, 6)[4:] == (0, 0)
     assert words(status, "request", 1.0, 2) == (0, 0)
 
 
 def test_release_all_gives_back_what_is_mine(cell: Cell, status: StatusBlock) -> None:
-    cell.write(HMI, [Change(PART, 1), Change(SPEED, 0.5)], 1.0)
-    cell.write(PLC, [Change(START, True)], 1.0)
-    assert status.write(HMI, RELEASE, [RELEASE_ALL], 1.0) is None
+    cell.write(Requester(HMI), [Change(PART, 1), Change(SPEED, 0.5)], 1.0)
+    cell.write(Requester(PLC), [Change(START, True)], 1.0)
+    assert status.write(Requester(HMI), RELEASE, [RELEASE_ALL], 1.0) is None
     assert words(status, "owner", 1.0, 6) == (1, 0, 0, 0, 0, 0)
 
 
 def test_zeros_ask_for_nothing(cell: Cell, status: StatusBlock) -> None:
-    assert status.write(HMI, REQUEST, [0, 0], 1.0) is None
+    assert status.write(Requester(HMI), REQUEST, [0, 0], 1.0) is None
     assert cell.health.writes_refused == 0
 
 
@@ -174,7 +175,7 @@ def test_zeros_ask_for_nothing(cell: Cell, status: StatusBlock) -> None:
 def test_what_cannot_be_asked_is_refused_counted_and_changes_nothing(
     cell: Cell, writer: int | None, first: int, request_words: list[int], reason: Reason
 ) -> None:
-    refusal = StatusBlock(cell).write(writer, first, request_words, 1.0)
+    refusal = StatusBlock(cell).write(Requester(writer), first, request_words, 1.0)
     assert refusal is not None
     assert refusal.reason is reason
     assert cell.health.writes_refused == 1
@@ -183,8 +184,8 @@ def test_what_cannot_be_asked_is_refused_counted_and_changes_nothing(
 
 @pytest.mark.parametrize("offset, word", [(REQUEST, PART + 1), (RELEASE, PART + 1), (RELEASE, RELEASE_ALL)])
 def test_locks_move_for_nobody_that_is_not_heard(cell: Cell, offset: int, word: int) -> None:
-    cell.request(HMI, PART, 0.5)
-    refusal = StatusBlock(cell).write(HMI, offset, [word], 1.0, heard=False)
+    cell.request(Requester(HMI), PART, 0.5)
+    refusal = StatusBlock(cell).write(Requester(HMI, trusted=False), offset, [word], 1.0)
     assert refusal is not None
     assert refusal.reason is Reason.HEARTBEAT_LOST
     assert cell.ownership.held_by(HMI) == [cell.definition.variables[PART].lock]

@@ -27,6 +27,7 @@ from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
+from gatewayd.core.requester import Requester
 from gatewayd.core.status import LENGTH, StatusBlock
 from gatewayd.core.succession import succeed
 
@@ -59,7 +60,7 @@ def kinds(cell: Cell) -> list[EventKind]:
 
 
 def test_values_owner_and_lease_go_on(cell: Cell, press: CellDefinition) -> None:
-    assert cell.write(PLC, [Change(PART, 7), Change(LAMP, value=True)], 1.0) is None
+    assert cell.write(Requester(PLC), [Change(PART, 7), Change(LAMP, value=True)], 1.0) is None
     told: list[Event] = []
     cell.events.listeners.append(told.append)
     new = succeed(cell, changed(press, PART, limits=Limits(0, 5)), 1.5).cell
@@ -70,7 +71,7 @@ def test_values_owner_and_lease_go_on(cell: Cell, press: CellDefinition) -> None
     assert new.ownership.owners[1] == PLC
     assert new.image.values[CYCLES:] == [5, 2.5, 3, True]
     assert told == []
-    refusal = new.write(PLC, [Change(PART, 6)], 1.6)
+    refusal = new.write(Requester(PLC), [Change(PART, 6)], 1.6)
     assert refusal is not None
     assert refusal.reason is Reason.OUT_OF_LIMITS
     new.tick(3.1)
@@ -79,7 +80,7 @@ def test_values_owner_and_lease_go_on(cell: Cell, press: CellDefinition) -> None
 
 def test_a_removed_input_is_released_and_cleared_once(cell: Cell, press: CellDefinition) -> None:
     """The old cell does it, whose listener is the robot link; what comes after has other numbers."""
-    assert cell.write(HMI, [Change(FORCE, 99.0), Change(SPEED, 0.5)], 1.0) is None
+    assert cell.write(Requester(HMI), [Change(FORCE, 99.0), Change(SPEED, 0.5)], 1.0) is None
     robot: list[float] = []
     cell.listeners.append(lambda _direction: robot.append(float(cell.image.values[FORCE])))
     succession = succeed(cell, without(press, "force", "path"), 2.0)
@@ -113,16 +114,16 @@ def test_a_renamed_input_keeps_its_register(press: CellDefinition) -> None:
 
 
 def test_what_the_robot_could_not_be_told_is_named(cell: Cell, press: CellDefinition) -> None:
-    assert cell.write(PLC, [Change(START, value=True), Change(PART, 3)], 1.0) is None
+    assert cell.write(Requester(PLC), [Change(START, value=True), Change(PART, 3)], 1.0) is None
     cell.robot_lost("cable", 1.5)
     succession = succeed(cell, without(press, "start", "part", "force"), 2.0)
     assert succession.stranded == ("start",), "part is held anyway, force was never touched"
 
 
 def test_fallbacks_that_fell_due_are_given_after_the_robot_is_back(cell: Cell, press: CellDefinition) -> None:
-    assert cell.write(PLC, [Change(START, value=True)], 1.0) is None
+    assert cell.write(Requester(PLC), [Change(START, value=True)], 1.0) is None
     cell.robot_lost("cable", 1.5)
-    cell.release_all(PLC, 1.6)
+    cell.release_all(Requester(PLC), 1.6)
     new = succeed(cell, without(press, "lamp"), 2.0).cell
     new.robot_connected(3.0)
     new.adopt({START: True}, 3.0)
@@ -130,7 +131,7 @@ def test_fallbacks_that_fell_due_are_given_after_the_robot_is_back(cell: Cell, p
 
 
 def test_a_fallback_that_fell_due_is_owed_under_another_name_too(cell: Cell, press: CellDefinition) -> None:
-    assert cell.write(PLC, [Change(START, value=True)], 1.0) is None
+    assert cell.write(Requester(PLC), [Change(START, value=True)], 1.0) is None
     cell.robot_lost("cable", 1.5)
     succession = succeed(cell, changed(press, START, name="go"), 2.0)
     assert succession.stranded == ()
@@ -141,7 +142,7 @@ def test_a_fallback_that_fell_due_is_owed_under_another_name_too(cell: Cell, pre
 
 
 def test_an_owner_that_may_own_no_longer_is_released_first(cell: Cell, press: CellDefinition) -> None:
-    assert cell.write(HMI, [Change(LAMP, value=True)], 1.0) is None
+    assert cell.write(Requester(HMI), [Change(LAMP, value=True)], 1.0) is None
     locks = list(press.locks)
     locks[1] = replace(locks[1], owners=(PLC,))
     new = succeed(cell, replace(press, locks=tuple(locks)), 2.0).cell
@@ -152,9 +153,9 @@ def test_an_owner_that_may_own_no_longer_is_released_first(cell: Cell, press: Ce
 
 def test_writers_are_known_by_name(cell: Cell, press: CellDefinition) -> None:
     """Their order in the file, and with it their numbers, may change."""
-    cell.writer_connected(HMI, 0.5)
-    cell.writer_connected(HMI, 0.6)
-    assert cell.write(HMI, [Change(FORCE, 50.0)], 1.0) is None
+    cell.writer_connected(Requester(HMI), 0.5)
+    cell.writer_connected(Requester(HMI), 0.6)
+    assert cell.write(Requester(HMI), [Change(FORCE, 50.0)], 1.0) is None
     order = (HMI, AUX, PLC)
     locks = tuple(
         replace(lock, owners=tuple(order.index(owner) for owner in lock.owners)) for lock in press.locks
@@ -162,15 +163,15 @@ def test_writers_are_known_by_name(cell: Cell, press: CellDefinition) -> None:
     writers = (Writer("hmi"), Writer("aux", timeout=1.0), Writer("plc"))
     new = succeed(cell, replace(press, locks=locks, writers=writers), 2.0).cell
     assert (new.writers.alive[0], new.writers.connections[0], new.writers.last_seen[0]) == (True, 2, 1.0)
-    new.writer_disconnected(0, 3.0, "gone")
+    new.writer_disconnected(Requester(0), 3.0, "gone")
     assert new.ownership.owners == [None, None, None, 0, None]
-    new.writer_disconnected(0, 3.0, "gone")
+    new.writer_disconnected(Requester(0), 3.0, "gone")
     assert new.ownership.owners == [None] * 5
 
 
 def test_a_writer_that_is_gone_loses_its_locks(cell: Cell, press: CellDefinition) -> None:
-    assert cell.write(HMI, [Change(FORCE, 50.0)], 1.0) is None
-    assert cell.write(HMI, [Change(START, value=True)], 1.1) is not None
+    assert cell.write(Requester(HMI), [Change(FORCE, 50.0)], 1.0) is None
+    assert cell.write(Requester(HMI), [Change(START, value=True)], 1.1) is not None
     locks = tuple(
         replace(lock, owners=tuple(owner for owner in lock.owners if owner == PLC)) for lock in press.locks
     )
@@ -185,7 +186,7 @@ def test_a_writer_that_is_gone_loses_its_locks(cell: Cell, press: CellDefinition
 def test_a_lease_of_another_length_begins_anew(
     cell: Cell, press: CellDefinition, after: float | None, left: float
 ) -> None:
-    assert cell.write(PLC, [Change(FORCE, 1.0)], 1.0) is None
+    assert cell.write(Requester(PLC), [Change(FORCE, 1.0)], 1.0) is None
     locks = list(press.locks)
     locks[3] = replace(locks[3], lease=after)
     new = succeed(cell, replace(press, locks=tuple(locks)), 2.0).cell
@@ -254,12 +255,12 @@ def _package(cell: Cell, who: int, _which: int, _number: int, now: float) -> Non
 
 DEEDS: dict[str, Callable[[Cell, int, int, int, float], object]] = {
     "write": lambda cell, who, which, number, now: cell.write(
-        who, [Change(which, _value(cell, which, number))], now
+        Requester(who), [Change(which, _value(cell, which, number))], now
     ),
-    "request": lambda cell, who, which, _, now: cell.request(who, which, now),
-    "release": lambda cell, who, which, _, now: cell.release(who, which, now),
-    "connected": lambda cell, who, _which, _, now: cell.writer_connected(who, now),
-    "disconnected": lambda cell, who, _which, _, now: cell.writer_disconnected(who, now, "closed"),
+    "request": lambda cell, who, which, _, now: cell.request(Requester(who), which, now),
+    "release": lambda cell, who, which, _, now: cell.release(Requester(who), which, now),
+    "connected": lambda cell, who, _which, _, now: cell.writer_connected(Requester(who), now),
+    "disconnected": lambda cell, who, _which, _, now: cell.writer_disconnected(Requester(who), now, "closed"),
     "available": lambda cell, who, which, _, now: cell.set_availability([which], bool(who), "in use", now),
     "force": lambda cell, _who, which, number, now: cell.force(
         which, _value(cell, which, number), now, now + 2.0

@@ -6,6 +6,7 @@ import re
 
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.refusal import Reason
+from gatewayd.core.requester import Requester
 from gatewayd.mapping.loader import load
 from tests.docs.generated import DOCS
 
@@ -40,7 +41,7 @@ def test_timeline_is_what_happens() -> None:
         played.tick(now)
         if tenth in acts:
             writer, value = acts[tenth]
-            refusal = played.write(writer, [Change(0, float(value))], now)
+            refusal = played.write(Requester(writer), [Change(0, float(value))], now)
             assert (refusal is not None and refusal.reason is Reason.HELD) is (now == 3.5)
         seen[now] = played.ownership.owners[0], played.image.values[0]
     assert [seen[now] for now in (0.0, 1.9, 2.0, 3.5, 4.9, 5.0, 6.9, 7.0)] == [

@@ -11,6 +11,7 @@ import pytest
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Direction
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
 from gatewayd.modbus.functions import EXCEPTION_OF, Unit, execute
 
 PLC, HMI = 0, 1
@@ -20,7 +21,7 @@ IndexOf = Callable[[str], int]
 
 
 def ask(unit: Unit, pdu: str, writer: int | None = PLC) -> str:
-    return execute(unit, writer, bytes.fromhex(pdu), NOW).hex(" ")
+    return execute(unit, Requester(writer), bytes.fromhex(pdu), NOW).hex(" ")
 
 
 def test_every_reason_has_its_exception() -> None:
@@ -33,6 +34,9 @@ def test_every_reason_has_its_exception() -> None:
         "ROBOT_LOST": 0x0B,
         "CLAIMED_ELSEWHERE": 0x0A,
         "HEARTBEAT_LOST": 0x0B,
+        "PARTIAL_TAKEOVER": 0x03,
+        "WAITED": 0x06,
+        "NOT_MEANT": 0x06,
     }
 
 
@@ -145,5 +149,5 @@ def test_locks_are_taken_and_given_back_by_the_status_block(
 
 
 def test_a_write_is_seen_by_the_next_read(cell: Cell, unit: Unit, index_of: IndexOf) -> None:
-    assert cell.write(HMI, [Change(index_of("count"), 5)], NOW) is None
+    assert cell.write(Requester(HMI), [Change(index_of("count"), 5)], NOW) is None
     assert ask(unit, "03 000b 0002") == "03 04 00 00 00 05"

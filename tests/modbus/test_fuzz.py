@@ -15,6 +15,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 from gatewayd.core.cell import Cell
+from gatewayd.core.requester import Requester
 from gatewayd.modbus.frames import GREATEST_FRAME
 from gatewayd.modbus.functions import Unit
 from gatewayd.modbus.server import ModbusListener
@@ -85,7 +86,7 @@ def test_any_stream_gets_whole_answers(cell: Cell, unit: Unit) -> None:
     for case in range(CASES):
         chance = random.Random(case)
         session = Session()
-        session.serve({1: Access(unit, chance.choice((0, 1, None)))})
+        session.serve({1: Access(unit, Requester(chance.choice((0, 1, None))))})
         data = made_stream(chance)
         answers = answered(session, data, chance)
         asked = position = 0

@@ -11,6 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Limits, Lock, ValueKind, Variable, Writer
+from gatewayd.core.requester import Requester
 from gatewayd.mapping.codec import make_codec
 from gatewayd.mapping.plan import Area, ModbusPlan, Placement
 from gatewayd.modbus.functions import Unit, execute
@@ -70,7 +71,7 @@ class Requests(RuleBasedStateMachine):
         self.owners: dict[int, int] = {}
 
     def ask(self, writer: int | None, pdu: bytes) -> bytes:
-        return execute(self.unit, writer, pdu, NOW)
+        return execute(self.unit, Requester(writer), pdu, NOW)
 
     def judge(
         self, writer: int | None, written: dict[int, int], implied: frozenset[int] = frozenset()

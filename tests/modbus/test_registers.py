@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Direction
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
 from gatewayd.mapping.plan import ModbusPlan
 from gatewayd.modbus.functions import Unit
 from gatewayd.modbus.registers import GREATEST_BITS, GREATEST_REGISTERS, Readable, RegisterImage
@@ -87,7 +88,7 @@ def test_a_register_with_bits_of_both_directions_shows_both(
 ) -> None:
     show(other_half=True)
     assert unit.image.holding.image[40:42] == bytes.fromhex("0002")
-    assert cell.write(0, [Change(index_of("half"), value=True)], 1000.0) is None
+    assert cell.write(Requester(0), [Change(index_of("half"), value=True)], 1000.0) is None
     assert unit.image.holding.image[40:42] == bytes.fromhex("0003")
     show(other_half=False)
     assert unit.image.holding.image[40:42] == bytes.fromhex("0001")
@@ -154,7 +155,7 @@ def test_bits_selected_by_a_mask_are_meant(unit: Unit, index_of: IndexOf) -> Non
 def test_a_mask_on_a_number_follows_the_formula(
     cell: Cell, unit: Unit, index_of: IndexOf, and_mask: int, or_mask: int
 ) -> None:
-    assert cell.write(0, [Change(index_of("part"), 0x0012)], 1000.0) is None
+    assert cell.write(Requester(0), [Change(index_of("part"), 0x0012)], 1000.0) is None
     expected = (0x0012 & and_mask) | (or_mask & ~and_mask & 0xFFFF)
     assert unit.image.holding.masked(10, and_mask, or_mask) == [Change(index_of("part"), expected)]
 
@@ -178,7 +179,10 @@ def test_coils_are_written_one_by_one(unit: Unit, index_of: IndexOf) -> None:
 
 def test_an_input_is_shown_after_it_was_written(cell: Cell, unit: Unit, index_of: IndexOf) -> None:
     assert (
-        cell.write(0, [Change(index_of("count"), -2), Change(index_of("coil_3"), value=True)], 1000.0) is None
+        cell.write(
+            Requester(0), [Change(index_of("count"), -2), Change(index_of("coil_3"), value=True)], 1000.0
+        )
+        is None
     )
     assert unit.image.holding.image[22:26] == struct.pack(">i", -2)
     assert unit.image.coils.read(0, 10) == bytes.fromhex("08 00")

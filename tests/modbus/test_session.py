@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import EventKind
+from gatewayd.core.requester import Requester
 from gatewayd.mapping.plan import ModbusPlan
 from gatewayd.modbus.frames import encode
 from gatewayd.modbus.functions import Unit, execute
@@ -33,7 +34,7 @@ REQUESTS = (
 @pytest.fixture
 def session(unit: Unit) -> Session:
     session = Session()
-    session.serve({1: Access(unit, PLC)})
+    session.serve({1: Access(unit, Requester(PLC))})
     return session
 
 
@@ -43,16 +44,18 @@ def session(unit: Unit) -> Session:
 def test_a_refused_stranger_is_named_by_its_address(cell: Cell, unit: Unit, pdu: str) -> None:
     """Whoever mends the mapping has to know what to write under `writers:`."""
     session = Session()
-    session.serve({1: Access(unit, None, "192.168.1.77")})
+    session.serve({1: Access(unit, Requester(None, "192.168.1.77"))})
     feed(session, stream(pdu))
     assert cell.last_refusal is not None
-    assert cell.last_refusal.refusal.peer == "192.168.1.77"
+    assert cell.last_refusal.peer == "192.168.1.77"
     assert [event.peer for event in cell.events if event.kind is EventKind.REFUSED] == ["192.168.1.77"]
 
 
 def test_a_writer_is_named_by_its_name_alone(cell: Cell, unit: Unit) -> None:
     session = Session()
-    session.serve({1: Access(unit, None, "192.168.1.77"), 2: Access(unit, PLC, "192.168.1.20")})
+    session.serve(
+        {1: Access(unit, Requester(None, "192.168.1.77")), 2: Access(unit, Requester(PLC, "192.168.1.20"))}
+    )
     feed(session, stream("06 000a 0005", unit=1))
     feed(session, stream("06 3a98 0001", unit=2))
     assert [event.peer for event in cell.events if event.kind is EventKind.REFUSED] == ["192.168.1.77", ""]
@@ -79,7 +82,7 @@ def stream(*requests: str, unit: int = 1) -> bytes:
 def fresh(unit: Unit) -> Session:
     """A session over the same cell, with the values all tests begin with."""
     session = Session()
-    session.serve({1: Access(unit, PLC)})
+    session.serve({1: Access(unit, Requester(PLC))})
     feed(session, stream("06 000a 0000", "10 000b 0002 04 00000000"))
     return session
 
@@ -130,7 +133,7 @@ def test_what_is_no_frame_is_told_after_the_answers_before_it(session: Session) 
 def test_the_quick_way_and_the_other_one_agree(unit: Unit) -> None:
     """Reads are answered by the loop itself where they can be; nobody must be able to tell."""
     session = Session()
-    session.serve({1: Access(unit, PLC), 2: Access(unit, None)})
+    session.serve({1: Access(unit, Requester(PLC)), 2: Access(unit, Requester(None))})
     for pdu in (
         "03 000a 0006",
         "04 0000 0006",
@@ -140,12 +143,12 @@ def test_the_quick_way_and_the_other_one_agree(unit: Unit) -> None:
         "04 0030 0001",
     ):
         quick = feed(session, stream(pdu))
-        assert quick == encode(1, 1, execute(unit, PLC, bytes.fromhex(pdu), NOW))
+        assert quick == encode(1, 1, execute(unit, Requester(PLC), bytes.fromhex(pdu), NOW))
 
 
 def test_with_two_units_the_device_itself_is_not_known(unit: Unit) -> None:
     session = Session()
-    session.serve({1: Access(unit, PLC), 2: Access(unit, PLC)})
+    session.serve({1: Access(unit, Requester(PLC)), 2: Access(unit, Requester(PLC))})
     assert feed(session, stream("03 000a 0001", unit=0)) == bytes.fromhex("0001 0000 0003 00 83 0b")
     assert feed(session, stream("03 000a 0001", unit=255)) == bytes.fromhex("0001 0000 0003 ff 83 0b")
     assert feed(session, stream("03 000a 0001", unit=2)) == bytes.fromhex("0001 0000 0005 02 03 02 0000")
@@ -157,7 +160,7 @@ def test_a_request_is_a_sign_of_life_for_the_unit_it_is_for(
     cells = [new_cell(NOW), new_cell(NOW)]
     units = {number: Unit(plan_of(number), cell) for number, cell in enumerate(cells, 1)}
     session = Session()
-    session.serve({number: Access(unit, PLC) for number, unit in units.items()})
+    session.serve({number: Access(unit, Requester(PLC)) for number, unit in units.items()})
     feed(session, stream("03 000a 0001", unit=2))
     assert [cell.writers.alive[PLC] for cell in cells] == [False, True]
     feed(session, stream("07", unit=1))
@@ -167,7 +170,7 @@ def test_a_request_is_a_sign_of_life_for_the_unit_it_is_for(
 def test_units_can_be_exchanged_between_two_requests(session: Session, unit: Unit) -> None:
     session.serve({})
     assert feed(session, stream("03 000a 0001")) == bytes.fromhex("0001 0000 0003 01 83 0b")
-    session.serve({7: Access(unit, PLC)})
+    session.serve({7: Access(unit, Requester(PLC))})
     assert feed(session, stream("03 000a 0001", unit=7)) == bytes.fromhex("0001 0000 0005 07 03 02 0000")
 
 

@@ -17,6 +17,7 @@ from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
+from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
 from gatewayd.mapping.loader import load
 from gatewayd.robot import inputs as inputs_module
@@ -59,7 +60,7 @@ class Rig:
 
     def write(self, *changes: tuple[int, bool | int | float], writer: int = PLC) -> None:
         """Apply a write request that must be accepted."""
-        refusal = self.cell.write(writer, [Change(*one) for one in changes], time.monotonic())
+        refusal = self.cell.write(Requester(writer), [Change(*one) for one in changes], time.monotonic())
         assert refusal is None, refusal
 
     def get(self, field: str) -> object:
@@ -308,7 +309,7 @@ async def test_what_an_old_controller_lacks_costs_only_itself(rigged: Rigged, un
         ]
         rig.write((0, 5))
         await until(lambda: rig.cell.image.values == [5, 0, 5, -1])
-        refusal = rig.cell.write(PLC, [Change(1, 5)], time.monotonic())
+        refusal = rig.cell.write(Requester(PLC), [Change(1, 5)], time.monotonic())
         assert refusal is not None
         assert refusal.reason is Reason.CLAIMED_ELSEWHERE
         told = rig.events(EventKind.UNAVAILABLE)
@@ -374,14 +375,14 @@ async def test_the_watchdog_is_fed_for_living_writers_only(rigged: Rigged, until
     async with rigged(options=WATCHDOG) as rig:
         await until(lambda: rig.cell.accepts_writes)
         now = time.monotonic
-        rig.cell.writer_connected(HMI, now())
+        rig.cell.writer_connected(Requester(HMI), now())
         await asyncio.sleep(0.1)
         assert not rig.cell.health.watchdog_fed
-        rig.cell.writer_connected(PLC, now())
+        rig.cell.writer_connected(Requester(PLC), now())
         await until(lambda: rig.cell.health.watchdog_fed)
         fed = int(str(rig.get("input_int_register_9")))
         await until(lambda: int(str(rig.get("input_int_register_9"))) > fed + 3)
-        rig.cell.writer_disconnected(PLC, now(), "gone")
+        rig.cell.writer_disconnected(Requester(PLC), now(), "gone")
         await until(lambda: not rig.cell.health.watchdog_fed)
         await rig.link.close()
 

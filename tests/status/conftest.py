@@ -11,6 +11,7 @@ import pytest
 from gatewayd.audit import Audit
 from gatewayd.control.api import Api
 from gatewayd.core.cell import Cell, Change
+from gatewayd.core.requester import Requester
 from gatewayd.daemon import Daemon
 from gatewayd.mapping.loader import load
 from gatewayd.station import Station
@@ -37,10 +38,10 @@ def station(daemon: Daemon) -> Station:
     assert cell.package_arrived(1.0, now)
     cell.outputs_written(now)
     cell.adopt({}, now)
-    cell.writer_connected(PLC, now, "127.0.0.2:1")
-    cell.writer_connected(HMI, now, "127.0.0.3:1")
-    assert cell.write(PLC, [Change(START, True), Change(FORCE_LIMIT, 12.5)], now) is None
-    assert cell.write(HMI, [Change(START, False)], now) is not None
+    cell.writer_connected(Requester(PLC), now, "127.0.0.2:1")
+    cell.writer_connected(Requester(HMI), now, "127.0.0.3:1")
+    assert cell.write(Requester(PLC), [Change(START, True), Change(FORCE_LIMIT, 12.5)], now) is None
+    assert cell.write(Requester(HMI), [Change(START, False)], now) is not None
     return found
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import Event, EventKind
+from gatewayd.core.requester import Requester
 from gatewayd.status.picture import RECENT, Level, bus, can_bus, gateway, robot, writers
 from tests.status.press import CYCLES, HMI, LINE, PLC, SPARE
 
@@ -86,7 +87,7 @@ def test_writers_by_their_last_deeds(cell: Cell, now: float) -> None:
     assert (hmi.level, hmi.words) == (Level.WARN, "refused start: never writable by this writer")
     assert (line.level, line.words) == (Level.IDLE, "has not come yet")
     assert writers(cell, now + RECENT + 1)[HMI].level is Level.GOOD
-    cell.writer_disconnected(PLC, now, "closed")
+    cell.writer_disconnected(Requester(PLC), now, "closed")
     lost = writers(cell, now + 5)[PLC]
     assert (lost.level, lost.words, lost.facts) == (Level.BAD, "lost, last heard 5 s ago", "holds no lock")
     assert writers(cell, now)[LINE].facts == "holds no lock"

@@ -11,6 +11,7 @@ from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Direction
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
+from gatewayd.core.requester import Requester
 from gatewayd.daemon import Daemon
 from gatewayd.station import Station
 from gatewayd.status.probes import CellProbe, Probes
@@ -76,8 +77,8 @@ def test_a_write_is_measured_until_it_is_sent(cell: Cell) -> None:
     probe.attach(cell, link)
     link.send()
     assert probe.write_to_package.count == 0
-    assert cell.write(PLC, [Change(START, False)], time.monotonic() - 0.01) is None
-    assert cell.write(PLC, [Change(START, True)], time.monotonic()) is None
+    assert cell.write(Requester(PLC), [Change(START, False)], time.monotonic() - 0.01) is None
+    assert cell.write(Requester(PLC), [Change(START, True)], time.monotonic()) is None
     link.send()
     link.send()
     assert probe.write_to_package.count == 1
@@ -87,7 +88,7 @@ def test_a_write_is_measured_until_it_is_sent(cell: Cell) -> None:
 def test_a_write_that_the_robot_never_saw_is_not_measured(cell: Cell) -> None:
     probe, link = CellProbe(), Link()
     probe.attach(cell, link)
-    cell.write(PLC, [Change(START, False)], time.monotonic())
+    cell.write(Requester(PLC), [Change(START, False)], time.monotonic())
     cell.robot_lost("cable", time.monotonic())
     link.send()
     assert probe.write_to_package.count == 0

@@ -8,7 +8,7 @@ with the next SYNC, if its writer still lives. Both only in OPERATIONAL.
 | shorter than the mapping | dropped | 8210h |
 | longer than the mapping | its first bytes are used | 8220h |
 | none for the event time, after a first one | | 8250h |
-| the cell refuses the write | dropped | FF01h-FF06h by reason |
+| the cell refuses the write | dropped | FF01h-FF08h by reason |
 
 Each fault is told once per PDO. It is cleared by the opposite: a frame of the right length, any usable frame, a write
 that succeeds; and when the PDO is no longer received (configured anew, OPERATIONAL left). While the writer's heartbeat
@@ -25,6 +25,7 @@ from typing import Final
 from gatewayd.canopen.pdo.parameters import Configuration
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
 
 __all__ = ["Fault", "ReceiveEngine", "ReceivePdo", "Tell"]
 
@@ -41,6 +42,8 @@ class Fault(Enum):
     CLAIMED_ELSEWHERE = 0xFF04
     NOT_WRITABLE = 0xFF05
     HEARTBEAT_LOST = 0xFF06
+    PARTIAL_TAKEOVER = 0xFF07
+    WAITED = 0xFF08
 
     @property
     def is_refusal(self) -> bool:
@@ -55,6 +58,8 @@ _FAULTS: Final = {
     Reason.CLAIMED_ELSEWHERE: Fault.CLAIMED_ELSEWHERE,
     Reason.NOT_WRITABLE: Fault.NOT_WRITABLE,
     Reason.HEARTBEAT_LOST: Fault.HEARTBEAT_LOST,
+    Reason.PARTIAL_TAKEOVER: Fault.PARTIAL_TAKEOVER,
+    Reason.WAITED: Fault.WAITED,
 }
 """The reasons that a write of whole, mapped variables can be refused for."""
 
@@ -93,12 +98,12 @@ class ReceivePdo:
 class ReceiveEngine:
     """All RPDOs of a node.
 
-    They write as `writer`; None stands for nobody, and every write is refused. Each frame of the right length is a
-    sign of life of the writer if it is heard, whether its write is refused or not. `raised` and `cleared` are told of
-    each fault of each PDO; a fault of one PDO may have been cleared while `standing` still has it for another.
+    They write as `requester()`, asked anew for each frame. Each frame of the right length is a sign of life of a
+    trusted writer, whether its write is refused or not. `raised` and `cleared` are told of each fault of each PDO; a
+    fault of one PDO may have been cleared while `standing` still has it for another.
     """
 
-    def __init__(self, cell: Cell, writer: int | None, raised: Tell, cleared: Tell) -> None:
+    def __init__(self, cell: Cell, requester: Callable[[], Requester], raised: Tell, cleared: Tell) -> None:
         self.received = 0
         """Frames in OPERATIONAL, faulty ones included."""
         self.refused = 0
@@ -107,7 +112,7 @@ class ReceiveEngine:
         """Frames that were too short or too long."""
         self.is_operational = False
         self._cell = cell
-        self._writer = writer
+        self._requester = requester
         self._raised = raised
         self._cleared = cleared
         self._pdos: dict[int, ReceivePdo] = {}
@@ -161,27 +166,29 @@ class ReceiveEngine:
             self._clear(pdo, tuple(pdo.faults), now)
         self._deadline = math.inf
 
-    def receive(self, can_id: int, data: bytes, now: float, *, heard: bool = True) -> bool:
-        """A data frame. Returns whether an RPDO has this identifier. `heard` is as in `Cell.write`."""
+    def receive(self, can_id: int, data: bytes, now: float) -> bool:
+        """A data frame. Returns whether an RPDO has this identifier."""
         pdos = self._by_can_id.get(can_id)
         if pdos is None:
             return False
         self._now = now
         if self.is_operational:
+            requester = self._requester()
             for pdo in pdos:
-                self._take(pdo, data, now, heard=heard)
+                self._take(pdo, data, now, requester)
         return True
 
     def on_sync(self, now: float) -> None:
         """A SYNC was received: write what was kept for it, unless the writer was lost meanwhile."""
         self._now = now
-        if self._writer is not None and not self._cell.writers.alive[self._writer]:
+        requester = self._requester()
+        if requester.writer is not None and not self._cell.writers.alive[requester.writer]:
             self.forget()
             return
         for pdo in self._synchronous:
             if pdo.latched is not None:
                 data, pdo.latched = pdo.latched, None
-                self._write(pdo, data, now)
+                self._write(pdo, data, now, requester)
 
     def forget(self) -> None:
         """The writer is lost: what it left for the next SYNC is nobody's any more."""
@@ -207,7 +214,7 @@ class ReceiveEngine:
 
     # -- inside --------------------------------------------------------------------------------------------------
 
-    def _take(self, pdo: ReceivePdo, data: bytes, now: float, *, heard: bool) -> None:
+    def _take(self, pdo: ReceivePdo, data: bytes, now: float, requester: Requester) -> None:
         self.received += 1
         pdo.received += 1
         if len(data) != pdo.size and not self._use_long(pdo, data, now):
@@ -224,13 +231,12 @@ class ReceiveEngine:
             pdo.due = now + event
             if self._deadline is not None:
                 self._deadline = min(self._deadline, pdo.due)
-        if self._writer is not None and heard:
-            self._cell.writer_seen(self._writer, now)
+        self._cell.writer_seen(requester, now)
         data = data[: pdo.size]
-        if pdo.configuration.is_synchronous and heard:
+        if pdo.configuration.is_synchronous and requester.trusted:
             pdo.latched = data
         else:
-            self._write(pdo, data, now, heard=heard)
+            self._write(pdo, data, now, requester)
 
     def _use_long(self, pdo: ReceivePdo, data: bytes, now: float) -> bool:
         """Tell of a wrong length. Returns whether the frame can be used all the same."""
@@ -239,13 +245,13 @@ class ReceiveEngine:
         self._raise(pdo, Fault.LONG if is_long else Fault.SHORT, now)
         return is_long
 
-    def _write(self, pdo: ReceivePdo, data: bytes, now: float, *, heard: bool = True) -> None:
+    def _write(self, pdo: ReceivePdo, data: bytes, now: float, requester: Requester) -> None:
         changes = pdo.meaning(data)
         if isinstance(changes, Refusal):
             refusal: Refusal | None = changes
-            self._cell.refuse(self._writer, changes, now)
+            self._cell.refuse(requester, changes, now)
         else:
-            refusal = self._cell.write(self._writer, changes, now, heard=heard)
+            refusal = self._cell.write(requester, changes, now)
         if refusal is not None:
             self.refused += 1
             self._raise(pdo, _FAULTS[refusal.reason], now)

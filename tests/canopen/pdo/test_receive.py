@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from gatewayd.canopen.pdo.parameters import Configuration
 from gatewayd.canopen.pdo.receive import Fault, ReceiveEngine
 from gatewayd.core.cell import Change
 from gatewayd.core.definition import Direction
+from gatewayd.core.requester import Requester
 
 Bench = Any
 """`Bench` of conftest.py, which cannot be imported."""
@@ -27,9 +29,10 @@ class Receiver:
     def __init__(self, bench: Bench, *names: str, writer: int | None = LINE, **parameters: Any) -> None:
         self.bench = bench
         self.told: list[str] = []
+        self.requester = Requester(writer)
         self.engine = ReceiveEngine(
             bench.cell,
-            writer,
+            lambda: self.requester,
             lambda fault, number, _now: self.told.append(f"+{fault.name} {number}"),
             lambda fault, number, _now: self.told.append(f"-{fault.name} {number}"),
         )
@@ -43,7 +46,8 @@ class Receiver:
 
     def receive(self, data: str, after: float = 0.0, can_id: int = 0x205, *, heard: bool = True) -> list[str]:
         """What was told of this frame."""
-        self.engine.receive(can_id, bytes.fromhex(data), T + after, heard=heard)
+        self.requester = replace(self.requester, trusted=heard)
+        self.engine.receive(can_id, bytes.fromhex(data), T + after)
         return self.take()
 
     def take(self) -> list[str]:
@@ -72,7 +76,7 @@ def test_synchronous_rpdo_waits_for_sync_and_the_newest_wins(bench: Bench, trans
     assert receiver.value("in_int_0") == 0
     receiver.engine.on_sync(T)
     assert receiver.value("in_int_0") == 2
-    bench.cell.write(LINE, [Change(bench.by_name["in_int_0"], 9)], T)
+    bench.cell.write(Requester(LINE), [Change(bench.by_name["in_int_0"], 9)], T)
     receiver.engine.on_sync(T)
     assert receiver.value("in_int_0") == 9, "what was written once is not written again"
 
@@ -200,12 +204,12 @@ def test_refused_rpdo_changes_nothing_and_is_told_once_until_a_write_succeeds(be
     index = bench.by_name["in_int_1"]
     line_ranks_first = Receiver(bench, "in_int_0", writer=PLC)
     assert line_ranks_first.receive("07000000") == []
-    bench.cell.write(PLC, [Change(index, 5)], T)
+    bench.cell.write(Requester(PLC), [Change(index, 5)], T)
     assert receiver.receive("0100000002000000") == ["+HELD 1"]
     assert receiver.receive("0100000002000000") == []
     assert (receiver.value("in_int_0"), receiver.value("in_int_1")) == (7, 5)
     assert receiver.engine.refused == 2
-    bench.cell.release_all(PLC, T)
+    bench.cell.release_all(Requester(PLC), T)
     assert receiver.receive("0100000002000000") == ["-HELD 1"]
     assert receiver.value("in_int_1") == 2
 
@@ -267,7 +271,7 @@ def test_configuring_a_pdo_anew_clears_its_faults(bench: Bench) -> None:
 
 def test_packed_bit_of_another_owner_may_only_keep_its_value(bench: Bench) -> None:
     """The bits of a PDO are written because their neighbours are."""
-    bench.cell.write(PLC, [Change(bench.by_name["in_bit_1"], True)], T)
+    bench.cell.write(Requester(PLC), [Change(bench.by_name["in_bit_1"], True)], T)
     receiver = Receiver(bench, "in_bit_0", "in_bit_1")
     assert receiver.receive("03") == []
     assert receiver.value("in_bit_0") is True
@@ -278,7 +282,7 @@ def test_packed_bit_of_another_owner_may_only_keep_its_value(bench: Bench) -> No
 def test_equal_content_is_written_again_and_keeps_the_owner(bench: Bench) -> None:
     receiver = Receiver(bench, "in_int_0")
     receiver.receive("01000000")
-    bench.cell.release_all(LINE, T)
+    bench.cell.release_all(Requester(LINE), T)
     assert receiver.value("in_int_0") == 0
     receiver.receive("01000000")
     assert receiver.value("in_int_0") == 1

@@ -1,0 +1,125 @@
+"""The clocks, and a loop that judges the time before it serves anything.
+
+- `now`: the time of everything in the daemon, leases and ages included. CLOCK_MONOTONIC, which stands still while
+  the machine is suspended, and all the time it was suspended for. Equal to `loop.time()` of a `ClockedLoop`.
+- `raw`: CLOCK_MONOTONIC_RAW, for comparisons with another machine's clock: no time service adjusts its speed.
+
+asyncio serves sockets before timers. After the process stood still (stopped, suspended, starved of the CPU) what
+waited in the sockets would therefore be served before anything notices that time has passed. The selector is what
+runs first in every turn, so it is here that a gap is noticed, and its listeners hear of it before any socket or timer.
+
+A machine whose clocks all stand still with it (some virtual machines when paused) shows no gap.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import selectors
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+__all__ = ["GAP", "ClockedLoop", "Gap", "new_event_loop", "now", "on_gap", "raw"]
+
+GAP = 0.05
+"""Seconds beyond what the loop wanted to sleep after which the process counts as having stood still."""
+_NOTICEABLE = 0.01
+"""Seconds between two readings of two clocks that are no suspension."""
+
+_CLOCK_RAW = getattr(time, "CLOCK_MONOTONIC_RAW", time.CLOCK_MONOTONIC)
+_CLOCK_BOOT = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
+
+_monotonic = time.monotonic
+_read = time.clock_gettime
+
+
+class _Suspension:
+    """How long the machine was suspended since this module was imported; judged once in each turn of the loop."""
+
+    __slots__ = ("_offset", "total")
+
+    def __init__(self) -> None:
+        self.total = 0.0
+        self._offset = _read(_CLOCK_BOOT) - _monotonic()
+
+    def look(self) -> None:
+        asleep = _read(_CLOCK_BOOT) - _monotonic() - self._offset
+        if asleep - self.total > _NOTICEABLE:
+            self.total = asleep
+
+
+_suspension = _Suspension()
+
+
+def now() -> float:
+    """Seconds of the daemon's own clock; never goes back, goes on while the machine is suspended."""
+    return _monotonic() + _suspension.total
+
+
+def raw() -> float:
+    """Seconds of CLOCK_MONOTONIC_RAW, which no time service corrects."""
+    return _read(_CLOCK_RAW)
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A time in which the process did nothing, though it should have."""
+
+    since: float
+    """End of the last turn of the loop before it, by `now`."""
+    until: float
+
+    @property
+    def length(self) -> float:
+        """Seconds for which something that is read now may have waited."""
+        return self.until - self.since
+
+
+GapListener = Callable[[Gap], None]
+
+
+class _Selector(selectors.DefaultSelector):
+    """Looks at the time when a turn of the loop begins, before what the turn will serve is known."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.gap_listeners: list[GapListener] = []
+        self._turn_began = now()
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        """See selectors.BaseSelector; the listeners of a gap are called first."""
+        asleep_at = now()
+        found: list[tuple[selectors.SelectorKey, int]] = super().select(timeout)
+        _suspension.look()
+        began, self._turn_began = self._turn_began, now()
+        overslept = self._turn_began - asleep_at - (timeout or 0.0) if timeout is not None else 0.0
+        if asleep_at - began > GAP or overslept > GAP:
+            gap = Gap(began, self._turn_began)
+            for listener in self.gap_listeners:
+                listener(gap)
+        return found
+
+
+class ClockedLoop(asyncio.SelectorEventLoop):
+    """An event loop on `now`, whose `gap_listeners` are called first in the turn after a gap. They must not raise."""
+
+    def __init__(self) -> None:
+        selector = _Selector()
+        self.gap_listeners = selector.gap_listeners
+        super().__init__(selector)
+
+    def time(self) -> float:
+        """See asyncio; `now`, so that deadlines pass while the machine is suspended."""
+        return now()
+
+
+def new_event_loop() -> ClockedLoop:
+    """A loop for `asyncio.Runner(loop_factory=...)`."""
+    return ClockedLoop()
+
+
+def on_gap(listener: GapListener) -> None:
+    """Have `listener` called after gaps of the running loop; another kind of loop notices none."""
+    loop = asyncio.get_running_loop()
+    if isinstance(loop, ClockedLoop):
+        loop.gap_listeners.append(listener)

@@ -1,0 +1,38 @@
+"""Who asks a cell for something, and what the link that took the request vouches for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import count
+
+from gatewayd.core.definition import OPERATOR
+
+__all__ = ["LOCAL_OPERATOR", "Requester", "new_connection"]
+
+
+@dataclass(frozen=True, slots=True)
+class Requester:
+    """The sender of a request, as its link knows it. Links make one for each connection and keep it."""
+
+    writer: int | None
+    """Index of the writer in the cell's definition; None: a peer that no writer is declared for."""
+    peer: str = ""
+    """Address of the peer, for refusals: who reads it knows what to declare."""
+    connection: int = 0
+    """Number of the connection, unique in the process (`new_connection`); locks follow it. 0: there is none."""
+    trusted: bool = True
+    """The link's word that the writer keeps what it promised. If it does not (its heartbeat stays away), its requests
+    are refused and are no sign of life. The same writer may be trusted by another link."""
+    waited: float = 0.0
+    """Seconds for which the request may have waited while the gateway stood still; 0: it was read when it came."""
+
+
+LOCAL_OPERATOR = Requester(OPERATOR)
+"""The control socket."""
+
+_connections = count(1)
+
+
+def new_connection() -> int:
+    """A number that no other connection has or had."""
+    return next(_connections)
