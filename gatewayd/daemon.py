@@ -100,7 +100,6 @@ class Daemon:
 
     def _after_gap(self, gap: clock.Gap) -> None:
         """The process stood still; nothing that waited meanwhile has been served yet."""
-        log.warning("the gateway stood still", extra=fields(seconds=round(gap.length, 3)))
         for station in self.stations:
             station.gap(gap.since, gap.until)
         for listener in self.listeners:

@@ -28,7 +28,8 @@ __all__ = ["HEARTBEAT_PERIOD", "REFUSAL_INTERVAL", "Cell", "Change", "LastRefusa
 
 HEARTBEAT_PERIOD = 0.1
 """Seconds between two counts of the heartbeat."""
-
+NOTABLE_GAP = 0.5
+"""Seconds for which the gateway stood still, from which on it is an event, and requests that waited are refused."""
 
 Written = Sequence[tuple[int, Value, Value]]
 """What a write changed: variable, old and new value."""
@@ -333,7 +334,9 @@ class Cell:
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`; called before anything that waited is served."""
-        self.health.gaps += 1
+        if now - since >= NOTABLE_GAP:
+            self.health.gaps += 1
+            self.events.append(Event(now, EventKind.STOOD_STILL, detail=f"for {now - since:.1f} s"))
         self.tick(now)
 
     # -- inside --------------------------------------------------------------------------------------------------
