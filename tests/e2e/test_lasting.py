@@ -45,6 +45,17 @@ runpy.run_module("gatewayd", run_name="__main__")
 """
 """The daemon under a wall clock that steps by an hour or by years each time that it is asked."""
 
+SUSPENDED_MACHINE = """\
+import runpy, sys, time
+path, sys.argv = sys.argv[1], ["gatewayd", *sys.argv[2:]]
+real = time.clock_gettime
+def asleep():
+    return float(open(path).read())
+time.clock_gettime = lambda which: real(which) + (asleep() if which == time.CLOCK_BOOTTIME else 0.0)
+runpy.run_module("gatewayd", run_name="__main__")
+"""
+"""The daemon on a machine that was suspended for as many seconds as a file says: CLOCK_MONOTONIC stood still."""
+
 WALL_CLOCK = {
     "audit": "the time of a record",
     "control/server": "the time in answers",
@@ -242,6 +253,31 @@ def test_steps_of_the_wall_clock_matter_to_nobody(plant: Plant) -> None:
     assert not daemon.lines("writer lost", "time-out")
     years = {json.loads(line)["time"][:4] for line in audit.read_text().splitlines()}
     assert len(years) > 1, "the clock did not step"
+
+
+def test_leases_age_while_the_machine_is_suspended(plant: Plant) -> None:
+    """Two hours of suspension are two hours: the lease has ended, though no clock of the process went on."""
+    simulator = plant.simulator()
+    text = CELL.replace("lease: 2s", "lease: 1h").replace(", timeout: 2s", "")
+    mapping = plant.mapping(text, simulator.port)
+    asleep = plant.directory / "asleep"
+    asleep.write_text("0")
+    command = [sys.executable, "-c", SUSPENDED_MACHINE, str(asleep), "run", str(mapping), "--control", "none"]
+    daemon = Process(command, plant.directory / "suspended.log")
+    try:
+        daemon.wait_for_line("listening for Modbus")
+        plc = plant.ready_plc()
+        assert plc.write_integers(0, 7) == 0
+        assert plc.owner(1) == 1
+        wait_for(lambda: simulator.integer("input_int_register_0") == 7, "the command to arrive")
+        renamed = asleep.with_suffix(".new")
+        renamed.write_text("7200")
+        renamed.replace(asleep)
+        wait_for(lambda: simulator.integer("input_int_register_0") == 0, "the fallback to arrive")
+        assert plant.plc().owner(1) == 0
+        daemon.wait_for_line("gateway stood still", "7200")
+    finally:
+        daemon.kill()
 
 
 def test_only_what_is_shown_to_people_asks_the_wall_clock() -> None:
