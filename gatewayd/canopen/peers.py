@@ -87,7 +87,7 @@ class Peers:
         """The writer is lost; its locks are released and the fallbacks apply."""
         if writer is not None and writer in self._alive:
             self._alive.discard(writer)
-            self._cell.writer_disconnected(self._requesters[writer], now, reason)
+            self._cell.writer_disconnected(self._requesters[writer], now, reason, at_once=True)
 
     def lose_all(self, reason: str, now: float) -> None:
         """No writer can be heard any more."""

@@ -1,16 +1,17 @@
-"""Whether a write request may be applied: judged whole, on the state of one moment, changing nothing."""
+"""Whether a request may be carried out: judged whole, on the state of one moment, changing nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from gatewayd.core.definition import Value, Variable
+from gatewayd.core.definition import OPERATOR, Value, Variable, Writer
 from gatewayd.core.image import ProcessImage
 from gatewayd.core.limits import has_no_limits, within
 from gatewayd.core.ownership import MOVES, Act, LockTable, Move, Standing
 from gatewayd.core.refusal import PRECEDENCE, Reason, Refusal
 from gatewayd.core.requester import Requester
+from gatewayd.core.supervision import patience
 
 __all__ = ["Admission", "Change", "Verdict"]
 
@@ -22,8 +23,9 @@ class Change:
     variable: int
     value: Value
     implied: bool = False
-    """A bit that is written only because its whole register is. Where somebody else holds its lock, or the writer may
-    never have it, an unchanged bit is let pass unwritten; a changed one is judged like any other."""
+    """A bit that is written only because its whole register is. Its writer means it if it owns it, or could take it as
+    its only possible owner. Any other is let pass unwritten if it is unchanged, and stands in the way if it is not: the
+    writer may have read the word before somebody else changed that bit."""
 
 
 @dataclass(slots=True)
@@ -40,24 +42,32 @@ class Verdict:
 class Admission:
     """Judges requests against the definition, the owners and the image."""
 
-    __slots__ = ("_image", "_locks", "_ownership", "_unlimited", "_variables")
+    __slots__ = ("_image", "_locks", "_ownership", "_sole", "_unlimited", "_variables", "_writers")
 
-    def __init__(self, variables: Sequence[Variable], ownership: LockTable, image: ProcessImage) -> None:
+    def __init__(
+        self,
+        variables: Sequence[Variable],
+        writers: Sequence[Writer],
+        ownership: LockTable,
+        image: ProcessImage,
+    ) -> None:
         self._variables = tuple(variables)
+        self._writers = tuple(writers)
         self._ownership = ownership
         self._image = image
         self._locks = tuple(variable.lock for variable in variables)
         self._unlimited = tuple(has_no_limits(variable) for variable in variables)
+        self._sole = tuple(len(lock.owners) == 1 for lock in ownership.locks)
 
     def judge(self, requester: Requester, changes: Sequence[Change], *, adopted: bool) -> Verdict:
         """The verdict on all changes together; `adopted`: the robot is there and its inputs were taken over.
 
         If several changes stand in the way, `PRECEDENCE` says which refusal is told. A peer that no writer
-        is declared for may write nothing. Of a writer that is not trusted nothing is applied, not even what would
-        change nothing.
+        is declared for may write nothing. Of a writer that is not trusted, or that asked too long ago, nothing is
+        applied, not even what would change nothing.
         """
         writer, trusted = requester.writer, requester.trusted
-        if writer is not None and adopted and trusted:
+        if writer is not None and adopted and trusted and not requester.waited:
             usual = self._usual(writer, changes)
             if usual is not None:
                 return usual
@@ -69,10 +79,37 @@ class Admission:
                 else self._judge(writer, change, verdict, adopted=adopted)
             )
             verdict.refusal = _graver(verdict.refusal, refusal)
+        verdict.refusal = _graver(verdict.refusal, self._partial_takeover(writer, verdict))
+        first = changes[0].variable if changes else None
         if not trusted:
-            first = changes[0].variable if changes else None
             verdict.refusal = _graver(verdict.refusal, Refusal(Reason.HEARTBEAT_LOST, first))
+        if self.is_late(requester, verdict.moves):
+            verdict.refusal = _graver(verdict.refusal, Refusal(Reason.WAITED, first))
         return verdict
+
+    def judge_lock(self, requester: Requester, variable: int, act: Act) -> Move | Refusal:
+        """What a request or a release of the lock that guards `variable` would do. A release is never too late."""
+        writer, lock = requester.writer, self._locks[variable]
+        if writer is None or lock is None:
+            return Refusal(Reason.NOT_WRITABLE, variable)
+        move = self._ownership.decide(lock, writer, act)
+        if move is Move.REFUSE_NEVER:
+            return Refusal(Reason.NOT_WRITABLE, variable)
+        if not requester.trusted:
+            return Refusal(Reason.HEARTBEAT_LOST, variable)
+        if act is Act.REQUEST and self.is_late(requester, (lock,) if move <= Move.TAKE_OVER else ()):
+            return Refusal(Reason.WAITED, variable)
+        if move is Move.REFUSE_HELD:
+            return Refusal(Reason.HELD, variable, self._ownership.owners[lock])
+        return move
+
+    def is_late(self, requester: Requester, locks: Iterable[int] = ()) -> bool:
+        """Whether the request waited for longer than its writer may be silent, or the leases of these locks last."""
+        writer, waited = requester.writer, requester.waited
+        if not waited or writer is None:
+            return False
+        declared = self._ownership.locks
+        return waited > patience(self._writers[writer], (declared[lock].lease for lock in locks))
 
     def _usual(self, writer: int, changes: Sequence[Change]) -> Verdict | None:
         """The usual request: its writer owns all of it, and nothing stands in the way. None: it has to be judged.
@@ -100,17 +137,16 @@ class Admission:
         variable = self._variables[index]
         lock = variable.lock
         standing = Standing.STRANGER if lock is None else self._ownership.standing(lock, writer)
-        owned = standing is Standing.OWNER
-        takeable = owned or standing is Standing.FREE
+        meant = not change.implied or self._means_implied(lock, standing)
         unchanged = change.implied and change.value == self._image.values[index]
-        if unchanged and not takeable:
+        if unchanged and not meant:
             return None
-        if lock is None or (not takeable and standing is Standing.STRANGER):
+        if lock is None or standing is Standing.STRANGER:
             return Refusal(Reason.NOT_WRITABLE, index)
         value = within(variable, change.value)
         if value is None:
             return Refusal(Reason.OUT_OF_LIMITS, index)
-        if owned:
+        if standing is Standing.OWNER:
             verdict.moves[lock] = Move.RENEW
         if not adopted:
             return Refusal(Reason.ROBOT_LOST, index)
@@ -118,9 +154,31 @@ class Admission:
             return None if unchanged else Refusal(Reason.CLAIMED_ELSEWHERE, index)
         if standing is Standing.LOWER:
             return Refusal(Reason.HELD, index, self._ownership.owners[lock])
-        if not owned:
-            verdict.moves[lock] = MOVES[standing, Act.WRITE]
+        if not meant:
+            return Refusal(Reason.NOT_MEANT, index)
+        verdict.moves[lock] = MOVES[standing, Act.WRITE]
         verdict.values.append((index, value))
+        return None
+
+    def _means_implied(self, lock: int | None, standing: Standing) -> bool:
+        if standing is Standing.OWNER:
+            return True
+        return standing is Standing.FREE and lock is not None and self._sole[lock]
+
+    def _partial_takeover(self, writer: int | None, verdict: Verdict) -> Refusal | None:
+        """Why a takeover may not be, if a group is to be taken over whole and it is not.
+
+        The local operator may: what is not forced falls back.
+        """
+        if writer == OPERATOR:
+            return None
+        for lock, move in verdict.moves.items():
+            declared = self._ownership.locks[lock]
+            if move is not Move.TAKE_OVER or not declared.whole:
+                continue
+            written = [index for index, _value in verdict.values if index in declared.members]
+            if len(set(written)) < len(declared.members):
+                return Refusal(Reason.PARTIAL_TAKEOVER, written[0])
         return None
 
 

@@ -18,6 +18,7 @@ from gatewayd.core.freshness import Freshness, Source
 from gatewayd.core.health import Health
 from gatewayd.core.image import ProcessImage
 from gatewayd.core.limits import within
+from gatewayd.core.locking import Locking
 from gatewayd.core.ownership import Act, LockTable, Move
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.refusal_log import REFUSAL_INTERVAL, RefusalLog
@@ -29,7 +30,7 @@ __all__ = ["HEARTBEAT_PERIOD", "REFUSAL_INTERVAL", "Cell", "Change", "LastRefusa
 HEARTBEAT_PERIOD = 0.1
 """Seconds between two counts of the heartbeat."""
 NOTABLE_GAP = 0.5
-"""Seconds for which the gateway stood still, from which on it is an event, and requests that waited are refused."""
+"""Seconds for which the gateway stood still, from which on it is an event."""
 
 Written = Sequence[tuple[int, Value, Value]]
 """What a write changed: variable, old and new value."""
@@ -53,7 +54,7 @@ class Cell:
         self.definition = definition
         self.image = ProcessImage(definition.variables)
         self.ownership = LockTable(definition.locks)
-        self.writers = WriterTable(definition.writers)
+        self.writers = WriterTable(definition.writers, definition.locks)
         self.freshness = Freshness(definition.stale_after)
         self.events = EventRing()
         self.health = Health()
@@ -62,7 +63,14 @@ class Cell:
         self.write_listeners: list[Callable[[int, Written, float], None]] = []
         """Told of every accepted write that changes something: writer, changes, time. They must not raise."""
         self.last_refusal: LastRefusal | None = None
-        self._admission = Admission(definition.variables, self.ownership, self.image)
+        self._admission = Admission(definition.variables, definition.writers, self.ownership, self.image)
+        self._locking = Locking(
+            self.ownership,
+            self.writers,
+            self.events.append,
+            self._fall_back,
+            lambda: self._notify(Direction.INPUT),
+        )
         self._refusals = RefusalLog(self.events.append)
         self._adopted = False
         self._due_fallbacks: set[int] = set()
@@ -82,19 +90,23 @@ class Cell:
     # -- fieldbus side -------------------------------------------------------------------------------------------
 
     def write(self, requester: Requester, changes: Sequence[Change], now: float) -> Refusal | None:
-        """Apply all changes, or none and return why not."""
+        """Apply all changes, or none and return why not.
+
+        Members of a lock that is taken over and that the request does not write take their release fallback.
+        """
         self._release_expired(now)
-        self.writer_seen(requester, now, wrote=True)
         verdict = self._admission.judge(requester, changes, adopted=self._adopted)
-        writer, refusal = requester.writer, verdict.refusal
+        refusal = verdict.refusal
+        if refusal is None or refusal.reason is not Reason.WAITED:
+            self.writer_seen(requester, now, wrote=True)
         if refusal is not None:
-            if writer is not None and refusal.reason.renews:
-                self._renew(writer, verdict.moves, now)
+            if refusal.reason.renews:
+                self._locking.renew(requester, verdict.moves, now)
             self.refuse(requester, refusal, now, _value_for(changes, refusal.variable))
             return refusal
-        if writer is not None:
-            self._move(writer, verdict.moves, now)
-            self._tell_written(writer, verdict.values, now)
+        if requester.writer is not None:
+            self._locking.move(requester, verdict.moves, now, verdict.values)
+            self._tell_written(requester.writer, verdict.values, now)
         self._set_inputs(verdict.values, now)
         self.health.writes_accepted += 1
         return None
@@ -121,7 +133,10 @@ class Cell:
         )
 
     def request(self, requester: Requester, variable: int, now: float) -> Refusal | None:
-        """Take the lock that guards `variable` (and with it its whole group) without writing a value."""
+        """Take the lock that guards `variable` (and with it its whole group) without writing a value.
+
+        Taken over from another owner, all its members take their release fallback.
+        """
         return self._act(requester, variable, Act.REQUEST, now)
 
     def release(self, requester: Requester, variable: int, now: float) -> Refusal | None:
@@ -131,7 +146,17 @@ class Cell:
     def release_all(self, requester: Requester, now: float, detail: str = "released by its owner") -> None:
         """Give every lock of the requester's writer back."""
         if requester.writer is not None:
-            self._free(self.ownership.held_by(requester.writer), now, detail)
+            self._locking.free(self.ownership.held_by(requester.writer), now, detail)
+
+    def drop_waited(self, requester: Requester, variables: Iterable[int], now: float) -> None:
+        """A cyclic command was refused because it waited: what it would have renewed is released at once.
+
+        Who is answered can ask again. What is only sent has no answer, so its sender would not know that its values
+        were left as they are.
+        """
+        locks = (self.definition.variables[index].lock for index in variables)
+        detail = "its command waited while the gateway stood still"
+        self._locking.drop(requester, (lock for lock in locks if lock is not None), now, detail)
 
     def writer_connected(self, requester: Requester, now: float, detail: str = "") -> None:
         """One more connection of the writer."""
@@ -140,27 +165,43 @@ class Cell:
             self.events.append(Event(now, EventKind.WRITER_CONNECTED, writer=writer, detail=detail))
 
     def writer_seen(self, requester: Requester, now: float, *, wrote: bool = False) -> None:
-        """Any request of a trusted writer feeds its supervision, a read as well."""
+        """A request of a trusted writer feeds its supervision, unless it waited for too long to be a sign of life.
+
+        A read does so too where not only writes count. `wrote`: it asks to write or for a lock, refused or not.
+        """
         writer = requester.writer
-        if writer is not None and requester.trusted and self.writers.seen(writer, now):
+        if writer is None or not requester.trusted:
+            return
+        if requester.waited and self._admission.is_late(requester):
+            return
+        if self.writers.seen(writer, now, wrote=wrote):
             self.events.append(Event(now, EventKind.WRITER_CONNECTED, writer=writer, detail="heard again"))
 
-    def writer_disconnected(self, requester: Requester, now: float, reason: str) -> None:
-        """One connection less; with the last one the writer is lost and its locks are released."""
-        writer = requester.writer
-        if writer is not None and self.writers.disconnected(writer):
-            self._writer_lost(writer, now, reason)
+    def writer_disconnected(
+        self, requester: Requester, now: float, reason: str, *, at_once: bool = False
+    ) -> None:
+        """One connection less: what follows it is released, after the writer's grace. With the last one it is lost.
+
+        `at_once`: it is not a connection that ended, the writer itself is known to be gone. There is no grace then.
+        """
+        self._locking.disconnected(requester, now, reason, at_once=at_once)
+
+    def holds(self, connection: int) -> bool:
+        """Whether some lock follows this connection."""
+        return connection != 0 and connection in self.ownership.connections
 
     # -- local operator ------------------------------------------------------------------------------------------
 
     def take_lock(self, lock: int, now: float, until: float = math.inf, detail: str = "") -> None:
         """The local operator takes a lock from whoever holds it; nobody else gets it until `until` or `free_lock`.
 
-        Taking it again changes `until`. Values stay as they are.
+        Taken from a writer, all its members take their release fallback, as with any takeover. Taking it again changes
+        `until`.
         """
         self._release_expired(now)
         self.forcing.hold(lock, until)
-        self._hold(lock, now, detail)
+        if self._hold(lock, now, detail):
+            self._notify(Direction.INPUT)
 
     def free_lock(self, lock: int, now: float, detail: str = "") -> bool:
         """The local operator releases a lock, whoever holds it; release fallbacks apply. Whether there was an owner."""
@@ -175,7 +216,7 @@ class Cell:
                 [one for one in self.ownership.locks[lock].members if one in self.forcing.forces], now, by
             )
         if self.ownership.owners[lock] is not None:
-            self._free([lock], now, by)
+            self._locking.free([lock], now, by)
         return True
 
     def force(
@@ -184,6 +225,7 @@ class Cell:
         """The local operator puts `value` in place of what the variable's source tells, at the latest until `until`.
 
         The robot gets a forced input as the operator's, who holds its lock so long; the fieldbus sees a forced output.
+        The other members of a lock that was a writer's take their release fallback.
         Forcing it again changes value and `until`. Refused like any write: limits, robot, register.
         """
         self._release_expired(now)
@@ -202,7 +244,7 @@ class Cell:
         self.forcing.lift()
         self.forcing.put(variable, Force(allowed, now, until))
         if declared.lock is not None:
-            self._hold(declared.lock, now, detail)
+            self._hold(declared.lock, now, detail, forced=variable)
         self.events.append(
             Event(
                 now, EventKind.FORCED, variable, declared.lock, OPERATOR, old=old, new=allowed, detail=detail
@@ -225,7 +267,7 @@ class Cell:
         """End every force and release every lock, the operator's as well; release fallbacks apply."""
         self.forcing.holds.clear()
         self._end_forces(list(self.forcing.forces), now, detail)
-        self._free(
+        self._locking.free(
             [lock for lock, owner in enumerate(self.ownership.owners) if owner is not None], now, detail
         )
 
@@ -321,9 +363,7 @@ class Cell:
     def tick(self, now: float) -> None:
         """Notice what only time brings: ended leases, silent writers, a silent or frozen robot."""
         self._release_expired(now)
-        for writer in self.writers.silent(now):
-            self.writers.lose(writer)
-            self._writer_lost(writer, now, f"no request for {self.definition.writers[writer].timeout:g} s")
+        self._locking.silence(now)
         was_fresh = self.freshness.state is Source.FRESH
         self.freshness.tick(now)
         if was_fresh and self.freshness.state is not Source.FRESH:
@@ -337,60 +377,44 @@ class Cell:
         if now - since >= NOTABLE_GAP:
             self.health.gaps += 1
             self.events.append(Event(now, EventKind.STOOD_STILL, detail=f"for {now - since:.1f} s"))
+        self._locking.gap(since, now)
         self.tick(now)
 
     # -- inside --------------------------------------------------------------------------------------------------
 
     def _act(self, requester: Requester, variable: int, act: Act, now: float) -> Refusal | None:
         self._release_expired(now)
-        self.writer_seen(requester, now, wrote=True)
-        writer, lock = requester.writer, self.definition.variables[variable].lock
-        if writer is None or lock is None:
-            refusal = Refusal(Reason.NOT_WRITABLE, variable)
-        else:
-            move = self.ownership.decide(lock, writer, act)
-            if move is Move.REFUSE_NEVER:
-                refusal = Refusal(Reason.NOT_WRITABLE, variable)
-            elif not requester.trusted:
-                refusal = Refusal(Reason.HEARTBEAT_LOST, variable)
-            elif move is Move.REFUSE_HELD:
-                refusal = Refusal(Reason.HELD, variable, self.ownership.owners[lock])
-            else:
-                if move is Move.RELEASE:
-                    self._free([lock], now, "released by its owner")
-                else:
-                    self._move(writer, {lock: move}, now)
-                return None
-        self.refuse(requester, refusal, now)
-        return refusal
+        lock = self.definition.variables[variable].lock
+        judged = self._admission.judge_lock(requester, variable, act)
+        if not isinstance(judged, Refusal):
+            self.writer_seen(requester, now, wrote=True)
+            assert lock is not None
+            if judged is Move.RELEASE:
+                self._locking.free([lock], now, "released by its owner")
+            elif judged is not Move.NOTHING:
+                self._locking.take(requester, lock, judged, now)
+            return None
+        if judged.reason is not Reason.WAITED:
+            self.writer_seen(requester, now, wrote=True)
+        self.refuse(requester, judged, now)
+        return judged
 
-    def _move(self, writer: int, moves: Mapping[int, Move], now: float) -> None:
-        owners, locks = self.ownership.owners, self.ownership.locks
-        for lock, move in moves.items():
-            former = owners[lock]
-            if former == writer and locks[lock].lease is None:
-                continue
-            self.ownership.apply(lock, writer, move, now)
-            if former == writer:
-                continue
-            if move is Move.ACQUIRE:
-                self.events.append(Event(now, EventKind.ACQUIRED, lock=lock, writer=writer))
-            elif move is Move.TAKE_OVER:
-                self.events.append(Event(now, EventKind.TAKEN_OVER, lock=lock, writer=writer, other=former))
+    def _hold(self, lock: int, now: float, detail: str, forced: int | None = None) -> bool:
+        """The operator holds the lock for as long as its takes and forces last; `forced` is about to be given.
 
-    def _renew(self, writer: int, moves: Mapping[int, Move], now: float) -> None:
-        for lock, move in moves.items():
-            if move is Move.RENEW:
-                self.ownership.apply(lock, writer, move, now)
-
-    def _hold(self, lock: int, now: float, detail: str) -> None:
-        """The operator holds the lock for as long as its takes and forces last."""
+        Whether it was a writer's, so that its other members fell back.
+        """
         until = self.forcing.until(lock, self.ownership.locks[lock].members)
         assert until is not None
         former = self.ownership.hold(lock, until)
         if former != OPERATOR:
             kind = EventKind.ACQUIRED if former is None else EventKind.TAKEN_OVER
             self.events.append(Event(now, kind, lock=lock, writer=OPERATOR, other=former, detail=detail))
+        if former in (None, OPERATOR):
+            return False
+        members = self.ownership.locks[lock].members
+        self._fall_back([member for member in members if member != forced], now)
+        return True
 
     def _end_forces(self, variables: Sequence[int], now: float, detail: str) -> None:
         self.forcing.lift()
@@ -420,7 +444,7 @@ class Cell:
             if until is not None:
                 self.ownership.hold(lock, until)
             elif self.ownership.owners[lock] == OPERATOR:
-                self._free([lock], now, detail)
+                self._locking.free([lock], now, detail)
 
     def _force_inputs(self, now: float) -> None:
         """The robot gets what is forced, whatever its inputs held when they were adopted."""
@@ -435,21 +459,7 @@ class Cell:
                 del self.forcing.holds[lock]
             self._end_forces(forces, now, "time limit")
             self._settle(holds, now, "time limit")
-        expired = self.ownership.expired(now)
-        if expired:
-            self._free(expired, now, "lease ended")
-
-    def _free(self, locks: Sequence[int], now: float, detail: str) -> None:
-        for lock in locks:
-            owner = self.ownership.free(lock)
-            self.events.append(Event(now, EventKind.RELEASED, lock=lock, writer=owner, detail=detail))
-        self._fall_back([index for lock in locks for index in self.ownership.locks[lock].members], now)
-        if locks:
-            self._notify(Direction.INPUT)
-
-    def _writer_lost(self, writer: int, now: float, reason: str) -> None:
-        self.events.append(Event(now, EventKind.WRITER_LOST, writer=writer, detail=reason))
-        self._free(self.ownership.held_by(writer), now, f"owner lost: {reason}")
+        self._locking.expire(now)
 
     def _wants_fallback(self, index: int) -> bool:
         lock = self.definition.variables[index].lock

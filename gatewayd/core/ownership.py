@@ -8,7 +8,7 @@ on all of them (`decide` changes nothing) and is then carried out whole (`apply`
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum, IntEnum
 
 from gatewayd.core.definition import OPERATOR, Lock
@@ -72,13 +72,17 @@ _OPERATORS = {None: Standing.FREE, OPERATOR: Standing.OWNER}
 class LockTable:
     """The owners of a cell's locks. Locks and writers are indices; times are monotonic seconds."""
 
-    __slots__ = ("_next_expiry", "_ranks", "expires", "locks", "owners")
+    __slots__ = ("_next_expiry", "_ranks", "connections", "expires", "locks", "orphans", "owners")
 
     def __init__(self, locks: Sequence[Lock]) -> None:
         self.locks = tuple(locks)
         self.owners: list[int | None] = [None] * len(locks)
         self.expires: list[float] = [math.inf] * len(locks)
         """When the lease ends; infinity without a lease or owner."""
+        self.connections = [0] * len(locks)
+        """The connection by which the owner last wrote or requested it; 0: none, or nobody owns it."""
+        self.orphans: dict[int, float] = {}
+        """Locks whose connection has ended, and until when their owner may go on with them by another one."""
         self._ranks = [{writer: rank for rank, writer in enumerate(lock.owners)} for lock in locks]
         self._next_expiry = math.inf
 
@@ -116,13 +120,20 @@ class LockTable:
     def hold(self, lock: int, until: float) -> int | None:
         """Give the lock to the local operator until that time, whatever its lease; returns the former owner."""
         former, self.owners[lock] = self.owners[lock], OPERATOR
+        self.follow(lock, 0)
         self.expires[lock] = until
         self._next_expiry = min(self._next_expiry, until)
         return former
 
+    def follow(self, lock: int, connection: int) -> None:
+        """The lock follows this connection of its owner from now on."""
+        self.connections[lock] = connection
+        self.orphans.pop(lock, None)
+
     def free(self, lock: int) -> int | None:
         """Release unconditionally; returns the former owner."""
         owner, self.owners[lock] = self.owners[lock], None
+        self.follow(lock, 0)
         self.expires[lock] = math.inf
         return owner
 
@@ -134,12 +145,41 @@ class LockTable:
         self._next_expiry = min(self.expires, default=math.inf)
         return ended
 
+    def orphaned(self, now: float) -> list[int]:
+        """The locks whose owner has not gone on with them in its grace."""
+        return sorted(lock for lock, end in self.orphans.items() if end <= now)
+
     def held_by(self, writer: int) -> list[int]:
         """The locks that `writer` owns."""
         return [lock for lock, owner in enumerate(self.owners) if owner == writer]
+
+    def held_through(self, writer: int, connection: int) -> list[int]:
+        """The locks of `writer` that follow this connection; none follows 0."""
+        return [lock for lock in self.held_by(writer) if connection and self.connections[lock] == connection]
 
     def remaining(self, lock: int, now: float) -> float:
         """Seconds of lease left; 0 if free, infinity if owned without a lease."""
         if self.owners[lock] is None:
             return 0.0
         return max(0.0, self.expires[lock] - now)
+
+    def succeed(
+        self, former: LockTable, locks: Mapping[int, int], writers: Mapping[int, int], now: float
+    ) -> None:
+        """Go on with the owners of the former table; the mappings lead from its indices to those here.
+
+        A lease of another length begins anew.
+        """
+        for source, target in locks.items():
+            owner = former.owners[source]
+            if owner is None:
+                continue
+            self.owners[target] = writers[owner]
+            self.connections[target] = former.connections[source]
+            lease, expires = self.locks[target].lease, former.expires[source]
+            if owner == OPERATOR or lease == former.locks[source].lease:
+                self.expires[target] = expires
+            else:
+                self.expires[target] = math.inf if lease is None else now + lease
+        self.orphans = {locks[lock]: end for lock, end in former.orphans.items() if lock in locks}
+        self._next_expiry = min(self.expires, default=math.inf)

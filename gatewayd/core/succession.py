@@ -8,7 +8,6 @@ definition's fallbacks, so that nothing is ever owned that nobody could release.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -41,8 +40,8 @@ def succeed(old: Cell, definition: CellDefinition, now: float) -> Succession:
     old.forcing.lift()
     new = Cell(definition)
     _take_image(old, new, match)
-    _take_locks(old, new, match, now)
-    _take_writers(old, new, match)
+    new.ownership.succeed(old.ownership, match.locks, match.writers, now)
+    new.writers.succeed(old.writers, match.writers)
     _take_source(old, new)
     _take_history(old, new, match)
     _take_forcing(old, new, match)
@@ -119,7 +118,7 @@ def _release(old: Cell, match: _Match, now: float) -> tuple[str, ...]:
     for lock in ending:
         old.forcing.holds.pop(lock, None)
     old._end_forces([index for index in old.forcing.forces if not _force_goes_on(match, index)], now, detail)
-    old._free([lock for lock in ending if old.ownership.owners[lock] is not None], now, detail)
+    old._locking.free([lock for lock in ending if old.ownership.owners[lock] is not None], now, detail)
     gone = _inputs_without_successor(match)
     released = {member for lock in ending for member in old.ownership.locks[lock].members}
     if old.accepts_writes:
@@ -159,30 +158,6 @@ def _take_image(old: Cell, new: Cell, match: _Match) -> None:
         image.quality[target] = quality
         image.available[target] = former.available[source]
     image.find_unreadable()
-
-
-def _take_locks(old: Cell, new: Cell, match: _Match, now: float) -> None:
-    former, table = old.ownership, new.ownership
-    for source, target in match.locks.items():
-        owner = former.owners[source]
-        if owner is None:
-            continue
-        table.owners[target] = match.writers[owner]
-        lease, expires = table.locks[target].lease, former.expires[source]
-        if owner == OPERATOR or lease == former.locks[source].lease:
-            table.expires[target] = expires
-        else:
-            table.expires[target] = math.inf if lease is None else now + lease
-    table._next_expiry = min(table.expires, default=math.inf)
-
-
-def _take_writers(old: Cell, new: Cell, match: _Match) -> None:
-    former, table = old.writers, new.writers
-    for source, target in match.writers.items():
-        if source != OPERATOR:
-            table.alive[target] = former.alive[source]
-            table.connections[target] = former.connections[source]
-            table.last_seen[target] = former.last_seen[source]
 
 
 def _take_source(old: Cell, new: Cell) -> None:

@@ -96,8 +96,8 @@ class _Bits:
 
     address: int
     writable: bool
-    bits: tuple[tuple[int, int], ...]
-    """Mask and variable."""
+    bits: tuple[tuple[int, int, bool], ...]
+    """Mask, variable, and whether it is implied where the whole register is written."""
 
     @property
     def words(self) -> int:
@@ -109,10 +109,14 @@ class _Bits:
 
     def changes(self, data: bytes) -> list[Change] | None:
         (word,) = _WORD.unpack(data)
-        return [Change(variable, bool(word & mask), implied=True) for mask, variable in self.bits]
+        return [Change(variable, bool(word & mask), implied) for mask, variable, implied in self.bits]
 
     def masked(self, _present: int, and_mask: int, or_mask: int) -> list[Change] | None:
-        return [Change(variable, bool(or_mask & mask)) for mask, variable in self.bits if not and_mask & mask]
+        return [
+            Change(variable, bool(or_mask & mask))
+            for mask, variable, _implied in self.bits
+            if not and_mask & mask
+        ]
 
 
 class RegisterTable:
@@ -304,5 +308,14 @@ def _items(placements: Sequence[Placement], cell: Cell) -> Iterator[_Number | _B
             writable = variables[placement.variable].direction is Direction.INPUT
             yield _Number(placement.address, placement.words, placement.variable, writable, placement.codec)
     for address, bits in packed.items():
-        writable = any(variables[variable].direction is Direction.INPUT for _mask, variable in bits)
-        yield _Bits(address, writable, tuple(sorted(bits)))
+        locks = {variables[variable].lock for _mask, variable in bits} - {None}
+        # Who writes a register whose inputs are one lock, or that is one bit, means it. An output in it nobody means.
+        shared = len(locks) > 1
+        yield _Bits(
+            address,
+            writable=bool(locks),
+            bits=tuple(
+                (mask, variable, shared or variables[variable].lock is None)
+                for mask, variable in sorted(bits)
+            ),
+        )

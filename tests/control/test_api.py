@@ -10,6 +10,7 @@ from gatewayd.audit import Audit
 from gatewayd.control.api import Api, ApiError, Cursor
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import OPERATOR
+from gatewayd.core.events import EventKind
 from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
 from tests.control.served import LIMIT, SPEED, FixedGateway, Served, at, bring_up, plan
@@ -132,7 +133,9 @@ class TestLocks:
         assert press.cell.write(Requester(PLC), [Change(SPEED, 1.0)], 1.0) is None
         lock = api.take("motion", {"for": 10}, BY, at(1.0))
         assert (lock["owner"], lock["remaining"]) == ("operator", 10.0)
-        assert [event.detail for event in press.cell.events][-1] == BY
+        taken = [event for event in press.cell.events if event.kind is EventKind.TAKEN_OVER]
+        assert [event.detail for event in taken] == [BY]
+        assert press.cell.image.values[SPEED] == 0.5, "it is the command of the PLC no more"
 
     def test_a_variable_names_its_lock(self, api: Api, press: Served) -> None:
         assert api.take("path", {}, BY, at(1.0))["name"] == "motion"

@@ -7,7 +7,15 @@ from dataclasses import replace
 import pytest
 
 from gatewayd.core.cell import HEARTBEAT_PERIOD, Cell, Change
-from gatewayd.core.definition import CellDefinition, Direction, Fallback, FallbackKind, Value
+from gatewayd.core.definition import (
+    OPERATOR,
+    CellDefinition,
+    Direction,
+    Fallback,
+    FallbackKind,
+    Value,
+    Writer,
+)
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
@@ -121,25 +129,50 @@ def test_a_held_nan_is_no_change(press: CellDefinition, connect: Connect) -> Non
 # -- implied bits ------------------------------------------------------------------------------------------------
 
 
-def test_an_implied_bit_that_is_free_is_taken_and_written(cell: Cell) -> None:
-    assert (
-        cell.write(
-            Requester(PLC), [Change(START, True, implied=True), Change(LAMP, False, implied=True)], 1.0
-        )
-        is None
-    )
-    assert cell.ownership.owners[:2] == [PLC, PLC]
+def word(start: bool, lamp: bool) -> list[Change]:
+    """The register that `start` (plc) and `lamp` (plc before hmi) share, written whole."""
+    return [Change(START, start, implied=True), Change(LAMP, lamp, implied=True)]
+
+
+def test_an_implied_bit_that_only_one_may_own_is_taken_and_written(cell: Cell) -> None:
+    assert cell.write(Requester(PLC), word(True, False), 1.0) is None
+    assert cell.ownership.owners[:2] == [PLC, None]
     assert cell.image.values[START] is True
 
 
 def test_an_implied_bit_of_somebody_else_may_pass_unchanged(cell: Cell) -> None:
     write(cell, PLC, START, True, 1.0)
-    assert (
-        cell.write(Requester(HMI), [Change(START, True, implied=True), Change(LAMP, True, implied=True)], 1.5)
-        is None
-    )
+    write(cell, HMI, LAMP, False, 1.0)
+    assert cell.write(Requester(HMI), word(True, True), 1.5) is None
     assert cell.ownership.owners[:2] == [PLC, HMI]
     assert cell.image.times[START] == 1.0
+
+
+def test_a_word_read_before_a_bit_was_stopped_does_not_bring_it_back(cell: Cell) -> None:
+    """The HMI jogs and is lost, the PLC writes the word that it has read before, for a bit of its own."""
+    connected = Requester(HMI, connection=7)
+    cell.writer_connected(connected, 0.5)
+    assert cell.write(connected, [Change(LAMP, True)], 1.0) is None
+    stale = cell.image.values[LAMP]
+    cell.writer_disconnected(connected, 1.1, "cable")
+    assert cell.image.values[LAMP] is False
+    assert cell.write(Requester(PLC), word(True, bool(stale)), 1.2) == Refusal(Reason.NOT_MEANT, LAMP)
+    assert cell.image.values[START : LAMP + 1] == [False, False]
+    assert cell.ownership.owners[:2] == [None, None]
+    assert cell.write(Requester(PLC), word(True, False), 1.3) is None
+    assert cell.image.values[START : LAMP + 1] == [True, False]
+
+
+def test_a_word_read_before_its_owner_cleared_a_bit_does_not_take_it_over(cell: Cell) -> None:
+    """The HMI clears what it jogs; the stale word of the PLC, which ranks above it, must not set it again."""
+    write(cell, HMI, LAMP, True, 1.0)
+    write(cell, HMI, LAMP, False, 1.1)
+    assert cell.write(Requester(PLC), word(True, True), 1.2) == Refusal(Reason.NOT_MEANT, LAMP)
+    assert owner(cell, 1) == HMI
+    assert write(cell, HMI, LAMP, False, 1.3) is None, "the next stop is not refused"
+    assert write(cell, PLC, LAMP, True, 1.4) is None, "taken on purpose"
+    assert cell.write(Requester(PLC), word(True, False), 1.5) is None, "and then written with the word"
+    assert cell.image.values[LAMP] is False
 
 
 def test_an_implied_changed_bit_that_the_writer_may_never_write_refuses_all(cell: Cell) -> None:
@@ -158,15 +191,6 @@ def test_an_implied_bit_of_a_higher_owner_must_keep_its_value(cell: Cell) -> Non
     )
     assert owner(cell, 1) == PLC
     assert cell.image.values[LAMP] is True
-
-
-def test_an_implied_bit_takes_a_lock_over_only_to_change_it(cell: Cell) -> None:
-    write(cell, HMI, LAMP, True, 1.0)
-    assert cell.write(Requester(PLC), [Change(LAMP, True, implied=True)], 1.5) is None
-    assert owner(cell, 1) == HMI
-    assert cell.write(Requester(PLC), [Change(LAMP, False, implied=True)], 1.5) is None
-    assert owner(cell, 1) == PLC
-    assert cell.image.values[LAMP] is False
 
 
 def test_an_implied_bit_of_a_robot_output_may_pass_unchanged(cell: Cell) -> None:
@@ -190,13 +214,68 @@ def test_an_implied_unchanged_bit_in_a_register_that_is_gone_is_let_pass(cell: C
 # -- taking over -------------------------------------------------------------------------------------------------
 
 
-def test_a_group_is_taken_over_as_a_whole(cell: Cell) -> None:
+def fallbacks(cell: Cell) -> list[tuple[int | None, Value | None, Value | None]]:
+    return [(event.variable, event.old, event.new) for event in told(cell, EventKind.FALLBACK)]
+
+
+def test_a_group_is_taken_over_as_a_whole_and_nothing_is_inherited(cell: Cell) -> None:
+    """The former owner's speed must not drive the new one's path."""
+    seen: list[list[Value]] = []
     cell.write(Requester(HMI), [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
+    cell.listeners.append(lambda _direction: seen.append(cell.image.values[SPEED : PATH + 1]))
     assert write(cell, PLC, PATH, 4, 1.5) is None
+    assert seen == [[0.0, 4]], "in one package"
     assert write(cell, HMI, SPEED, 0.1, 1.6) == Refusal(Reason.HELD, SPEED, PLC)
-    assert cell.image.values[SPEED : PATH + 1] == [0.4, 4]
     (event,) = told(cell, EventKind.TAKEN_OVER)
     assert (event.lock, event.writer, event.other) == (4, PLC, HMI)
+    assert fallbacks(cell) == [(SPEED, 0.4, 0.0)]
+
+
+def test_a_member_that_holds_keeps_its_value_in_a_takeover(press: CellDefinition, connect: Connect) -> None:
+    speed = replace(press.variables[SPEED], on_release=Fallback(FallbackKind.HOLD))
+    cell = Cell(replace(press, variables=(*press.variables[:SPEED], speed, *press.variables[SPEED + 1 :])))
+    connect(cell, 0.0)
+    cell.write(Requester(HMI), [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
+    assert write(cell, PLC, PATH, 4, 1.5) is None
+    assert cell.image.values[SPEED : PATH + 1] == [0.4, 4]
+
+
+def test_a_takeover_by_request_drops_every_member(cell: Cell) -> None:
+    cell.write(Requester(HMI), [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
+    seen: list[list[Value]] = []
+    cell.listeners.append(lambda _direction: seen.append(cell.image.values[SPEED : PATH + 1]))
+    assert cell.request(Requester(PLC), PATH, 1.5) is None
+    assert seen == [[0.0, 7]]
+    assert fallbacks(cell) == [(SPEED, 0.4, 0.0), (PATH, 3, 7)]
+    assert cell.request(Requester(PLC), PATH, 1.6) is None
+    assert len(seen) == 1, "renewing changes nothing"
+
+
+def test_acquiring_a_free_lock_changes_nothing(cell: Cell) -> None:
+    cell.adopt({SPEED: 0.4, PATH: 3}, 0.5)
+    assert cell.request(Requester(HMI), PATH, 1.0) is None
+    assert write(cell, HMI, PATH, 4, 1.1) is None
+    assert cell.image.values[SPEED : PATH + 1] == [0.4, 4]
+    assert fallbacks(cell) == []
+
+
+def test_what_a_takeover_drops_waits_for_its_register(cell: Cell) -> None:
+    cell.write(Requester(HMI), [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
+    cell.set_availability([SPEED], False, "claimed", 1.1)
+    assert write(cell, PLC, PATH, 4, 1.5) is None
+    assert cell.image.values[SPEED] == 0.4
+    cell.set_availability([SPEED], True, "freed", 2.0)
+    cell.adopt({SPEED: 0.4}, 2.0)
+    assert cell.image.values[SPEED] == 0.0
+
+
+def test_a_takeover_by_request_without_a_robot_drops_when_it_is_back(cell: Cell) -> None:
+    cell.write(Requester(HMI), [Change(SPEED, 0.4), Change(PATH, 3)], 1.0)
+    cell.robot_lost("cable", 1.1)
+    assert cell.request(Requester(PLC), PATH, 1.2) is None
+    cell.robot_connected(2.0)
+    cell.adopt({SPEED: 0.4, PATH: 3}, 2.0)
+    assert cell.image.values[SPEED : PATH + 1] == [0.0, 7]
 
 
 def test_a_list_without_takeover_keeps_its_holder(cell: Cell) -> None:
@@ -403,6 +482,225 @@ def test_a_silent_writer_loses_its_locks_once_and_may_come_back(cell: Cell) -> N
     cell.writer_disconnected(Requester(AUX), 2.6, "closed")
     assert owner(cell, 3) is None
     assert len(told(cell, EventKind.WRITER_LOST)) == 2
+
+
+def via(writer: int, connection: int, waited: float = 0.0) -> Requester:
+    return Requester(writer, connection=connection, waited=waited)
+
+
+def test_a_lock_follows_the_connection_that_works_with_it(cell: Cell) -> None:
+    """A viewer on the same address keeps nothing alive that the program has left."""
+    program, viewer = via(HMI, 7), via(HMI, 8)
+    cell.writer_connected(program, 1.0)
+    cell.writer_connected(viewer, 1.0)
+    assert cell.write(program, [Change(LAMP, True), Change(FORCE, 50.0)], 1.0) is None
+    assert (cell.holds(7), cell.holds(8), cell.holds(0)) == (True, False, False)
+    assert cell.request(viewer, FORCE, 1.1) is None
+    cell.writer_disconnected(program, 1.2, "closed by the peer")
+    assert (owner(cell, 1), owner(cell, 3)) == (None, HMI)
+    assert cell.image.values[LAMP] is False
+    assert not cell.holds(7)
+    (event,) = told(cell, EventKind.RELEASED)
+    assert event.detail == "its connection ended: closed by the peer"
+    assert cell.writers.alive[HMI]
+    assert told(cell, EventKind.WRITER_LOST) == []
+    cell.writer_disconnected(viewer, 1.3, "closed by the peer")
+    assert owner(cell, 3) is None
+    assert not cell.writers.alive[HMI]
+
+
+def test_a_refused_write_moves_no_lock_to_its_connection(cell: Cell) -> None:
+    """But one that only the robot's absence refuses does: it renews."""
+    cell.writer_connected(via(HMI, 7), 1.0)
+    cell.writer_connected(via(HMI, 8), 1.0)
+    assert cell.write(via(HMI, 7), [Change(PART, 1)], 1.0) is None
+    assert cell.write(via(HMI, 8), [Change(PART, 2**40)], 1.1) is not None
+    assert (cell.holds(7), cell.holds(8)) == (True, False)
+    cell.robot_lost("cable", 1.2)
+    assert cell.write(via(HMI, 8), [Change(PART, 2)], 1.3) == Refusal(Reason.ROBOT_LOST, PART)
+    assert (cell.holds(7), cell.holds(8)) == (False, True)
+
+
+def test_a_connection_does_not_end_what_a_higher_writer_or_the_operator_took_from_it(cell: Cell) -> None:
+    for connection in (7, 8):
+        cell.writer_connected(via(HMI, connection), 1.0)
+    assert cell.write(via(HMI, 7), [Change(LAMP, True), Change(PART, 1)], 1.0) is None
+    assert cell.write(via(PLC, 9), [Change(LAMP, True)], 1.1) is None
+    cell.take_lock(2, 1.1)
+    cell.writer_disconnected(via(HMI, 7), 1.2, "closed")
+    assert (owner(cell, 1), owner(cell, 2)) == (PLC, OPERATOR)
+    assert cell.image.values[LAMP] is True
+
+
+@pytest.fixture
+def patient(press: CellDefinition, connect: Connect) -> Cell:
+    """The HMI opens a connection for each write, and has two seconds of grace."""
+    cell = Cell(replace(press, writers=(press.writers[PLC], Writer("hmi", grace=2.0), press.writers[AUX])))
+    connect(cell, 0.0)
+    return cell
+
+
+def connected_write(cell: Cell, connection: int, variable: int, value: Value, now: float) -> None:
+    requester = via(HMI, connection)
+    cell.writer_connected(requester, now)
+    assert cell.write(requester, [Change(variable, value)], now) is None
+    cell.writer_disconnected(requester, now, "closed by the peer")
+
+
+def test_a_connection_per_write_keeps_its_value_within_the_grace(patient: Cell) -> None:
+    seen: list[Value] = []
+    patient.listeners.append(lambda _direction: seen.append(patient.image.values[FORCE]))
+    for step in range(5):
+        connected_write(patient, 10 + step, FORCE, 42.0, 1.0 + 1.9 * step)
+        patient.tick(1.0 + 1.9 * step + 1.8)
+    assert set(seen) == {42.0}
+    assert patient.writers.alive[HMI]
+    patient.tick(1.0 + 4 * 1.9 + 2.0)
+    assert owner(patient, 3) is None
+    assert patient.image.values[FORCE] == 10.0
+    (lost,) = told(patient, EventKind.WRITER_LOST)
+    assert lost.detail == "connection gone for 2 s"
+
+
+def test_what_no_connection_goes_on_with_is_released_when_the_grace_has_passed(patient: Cell) -> None:
+    connected_write(patient, 10, FORCE, 42.0, 1.0)
+    connected_write(patient, 11, LAMP, True, 1.5)
+    cell = patient
+    cell.writer_connected(via(HMI, 12), 2.0)
+    assert cell.request(via(HMI, 12), LAMP, 2.0) is None
+    assert cell.write(via(PLC, 1), [Change(PART, 1)], 3.0) is None
+    assert (owner(cell, 1), owner(cell, 3)) == (HMI, None), "by any request, not only by the tick"
+    (released,) = told(cell, EventKind.RELEASED)
+    assert (released.lock, released.detail) == (3, "connection gone for 2 s")
+    cell.tick(9.0)
+    assert cell.writers.alive[HMI]
+    assert owner(cell, 1) is None, "its lease"
+
+
+def test_a_lease_ends_within_the_grace_and_somebody_else_may_take_over(patient: Cell) -> None:
+    connected_write(patient, 10, LAMP, True, 1.0)
+    connected_write(patient, 11, PART, 1, 1.0)
+    assert patient.write(via(PLC, 1), [Change(LAMP, True)], 1.1) is None
+    patient.tick(3.0)
+    patient.tick(4.0)
+    assert (owner(patient, 1), owner(patient, 2)) == (PLC, None)
+    assert patient.image.values[LAMP] is True
+
+
+def test_a_writer_that_is_known_to_be_gone_has_no_grace(patient: Cell) -> None:
+    for connection in (7, 8):
+        patient.writer_connected(via(HMI, connection), 1.0)
+    assert patient.write(via(HMI, 7), [Change(LAMP, True)], 1.0) is None
+    patient.writer_disconnected(via(HMI, 7), 1.1, "its heartbeat stays away", at_once=True)
+    assert owner(patient, 1) is None
+    patient.writer_disconnected(via(HMI, 8), 1.1, "bus lost", at_once=True)
+    assert not patient.writers.alive[HMI]
+
+
+def test_reads_do_not_feed_a_time_out_that_counts_writes(press: CellDefinition, connect: Connect) -> None:
+    """Nor do they, or a connection, make a dead program look alive again."""
+    cell = Cell(
+        replace(press, writers=(*press.writers[:AUX], Writer("aux", timeout=1.0, counts_writes=True)))
+    )
+    connect(cell, 0.0)
+    cell.writer_connected(via(AUX, 7), 1.0)
+    assert not cell.writers.alive[AUX]
+    assert cell.write(via(AUX, 7), [Change(FORCE, 50.0)], 1.0) is None
+    assert cell.request(via(AUX, 7), FORCE, 1.5) is None
+    assert cell.write(via(AUX, 7), [Change(START, True)], 2.0) is not None, (
+        "a refused write is a sign of life too"
+    )
+    cell.writer_connected(via(AUX, 8), 2.5)
+    cell.writer_seen(via(AUX, 8), 2.9)
+    cell.tick(3.0)
+    assert cell.writers.alive[AUX]
+    cell.tick(3.01)
+    assert not cell.writers.alive[AUX]
+    assert owner(cell, 3) is None
+    (lost,) = told(cell, EventKind.WRITER_LOST)
+    assert lost.detail == "no write for 1 s"
+    cell.writer_seen(via(AUX, 8), 3.1)
+    cell.writer_connected(via(AUX, 9), 3.1)
+    assert not cell.writers.alive[AUX]
+    assert cell.write(via(AUX, 7), [Change(FORCE, 50.0)], 3.2) is None
+    assert cell.writers.alive[AUX]
+
+
+# -- after the gateway stood still -------------------------------------------------------------------------------
+
+
+def test_after_a_gap_what_ended_is_released_and_nobody_is_accused(cell: Cell) -> None:
+    write(cell, AUX, FORCE, 50.0, 1.0)
+    write(cell, PLC, PART, 5, 1.0)
+    assert cell.force(CYCLES, 9, 1.0, 3.0) is None
+    cell.gap(1.5, 5.0)
+    assert owner(cell, 2) is None, "its lease has ended"
+    assert owner(cell, 3) == AUX
+    assert not cell.forcing.forces
+    assert cell.writers.alive[AUX]
+    cell.tick(6.0)
+    assert cell.writers.alive[AUX]
+    cell.tick(6.01)
+    assert not cell.writers.alive[AUX], "one further silent time-out"
+
+
+def test_short_gaps_keep_no_dead_writer_alive(cell: Cell) -> None:
+    write(cell, AUX, FORCE, 50.0, 1.0)
+    now = 1.0
+    while cell.writers.alive[AUX] and now < 100.0:
+        cell.gap(now, now + 0.25)
+        now += 0.5
+        cell.tick(now)
+    assert now < 4.0, "only the time that the gateway stood still is not counted"
+
+
+def test_a_gap_prolongs_the_grace(patient: Cell) -> None:
+    cell = patient
+    connected_write(cell, 10, START + 1, True, 1.0)
+    cell.writer_connected(via(HMI, 11), 1.0)
+    connected_write(cell, 12, FORCE, 42.0, 1.0)
+    cell.writer_disconnected(via(HMI, 11), 1.0, "closed")
+    cell.gap(1.5, 4.5)
+    assert (owner(cell, 1), owner(cell, 3)) == (HMI, HMI)
+    cell.tick(5.9)
+    assert cell.writers.alive[HMI]
+    cell.tick(6.5)
+    assert not cell.writers.alive[HMI]
+    assert cell.ownership.owners == [None] * 5
+
+
+def test_what_waited_for_too_long_is_refused_and_is_no_sign_of_life(cell: Cell) -> None:
+    late = via(AUX, 7, waited=4.0)
+    assert cell.write(late, [Change(FORCE, 50.0)], 5.0) == Refusal(Reason.WAITED, FORCE)
+    assert cell.request(late, FORCE, 5.0) == Refusal(Reason.WAITED, FORCE)
+    cell.writer_seen(late, 5.0)
+    assert owner(cell, 3) is None
+    assert not cell.writers.alive[AUX]
+    assert cell.image.values[FORCE] == 0.0
+    assert cell.health.writes_refused == 2
+    assert cell.write(via(AUX, 7, waited=0.9), [Change(FORCE, 50.0)], 5.0) is None
+
+
+def test_what_waited_renews_nothing_and_a_release_is_always_processed(cell: Cell) -> None:
+    assert cell.write(via(HMI, 7), [Change(FORCE, 50.0), Change(LAMP, True)], 1.0) is None
+    late = via(HMI, 7, waited=5.5)
+    assert cell.write(late, [Change(FORCE, 60.0)], 5.9) == Refusal(Reason.WAITED, FORCE)
+    assert cell.ownership.remaining(3, 5.9) == pytest.approx(0.1)
+    assert cell.release(late, FORCE, 5.9) is None
+    assert owner(cell, 3) is None
+    cell.release_all(late, 5.9)
+    assert owner(cell, 1) is None
+
+
+def test_a_dropped_command_releases_what_it_would_have_renewed(cell: Cell) -> None:
+    assert cell.write(via(HMI, 7), [Change(LAMP, True), Change(PART, 3), Change(FORCE, 50.0)], 1.0) is None
+    assert write(cell, PLC, START, True, 1.0) is None
+    cell.drop_waited(via(HMI, 7, waited=4.0), [START, LAMP, LAMP, FORCE, CYCLES], 2.0)
+    assert cell.ownership.owners[:4] == [PLC, None, HMI, None]
+    assert cell.image.values[START : FORCE + 1] == [True, False, 3, 10.0]
+    assert {event.detail for event in told(cell, EventKind.RELEASED)} == {
+        "its command waited while the gateway stood still"
+    }
 
 
 @pytest.mark.parametrize("act", ["write", "request"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 from hypothesis import settings
@@ -93,11 +93,16 @@ DEFINITION = CellDefinition(
         Lock("priority", (1,), (0, 1, 2), takeover=True, lease=0.5),
         Lock("list", (2,), (1, 0), lease=0.5),
         Lock("any", (3,), (0, 1, 2, 3), lease=1.0),
-        Lock("group", (4, 5), (2, 1, 0), takeover=True, lease=0.75),
+        Lock("group", (4, 5), (2, 1, 0), takeover=True, lease=0.75, whole=True),
         Lock("endless", (6,), (3, 2)),
         Lock("single", (7,), (3,), lease=0.25),
     ),
-    writers=(Writer("a"), Writer("b", 0.5), Writer("c", 0.25), Writer("d")),
+    writers=(
+        Writer("a", grace=0.5),
+        Writer("b", 0.5, grace=0.25),
+        Writer("c", 0.25, counts_writes=True),
+        Writer("d", heartbeat=0.75),
+    ),
     stale_after=0.25,
 )
 VARIABLES = DEFINITION.variables
@@ -105,20 +110,27 @@ LOCKS = DEFINITION.locks
 INPUTS = [n for n, one in enumerate(VARIABLES) if one.direction is Direction.INPUT]
 OUTPUTS = [n for n, one in enumerate(VARIABLES) if one.direction is Direction.OUTPUT]
 BITS = [0, 1, 2, 3]
+SUPERVISED = {0: [], 1: [0.5], 2: [0.25], 3: [0.75]}
+"""How long each writer may be silent."""
 LOCK_OF = {member: number for number, lock in enumerate(LOCKS) for member in lock.members}
 TELLING_ORDER = [
     Reason.NOT_WRITABLE,
     Reason.OUT_OF_LIMITS,
     Reason.HEARTBEAT_LOST,
+    Reason.WAITED,
     Reason.ROBOT_LOST,
     Reason.CLAIMED_ELSEWHERE,
+    Reason.PARTIAL_TAKEOVER,
     Reason.HELD,
+    Reason.NOT_MEANT,
 ]
 
 writers = st.integers(0, 3)
 mostly = st.sampled_from([True, True, True, False])
 anybody = st.one_of(st.none(), writers)
 steps = st.sampled_from([0.0, 0.125, 0.25, 0.5])
+lines = st.integers(0, 2)
+waits = st.sampled_from([0.0, 0.0, 0.0, 0.0, 0.25, 0.375, 0.625, 0.875])
 numbers = st.sampled_from([0, 1, -6, -5, 10, 11, 2**31 - 1, 2**31, True, 1.0, 1.5, math.nan])
 reals = st.sampled_from([0.0, -0.0, 1, True, 1.0, 1.5, -1.0, 1.0000001, math.inf, math.nan])
 VALUES = {BOOL: st.booleans(), INT: numbers, FLOAT: reals}
@@ -136,6 +148,12 @@ def changes(draw: st.DrawFn) -> list[Change]:
 
 def adoptions() -> st.SearchStrategy[dict[int, Value]]:
     return st.fixed_dictionaries({}, optional={index: HELD_VALUES[VARIABLES[index].kind] for index in INPUTS})
+
+
+def requester(writer: int | None, line: int, *, trusted: bool = True, waited: float = 0.0) -> Requester:
+    """By one of the writer's two connections, or by none (0)."""
+    number = 0 if writer is None or not line else 10 * (writer + 1) + line
+    return Requester(writer, connection=number, trusted=trusted, waited=waited)
 
 
 def same(left: Value, right: Value) -> bool:
@@ -166,6 +184,12 @@ class Model:
         self.gone: set[int] = set()
         self.due: set[int] = set()
         self.connections: Counter[int] = Counter()
+        self.worked: dict[int, int] = {}
+        """By which connection the owner of a lock last worked with it."""
+        self.abandoned: dict[int, float] = {}
+        """Locks whose connection has ended, and when."""
+        self.parted: dict[int, float] = {}
+        """Writers whose last connection has ended, and when."""
         self.alive: set[int] = set()
         self.heard: dict[int, float] = {}
         self.connected = self.adopted = False
@@ -186,19 +210,26 @@ class Model:
         assert owner is not None
         return LOCKS[lock].takeover and ranking.index(writer) < ranking.index(owner)
 
-    def own(self, lock: int, writer: int, now: float) -> None:
-        former = self.owner[lock]
+    def own(self, lock: int, by: Requester, now: float, written: Collection[int] = ()) -> None:
+        writer, former = by.writer, self.owner[lock]
+        assert writer is not None
         if former is None:
             self.events[EventKind.ACQUIRED] += 1
         elif former != writer:
             self.events[EventKind.TAKEN_OVER] += 1
-        self.owner[lock] = writer
+            for index in LOCKS[lock].members:
+                if index not in written:
+                    self.fall_back(index, now)
+        self.owner[lock], self.worked[lock] = writer, by.connection
+        self.abandoned.pop(lock, None)
         lease = LOCKS[lock].lease
         self.until[lock] = math.inf if lease is None else now + lease
 
     def free(self, lock: int, now: float) -> None:
         self.events[EventKind.RELEASED] += 1
         self.owner[lock], self.until[lock] = None, math.inf
+        self.worked.pop(lock, None)
+        self.abandoned.pop(lock, None)
         for index in LOCKS[lock].members:
             self.fall_back(index, now)
 
@@ -206,21 +237,76 @@ class Model:
         for lock in range(len(LOCKS)):
             if self.owner[lock] is not None and now >= self.until[lock]:
                 self.free(lock, now)
+        for writer, since in list(self.parted.items()):
+            if now >= since + DEFINITION.writers[writer].grace:
+                self.lose(writer, now)
+        for lock, since in list(self.abandoned.items()):
+            owner = self.owner[lock]
+            assert owner is not None
+            if now >= since + DEFINITION.writers[owner].grace:
+                self.free(lock, now)
 
     def lose(self, writer: int, now: float) -> None:
         if writer in self.alive:
             self.alive.discard(writer)
+            self.parted.pop(writer, None)
             self.events[EventKind.WRITER_LOST] += 1
             for lock in range(len(LOCKS)):
                 if self.owner[lock] == writer:
                     self.free(lock, now)
 
-    def hear(self, writer: int | None, now: float) -> None:
-        if writer is not None:
-            self.heard[writer] = now
-            if writer not in self.alive:
-                self.alive.add(writer)
-                self.events[EventKind.WRITER_CONNECTED] += 1
+    def hear(self, by: Requester, now: float, *, wrote: bool = False) -> None:
+        writer = by.writer
+        if writer is None or not by.trusted or self.too_old(by, []):
+            return
+        if writer == 2 and not wrote:
+            return
+        self.heard[writer] = now
+        if writer not in self.alive:
+            self.alive.add(writer)
+            self.events[EventKind.WRITER_CONNECTED] += 1
+
+    def too_old(self, by: Requester, locks: list[int]) -> bool:
+        """Whether its writer, silent for so long, would have lost something by it."""
+        limits = list(SUPERVISED[by.writer]) if by.writer is not None else []
+        limits += [lease for lock in locks if (lease := LOCKS[lock].lease) is not None]
+        return by.waited > min(limits, default=0.5)
+
+    def connect_writer(self, by: Requester, now: float) -> None:
+        assert by.writer is not None
+        self.connections[by.writer] += 1
+        self.parted.pop(by.writer, None)
+        self.hear(by, now)
+
+    def disconnect_writer(self, by: Requester, now: float, *, at_once: bool) -> None:
+        writer = by.writer
+        assert writer is not None
+        self.connections[writer] = max(0, self.connections[writer] - 1)
+        patient = DEFINITION.writers[writer].grace > 0 and not at_once
+        if not self.connections[writer] and writer in self.alive:
+            if patient:
+                self.parted[writer] = now
+            else:
+                self.lose(writer, now)
+        for lock in range(len(LOCKS)):
+            if self.owner[lock] == writer and by.connection and self.worked[lock] == by.connection:
+                if patient:
+                    self.abandoned[lock] = now
+                else:
+                    self.free(lock, now)
+
+    def stand_still(self, since: float, now: float) -> None:
+        """Of what waits, nothing counts against a writer."""
+        for writer in range(4):
+            leases = [lock.lease for lock in LOCKS if writer in lock.owners and lock.lease is not None]
+            anew = now - since > min([*SUPERVISED[writer], *leases])
+            if writer in self.heard:
+                self.heard[writer] = now if anew else min(now, self.heard[writer] + (now - since))
+            if writer in self.parted:
+                self.parted[writer] = now if anew else self.parted[writer] + (now - since)
+            for lock in self.abandoned:
+                if self.owner[lock] == writer:
+                    self.abandoned[lock] = now if anew else self.abandoned[lock] + (now - since)
 
     # Values.
 
@@ -270,39 +356,86 @@ class Model:
             return None if self.untouched(change) else Refusal(Reason.CLAIMED_ELSEWHERE, index)
         lock = LOCK_OF[index]
         holder = self.owner[lock]
-        if holder in (None, writer) or self.outranks(writer, lock):
-            return None
-        return Refusal(Reason.HELD, index, holder)
+        if holder not in (None, writer) and not self.outranks(writer, lock):
+            return Refusal(Reason.HELD, index, holder)
+        return None if self.means(writer, change) else Refusal(Reason.NOT_MEANT, index)
 
     def untouched(self, change: Change) -> bool:
         return change.implied and change.value == self.value[change.variable]
 
-    def passes(self, writer: int, change: Change) -> bool:
-        """An implied bit of somebody else that keeps its value."""
+    def means(self, writer: int, change: Change) -> bool:
+        """Whether the writer knows that it writes this bit: it owns it, or nobody else ever could."""
+        if not change.implied:
+            return True
         index = change.variable
-        own_or_free = self.may(writer, index) and self.owner[LOCK_OF[index]] in (None, writer)
-        return self.untouched(change) and not own_or_free
+        if not self.may(writer, index):
+            return False
+        lock = LOCK_OF[index]
+        return self.owner[lock] == writer or (self.owner[lock] is None and LOCKS[lock].owners == (writer,))
 
-    def write(self, writer: int | None, request: list[Change], now: float, *, heard: bool) -> Refusal | None:
+    def passes(self, writer: int, change: Change) -> bool:
+        """An implied bit that keeps its value, and that the writer does not mean."""
+        return self.untouched(change) and not self.means(writer, change)
+
+    def moved(self, writer: int, request: list[Change]) -> set[int]:
+        """The locks that the request would acquire, renew or take over, by what it writes."""
+        return {
+            LOCK_OF[change.variable]
+            for change in request
+            if not self.passes(writer, change)
+            and self.may(writer, change.variable)
+            and self.fits(change.variable, change.value) is not None
+            and (
+                self.owner[LOCK_OF[change.variable]] == writer
+                or (self.adopted and change.variable not in self.gone and self.judge(writer, change) is None)
+            )
+        }
+
+    def partial(self, writer: int, request: list[Change]) -> Refusal | None:
+        """Of the locks only the group is taken over whole or not at all."""
+        written = [
+            change.variable
+            for change in request
+            if change.variable in (4, 5)
+            and change.variable not in self.gone
+            and self.adopted
+            and not self.passes(writer, change)
+            and self.judge(writer, change) is None
+        ]
+        if written and self.owner[4] not in (None, writer) and set(written) != {4, 5}:
+            return Refusal(Reason.PARTIAL_TAKEOVER, written[0])
+        return None
+
+    def write(self, by: Requester, request: list[Change], now: float) -> Refusal | None:
         self.expire(now)
-        self.hear(writer if heard else None, now)
+        writer = by.writer
         refusals = [refusal for change in request if (refusal := self.judge(writer, change)) is not None]
-        if not heard:
+        if writer is not None and (partial := self.partial(writer, request)) is not None:
+            refusals.append(partial)
+        if not by.trusted:
             refusals.append(Refusal(Reason.HEARTBEAT_LOST, request[0].variable))
-        if refusals:
-            refusal = min(refusals, key=lambda one: TELLING_ORDER.index(one.reason))
-            if refusal.reason is Reason.ROBOT_LOST and writer is not None:
-                for change in request:
-                    lock = LOCK_OF.get(change.variable)
-                    if lock is not None and self.owner[lock] == writer:
-                        self.own(lock, writer, now)
-            return self.refuse(writer, refusal, now)
-        assert writer is not None
-        written = [change for change in request if not self.passes(writer, change)]
+        if writer is not None and self.too_old(by, list(self.moved(writer, request))):
+            refusals.append(Refusal(Reason.WAITED, request[0].variable))
+        refusal = min(refusals, key=lambda one: TELLING_ORDER.index(one.reason), default=None)
+        if refusal is None or refusal.reason is not Reason.WAITED:
+            self.hear(by, now, wrote=True)
+        if refusal is None:
+            self.carry_out(by, request, now)
+            return None
+        if refusal.reason is Reason.ROBOT_LOST and writer is not None:
+            for lock in self.moved(writer, request):
+                if self.owner[lock] == writer:
+                    self.own(lock, by, now)
+        return self.refuse(writer, refusal, now)
+
+    def carry_out(self, by: Requester, request: list[Change], now: float) -> None:
+        assert by.writer is not None
+        written = [change for change in request if not self.passes(by.writer, change)]
+        given = {change.variable for change in written if change.variable not in self.gone}
         for change in written:
             lock = LOCK_OF[change.variable]
-            if change.variable not in self.gone or self.owner[lock] == writer:
-                self.own(lock, writer, now)
+            if change.variable not in self.gone or self.owner[lock] == by.writer:
+                self.own(lock, by, now, given)
         for change in written:
             if change.variable not in self.gone:
                 value = self.fits(change.variable, change.value)
@@ -310,29 +443,38 @@ class Model:
                 self.due.discard(change.variable)
                 self.put(change.variable, value, now)
         self.accepted += 1
-        return None
 
     def refuse(self, writer: int | None, refusal: Refusal, now: float) -> Refusal:
         self.refused += 1
         self.last = (refusal, writer, now)
         return refusal
 
-    def act(self, writer: int | None, index: int, now: float, *, take: bool, heard: bool) -> Refusal | None:
+    def act(self, by: Requester, index: int, now: float, *, take: bool) -> Refusal | None:
         self.expire(now)
-        self.hear(writer if heard else None, now)
+        writer = by.writer
         if writer is None or not self.may(writer, index):
+            self.hear(by, now, wrote=True)
             return self.refuse(writer, Refusal(Reason.NOT_WRITABLE, index), now)
-        if not heard:
+        if not by.trusted:
             return self.refuse(writer, Refusal(Reason.HEARTBEAT_LOST, index), now)
         lock = LOCK_OF[index]
         holder = self.owner[lock]
-        if holder in (None, writer) or (take and self.outranks(writer, lock)):
-            if take:
-                self.own(lock, writer, now)
-            elif holder == writer:
+        possible = holder in (None, writer) or (take and self.outranks(writer, lock))
+        if take and self.too_old(by, [lock] if possible else []):
+            return self.refuse(writer, Refusal(Reason.WAITED, index), now)
+        self.hear(by, now, wrote=True)
+        if not possible:
+            return self.refuse(writer, Refusal(Reason.HELD, index, holder), now)
+        if take:
+            self.own(lock, by, now)
+        elif holder == writer:
+            self.free(lock, now)
+        return None
+
+    def drop(self, writer: int, indices: list[int], now: float) -> None:
+        for lock in {LOCK_OF[index] for index in indices if index in LOCK_OF}:
+            if self.owner[lock] == writer:
                 self.free(lock, now)
-            return None
-        return self.refuse(writer, Refusal(Reason.HELD, index, holder), now)
 
     # The robot.
 
@@ -462,14 +604,24 @@ class CellMachine(RuleBasedStateMachine):
         self.ticked += self.cell.health.heartbeat - before
         assert not self.ended_leases()
 
-    # Writers.
+    @rule(length=st.sampled_from([0.125, 0.25, 0.375, 0.625, 0.875]))
+    def stands_still(self, length: float) -> None:
+        since, self.now = self.now, self.now + length
+        before = self.cell.health.heartbeat
+        self.cell.gap(since, self.now)
+        self.model.events[EventKind.STOOD_STILL] += length >= 0.5
+        self.model.stand_still(since, self.now)
+        self.model.tick(self.now)
+        self.ticked += self.cell.health.heartbeat - before
 
-    @rule(writer=anybody, request=changes(), heard=mostly)
-    def write(self, writer: int | None, request: list[Change], heard: bool) -> None:
-        self.both(
-            lambda c: c.write(Requester(writer, trusted=heard), request, self.now),
-            lambda m: m.write(writer, request, self.now, heard=heard),
-        )
+    # Writers. Each has two connections and sometimes none.
+
+    @rule(writer=anybody, request=changes(), trusted=mostly, line=lines, waited=waits)
+    def write(
+        self, writer: int | None, request: list[Change], trusted: bool, line: int, waited: float
+    ) -> None:
+        by = requester(writer, line, trusted=trusted, waited=waited)
+        self.both(lambda c: c.write(by, request, self.now), lambda m: m.write(by, request, self.now))
         assert not self.ended_leases()
 
     @rule(data=st.data(), index=st.sampled_from(INPUTS), value=st.sampled_from([0, 1]), implied=st.booleans())
@@ -479,25 +631,37 @@ class CellMachine(RuleBasedStateMachine):
         self.write(
             data.draw(st.sampled_from(LOCKS[LOCK_OF[index]].owners)),
             [Change(index, kind(value), implied)],
-            heard=data.draw(mostly),
+            data.draw(mostly),
+            data.draw(lines),
+            data.draw(waits),
         )
 
     @rule(
-        writer=anybody,
+        writer=st.integers(0, 2), number=st.sampled_from([0, 5]), real=st.sampled_from([0.0, 2.5]), line=lines
+    )
+    def write_the_whole_group(self, writer: int, number: int, real: float, line: int) -> None:
+        self.write(writer, [Change(4, number), Change(5, real)], True, line, 0.0)
+
+    @rule(
+        who=st.tuples(anybody, lines, mostly, waits),
         index=st.integers(0, len(VARIABLES) - 1),
         take=st.booleans(),
         by_word=st.booleans(),
-        heard=mostly,
     )
-    def ask(self, writer: int | None, index: int, take: bool, by_word: bool, heard: bool) -> None:
+    def ask(self, who: tuple[int | None, int, bool, float], index: int, take: bool, by_word: bool) -> None:
         """Directly, or through the words of the status block."""
+        writer, line, trusted, waited = who
+        by = requester(writer, line, trusted=trusted, waited=waited)
         if by_word and writer is not None:
-            word = REQUEST if take else RELEASE
-            refusal = self.status.write(Requester(writer, trusted=heard), word, [index + 1], self.now)
+            refusal = self.status.write(by, REQUEST if take else RELEASE, [index + 1], self.now)
         else:
-            act = self.cell.request if take else self.cell.release
-            refusal = act(Requester(writer, trusted=heard), index, self.now)
-        assert refusal == self.model.act(writer, index, self.now, take=take, heard=heard)
+            refusal = (self.cell.request if take else self.cell.release)(by, index, self.now)
+        assert refusal == self.model.act(by, index, self.now, take=take)
+
+    @rule(writer=writers, indices=st.lists(st.integers(0, len(VARIABLES) - 1), max_size=4))
+    def drop_waited(self, writer: int, indices: list[int]) -> None:
+        self.cell.drop_waited(Requester(writer), indices, self.now)
+        self.model.drop(writer, indices, self.now)
 
     @rule(writer=writers)
     def release_all(self, writer: int) -> None:
@@ -513,23 +677,24 @@ class CellMachine(RuleBasedStateMachine):
         self.cell.refuse(Requester(writer), refusal, self.now, 1)
         self.model.refuse(writer, refusal, self.now)
 
-    @rule(writer=writers)
-    def connect(self, writer: int) -> None:
-        self.cell.writer_connected(Requester(writer), self.now)
-        self.model.connections[writer] += 1
-        self.model.hear(writer, self.now)
+    @rule(writer=writers, line=lines)
+    def connect(self, writer: int, line: int) -> None:
+        by = requester(writer, line)
+        self.cell.writer_connected(by, self.now)
+        self.model.connect_writer(by, self.now)
 
-    @rule(writer=writers)
-    def seen(self, writer: int) -> None:
-        self.cell.writer_seen(Requester(writer), self.now)
-        self.model.hear(writer, self.now)
+    @rule(writer=writers, waited=waits)
+    def seen(self, writer: int, waited: float) -> None:
+        by = Requester(writer, waited=waited)
+        self.cell.writer_seen(by, self.now)
+        self.model.hear(by, self.now)
 
-    @rule(writer=writers)
-    def disconnect(self, writer: int) -> None:
-        self.cell.writer_disconnected(Requester(writer), self.now, "closed")
-        self.model.connections[writer] = max(0, self.model.connections[writer] - 1)
-        if not self.model.connections[writer]:
-            self.model.lose(writer, self.now)
+    @rule(writer=writers, line=lines, at_once=st.booleans())
+    def disconnect(self, writer: int, line: int, at_once: bool) -> None:
+        by = requester(writer, line)
+        self.cell.writer_disconnected(by, self.now, "closed", at_once=at_once)
+        self.model.disconnect_writer(by, self.now, at_once=at_once)
+        if at_once and not self.model.connections[writer]:
             assert writer not in self.cell.ownership.owners
 
     # The robot.
@@ -604,6 +769,9 @@ class CellMachine(RuleBasedStateMachine):
             assert owner is None or owner in declared.owners
             assert table.expires[lock] == self.model.until[lock], declared.name
             assert owner is None or self.cell.writers.alive[owner]
+            assert table.connections[lock] == self.model.worked.get(lock, 0)
+        for line in (0, 11, 12, 21, 22, 31, 32, 41, 42):
+            assert self.cell.holds(line) is (line != 0 and line in self.model.worked.values())
 
     @invariant()
     def stale_never_looks_fresh(self) -> None:

@@ -38,7 +38,7 @@ def package(cell: Cell, now: float, cycles: int, *, alarm: bool = False) -> None
 
 class TestLocks:
     def test_the_operator_takes_a_lock_from_any_owner_and_keeps_it(self, cell: Cell) -> None:
-        """No priority of the mapping outranks him, and no lease of it ends his."""
+        """No priority of the mapping outranks him, and no lease of it ends his. `part` holds its value."""
         assert cell.write(Requester(PLC), [Change(PART, 7)], 1.0) is None
         cell.take_lock(PART, 1.1, detail="by anna")
         refusal = cell.write(Requester(PLC), [Change(PART, 8)], 100.0)
@@ -47,6 +47,22 @@ class TestLocks:
         assert cell.image.values[PART] == 7
         taken = next(event for event in cell.events if event.kind is EventKind.TAKEN_OVER)
         assert (taken.writer, taken.other, taken.detail) == (OPERATOR, PLC, "by anna")
+
+    def test_what_he_takes_from_a_writer_falls_back_at_once(self, cell: Cell) -> None:
+        """As with any takeover by request: its command would go on as nobody's."""
+        assert cell.write(Requester(HMI), [Change(SPEED, 0.4), Change(PATH, 3)], 1.0) is None
+        seen: list[list[Value]] = []
+        cell.listeners.append(lambda _direction: seen.append(cell.image.values[SPEED : PATH + 1]))
+        cell.take_lock(MOTION, 1.5)
+        assert seen == [[0.0, 7]]
+        assert kinds(cell)[-3:] == [EventKind.TAKEN_OVER, EventKind.FALLBACK, EventKind.FALLBACK]
+
+    def test_what_nobody_owned_or_he_has_already_stays_as_it_is(self, cell: Cell) -> None:
+        cell.adopt({SPEED: 0.4, PATH: 3}, 0.5)
+        cell.take_lock(MOTION, 1.0)
+        cell.take_lock(MOTION, 2.0)
+        assert cell.force(SPEED, 0.5, 3.0, SECOND) is None
+        assert cell.image.values[SPEED : PATH + 1] == [0.5, 3]
 
     def test_not_even_the_first_of_a_takeover_list_gets_it_back(self, cell: Cell) -> None:
         cell.take_lock(MOTION, 1.0)
@@ -101,6 +117,13 @@ class TestForcedInput:
         assert refusal is not None
         assert refusal.reason is Reason.HELD
         assert cell.image.values[FORCE] == 42.0
+
+    def test_the_other_members_of_a_writers_group_fall_back(self, cell: Cell) -> None:
+        assert cell.write(Requester(HMI), [Change(SPEED, 0.4), Change(PATH, 3)], 1.0) is None
+        seen: list[list[Value]] = []
+        cell.listeners.append(lambda _direction: seen.append(cell.image.values[SPEED : PATH + 1]))
+        assert cell.force(PATH, 5, 1.5, SECOND) is None
+        assert seen[0] == [0.0, 5], "in one package"
 
     @pytest.mark.parametrize("by_time", [True, False])
     def test_afterwards_the_policy_rules_and_the_plc_may_write(self, cell: Cell, by_time: bool) -> None:

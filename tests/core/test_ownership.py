@@ -106,3 +106,38 @@ def test_freeing_names_the_former_owner_once(table: LockTable) -> None:
     assert table.free(LISTED) == 1
     assert table.free(LISTED) is None
     assert table.held_by(1) == [ENDLESS]
+
+
+def test_a_lock_follows_one_connection_of_its_owner_until_it_is_free_or_the_operators(
+    table: LockTable,
+) -> None:
+    for lock in (LISTED, ENDLESS):
+        table.apply(lock, 1, Move.ACQUIRE, 5.0)
+        table.follow(lock, 7)
+    assert table.held_through(1, 7) == [LISTED, ENDLESS]
+    assert table.held_through(0, 7) == table.held_through(1, 0) == []
+    table.free(LISTED)
+    table.hold(ENDLESS, math.inf)
+    assert table.connections == [0, 0, 0]
+
+
+def test_an_orphan_is_one_no_more_when_another_connection_goes_on_with_it(table: LockTable) -> None:
+    for lock in range(3):
+        table.apply(lock, 1, Move.ACQUIRE, 5.0)
+        table.orphans[lock] = 7.0
+    table.follow(RANKED, 8)
+    table.free(ENDLESS)
+    assert table.orphaned(6.99) == []
+    assert table.orphaned(7.0) == [LISTED]
+
+
+def test_owners_leases_connections_and_orphans_go_on_in_a_successor(table: LockTable) -> None:
+    for lock in (LISTED, ENDLESS):
+        table.apply(lock, 1, Move.ACQUIRE, 5.0)
+        table.follow(lock, 7)
+    table.orphans[LISTED] = 5.5
+    new = LockTable([Lock("endless", (2,), (0, 1), lease=3.0), Lock("listed", (1,), (0, 1), lease=1.0)])
+    new.succeed(table, {LISTED: 1, ENDLESS: 0}, {0: 1, 1: 0}, 5.25)
+    assert (new.owners, new.expires) == ([0, 0], [8.25, 6.0])
+    assert (new.connections, new.orphans) == ([7, 7], {1: 5.5})
+    assert new.expired(6.0) == [1]

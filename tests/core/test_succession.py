@@ -169,6 +169,26 @@ def test_writers_are_known_by_name(cell: Cell, press: CellDefinition) -> None:
     assert new.ownership.owners == [None] * 5
 
 
+def test_connections_and_graces_survive(cell: Cell, press: CellDefinition) -> None:
+    writers = (press.writers[PLC], Writer("hmi", grace=2.0), press.writers[AUX])
+    definition = replace(press, writers=writers)
+    cell = succeed(cell, definition, 0.5).cell
+    program, viewer = Requester(HMI, connection=7), Requester(HMI, connection=8)
+    for requester in (program, viewer):
+        cell.writer_connected(requester, 1.0)
+    assert cell.write(program, [Change(FORCE, 50.0)], 1.0) is None
+    assert cell.write(viewer, [Change(LAMP, value=True)], 1.0) is None
+    cell.writer_disconnected(program, 1.5, "closed")
+    new = succeed(cell, without(definition, "start"), 2.0).cell
+    assert (new.holds(7), new.holds(8)) == (True, True)
+    new.tick(3.5)
+    assert new.ownership.owners == [HMI, None, None, None, None]
+    new.writer_disconnected(viewer, 3.5, "closed")
+    new.tick(5.5)
+    assert not new.writers.alive[HMI]
+    assert new.ownership.owners == [None] * 5
+
+
 def test_a_writer_that_is_gone_loses_its_locks(cell: Cell, press: CellDefinition) -> None:
     assert cell.write(Requester(HMI), [Change(FORCE, 50.0)], 1.0) is None
     assert cell.write(Requester(HMI), [Change(START, value=True)], 1.1) is not None
@@ -253,14 +273,20 @@ def _package(cell: Cell, who: int, _which: int, _number: int, now: float) -> Non
         cell.outputs_written(now)
 
 
+def via(writer: int, number: int) -> Requester:
+    """One of two connections of the writer."""
+    return Requester(writer, connection=1 + 2 * writer + number % 2)
+
+
 DEEDS: dict[str, Callable[[Cell, int, int, int, float], object]] = {
     "write": lambda cell, who, which, number, now: cell.write(
-        Requester(who), [Change(which, _value(cell, which, number))], now
+        via(who, which + number), [Change(which, _value(cell, which, number))], now
     ),
-    "request": lambda cell, who, which, _, now: cell.request(Requester(who), which, now),
+    "request": lambda cell, who, which, _, now: cell.request(via(who, which), which, now),
     "release": lambda cell, who, which, _, now: cell.release(Requester(who), which, now),
-    "connected": lambda cell, who, _which, _, now: cell.writer_connected(Requester(who), now),
-    "disconnected": lambda cell, who, _which, _, now: cell.writer_disconnected(Requester(who), now, "closed"),
+    "connected": lambda cell, who, which, _, now: cell.writer_connected(via(who, which), now),
+    "disconnected": lambda cell, who, which, _, now: cell.writer_disconnected(via(who, which), now, "closed"),
+    "gap": lambda cell, who, _which, _, now: cell.gap(now - who, now),
     "available": lambda cell, who, which, _, now: cell.set_availability([which], bool(who), "in use", now),
     "force": lambda cell, _who, which, number, now: cell.force(
         which, _value(cell, which, number), now, now + 2.0
@@ -302,18 +328,19 @@ def observed(cell: Cell, now: float) -> tuple[object, ...]:
         list(cell.events),
         cell.events.count,
         (image.values, image.quality, image.available, ages, image.unreadable),
-        (cell.ownership.owners, cell.ownership.expires),
+        (cell.ownership.owners, cell.ownership.expires, cell.ownership.connections, cell.ownership.orphans),
         (cell.writers.alive, cell.writers.connections, cell.writers.last_seen),
         cell.accepts_writes,
     )
 
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(history=HISTORY)
+@given(history=HISTORY, grace=st.sampled_from([0.0, 0.5]))
 def test_a_succession_that_changes_nothing_cannot_be_noticed(
-    press: CellDefinition, history: list[Step]
+    press: CellDefinition, history: list[Step], grace: float
 ) -> None:
     """Two cells with one history, of which one is succeeded now and then, are the same to every observer."""
+    press = replace(press, writers=(replace(press.writers[PLC], grace=grace), *press.writers[1:]))
     plain, replaced = Cell(press), Cell(press)
     now = 0.0
     for step in history:

@@ -121,7 +121,7 @@ class Layout:
             return self._packed([fit(value, one) for value, one in zip(content, self._content, strict=True)])
 
     def changes(self, data: bytes) -> list[Change] | Refusal:
-        """What `size` bytes mean for the cell. BOOLEANs that are packed with others are implied.
+        """What `size` bytes mean for the cell. Every bit is meant: who maps it into an RPDO sends it on purpose.
 
         A refusal says which variable has no value for what was received.
         """
@@ -160,8 +160,6 @@ class _Run:
 
     mapped: tuple[Mapped, ...]
     bits: bool
-    implied: bool
-    """The PDO carries other BOOLEANs too."""
 
     @property
     def format(self) -> str:
@@ -185,19 +183,18 @@ class _Run:
         """What takes its value when a PDO is received."""
         members = [one.variable for one in self.mapped if one.variable is not None]
         if self.bits:
-            yield _Bits(members, variables, implied=self.implied)
+            yield _Bits(members, variables)
         elif members:
             yield _Number(members[0], self.mapped[0].type, variables[members[0]].kind)
 
 
 def _runs(mapping: Sequence[Mapped]) -> Iterator[_Run]:
-    implied = sum(one.type is CanType.BOOLEAN for one in mapping) > 1
     for bits, group in groupby(mapping, key=lambda one: one.type is CanType.BOOLEAN):
         if bits:
-            yield _Run(tuple(group), bits=True, implied=implied)
+            yield _Run(tuple(group), bits=True)
         else:
             for one in group:
-                yield _Run((one,), bits=False, implied=False)
+                yield _Run((one,), bits=False)
 
 
 def _slices(runs: Iterable[_Run]) -> Iterator[tuple[slice, int]]:
@@ -237,9 +234,9 @@ class _Bits:
 
     __slots__ = ("_pairs",)
 
-    def __init__(self, members: Sequence[int], variables: Sequence[Variable], *, implied: bool) -> None:
+    def __init__(self, members: Sequence[int], variables: Sequence[Variable]) -> None:
         self._pairs = tuple(
-            tuple(Change(index, _truth(variables[index].kind, bit), implied) for bit in (False, True))
+            tuple(Change(index, _truth(variables[index].kind, bit)) for bit in (False, True))
             for index in members
         )
 

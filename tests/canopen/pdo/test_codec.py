@@ -156,12 +156,10 @@ def test_dummy_is_zero_when_sent_and_skipped_when_received() -> None:
     assert layout.changes(bytes.fromhex("ffff07")) == [Change(0, 7)]
 
 
-def test_bits_are_implied_only_among_other_bits() -> None:
+def test_every_bit_of_a_pdo_is_meant() -> None:
     variables = [variable(0, ValueKind.BOOL), variable(1, ValueKind.BOOL)]
     both = Layout([Mapped(0, CanType.BOOLEAN), Mapped(1, CanType.BOOLEAN)], variables)
-    assert both.changes(b"\x02") == [Change(0, False, implied=True), Change(1, True, implied=True)]
-    single = Layout([Mapped(1, CanType.BOOLEAN)], variables)
-    assert single.changes(b"\x01") == [Change(1, True)]
+    assert both.changes(b"\x02") == [Change(0, False), Change(1, True)]
 
 
 @pytest.mark.parametrize(

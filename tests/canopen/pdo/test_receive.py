@@ -269,14 +269,16 @@ def test_configuring_a_pdo_anew_clears_its_faults(bench: Bench) -> None:
 # -- ownership ---------------------------------------------------------------------------------------------------
 
 
-def test_packed_bit_of_another_owner_may_only_keep_its_value(bench: Bench) -> None:
-    """The bits of a PDO are written because their neighbours are."""
+def test_a_bit_of_another_owner_refuses_the_whole_pdo(bench: Bench) -> None:
+    """What is mapped into an RPDO is meant: there is no masked form of it."""
     bench.cell.write(Requester(PLC), [Change(bench.by_name["in_bit_1"], True)], T)
     receiver = Receiver(bench, "in_bit_0", "in_bit_1")
-    assert receiver.receive("03") == []
-    assert receiver.value("in_bit_0") is True
-    assert receiver.receive("01") == ["+HELD 1"]
-    assert receiver.value("in_bit_1") is True
+    assert receiver.receive("03") == ["+HELD 1"]
+    assert receiver.value("in_bit_0") is False
+    bench.cell.release_all(Requester(PLC), T)
+    assert receiver.receive("03") == ["-HELD 1"]
+    assert receiver.value("in_bit_0") is receiver.value("in_bit_1") is True
+    assert len(bench.cell.ownership.held_by(LINE)) == 2
 
 
 def test_equal_content_is_written_again_and_keeps_the_owner(bench: Bench) -> None:
