@@ -215,6 +215,9 @@ class RobotLink:
                 "no robot", extra=fields(cell=self._cell.definition.name, robot=address, reason=loss.text)
             )
 
+    def probed(self, delay: float) -> None:
+        """A probe was answered; this link sends none."""
+
     def text(self, message: TextMessage) -> None:
         """The controller says something; it goes to the log."""
         log.warning(
@@ -279,16 +282,21 @@ class RobotLink:
             return
         for key, flat in self._inputs.due(self._cell.image):
             self._next_send = now + self._cycle
-            if self._client.send(key, flat):
+            if self._client_send(key, flat):
                 self._inputs.sent(key, flat, now)
                 for listener in self.sent_listeners:
                     listener()
+
+    def _client_send(self, key: str, flat: Sequence[Value]) -> bool:
+        session = self._client.session
+        recipe = session.inputs.get(key) if session is not None else None
+        return recipe is not None and self._client.send(recipe, flat)
 
     async def _feed_watchdog(self, period: float) -> None:
         while True:
             await asyncio.sleep(period)
             health = self._cell.health
-            health.watchdog_fed = self._is_healthy() and self._client.send(WATCHDOG_KEY, (self._feeds,))
+            health.watchdog_fed = self._is_healthy() and self._client_send(WATCHDOG_KEY, (self._feeds,))
             self._feeds = (self._feeds + 1) % _FEED_LIMIT
 
     def _is_healthy(self) -> bool:

@@ -7,11 +7,11 @@ import pytest
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.claims import HandshakeError
-from gatewayd.rtde.negotiation import TOO_LONG, Event, Negotiation, State, Step, Wishes
+from gatewayd.rtde.negotiation import Event, Negotiation, State, Step, Wishes
 
 E_SERIES = m.ControllerVersion(5, 12, 0, 1101)
 CB3 = m.ControllerVersion(3, 15, 8, 1)
-DATA = m.DataPackage(1, b"")
+DATA = m.DataPackage(1, bytes(16))
 WISHES = Wishes(("output_int_register_0",), ("input_int_register_0",))
 TO_OUTPUTS = (m.ProtocolVersionReply(True), E_SERIES)
 TO_INPUTS = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE", "INT32", "INT32")))
@@ -110,14 +110,17 @@ def test_inputs_in_use_are_told_with_their_likely_holder() -> None:
     )
     replies = (
         *TO_OUTPUTS,
-        m.OutputsSetup(1, ("DOUBLE",)),
         m.InputsSetup(0, ("INT32", "IN_USE")),
         m.InputsSetup(1, ("INT32",)),
         m.InputsSetup(0, ("NOT_FOUND",)),
+        m.OutputsSetup(0, ("NOT_FOUND",)),
+        m.OutputsSetup(1, ("DOUBLE",)),
+        m.InputsSetup(2, ("INT32",)),
         m.StartReply(True),
     )
     negotiation, _ = talk(wishes, replies)
-    in_use, missing = negotiation.session().unavailable
+    unreadable, in_use, missing = negotiation.session().unavailable
+    assert (unreadable.field, unreadable.output) == ("input_int_register_0", True)
     assert (in_use.field, in_use.output, in_use.word) == ("input_int_register_1", False, "IN_USE")
     assert "PROFINET" in in_use.hint
     assert (missing.field, missing.word) == ("tool_digital_output", "NOT_FOUND")
@@ -216,35 +219,11 @@ def test_a_session_can_begin_paused() -> None:
 
 
 def test_inputs_can_be_claimed_while_paused() -> None:
-    wishes = Wishes(inputs=("input_int_register_0",), read_back=False, running=False)
-    replies = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",)), m.InputsSetup(0, ("IN_USE",)))
+    wishes = Wishes(inputs=("input_int_register_0",), running=False)
+    replies = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE", "INT32")), m.InputsSetup(0, ("IN_USE",)))
     negotiation, _ = talk(wishes, replies)
     assert negotiation.retry_claims()
     assert negotiation.handle(m.InputsSetup(1, ("INT32",))).event is Event.INPUTS_CHANGED
-
-
-def test_subscription_has_the_timestamp_first_and_everything_once() -> None:
-    wishes = Wishes(
-        ("robot_mode", "timestamp", "input_int_register_1"),
-        ("input_int_register_1", "input_int_register_2", "speed_slider_mask"),
-        watchdog="input_int_register_3",
-    )
-    assert wishes.subscription() == (
-        "timestamp",
-        "robot_mode",
-        "input_int_register_1",
-        "input_int_register_2",
-        "input_int_register_3",
-    )
-
-
-def test_a_shortened_subscription_leaves_out_read_backs_and_says_so() -> None:
-    wishes = Wishes(inputs=("input_int_register_0",), short_outputs=True)
-    replies = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",)), m.InputsSetup(1, ("INT32",)), m.StartReply(True))
-    negotiation, steps = talk(wishes, replies)
-    assert steps[2].send == m.SetupOutputs(("timestamp",), 500.0)
-    (left_out,) = negotiation.session().unavailable
-    assert (left_out.field, left_out.output, left_out.word) == ("input_int_register_0", True, TOO_LONG)
 
 
 def test_what_is_awaited_is_put_in_words() -> None:

@@ -13,6 +13,7 @@ from gatewayd.rtde.client import LossReason
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import Faults
 from gatewayd.simulator.server import SimulatedController
+from tests.rtde.conftest import send
 
 if TYPE_CHECKING:
     from tests.rtde.conftest import Connected
@@ -48,7 +49,7 @@ async def test_the_full_image_is_written_and_read_back(
             assert session.unavailable == ()
             assert session.series is series
             values = [1 << 31, 7, *range(-12, 12), *(number / 4 for number in range(24))]
-            assert client.send("registers", values)
+            assert send(client, "registers", values)
             slots = [session.outputs.slots[name] for name in image("input")]
             read_back = slice(slots[0].start, slots[-1].stop)
             await until(lambda: seen.packages[-1][read_back] == tuple(values))
