@@ -225,11 +225,12 @@ class Notebook:
         self.delays: list[float] = []
         self.packages: list[tuple[Scalar, ...]] = []
         self.calls: list[str] = []
-        """Names of the calls about packages and inputs, in their order."""
+        """Names of the calls about sessions, packages and inputs, in their order."""
         self.client: client.RtdeClient | None = None
 
     def session_started(self, session: client.Session) -> None:
         self.sessions.append(session)
+        self.calls.append("session_started")
 
     def values(self, values: tuple[Scalar, ...], now: float) -> None:
         assert now > 0
@@ -242,6 +243,7 @@ class Notebook:
 
     def session_lost(self, loss: client.Loss) -> None:
         self.losses.append(loss)
+        self.calls.append("session_lost")
 
     def text(self, message: messages.TextMessage) -> None:
         self.texts.append(message)

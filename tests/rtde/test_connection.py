@@ -125,7 +125,7 @@ async def test_the_first_package_may_take_longer(
 ) -> None:
     """A controller whose safety set-up is not confirmed accepts the start and sends nothing."""
     controller.script.sends_data = False
-    async with connected(data_timeout=0.05, first_data_timeout=0.4) as (_, seen):
+    async with connected(data_timeout=0.05, first_data_timeout=1.0) as (_, seen):
         await until(lambda: seen.sessions)
         await asyncio.sleep(0.2)
         assert not seen.losses

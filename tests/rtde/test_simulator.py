@@ -99,15 +99,6 @@ async def test_the_boot_restart_is_waited_out(connected: Connected, until: Until
         assert seen.losses[0].reason in {LossReason.CLOSED, LossReason.RESTARTED}
 
 
-async def test_an_old_controller_gets_a_short_list(connected: Connected, until: Until) -> None:
-    async with SimulatedController(Controller(faults=Faults(strict_lists=True))) as simulated:
-        settings = {"outputs": image("output"), "inputs": image("input"), "handshake_timeout": 0.2}
-        async with connected(port=simulated.port, **settings) as (_, seen):
-            await until(lambda: seen.packages)
-            assert {one.word for one in seen.sessions[0].unavailable} == {"TOO_LONG"}
-            assert len(seen.sessions[0].inputs["registers"].recipe.names) == 50
-
-
 async def test_what_one_client_leaves_another_gets(connected: Connected, until: Until) -> None:
     async with SimulatedController() as simulated, AsyncExitStack() as leaving:
         both = {"port": simulated.port, "claim_retry": 0.05}
