@@ -260,7 +260,7 @@ def _controller(
 
     faults = Faults(
         hold=_fields(hold),
-        unreadable=frozenset(_fields(unreadable)),
+        unreadable=_inputs(unreadable),
         long_lists=LongLists(strict_lists or "take"),
         drop_at=_drop_at(drop_at),
         drop_times=drop_times or math.inf,
@@ -282,6 +282,17 @@ def _controller(
 
 def _fields(text: str | None) -> tuple[str, ...]:
     return tuple(name.strip() for name in (text or "").split(",") if name.strip())
+
+
+def _inputs(text: str | None) -> frozenset[str]:
+    from gatewayd.rtde.catalogue import INPUTS
+
+    fields = frozenset(_fields(text))
+    unknown = sorted(fields - INPUTS.keys())
+    if unknown:
+        message = f"no such input: {', '.join(unknown)}"
+        raise click.BadParameter(message, param_hint="--unreadable")
+    return fields
 
 
 def _drop_at(text: str | None) -> DropAt | None:
