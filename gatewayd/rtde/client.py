@@ -13,7 +13,6 @@ import contextlib
 import socket
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from time import monotonic
 
 from gatewayd.rtde.claims import InputRecipe
 from gatewayd.rtde.connection import ClientHandler, Connection, Tolerances
@@ -174,7 +173,7 @@ class RtdeClient:
         self._lists.learn(connection.lists, started=connection.started_at is not None)
         if connection.started_at is None:
             return loss, 0.0
-        return replace(loss, started=True), monotonic() - connection.started_at
+        return replace(loss, started=True), asyncio.get_running_loop().time() - connection.started_at
 
     async def _connect(self, wishes: Wishes) -> Connection:
         loop = asyncio.get_running_loop()

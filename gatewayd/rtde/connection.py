@@ -7,7 +7,6 @@ import math
 import struct
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from time import monotonic
 from typing import ClassVar, Protocol, cast
 
 from gatewayd.rtde.claims import HandshakeError, InputRecipe
@@ -45,7 +44,7 @@ class ClientHandler(Protocol):
         """The set-up is complete; values follow."""
 
     def values(self, values: tuple[Scalar, ...], now: float) -> None:
-        """A package, flat in the order of `Session.outputs`, received at `now` (monotonic seconds)."""
+        """A package, flat in the order of `Session.outputs`, received at `now` (the loop's time)."""
 
     def inputs_changed(self, session: Session) -> None:
         """The input recipes have changed: inputs that were in use have been claimed, or registers have joined.
@@ -158,7 +157,7 @@ class Connection(asyncio.Protocol):
         question = self._negotiation.probe()
         if question is None:
             return False
-        self._probed_at = monotonic()
+        self._probed_at = self._loop.time()
         self._probe = self._loop.call_later(self._tolerances.handshake, self._probe_unanswered)
         self._write(question)
         return not self.done.done()
@@ -218,7 +217,7 @@ class Connection(asyncio.Protocol):
     # messages
 
     def _receive(self, data: bytes) -> None:
-        now = monotonic()
+        now = self._loop.time()
         packages: list[DataPackage] = []
         failure: ProtocolError | None = None
         try:
@@ -256,7 +255,7 @@ class Connection(asyncio.Protocol):
         if step.send is not None:
             self._request(step.send)
         elif self._negotiation.reading:
-            self._await(self._tolerances.first_data)
+            self._await(self._patience)
         elif not self._negotiation.waiting:
             self._disarm()
         if self.done.done():
@@ -268,7 +267,7 @@ class Connection(asyncio.Protocol):
 
     def _measure_round_trip(self, message: ControllerMessage) -> None:
         if self._asked_at is not None and not isinstance(message, DataPackage):
-            self._round_trip = max(self._round_trip, monotonic() - self._asked_at)
+            self._round_trip = max(self._round_trip, self._loop.time() - self._asked_at)
             self._asked_at = None
 
     def _deliver(self, packages: list[DataPackage], now: float) -> ProtocolError | None:
@@ -298,7 +297,7 @@ class Connection(asyncio.Protocol):
         return None
 
     def _started(self) -> None:
-        now = monotonic()
+        now = self._loop.time()
         session = self.session = self._negotiation.session(self._round_trip)
         self.started_at = self._heard = self._measured = now
         self._statistics.sessions += 1
@@ -310,13 +309,13 @@ class Connection(asyncio.Protocol):
         self._handler.session_started(session)
 
     def _inputs_changed(self) -> None:
-        self._heard = monotonic()
+        self._heard = self._loop.time()
         self.session = self._negotiation.session(self._round_trip)
         self._schedule_retry()
         self._handler.inputs_changed(self.session)
 
     def _pause_answered(self) -> None:
-        self._heard = monotonic()
+        self._heard = self._loop.time()
         for waiter in self._waiters:
             if not waiter.done():
                 waiter.set_result(None)
@@ -326,7 +325,7 @@ class Connection(asyncio.Protocol):
         if self._probe is not None:  # else it was given up
             self._probe.cancel()
             self._probe = None
-            self._handler.probed(monotonic() - self._probed_at)
+            self._handler.probed(self._loop.time() - self._probed_at)
 
     def _probe_unanswered(self) -> None:
         self._probe = None
@@ -354,7 +353,7 @@ class Connection(asyncio.Protocol):
 
     def _request(self, message: ExecutableMessage) -> None:
         self._write(message)
-        self._asked_at = monotonic()
+        self._asked_at = self._loop.time()
         self._await(self._tolerances.handshake)
 
     def _await(self, seconds: float) -> None:
@@ -379,14 +378,14 @@ class Connection(asyncio.Protocol):
 
     def _unanswered(self) -> None:
         if self._negotiation.reading:
-            self._fail(LossReason.SILENT, _silence(self._tolerances.first_data, first=True))
+            self._fail(LossReason.SILENT, _silence(self._patience, first=self.session is None))
             return
         what = self._negotiation.awaited
         self._fail(LossReason.UNANSWERED, f"{what} did not come within {self._tolerances.handshake:g} s")
 
     def _watch(self) -> None:
         self._statistics.turns += 1
-        now = monotonic()
+        now = self._loop.time()
         silence = now - self._heard
         if self._negotiation.running and silence > self._patience:
             first = self._pace is None or self._pace.timestamp is None

@@ -6,8 +6,8 @@ apart then: its first package after the claims is the reading. Whether a control
 only its answer tells; a refusal that blames no field leads to readings in pieces on the same connection. A reading is
 an output recipe for one package: set up, started, paused. Inputs that are claimed later are read in the same way.
 
-Text messages are the caller's; data packages are told to the negotiation only while it waits for a start, which they
-prove (a controller may send data before the answer to a start, or instead of it), or for the package of a reading.
+Text messages are the caller's; data packages are handed to the negotiation only while it waits for a start, which
+they prove (a controller may send data before the answer to a start, or instead of it), or for the package of a reading.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class State(Enum):
 
 
 class Event(Enum):
-    """Something to tell the user of the client."""
+    """Something to report to the user of the client."""
 
     STARTED = auto()
     INPUTS_CHANGED = auto()
@@ -343,11 +343,19 @@ class Negotiation:
             if len(message.payload) != self._outputs.size:
                 return _NOTHING
         elif not message.accepted:
-            raise HandshakeError("the controller refused to start the output")
+            return self._start_refused()
         event = Event.RESUMED if self.state is State.RESUMING else self._complete()
         if not self._run:
             return self._go(State.PAUSING, Pause(), event)
         return self._rest(State.RUNNING, event)
+
+    def _start_refused(self) -> Step:
+        """In version 1 the answer to a list has no place for a refusal: it shows here."""
+        if self._agreed is not None or self._outputs is None or not is_long(self._outputs.names):
+            raise HandshakeError("the controller refused to start the output")
+        self._outputs = None
+        self.took_long_list = False
+        return self._list_refused()
 
     def _complete(self) -> Event:
         """The working recipe is set up and, if wanted, started: what that is to the user."""

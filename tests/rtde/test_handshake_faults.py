@@ -119,6 +119,28 @@ async def test_a_long_list_that_comes_to_nothing_is_no_reason_to_leave_inputs_un
             await changes_one_register(simulated, client, seen, until)
 
 
+@pytest.mark.parametrize(
+    "faults",
+    [
+        Faults(long_lists=LongLists.REFUSE, v1_only=True),
+        Faults(long_lists=LongLists.COMPLAIN, v1_only=True),
+        Faults(long_lists=LongLists.REFUSE, drop=0.2, duplicate=0.2, split=0.2, seed=1),
+        Faults(long_lists=LongLists.REFUSE, text_on_connect="SafetySetup has not been confirmed yet"),
+    ],
+    ids=["version 1, refused", "version 1, complained of", "mangled", "text"],
+)
+async def test_readings_in_pieces_bear_other_faults(
+    faults: Faults, connected: Connected, until: Until
+) -> None:
+    async with SimulatedController(Controller(faults=faults)) as simulated:
+        preset(simulated)
+        settings = {"outputs": OUTPUT_REGISTERS, "inputs": INPUT_REGISTERS, "handshake_timeout": 0.25}
+        async with connected(port=simulated.port, **settings) as (client, seen):
+            await until(lambda: seen.packages)
+            assert seen.sessions[-1].held
+            await changes_one_register(simulated, client, seen, until)
+
+
 @pytest.mark.parametrize("lists", [LongLists.TAKE, LongLists.REFUSE], ids=lambda lists: lists.value)
 @pytest.mark.parametrize("verify", [True, False], ids=["verify", "no verify"])
 async def test_an_input_that_is_freed_while_the_clock_stands_still_is_read_before_it_is_ours(

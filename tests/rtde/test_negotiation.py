@@ -1,13 +1,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.claims import HandshakeError
 from gatewayd.rtde.negotiation import Event, Negotiation, State, Step, Wishes
+from tests.rtde.pure_controller import PureController
 
 E_SERIES = m.ControllerVersion(5, 12, 0, 1101)
 CB3 = m.ControllerVersion(3, 15, 8, 1)
@@ -232,3 +236,43 @@ def test_what_is_awaited_is_put_in_words() -> None:
     negotiation, _ = talk(WISHES, (*TO_INPUTS, m.InputsSetup(0, ("IN_USE",)), m.StartReply(True)))
     negotiation.retry_claims()
     assert negotiation.awaited == "the answer to an input recipe"
+
+
+WORDS = st.sampled_from(("DOUBLE", "INT32", "NOT_FOUND", "IN_USE", "STRING", ""))
+ANYTHING = st.one_of(
+    st.builds(m.ProtocolVersionReply, st.booleans()),
+    st.sampled_from((E_SERIES, CB3)),
+    st.builds(m.OutputsSetup, st.none() | st.integers(0, 2), st.lists(WORDS, max_size=5).map(tuple)),
+    st.builds(m.InputsSetup, st.integers(0, 255), st.lists(WORDS, max_size=4).map(tuple)),
+    st.builds(m.StartReply, st.booleans()),
+    st.builds(m.PauseReply, st.booleans()),
+    st.builds(m.DataPackage, st.none() | st.integers(0, 2), st.binary(max_size=20)),
+)
+
+
+@settings(max_examples=500, deadline=None)
+@given(data=st.data())
+def test_whatever_a_controller_answers_ends_the_talk_in_order_or_goes_on(data: st.DataObject) -> None:
+    """Right answers up to some point, then anything: nothing but a HandshakeError is raised, nothing is asked twice."""
+    draw = data.draw
+    inputs = tuple(
+        f"input_{kind}_register_{n}" for kind in ("int", "double") for n in range(draw(st.integers(0, 48)))
+    )
+    controller = PureController(
+        limit=draw(st.sampled_from((100, 2048, 65535))), in_use=set(inputs[:2]), unreadable=set(inputs[1:3])
+    )
+    negotiation = Negotiation(Wishes(("output_int_register_0",), inputs, read_back=draw(st.booleans())))
+    request: m.ExecutableMessage | None = negotiation.begin()
+    with suppress(HandshakeError):
+        for _ in range(draw(st.integers(0, 40))):
+            if request is not None:
+                controller.ask(request)
+            if draw(st.integers(0, 9)) == 0 or not controller.out:
+                controller.out.appendleft(draw(ANYTHING))
+            request = negotiation.handle(controller.out.popleft()).send
+            if request is None and draw(st.booleans()):
+                request = draw(
+                    st.sampled_from((negotiation.retry_claims, negotiation.pause, negotiation.resume))
+                )()
+            if negotiation.state is State.RUNNING:
+                assert negotiation.session().inputs.keys() == negotiation.claims.recipes.keys()
