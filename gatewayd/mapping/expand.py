@@ -123,6 +123,11 @@ class ConcreteVariable:
         return _RANGES[self.type][1] if self.kind is ValueKind.INT else None
 
     @property
+    def is_program_output(self) -> bool:
+        """Whether it is an output register, which only the robot program writes."""
+        return self.field.name.startswith("output_")
+
+    @property
     def position(self) -> Position:
         """Place of the variable's name."""
         return self.part.key
@@ -186,6 +191,7 @@ class ConcreteLock:
     is_any: bool
     takeover: bool
     lease: float | None
+    whole: bool
     group: Part[Group] | None
     position: Position
     """Place of the owner, or of what declares the lock."""
@@ -330,7 +336,8 @@ class _Builder:
         takeover = spec.takeover if spec.takeover is not None else shared and not is_any
         name = group.name if group is not None else self.variables[members[0]].name
         position = declared.at("owner") if spec.owner is not None else declared.key
-        return ConcreteLock(name, members, owners, is_any, takeover, lease, group, position)
+        whole = group is not None and group.spec.whole
+        return ConcreteLock(name, members, owners, is_any, takeover, lease, whole, group, position)
 
     def _place(self, variables: list[ConcreteVariable], spec: PlacementSpec, position: Position) -> None:
         modbus = self.document.modbus

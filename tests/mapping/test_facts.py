@@ -61,7 +61,9 @@ def test_variables_are_told_as_the_file_spells_them() -> None:
 
 
 OTHERWISE: dict[type, Any] = {str: "other", bool: None, int: 77, float: 0.123456789, tuple: ()}
-KNOWN = {"source", "fingerprint", "number", "name", "lock", "low", "high", "members", "kind", "cell"}
+KNOWN = {
+    "source", "fingerprint", "number", "name", "lock", "low", "high", "members", "kind", "cell", "shown", "shows_nan",
+}  # fmt: skip
 """Fields that a difference is told by elsewhere (numbers, names), or that follow from others."""
 
 
@@ -85,7 +87,9 @@ CASES = [
     *(("modbus", field.name) for field in dataclasses.fields(cast("Any", plan().modbus))),
     *(("variables", field.name) for field in dataclasses.fields(plan().cell.variables[0])),
     *(("locks", field.name) for field in dataclasses.fields(plan().cell.locks[0])),
+    *(("writers", field.name) for field in dataclasses.fields(plan().cell.writers[0])),
     ("cell", "stale_after"),
+    ("cell", "adopt_for"),
     ("cell", "clear_on_connect"),
 ]
 
