@@ -237,9 +237,15 @@ def _pdo(pdo: ConcretePdo) -> PdoPlan:
         transmission=pdo.transmission,
         inhibit=_ticks(pdo.inhibit, 10_000),
         event=_ticks(pdo.event, 1000),
-        entries=tuple(
-            PdoEntry(one.variable, one.plan.index, one.plan.subindex, one.plan.type.bits)
-            for one in pdo.entries
+        entries=(
+            *(
+                PdoEntry(None, word.index, word.subindex, word.type.bits, word.quality_of)
+                for word in pdo.status
+            ),
+            *(
+                PdoEntry(one.variable, one.plan.index, one.plan.subindex, one.plan.type.bits)
+                for one in pdo.entries
+            ),
         ),
         sync_start=pdo.sync_start,
         name=pdo.name,

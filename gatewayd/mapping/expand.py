@@ -275,6 +275,7 @@ class _Builder:
             Candidate(
                 variable.index,
                 variable.part.name,
+                variable.name,
                 variable.member,
                 variable.direction,
                 variable.type,

@@ -220,7 +220,7 @@ def _text(plan: Plan, name: str, value: Any) -> str:
     """Any value of a link's plan; fields called `variable` or `...writer` are indices and told by name."""
     if value is None:
         return "none"
-    if name == "variable":
+    if name in ("variable", "quality_of"):
         return str(plan.cell.variables[value].name)
     if name.endswith("writer"):
         return str(plan.cell.writers[value].name)

@@ -1,8 +1,8 @@
 """Which values of a variable all of its places can show: the others are not good (quality OUT_OF_RANGE).
 
 A place shows a value that it encodes without saturating; rounding to its own resolution is what it is for. So an
-integer place ends half a step beyond its greatest number, where rounding begins to exceed that. A packed bit, a coil and
-`bool` show of every number whether it is 0.
+integer place ends half a step beyond its greatest number, where rounding begins to exceed that. A packed bit, a coil
+and `bool` show of every number whether it is 0.
 """
 
 from __future__ import annotations

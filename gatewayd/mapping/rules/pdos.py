@@ -10,7 +10,7 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.bus_load import FIRST_EVENT_TYPE, pdo_bits
 from gatewayd.mapping.can_expand import CanopenCell, ConcretePdo, MemberProblem, Misnamed
-from gatewayd.mapping.can_model import AUTO, NO_PDO
+from gatewayd.mapping.can_model import AUTO, NO_PDO, PdoSpec
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expand import ExpandedCell
 from gatewayd.mapping.pdo_layout import PDO_BITS, PDO_NUMBERS
@@ -40,8 +40,7 @@ def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """PDOs of the file beyond eight bytes."""
     for pdo in _pdos(cell):
         if pdo.bits > PDO_BITS:
-            over = next(entry for offset, entry in pdo.offsets if offset + entry.plan.type.bits > PDO_BITS)
-            name = cell.variables[over.variable].name
+            name = next(name for name, end in _contents(cell, pdo) if end > PDO_BITS)
             message = (
                 f"the PDO `{pdo.name}` has {pdo.bits} bits, a PDO carries {PDO_BITS}; `{name}` does not fit"
             )
@@ -76,8 +75,8 @@ def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "mixed-pdo",
     "a PDO with variables of both directions",
     """
-A PDO is sent by one node. What flows towards the robot comes in an RPDO, what comes from the robot leaves in
-a TPDO: two PDOs.
+A PDO is sent by one node. What flows towards the robot comes in an RPDO, what comes from the robot and the words
+of the status block leave in a TPDO: two PDOs.
 """,
 )
 def mixed_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -85,7 +84,8 @@ def mixed_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for pdo in _pdos(cell):
         other = next((entry for entry in pdo.entries if entry.direction is not pdo.direction), None)
         if other is not None:
-            first, name = (cell.variables[entry.variable].name for entry in (pdo.entries[0], other))
+            name = cell.variables[other.variable].name
+            first = pdo.status[0].name if pdo.status else cell.variables[pdo.entries[0].variable].name
             message = (
                 f"the PDO `{pdo.name}` carries `{first}` {_WORDS[pdo.direction]} "
                 f"and `{name}` {_WORDS[other.direction]}"
@@ -296,7 +296,7 @@ def variable_in_two_pdos(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     "empty-pdo",
     "a PDO that carries nothing",
     """
-The PDO names no variable, and no variable names it. It would take a COB-ID and send nothing.
+The PDO names no variable and no status word, and no variable names it. It would take a COB-ID and send nothing.
 """,
 )
 def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -306,9 +306,7 @@ def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     broken = {wrong.pdo for wrong in cell.canopen.misnamed}
     unresolved = {missing.part.name for missing in cell.unresolved}
     for name in cell.canopen.empty:
-        if name in broken or unresolved & {
-            member.name for member in cell.canopen.part.spec.pdos[name].variables
-        }:
+        if name in broken or unresolved & set(_named(cell.canopen.part.spec.pdos[name])):
             continue
         message = f"no variable is in the PDO `{name}`"
         hint = "name its `variables`, or remove it"
@@ -320,8 +318,9 @@ def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "unknown-pdo-variable",
     "a PDO that names a variable that does not exist",
     """
-`variables` of a PDO names variables of this file: a single one (`start`), a whole family (`recipe`), one of a
-family (`recipe[3]`) or some of it (`recipe[0..7]`; inside a list in brackets it needs quotes).
+`variables` of a PDO names variables of this file, and so does `quality of` in its `status`: a single one
+(`start`), a whole family (`recipe`), one of a family (`recipe[3]`) or some of it (`recipe[0..7]`; inside a list in
+brackets it needs quotes).
 """,
 )
 def unknown_pdo_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -500,6 +499,20 @@ def _pdos(cell: ExpandedCell) -> Iterator[ConcretePdo]:
     """The PDOs of the file; those of the automatic layout have none of these mistakes."""
     if cell.canopen is not None:
         yield from (pdo for pdo in cell.canopen.pdos if pdo.name)
+
+
+def _contents(cell: ExpandedCell, pdo: ConcretePdo) -> Iterator[tuple[str, int]]:
+    """The name of everything in a PDO, and the bit after it."""
+    for offset, word in pdo.status_offsets:
+        yield word.name, offset + word.type.bits
+    for offset, entry in pdo.offsets:
+        yield cell.variables[entry.variable].name, offset + entry.plan.type.bits
+
+
+def _named(pdo: PdoSpec) -> Iterator[str]:
+    """The lines that a PDO names."""
+    yield from (member.name for member in pdo.variables)
+    yield from (member.variables.name for member in pdo.status if member.variables is not None)
 
 
 def _once(cell: ExpandedCell, *problems: MemberProblem) -> Iterator[Misnamed]:
