@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Callable
 from enum import Enum
-from functools import partial
 from ipaddress import IPv4Network, IPv6Network
 from typing import Any, Final
 
@@ -59,7 +58,7 @@ def compile_plan(cell: ExpandedCell) -> Plan:
     definition = CellDefinition(
         name=document.cell,
         fingerprint=0,
-        variables=tuple(map(partial(_variable, robot), cell.variables, shown_of(cell))),
+        variables=tuple(map(_variable, cell.variables, shown_of(cell))),
         locks=tuple(
             Lock(
                 lock.name,
@@ -95,7 +94,7 @@ def package_period(robot: Robot) -> float:
     return max(int(base / robot.frequency), 1) / base
 
 
-def _variable(robot: Robot, variable: ConcreteVariable, shown: Shown) -> Variable:
+def _variable(variable: ConcreteVariable, shown: Shown) -> Variable:
     spec, kind = variable.spec, variable.kind
     is_input = variable.direction is Direction.INPUT
     return Variable(
@@ -117,14 +116,8 @@ def _variable(robot: Robot, variable: ConcreteVariable, shown: Shown) -> Variabl
         comment=spec.comment,
         shown=shown.bounds,
         shows_nan=shown.nan,
-        valid_running=_is_valid_running(robot, variable),
+        valid_running=variable.valid_running,
     )
-
-
-def _is_valid_running(robot: Robot, variable: ConcreteVariable) -> bool:
-    """Whether it is good only while the robot program runs."""
-    of_program = robot.valid is not None and variable.is_program_output
-    return variable.direction is Direction.OUTPUT and (of_program or variable.spec.valid is not None)
 
 
 def _writer(name: str, spec: WriterSpec) -> Writer:
@@ -150,7 +143,7 @@ def _robot(cell: ExpandedCell, robot: Robot, writers: dict[str, int]) -> RobotPl
         host=robot.host,
         port=robot.port,
         frequency=robot.frequency,
-        outputs=tuple(name for name in _subscribed(cell, robot) if name != _TIMESTAMP),
+        outputs=tuple(name for name in _subscribed(cell) if name != _TIMESTAMP),
         inputs=_fields(cell, Direction.INPUT),
         verify=robot.verify,
         watchdog=None
@@ -163,10 +156,10 @@ def _robot(cell: ExpandedCell, robot: Robot, writers: dict[str, int]) -> RobotPl
     )
 
 
-def _subscribed(cell: ExpandedCell, robot: Robot) -> tuple[str, ...]:
+def _subscribed(cell: ExpandedCell) -> tuple[str, ...]:
     """Fields of outputs, and what says whether the program runs where the quality of one hangs on it."""
     fields = _fields(cell, Direction.OUTPUT)
-    if not any(_is_valid_running(robot, variable) for variable in cell.variables):
+    if not any(variable.valid_running for variable in cell.variables):
         return fields
     return tuple(dict.fromkeys((*fields, PROGRAM_STATE)))
 

@@ -32,6 +32,7 @@ __all__ = [
     "ReferenceProblem",
     "Unresolved",
     "expand",
+    "is_program_output",
 ]
 
 SHARED_LEASE: Final = 5.0
@@ -106,6 +107,8 @@ class ConcreteVariable:
     """Index within the family of its line (`recipe[3]`: 3); None for a single variable."""
     lock: int | None
     """Index into `ExpandedCell.locks`; None for outputs and where the group does not exist."""
+    valid_running: bool
+    """Whether it is good only while the robot program runs."""
 
     @property
     def spec(self) -> VariableSpec:
@@ -121,11 +124,6 @@ class ConcreteVariable:
     def high(self) -> int | None:
         """Greatest value of the robot's type; None for bits and reals."""
         return _RANGES[self.type][1] if self.kind is ValueKind.INT else None
-
-    @property
-    def is_program_output(self) -> bool:
-        """Whether it is an output register, which only the robot program writes."""
-        return self.field.name.startswith("output_")
 
     @property
     def position(self) -> Position:
@@ -220,6 +218,11 @@ class ExpandedCell:
         )
 
 
+def is_program_output(field: Field) -> bool:
+    """Whether it is an output register, which only the robot program writes."""
+    return field.name.startswith("output_")
+
+
 def expand(document: Document) -> ExpandedCell:
     """Expand the variables of a document. Never raises, whatever valid parts it holds.
 
@@ -304,9 +307,15 @@ class _Builder:
             target.element,
             member,
             lock,
+            direction is Direction.OUTPUT and self._is_valid_running(part, target),
         )
         self.variables.append(variable)
         return variable
+
+    def _is_valid_running(self, part: Part[VariableSpec], target: Target) -> bool:
+        robot = self.document.robot
+        of_all = robot is not None and robot.spec.valid is not None and is_program_output(target.field)
+        return of_all or part.spec.valid is not None
 
     def _lock_index(self, part: Part[VariableSpec], index: int) -> int | None:
         group = part.spec.group

@@ -10,6 +10,7 @@ from gatewayd.mapping.rules import (
     bounds,
     can_bus,
     canopen,
+    companions,
     conversion,
     failsafe,
     listener,
@@ -18,6 +19,8 @@ from gatewayd.mapping.rules import (
     pdos,
     places,
     rtde,
+    sharing,
+    supervision,
 )
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
@@ -28,12 +31,15 @@ FAMILY_MODULES = (
     places,
     listener,
     rtde,
+    companions,
     canopen,
     pdos,
     pdo_company,
     can_bus,
     ownership,
+    sharing,
     failsafe,
+    supervision,
     conversion,
 )
 """The modules whose rules are applied."""
