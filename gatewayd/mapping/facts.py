@@ -217,9 +217,9 @@ def _fallback(fallback: Fallback) -> str:
 
 
 def _text(plan: Plan, name: str, value: Any) -> str:
-    """Any value of a link's plan; fields called `variable` or `...writer` are indices and told by name."""
+    """Any value of a link's plan; fields called `variable`, `quality_of` or `...writer` are indices and told by name."""
     if value is None:
-        return "none"
+        return "" if name == "quality_of" else "none"
     if name in ("variable", "quality_of"):
         return str(plan.cell.variables[value].name)
     if name.endswith("writer"):

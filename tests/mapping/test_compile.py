@@ -412,3 +412,23 @@ def test_what_follows_from_places_is_no_meaning_of_its_own() -> None:
     plan = compiled()
     assert plan.cell.variables[1].shown == pytest.approx((-3276.85, 3276.75))
     assert plan.cell.fingerprint == FINGERPRINT
+
+
+def test_status_words_are_entries_of_a_tpdo() -> None:
+    """Objects without a variable of their own; a quality names the variable that it is of."""
+    section = (
+        "canopen: {channel: can0, bitrate: 500000, node: 16, "
+        "pdos: {state: {status: [lag, quality of clock], variables: lamps}}}\nwriters:\n"
+    )
+    plan = keyed(("writers:\n", section))
+    assert plan.canopen is not None
+    (pdo,) = plan.canopen.pdos
+    assert pdo.direction is Direction.OUTPUT
+    assert pdo.entries == (
+        PdoEntry(None, 0x5F00, 30, 32),
+        PdoEntry(None, 0x5F40, 4, 16, quality_of=3),
+        PdoEntry(6, 0x2400, 1, 1),
+        PdoEntry(7, 0x2400, 2, 1),
+    )
+    assert [entry.is_status for entry in pdo.entries] == [True, True, False, False]
+    assert not PdoEntry(None, 0x0005, 0, 8).is_status
