@@ -126,8 +126,8 @@ class PdoSpec(Section):
     )
     status: StatusMembers = Field(
         default=(),
-        description="words of the status block before the variables, for PDOs from the robot: flags, robot_state, "
-        "'quality of force'",
+        description="words of the status block, before the variables, in a PDO from the robot: names of its fields "
+        "(flags, robot_state), 'quality of force'",
     )
     variables: Members = Field(
         default=(),
