@@ -819,7 +819,7 @@ def test_read_backs_make_the_list_too_long() -> None:
     )
     found = load((head + lines).encode(), "cell.yaml").diagnostics
     (long,) = [one for one in found if one.rule.id == "GW308"]
-    assert long.hint == "write `verify: false` to read inputs only when connecting, or leave fields out"
+    assert long.hint == "write `verify: false` if no input needs to be, or leave fields out"
     quiet = head.replace("series: cb3}", "series: cb3, verify: false}")
     assert "GW308" not in [rule for rule, _ in findings(lines, quiet)]
 

@@ -306,10 +306,11 @@ def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "long-recipe",
     "more field names than an old controller takes in one request",
     """
-Controllers before software 5.17 take at most 2048 bytes of field names in one request, and all outputs travel in one
-recipe; with `verify: true` the read-back of every input travels with them. Where the outputs alone fit, write
-`verify: false`: the inputs are then read once when connecting, in pieces, and what was written is not compared
-afterwards. Otherwise leave fields out.
+Controllers before software 5.17 take at most 2048 bytes of field names in one request, and everything that is read
+all the time travels in one recipe: the outputs first, then with `verify: true` the read-backs of as many inputs as
+have room. An input without room is read in pieces when connecting, and what is written is not compared with it
+afterwards (which is what `verify: false` does with all of them). An output without room has no value. Leave fields
+out.
 """,
     Severity.WARNING,
 )
@@ -327,13 +328,13 @@ def long_recipe(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     names = list(dict.fromkeys((*outputs, *read_back))) if robot.spec.verify else outputs
     if _length(names) <= _SHORT_LISTS:
         return
-    message = (
-        f"the names of the {len(names)} fields in the recipe take {_length(names)} bytes, "
-        f"this controller takes {_SHORT_LISTS}"
-    )
-    hint = "leave fields out"
-    if _length(outputs) <= _SHORT_LISTS:
-        hint = "write `verify: false` to read inputs only when connecting, or leave fields out"
+    message = f"the names of {len(names)} fields take {_length(names)} bytes, this controller takes {_SHORT_LISTS}: "
+    if _length(outputs) > _SHORT_LISTS:
+        message += "outputs that have no room have no value"
+        hint = "leave fields out"
+    else:
+        message += "inputs that have no room are not compared with what was written"
+        hint = "write `verify: false` if no input needs to be, or leave fields out"
     yield rule.at(cell.document.key_at("variables"), message, hint=hint)
 
 
