@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Callable, Iterator
 
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
 from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
+from gatewayd.rtde.companions import Companions, companions
 
 __all__: list[str] = []
-
-_EVERY_BIT: Final = -1
-_MASKS: Final = {
-    "speed_slider_fraction": ("speed_slider_mask", 0),
-    "standard_digital_output": ("standard_digital_output_mask", _EVERY_BIT),
-    "configurable_digital_output": ("configurable_digital_output_mask", _EVERY_BIT),
-    "tool_digital_output": ("tool_digital_output_mask", _EVERY_BIT),
-    "standard_analog_output_0": ("standard_analog_output_mask", 0),
-    "standard_analog_output_1": ("standard_analog_output_mask", 1),
-}
-"""Field -> the mask that it acts through, and its bit there."""
-_DOMAINS: Final = {
-    "standard_analog_output_0": ("standard_analog_output_type", 0),
-    "standard_analog_output_1": ("standard_analog_output_type", 1),
-}
-"""Field -> what says in which domain it is meant, and its bit there."""
 
 
 @cell_rule(
@@ -40,7 +24,7 @@ at 0. Without the mask the value is written and nothing happens. Map the mask as
 )
 def missing_mask(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Masked inputs whose mask is not mapped."""
-    for variable, mask, _ in _without(cell, _MASKS):
+    for variable, mask, _ in _without(cell, _mask):
         if mask not in _mapped(cell):
             message = f"`{variable.name}` ({variable.target}) has no effect without `{mask}`"
             yield rule.at(variable.at("robot"), message, hint=f"map `{mask}` as a variable too")
@@ -58,7 +42,7 @@ not the one of this output, so its value is written and nothing happens. Map tha
 )
 def missing_mask_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Masked inputs whose mask is mapped in other bits only."""
-    for variable, mask, bit in _without(cell, _MASKS):
+    for variable, mask, bit in _without(cell, _mask):
         if mask in _mapped(cell):
             message = f"`{variable.name}` ({variable.target}) has no effect without bit {bit} of `{mask}`"
             yield rule.at(variable.at("robot"), message, hint=f"map `{mask}.{bit}` as a variable too")
@@ -78,13 +62,21 @@ the domain as its `on_release` (`true` for volts), so that the fallback has it t
 )
 def missing_domain(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Analog outputs whose domain is not mapped."""
-    for variable, domain, bit in _without(cell, _DOMAINS):
+    for variable, domain, bit in _without(cell, _domain):
         message = f"`{variable.name}` ({variable.target}) acts as a current or a voltage without saying which"
         yield rule.at(variable.at("robot"), message, hint=f"map `{domain}.{bit}` as a variable too")
 
 
+def _mask(needs: Companions) -> str | None:
+    return needs.mask
+
+
+def _domain(needs: Companions) -> str | None:
+    return needs.type
+
+
 def _without(
-    cell: ExpandedCell, companions: dict[str, tuple[str, int]]
+    cell: ExpandedCell, companion_of: Callable[[Companions], str | None]
 ) -> Iterator[tuple[ConcreteVariable, str, int]]:
     """The first input of each line whose companion is not mapped in its bit; with the companion and that bit.
 
@@ -97,11 +89,12 @@ def _without(
         return
     seen: set[tuple[str, str]] = set()
     for variable in cell.variables:
-        companion, bit = companions.get(variable.field.name, ("", 0))
+        needs = companions(variable.field.name)
+        companion = companion_of(needs) if needs is not None else None
         key = variable.part.name, variable.field.name
-        if not companion or companion in broken or key in seen:
+        if needs is None or companion is None or companion in broken or key in seen:
             continue
-        wanted = variable.bit if bit == _EVERY_BIT else bit
+        wanted = variable.bit if needs.bit is None else needs.bit
         bits = mapped.get(companion, set())
         if None in bits or (bits if wanted is None else wanted in bits):
             continue
