@@ -13,7 +13,7 @@ from gatewayd.mapping.plan import Network
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.wording import did_you_mean, seconds
 
-__all__ = ["endless_locks", "unsupervised_requirements"]
+__all__ = ["endless_locks"]
 
 _LEAST_LEASE = 0.1
 _RESERVED = (ANY, "free", "gateway", "operator", "robot", "undeclared")
@@ -387,35 +387,6 @@ def endless_locks(cell: ExpandedCell) -> Iterator[tuple[ConcreteLock, str]]:
         silent = [name for name in lock.owners if not cell.document.writers[name].spec.is_supervised]
         if len(lock.owners) > 1 and lock.lease is None and silent:
             yield lock, silent[0]
-
-
-@cell_rule(
-    "GW515",
-    "unsupervised-watchdog",
-    "a watchdog that requires a writer without a timeout",
-    """
-The watchdog is fed while the required writers are alive. A writer without `timeout` counts as alive as
-long as its connection is open, even if its program stands still, so the robot program would not stop.
-""",
-    Severity.WARNING,
-)
-def unsupervised_watchdog(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Required writers without `timeout`."""
-    for position, name in unsupervised_requirements(cell):
-        message = f"the watchdog requires `{name}`, which has no timeout"
-        related = (Related(cell.document.writers[name].key, f"`{name}` is here"),)
-        yield rule.at(position, message, hint=f"add `timeout: 1s` to `{name}`", related=related)
-
-
-def unsupervised_requirements(cell: ExpandedCell) -> Iterator[tuple[Position, str]]:
-    """Writers that the watchdog requires and nobody supervises, with the place that names them."""
-    robot = cell.document.robot
-    if robot is None or robot.spec.watchdog is None:
-        return
-    for index, name in enumerate(robot.spec.watchdog.requires or ()):
-        writer = cell.document.writers.get(name)
-        if writer is not None and not writer.spec.is_supervised:
-            yield robot.at("watchdog", "requires", index), name
 
 
 @cell_rule(

@@ -1,18 +1,47 @@
-"""Rules GW521 and GW522: who notices that a writer hangs, and keys that nothing lets act."""
+"""Rules GW515, GW521, GW522 and GW613: who notices that a writer hangs, and keys that nothing lets act."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from gatewayd.core.definition import Direction
-from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
+from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expand import ExpandedCell, is_program_output
 from gatewayd.mapping.rules.failsafe import silent_motion
-from gatewayd.mapping.rules.ownership import endless_locks, unsupervised_requirements
+from gatewayd.mapping.rules.ownership import endless_locks
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.wording import names_and_more
 
 __all__: list[str] = []
+
+
+@cell_rule(
+    "GW515",
+    "unsupervised-watchdog",
+    "a watchdog that requires a writer without a timeout",
+    """
+The watchdog is fed while the required writers are alive. A writer without `timeout` counts as alive as
+long as its connection is open, even if its program stands still, so the robot program would not stop.
+""",
+    Severity.WARNING,
+)
+def unsupervised_watchdog(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Required writers without `timeout`."""
+    for position, name in _unsupervised_requirements(cell):
+        message = f"the watchdog requires `{name}`, which has no timeout"
+        related = (Related(cell.document.writers[name].key, f"`{name}` is here"),)
+        yield rule.at(position, message, hint=f"add `timeout: 1s` to `{name}`", related=related)
+
+
+def _unsupervised_requirements(cell: ExpandedCell) -> Iterator[tuple[Position, str]]:
+    """Writers that the watchdog requires and nobody supervises, with the place that names them."""
+    robot = cell.document.robot
+    if robot is None or robot.spec.watchdog is None:
+        return
+    for index, name in enumerate(robot.spec.watchdog.requires or ()):
+        writer = cell.document.writers.get(name)
+        if writer is not None and not writer.spec.is_supervised:
+            yield robot.at("watchdog", "requires", index), name
 
 
 @cell_rule(
@@ -31,7 +60,7 @@ def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers without supervision, unless another rule has told already what that leads to."""
     reported = {name for _, name in silent_motion(cell)}
     reported |= {name for _, name in endless_locks(cell)}
-    reported |= {name for _, name in unsupervised_requirements(cell)}
+    reported |= {name for _, name in _unsupervised_requirements(cell)}
     for writer in cell.document.writers.values():
         if writer.spec.is_supervised or writer.name in reported:
             continue
