@@ -36,6 +36,7 @@ LAYERS: dict[str, set[str]] = {
         "core.status",
         "mapping",
         "rtde.catalogue",
+        "rtde.companions",
         "rtde.types",
     },
     "modbus": {"clock", "core", "logs", "mapping.codec", "mapping.plan", "modbus"},

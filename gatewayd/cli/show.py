@@ -148,8 +148,16 @@ def _notes(loaded: Loaded, plan: Plan, *, shortened: bool) -> list[str]:
         peers = ", ".join(known)
         silence = writer.timeout if writer.timeout is not None else spec.heartbeat
         watch = "no timeout" if silence is None else f"lost after {silence:.6g}s of silence"
+        watch += " (only writes count)" if writer.counts_writes else ""
+        watch += f", keeps what it owns for {writer.grace:.6g}s without a connection" if writer.grace else ""
         notes.append(f"writer {writer.name}: {peers}, {watch}")
     notes.append("-> towards the robot, <- from the robot; addresses from 0; bit 0 is the least significant")
+    if plan.cell.locks and plan.cell.adopt_for is not None and not plan.cell.clear_on_connect:
+        notes.append(
+            f"what the controller holds at the start falls back after {plan.cell.adopt_for:.6g}s without an owner"
+        )
+    if any(variable.valid_running for variable in plan.cell.variables):
+        notes.append("running: not good while the robot program does not run")
     if plan.modbus is not None:
         notes.append("status of the gateway: holding and input registers from 60000 (460001, 360001)")
     if plan.canopen is not None:
@@ -164,7 +172,7 @@ def _table(entries: list[tuple[Row, Row]], *, wide: bool) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    from gatewayd.mapping.table import formula, limits, policy
+    from gatewayd.mapping.table import formula, limits, lost, policy
 
     table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False)
     for title, whole in _COLUMNS.items():
@@ -199,7 +207,7 @@ def _table(entries: list[tuple[Row, Row]], *, wide: bool) -> Table:
             Text(type_name),
             Text(", ".join(filter(None, (formula(first), limits(first))))),
             Text(policy(first)),
-            Text(first.on_release or first.on_stale),
+            Text(lost(first)),
         )
         table.add_row(*texts)
     return table

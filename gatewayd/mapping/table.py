@@ -25,6 +25,7 @@ __all__ = [
     "by_line",
     "formula",
     "limits",
+    "lost",
     "policy",
     "rows",
 ]
@@ -83,6 +84,10 @@ class Row:
     """COB-ID of the PDO, `0x190`."""
     pdo_bit: int | None = None
     """Where it begins in the PDO, 0 the least significant bit of the first byte."""
+    whole: bool = False
+    """Whether its group is taken over only by writing all of it."""
+    valid: str = ""
+    """`running`: good only while the robot program runs; empty: always."""
 
 
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
@@ -169,6 +174,8 @@ def _row(
         on_release=_fallback(spec.on_release) if is_input else "",
         on_stale="" if is_input else _fallback(spec.on_stale),
         comment=spec.comment,
+        whole=lock is not None and lock.whole,
+        valid="running" if variable.valid_running else "",
         **canopen,
     )
 
@@ -279,7 +286,7 @@ def _markdown(row: Row) -> tuple[str, ...]:
         formula(row),
         limits(row),
         policy(row),
-        row.on_release or row.on_stale,
+        lost(row),
         row.comment,
     )
 
@@ -302,10 +309,15 @@ def limits(row: Row) -> str:
 
 
 def policy(row: Row) -> str:
-    """Who may own it and for how long: `plc > hmi, 5s`; with the group that it is owned with."""
+    """Who may own it and for how long: `plc > hmi, 5s`; with the group that it is owned with, `(motion, whole)`."""
     lease = "" if row.lease is None else f", {row.lease:.6g}s"
-    group = f" ({row.group})" if row.group else ""
+    group = f" ({row.group}{', whole' if row.whole else ''})" if row.group else ""
     return f"{row.owner}{lease}{group}"
+
+
+def lost(row: Row) -> str:
+    """What is seen when a side is lost: `clear`; `clear, running` where that is so without a running program too."""
+    return (row.on_release or row.on_stale) + (f", {row.valid}" if row.valid else "")
 
 
 def _plain(value: object) -> object:

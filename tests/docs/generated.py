@@ -106,6 +106,8 @@ def _types(schema: Mapping[str, Any]) -> Iterator[str]:
     if "anyOf" in schema:
         for choice in schema["anyOf"]:
             yield from _types(choice)
+    elif len(schema.get("enum", ())) > _MANY_WORDS:
+        yield "text"
     elif "enum" in schema or "const" in schema:
         yield from (f"`{word}`" for word in schema.get("enum", [schema.get("const")]))
     elif _DURATION.search(schema.get("pattern", "")):
@@ -118,6 +120,8 @@ def _types(schema: Mapping[str, Any]) -> Iterator[str]:
         yield _TYPES[schema.get("type", "object")] + _range(schema)
 
 
+_MANY_WORDS = 16
+"""Choices that a cell of a table can hold; the meaning says where more are listed."""
 _TYPES = {
     "array": "list",
     "boolean": "`true`, `false`",
