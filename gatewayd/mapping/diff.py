@@ -15,6 +15,7 @@ from enum import Enum
 from gatewayd.mapping import facts
 from gatewayd.mapping.facts import Facts
 from gatewayd.mapping.plan import Plan
+from gatewayd.mapping.weakening import weakened
 
 __all__ = [
     "MOST_GONE",
@@ -164,10 +165,15 @@ def _details(old: Facts, new: Facts) -> Iterator[Detail]:
 def objections(changes: Changes, owned: Collection[str]) -> tuple[str, ...]:
     """Why the new mapping must not replace the running one unasked; `owned`: variables that are owned at this moment.
 
-    A machine may be moving by what it owns, a direction that turns round makes a reader a writer, and a file that lost
-    many variables is most often the wrong one.
+    A machine may be moving by what it owns, a direction that turns round makes a reader a writer, a promise that is
+    weakened is one that others rely on, and a file that lost many variables is most often the wrong one.
     """
-    found = [*_touches_owned(changes, owned), *_turns_round(changes), *_cuts_owners_off(changes, owned)]
+    found = [
+        *_touches_owned(changes, owned),
+        *_turns_round(changes),
+        *_cuts_owners_off(changes, owned),
+        *weakened(changes.old.cell, changes.new.cell),
+    ]
     gone, before = len(changes.of(Kind.REMOVED)), len(changes.old.cell.variables)
     if gone > MOST_GONE * before:
         found.append(f"{gone} of {before} variables would be gone: is it the right file?")
