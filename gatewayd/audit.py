@@ -21,6 +21,7 @@ from gatewayd.core.cell import Cell, Written
 from gatewayd.core.definition import Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.happening import ACCEPTED, Happening
+from gatewayd.printable import json_text
 
 __all__ = ["CAPACITY", "KINDS", "MERGED", "Audit", "Record", "plain_value", "utc"]
 
@@ -135,7 +136,8 @@ class Audit:
         self._records.append(record)
         self.count += 1
         if self._sink is not None:
-            self._sink(json.dumps(record.as_json(), ensure_ascii=False, separators=(",", ":")))
+            text = json.dumps(record.as_json(), ensure_ascii=False, separators=(",", ":"))
+            self._sink(json_text(text))
 
     def wall(self, ago: float = 0.0) -> float:
         """The wall clock so many seconds ago."""

@@ -12,6 +12,7 @@ from gatewayd.core.definition import CellDefinition, Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
 from gatewayd.figures import value
+from gatewayd.printable import printable
 
 __all__ = ["ACCEPTED", "BAD", "GATEWAY", "STRANGER", "UNDECLARED", "Happening", "limits_of", "stranger"]
 
@@ -124,7 +125,11 @@ class Happening:
         """Who did what, with value and unit, why, who stood in the way and how often. `refused` may say how.
 
         An event whose variable, lock or writer a reload has removed is told by its kind; the detail has the names.
+        What came from outside is escaped, as everything that people read.
         """
+        return printable(self._sentence(refused))
+
+    def _sentence(self, refused: str) -> str:
         text = self._refusal(refused) if self.what == _REFUSED else self._told()
         if self.what not in _ASIDE:
             return f"{text}: {self.detail}" if self.detail else text

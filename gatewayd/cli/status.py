@@ -8,7 +8,15 @@ from typing import Any
 
 import click
 
-from gatewayd.cli.remote import cell_option, connect, json_option, refusals, socket_option
+from gatewayd.cli.remote import (
+    cell_option,
+    connect,
+    echo_json,
+    json_option,
+    readable,
+    refusals,
+    socket_option,
+)
 
 __all__ = ["DEGRADED", "command"]
 
@@ -51,11 +59,9 @@ def command(context: click.Context, socket: Path | None, cell: str | None, *, as
             events = client.get("/v1/events", limit=_EVENTS * max(1, len(answer["cells"])))["events"]
         locks = client.get("/v1/locks", cell=cell)["locks"]
     if as_json:
-        import json
-
-        click.echo(json.dumps(answer, indent=2, ensure_ascii=False))
+        echo_json(answer)
     else:
-        for line in _lines(answer, locks, events):
+        for line in _lines(*readable([answer, locks, events])):
             click.echo(line)
     context.exit(0 if answer["healthy"] else DEGRADED)
 

@@ -19,9 +19,11 @@ from gatewayd.cli.remote import (
     cell_option,
     complete_variables,
     connect,
+    readable,
     refusals,
     socket_option,
 )
+from gatewayd.printable import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -93,11 +95,9 @@ def _look(client: Client, cell: str | None) -> Glimpse:
     status = client.get("/v1/status")
     if cell is not None:
         status["cells"] = [one for one in status["cells"] if one["name"] == cell]
-    return Glimpse(
-        status,
-        client.get("/v1/variables", cell=cell)["variables"],
-        client.get("/v1/events", cell=cell, limit=_EVENTS)["events"],
-    )
+    variables = client.get("/v1/variables", cell=cell)["variables"]
+    events = client.get("/v1/events", cell=cell, limit=_EVENTS)["events"]
+    return Glimpse(*readable([status, variables, events]))
 
 
 def _lines(client: Client, cell: str | None, first: Glimpse, view: View, interval: float) -> None:
@@ -135,7 +135,7 @@ def _live(console: Console, look: Callable[[], Glimpse], first: Glimpse, view: V
                 try:
                     glimpse, before = look(), glimpse
                 except (NoDaemon, ControlError) as error:
-                    glimpse, before = replace(glimpse, lost=str(error)), None
+                    glimpse, before = replace(glimpse, lost=printable(str(error))), None
 
 
 def keys(descriptor: int, patience: float) -> Iterator[str]:

@@ -20,6 +20,7 @@ from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
 from gatewayd.control.views import Json
 from gatewayd.logs import fields
+from gatewayd.printable import json_text
 
 __all__ = ["ALIVE_PERIOD", "FOLLOWERS", "GREATEST_BODY", "application", "serving"]
 
@@ -177,7 +178,7 @@ def _moment() -> Moment:
 
 
 def _line(event: Json) -> str:
-    return json.dumps(event, ensure_ascii=False, separators=(",", ":")) + "\n"
+    return json_text(json.dumps(event, ensure_ascii=False, separators=(",", ":"))) + "\n"
 
 
 def _json(value: Json, status: int = 200) -> web.Response:

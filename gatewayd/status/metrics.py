@@ -22,6 +22,7 @@ from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
+from gatewayd.printable import printable
 from gatewayd.station import Station
 from gatewayd.status.health import readiness
 from gatewayd.status.histogram import Histogram
@@ -308,7 +309,7 @@ def _family(info: MetricInfo, samples: Iterable[_Sample] = ()) -> Metric:
     make = CounterMetricFamily if info.kind is Kind.COUNTER else GaugeMetricFamily
     family = make(info.name, info.meaning, labels=info.labels)
     for labels, value in samples:
-        family.add_metric(labels, value)
+        family.add_metric(list(map(printable, labels)), value)
     return family
 
 
