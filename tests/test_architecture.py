@@ -68,6 +68,7 @@ LAYERS: dict[str, set[str]] = {
     "service": {"core", "liveness", "logs", "sentence", "systemd"},
     "compilation": {"gatewayd", "mapping.compiled"},
     "printable": set(),
+    "signals": set(),
     "reload": {
         "clock",
         "compilation",
@@ -132,6 +133,7 @@ LAYERS: dict[str, set[str]] = {
         "reload",
         "rtde",
         "service",
+        "signals",
         "simulator",
         "startup",
         "status.launch",
@@ -147,7 +149,7 @@ LAYERS: dict[str, set[str]] = {
         "mapping",
         "printable",
     },
-    "__main__": {"cli"},
+    "__main__": {"cli", "printable", "signals"},
 }
 """Module or package -> what it and everything in it may import; the longest name that fits decides."""
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import select
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,6 @@ import click
 
 from gatewayd.cli.remote import (
     DURATION,
-    UNREACHABLE,
     cell_option,
     complete_variables,
     connect,
@@ -83,10 +83,13 @@ def command(
     view = View(filter=text)
     with refusals():
         first = _look(client, cell)
-    if once or not console.is_terminal or console.is_dumb_terminal or not sys.stdin.isatty():
-        _lines(client, cell, first, view, interval=0.0 if once else interval)
-        context.exit(0 if once else UNREACHABLE)
-    _live(console, lambda: _look(client, cell), first, view, interval)
+    # Ctrl-C is a way to end it, not to break it off; whatever else ends it leaves the terminal as it was.
+    with suppress(KeyboardInterrupt), _ending_on_signals():
+        if once or not console.is_terminal or console.is_dumb_terminal or not sys.stdin.isatty():
+            _lines(client, cell, first, view, interval=0.0 if once else interval)
+        else:
+            _live(console, lambda: _look(client, cell), first, view, interval)
+    context.exit(0)
 
 
 def _look(client: Client, cell: str | None) -> Glimpse:
@@ -168,3 +171,18 @@ def _raw(descriptor: int) -> Iterator[None]:
         yield
     finally:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, former)
+
+
+@contextmanager
+def _ending_on_signals() -> Iterator[None]:
+    """SIGTERM and SIGHUP end what is inside as Ctrl-C does."""
+
+    def interrupt(_number: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    former = {number: signal.signal(number, interrupt) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)

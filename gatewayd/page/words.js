@@ -37,11 +37,13 @@ export function count(number, noun) {
 
 // What Unicode shows as nothing, or what turns the line round: written out, as gatewayd/printable.py does it elsewhere.
 const HIDDEN = /[\p{C}\p{Zl}\p{Zp}\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0\u{e0100}-\u{e01ef}]/gu;
+const NAMED = { "\t": "\\t", "\n": "\\n", "\r": "\\r" };
 const MAX_LENGTH = 4000;
 
 export function printable(text) {
   const shown = text.length > MAX_LENGTH ? `${text.slice(0, MAX_LENGTH)}... (${text.length} characters)` : text;
   return shown.replace(HIDDEN, (found) => {
+    if (found in NAMED) return NAMED[found];
     const code = found.codePointAt(0), digits = code.toString(16);
     return code < 256 ? `\\x${digits.padStart(2, "0")}` : code < 65536 ? `\\u${digits.padStart(4, "0")}` : `\\U${digits.padStart(8, "0")}`;
   });
