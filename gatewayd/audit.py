@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell, Written
 from gatewayd.core.definition import Value
 from gatewayd.core.events import Event, EventKind
@@ -126,7 +127,7 @@ class Audit:
         try:
             while True:
                 self.follow(cells())
-                self.tick(time.monotonic())
+                self.tick(clock.now())
                 await asyncio.sleep(_PERIOD)
         finally:
             self.follow(())

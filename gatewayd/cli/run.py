@@ -234,7 +234,8 @@ async def _serve(
 ) -> None:
     import asyncio
 
-    from gatewayd.operation import Operation
+    from gatewayd import clock
+    from gatewayd.operation import Operation, Standstill
     from gatewayd.reload import Reloader
     from gatewayd.service import Service
     from gatewayd.status.launch import serve
@@ -248,8 +249,15 @@ async def _serve(
     SIGNALS.follow(asyncio.get_running_loop(), _Obedience(stop, reloader.ask))
     if stop.is_set():
         return
+    standstill = Standstill()
+    clock.on_gap(standstill.gap)
     operation = Operation(
-        daemon, control, audit, lambda: service.notes, lambda force: reloader.reload(force=force)
+        daemon,
+        control,
+        audit,
+        lambda: service.notes,
+        lambda force: reloader.reload(force=force),
+        stood_still=standstill.seconds,
     )
     operating = asyncio.create_task(operation.run())
     reporting = asyncio.create_task(service.run(stop))

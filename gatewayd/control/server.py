@@ -16,6 +16,7 @@ from typing import Any
 
 from aiohttp import web
 
+from gatewayd import clock
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
 from gatewayd.control.views import Json
@@ -117,18 +118,23 @@ class _Routes:
 
     def act(self, act: _Act) -> _Handler:
         async def handle(request: web.Request) -> web.StreamResponse:
+            self._api.refuse_what_waited()
             body, who = await _body(request), await _who(request)
+            self._api.refuse_what_waited()
             return _json(act(request.match_info["name"], body, who, _moment()))
 
         return handle
 
     async def reload(self, request: web.Request) -> web.StreamResponse:
+        self._api.refuse_what_waited()
         force = (await _body(request)).get("force", False)
         if not isinstance(force, bool):
             raise ApiError(400, "bad_request", "`force` must be true or false")
         if self._reload is None:
             raise ApiError(501, "no_reload", "this gateway cannot reload: restart it")
-        log.info("reload asked for", extra=fields(detail=await _who(request), force=force))
+        who = await _who(request)
+        self._api.refuse_what_waited()
+        log.info("reload asked for", extra=fields(detail=who, force=force))
         result = await self._reload(force)
         return _json(dict(result.as_object()), 409 if result.exit_code else 200)
 
@@ -153,12 +159,12 @@ class _Routes:
             headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"}
         )
         await response.prepare(request)
-        told = time.monotonic()
+        told = clock.now()
         # A follower that is gone, or that leaves too much unread, is told nothing more.
         with suppress(ConnectionError, TimeoutError):
             while True:
-                if found or time.monotonic() - told >= ALIVE_PERIOD:
-                    told = time.monotonic()
+                if found or clock.now() - told >= ALIVE_PERIOD:
+                    told = clock.now()
                     async with asyncio.timeout(_WRITE_TIME):
                         await response.write("".join(map(_line, found)).encode() or b"\n")
                 await asyncio.sleep(_FOLLOW_PERIOD)
@@ -174,7 +180,7 @@ _HTTP_ERRORS = {
 
 
 def _moment() -> Moment:
-    return Moment(time.monotonic(), time.time())
+    return Moment(clock.now(), time.time())
 
 
 def _line(event: Json) -> str:

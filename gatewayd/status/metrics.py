@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -17,6 +16,7 @@ from prometheus_client import CollectorRegistry, ProcessCollector, generate_late
 from prometheus_client.core import HistogramMetricFamily, Metric
 from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamily
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
@@ -206,7 +206,7 @@ class Exposition:
 
     def collect(self) -> Iterator[Metric]:
         """Called for each `text`."""
-        now = time.monotonic()
+        now = clock.now()
         daemon, probes = self._probes.daemon, self._probes
         troubles = probes.troubles()
         ready, _ = readiness(daemon.cells, probes.late, troubles)
