@@ -37,6 +37,7 @@ KINDS = frozenset(
         EventKind.TAKEN_OVER,
         EventKind.RELEASED,
         EventKind.FALLBACK,
+        EventKind.FOLLOWED,
         EventKind.FORCED,
         EventKind.UNFORCED,
     }

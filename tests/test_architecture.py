@@ -59,6 +59,7 @@ LAYERS: dict[str, set[str]] = {
     "audit": {"clock", "core", "happening", "printable"},
     "auditfile": {"logs"},
     "control": {
+        "aside",
         "audit",
         "clock",
         "control",

@@ -17,6 +17,7 @@ from typing import Any
 from aiohttp import web
 
 from gatewayd import clock
+from gatewayd.aside import aside
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
 from gatewayd.control.views import Json
@@ -221,8 +222,8 @@ async def _who(request: web.Request) -> str:
         return f"from {request.remote}" if request.remote else ""
     raw = sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER_CREDENTIALS.size)
     _pid, user, _group = _PEER_CREDENTIALS.unpack(raw)
-    # The user database may be on the network.
-    return f"by {await asyncio.to_thread(_user_name, user)}"
+    # The user database may be on the network, and asyncio's own threads would be waited for at the gateway's end.
+    return f"by {await aside(lambda: _user_name(user), 'user name')}"
 
 
 @lru_cache(maxsize=32)

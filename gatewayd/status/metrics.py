@@ -112,6 +112,31 @@ METRICS = (
         _CELL,
         "inputs whose read-back differed from what was written",
     ),
+    MetricInfo(
+        "gatewayd_lag_seconds",
+        Kind.GAUGE,
+        _CELL,
+        "by how much the newest package of the robot is later than the quickest ones were; part of every age",
+    ),
+    MetricInfo(
+        "gatewayd_differing",
+        Kind.GAUGE,
+        _CELL,
+        "inputs for which the robot holds something else than it was given",
+    ),
+    MetricInfo("gatewayd_unadopted", Kind.GAUGE, _CELL, "inputs whose content in the robot is not known"),
+    MetricInfo(
+        "gatewayd_adoption_seconds",
+        Kind.GAUGE,
+        _CELL,
+        "seconds until adopted inputs without an owner fall back; 0: none will",
+    ),
+    MetricInfo(
+        "gatewayd_gaps_total",
+        Kind.COUNTER,
+        _CELL,
+        "times the gateway stood still: stopped, suspended or starved of the CPU",
+    ),
     MetricInfo("gatewayd_variables", Kind.GAUGE, ("cell", "quality"), "variables by quality"),
     MetricInfo(
         "gatewayd_input_age_seconds",
@@ -256,6 +281,11 @@ def _cell(station: Station, now: float) -> dict[str, list[_Sample]]:
         "gatewayd_robot_sessions_total": [((), health.sessions)],
         "gatewayd_robot_watchdog_fed": [((), _LEVELS[health.watchdog_fed])],
         "gatewayd_read_back_mismatches_total": [((), health.read_back_mismatches)],
+        "gatewayd_lag_seconds": [((), health.lag)],
+        "gatewayd_differing": [((), health.differing)],
+        "gatewayd_unadopted": [((), health.unadopted)],
+        "gatewayd_adoption_seconds": [((), health.adoption)],
+        "gatewayd_gaps_total": [((), health.gaps)],
         "gatewayd_variables": [((one.name.lower(),), image.quality.count(one)) for one in Quality],
         "gatewayd_input_age_seconds": [
             ((), now - max((image.times[i] for i in image.inputs), default=-math.inf))

@@ -40,6 +40,9 @@ _IN_RUNS = frozenset(
         EventKind.FALLBACK,
         EventKind.UNAVAILABLE,
         EventKind.AVAILABLE,
+        EventKind.ADOPTION_ENDS,
+        EventKind.DIFFERS,
+        EventKind.FOLLOWED,
     }
 )
 """Kinds of events that befall many variables in one moment."""

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 from pathlib import Path
 from shutil import which
 
 import pytest
 
+from gatewayd.core.image import Quality
 from gatewayd.printable import printable
 from tests.test_printable import HOSTILE
 
 WORDS = Path(__file__).parents[2] / "gatewayd" / "page" / "words.js"
+
+
+def test_the_page_has_a_word_for_every_quality() -> None:
+    found = re.search(r"QUALITIES = \[(.*?)\]", WORDS.read_text("utf-8"), re.DOTALL)
+    assert found is not None
+    assert len(json.loads(f"[{found[1]}]")) == len(Quality)
 
 
 @pytest.mark.skipif(which("node") is None, reason="Node.js is not installed (Debian package nodejs)")
