@@ -204,8 +204,9 @@ def test_a_command_that_waited_while_the_gateway_stood_still_is_not_carried_out(
     assert waiting.returncode == 1, errors
     assert re.search(r"the gateway stood still for \d+\.\d s; repeat the command", errors), errors
     assert not daemon.lines("value forced")
-    done = gatewayd(socket, "force", "number", "42")
-    assert done.returncode == 0, done.stderr
+    wait_for(
+        lambda: gatewayd(socket, "force", "number", "42").returncode == 0, "the repeated command to count"
+    )
     wait_for(lambda: simulator.integer("input_int_register_0") == 42, "the robot to have the forced value")
 
 
