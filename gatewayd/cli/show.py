@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from gatewayd.printable import printable
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -91,7 +93,7 @@ def _load(context: click.Context, file: str) -> Loaded:
         return load(read_bytes(Path(file)), name)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        click.echo(f"{name}: cannot be read: {reason}", err=True)
+        click.echo(printable(f"{name}: cannot be read: {reason}"), err=True)
         context.exit(UNREADABLE)
 
 
@@ -112,14 +114,14 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
     entries = [(row, row) for row in rows(loaded.cell)] if every else list(by_line(loaded.cell))
     known = sys.stdout.isatty() or "COLUMNS" in os.environ
     console = Console(width=None if known else PIPE_WIDTH, markup=False, highlight=False)
-    console.print(_heading(plan), style="bold")
+    console.print(printable(_heading(plan)), style="bold")
     console.print(_table(entries, wide=console.width >= _WIDE))
     if loaded.cell.canopen is not None:
         console.print(_pdo_table(loaded))
         for line in _loads(loaded):
             console.print(line, soft_wrap=True)
     for line in _notes(loaded, plan, shortened=any(first is not last for first, last in entries)):
-        console.print(line, style="dim", soft_wrap=True)
+        console.print(printable(line), style="dim", soft_wrap=True)
 
 
 def _heading(plan: Plan) -> str:
@@ -205,7 +207,7 @@ def _table(entries: list[tuple[Row, Row]], *, wide: bool) -> Table:
             Text(place),
             Text(_notations(first, last)),
             Text(type_name),
-            Text(", ".join(filter(None, (formula(first), limits(first))))),
+            Text(printable(", ".join(filter(None, (formula(first), limits(first)))))),
             Text(policy(first)),
             Text(lost(first)),
         )

@@ -336,7 +336,7 @@ class Cell:
         """The process stood still from `since` to `now`; called before anything that waited is served."""
         if now - since >= NOTABLE_GAP:
             self.health.gaps += 1
-            self.events.append(Event(now, EventKind.STOOD_STILL, detail=f"for {now - since:.1f} s"))
+            self.events.append(Event(now, EventKind.STOOD_STILL, detail=f"{now - since:.1f} s"))
         self.tick(now)
 
     # -- inside --------------------------------------------------------------------------------------------------

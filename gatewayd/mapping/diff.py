@@ -15,7 +15,11 @@ from enum import Enum
 from gatewayd.mapping import facts
 from gatewayd.mapping.facts import Facts
 from gatewayd.mapping.plan import Plan
+<<<<<<< HEAD
 from gatewayd.mapping.weakening import weakened
+=======
+from gatewayd.printable import json_text, printable
+>>>>>>> process
 
 __all__ = [
     "MOST_GONE",
@@ -276,7 +280,7 @@ def as_text(changes: Changes) -> str:
             f"note: the status block counts {count} variable{'' if count == 1 else 's'} anew, from `{first.name}` "
             f"({first.old} -> {first.new}) on; what is added at the end of the file moves none"
         )
-    return "".join(f"{line}\n" for line in lines)
+    return "".join(f"{printable(line, None)}\n" for line in lines)
 
 
 def as_json(changes: Changes) -> str:
@@ -302,7 +306,7 @@ def as_json(changes: Changes) -> str:
         },
         "renumbered": [{"name": one.name, "old": one.old, "new": one.new} for one in changes.renumbered],
     }
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
 
 def _identity(plan: Plan) -> dict[str, str]:

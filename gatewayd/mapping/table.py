@@ -15,6 +15,7 @@ from gatewayd.mapping.expand import ConcretePlacement, ConcreteVariable, Expande
 from gatewayd.mapping.pdo_table import as_document, load_by_bit_rate, object_place, pdo_rows
 from gatewayd.mapping.plan import AREA_NAMES, Plan
 from gatewayd.mapping.rules.wording import cob, seconds
+from gatewayd.printable import json_text, printable
 
 __all__ = [
     "COLUMNS",
@@ -211,7 +212,7 @@ def as_json(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
         "canopen": as_document(cell),
         "variables": [dataclasses.asdict(row) for row in table],
     }
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
 
 def as_markdown(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
@@ -323,8 +324,10 @@ def lost(row: Row) -> str:
 def _plain(value: object) -> object:
     if value is None:
         return ""
+    if isinstance(value, str):
+        return printable(value)
     return str(value).lower() if isinstance(value, bool) else value
 
 
 def _cell(text: str) -> str:
-    return " ".join(text.replace("|", "\\|").split())
+    return printable(" ".join(text.replace("|", "\\|").split()))

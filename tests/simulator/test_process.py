@@ -28,7 +28,7 @@ async def test_it_serves_clients_and_takes_commands(
         await one.ended()
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_ends_it_cleanly(process: Callable[..., Process], number: signal.Signals) -> None:
     simulator = process()
     simulator.popen.send_signal(number)
