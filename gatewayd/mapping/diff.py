@@ -15,11 +15,8 @@ from enum import Enum
 from gatewayd.mapping import facts
 from gatewayd.mapping.facts import Facts
 from gatewayd.mapping.plan import Plan
-<<<<<<< HEAD
 from gatewayd.mapping.weakening import weakened
-=======
 from gatewayd.printable import json_text, printable
->>>>>>> process
 
 __all__ = [
     "MOST_GONE",
