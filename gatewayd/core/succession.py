@@ -186,11 +186,8 @@ def _take_writers(old: Cell, new: Cell, match: _Match) -> None:
 
 
 def _take_source(old: Cell, new: Cell) -> None:
-    former, freshness = old.freshness, new.freshness
-    freshness.state = former.state
-    freshness.timestamp = former.timestamp
-    freshness.last_package = former.last_package
-    freshness.last_progress = former.last_progress
+    new.freshness.succeed(old.freshness)
+    new.lag.succeed(old.lag)
     new.health = replace(old.health)
 
 

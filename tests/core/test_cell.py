@@ -489,7 +489,7 @@ def test_a_controller_that_is_still_frozen_does_not_pass_for_fresh_by_a_new_sess
     cell.robot_connected(0.4)
     assert not cell.package_arrived(0.0, 0.5)
     assert cell.freshness.state is Source.FROZEN
-    assert cell.package_arrived(0.002, 0.6)
+    assert cell.package_arrived(0.6, 0.6)
 
 
 def test_a_lost_robot_makes_inputs_stale_and_refuses_writes(cell: Cell) -> None:
