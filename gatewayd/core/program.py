@@ -11,11 +11,12 @@ STATES: dict[int, tuple[str, bool]] = {
     3: ("pausing", True),
     4: ("paused", True),
     5: ("resuming", True),
+    6: ("retracting", False),
 }
 """RTDE's `runtime_state`: its name, and whether the program runs.
 
 A program that pauses still owns what it wrote and goes on with it. One that stops writes nothing any more, so what its
-registers hold is what it left behind.
+registers hold is what it left behind; a robot that retracts is not on the program's path.
 """
 
 

@@ -57,8 +57,14 @@ HEADER = (
     (34, 2, "refusal_age"),
     (40, 1, "request"),
     (41, 1, "release"),
+    (42, 1, "unadopted"),
+    (43, 1, "differing"),
+    (44, 2, "lag"),
+    (46, 1, "adoption"),
+    (47, 1, "program"),
+    (48, 1, "gaps"),
 )
-"""The header as PLC programs have it built in: entries are only appended. 5F00h numbers its sub-indices by this order."""
+"""The header as PLC programs have it built in: entries are only appended, and 5F00h counts them in this order."""
 BLOCKS = (
     (64, 64, "good"),
     (128, 64, "writers_alive"),
@@ -124,6 +130,17 @@ def test_the_header_tells_the_state(cell: Cell, status: StatusBlock) -> None:
     assert long(status, "robot_age", 0.1) == 100
     assert words(status, "frequency", 0.1) == (5000,)
     assert words(status, "sessions", 0.1) == (1,)
+
+
+def test_the_appended_words_show_what_the_health_says(cell: Cell, status: StatusBlock) -> None:
+    assert words(status, "unadopted", 0.0, 8) == (0,) * 8
+    health = cell.health
+    health.unadopted, health.differing, health.lag = 3, 2, 70.1234
+    health.adoption, health.program, health.gaps = 4.2, 4, 2**16 + 1
+    assert words(status, "unadopted", 0.0, 8) == (3, 2, 1, 4587, 5, 5, 1, 0)
+    assert words(status, "refusal_reason", 0.0, 12) == (0, 0, 0, 0, 0xFFFF, 0xFFFF, 0, 0, 0, 0, 0, 0)
+    health.program, health.adoption = 0, 1e9
+    assert words(status, "adoption", 0.0, 2) == (0xFFFF, 1)
 
 
 def test_flags_follow_the_state_bit_by_bit(cell: Cell, status: StatusBlock) -> None:
