@@ -7,7 +7,7 @@ every place of it can show (`shown`, `shows_nan`), and that it means something o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 
 from gatewayd.core.definition import Direction, FallbackKind, Value, Variable
@@ -37,6 +37,8 @@ class Quality(IntEnum):
 
 _REPORTED = (Quality.GOOD, Quality.STALE, Quality.DIFFERS, Quality.OUT_OF_RANGE, Quality.NOT_RUNNING)
 """Qualities of values that came from their source at some time."""
+_SHOWN = (Quality.GOOD, Quality.OUT_OF_RANGE)
+"""Qualities of outputs that show what the robot reports."""
 
 
 class ProcessImage:
@@ -104,7 +106,7 @@ class ProcessImage:
         self._outputs_told = False
         for index in self.outputs:
             self._show_fallback(index)
-        self.hold_shown()
+        self._hold_shown()
 
     def time_of(self, index: int) -> float:
         """When the source told the value; minus infinity if it never did."""
@@ -130,7 +132,7 @@ class ProcessImage:
             values[index] = value
             times[index] = now
             if available[index]:
-                quality[index] = good if index not in bounds else _judged(value, *bounds[index])
+                quality[index] = good if index not in bounds else self.judged(index)
 
     def inputs_lost(self) -> None:
         """Nobody knows what the controller's inputs hold from now on."""
@@ -183,12 +185,36 @@ class ProcessImage:
             self._show_fallback(index)
             self.find_unreadable()
 
+    def judged(self, index: int) -> Quality:
+        """The quality of a value that is its source's and current: good, if every place can show it."""
+        return _judged(self.values[index], *self._bounds[index]) if index in self._bounds else Quality.GOOD
+
+    def succeed(self, former: ProcessImage, variables: Mapping[int, int]) -> None:
+        """Go on where `former` stands, for variables that go on: old -> new index."""
+        self.output_time, self.running_time = former.output_time, former.running_time
+        self.running = former.running
+        for source, target in variables.items():
+            variable, quality = self.variables[target], former.quality[source]
+            self.values[target] = former.values[source]
+            self.times[target] = former.times[source]
+            self.available[target] = former.available[source]
+            if quality in _SHOWN:
+                stopped = (
+                    variable.direction is Direction.OUTPUT and variable.valid_running and not self.running
+                )
+                quality = Quality.NOT_RUNNING if stopped else self.judged(target)
+            if variable.direction is Direction.OUTPUT and quality not in _SHOWN:
+                self.values[target] = variable.on_stale.apply(self.values[target], variable.kind)
+            self.quality[target] = quality
+        self._hold_shown()
+        self.find_unreadable()
+
     def find_unreadable(self) -> None:
         """Bring `unreadable` up to date after qualities changed."""
         shown = (Quality.GOOD, Quality.FORCED)
         self.unreadable = frozenset(index for index in self._exceptions if self.quality[index] not in shown)
 
-    def hold_shown(self) -> None:
+    def _hold_shown(self) -> None:
         """Outputs that hold their value while the program does not run hold what they show now."""
         for index in self._running_only:
             if self.variables[index].on_stale.kind is FallbackKind.HOLD:
@@ -217,9 +243,7 @@ class ProcessImage:
             for index in self._running_only:
                 if quality[index] is Quality.NOT_RUNNING:
                     changed = True
-                    quality[index] = Quality.GOOD
-                    if index in self._bounds:
-                        quality[index] = _judged(values[index], *self._bounds[index])
+                    quality[index] = self.judged(index)
             for index in self._held:
                 self._held[index] = values[index]
             return changed
