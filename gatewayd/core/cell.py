@@ -271,15 +271,16 @@ class Cell:
         shown = self.freshness.package(
             timestamp, now, self._measure_lag(timestamp, now if raw is None else raw)
         )
-        late = self.freshness.state is Source.LATE
-        self.lag.watch(now, late=late)
         if shown:
             if not was_fresh:
+                self.lag.in_time()
                 self.events.append(Event(now, EventKind.FRESH))
             self.forcing.lift()
             self.image.uncover()
-        elif was_fresh and late:
-            self._source_stale(now)
+        elif self.freshness.state is Source.LATE:
+            self.lag.stays_late(now)
+            if was_fresh:
+                self._source_stale(now)
         return shown
 
     def program(self, state: int | None) -> None:
@@ -310,7 +311,7 @@ class Cell:
         if self.freshness.state is not Source.LATE or not self.lag.probed(delay):
             return False
         self.health.lag = self.lag.seconds
-        self.lag.watch(now, late=False)
+        self.lag.in_time()
         return True
 
     def adopt(self, values: Mapping[int, Value], now: float) -> None:

@@ -7,6 +7,7 @@ every place of it can show (`shown`, `shows_nan`), and that it means something o
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 
@@ -57,6 +58,7 @@ class ProcessImage:
         "_outputs_told",
         "_restricted",
         "_running_only",
+        "_stopped",
         "available",
         "inputs",
         "output_time",
@@ -89,13 +91,15 @@ class ProcessImage:
         self._bounds = {
             index: _bounds(variable) for index, variable in enumerate(variables) if _is_restricted(variable)
         }
-        """Range and whether NaN can be shown, of variables of which some place cannot show every value."""
+        """Range, and whether NaN and infinities are shown, of variables of which a place cannot show every value."""
         self._restricted = tuple(
             (index, *self._bounds[index]) for index in self.outputs if index in self._bounds
         )
         self._running_only = tuple(index for index in self.outputs if variables[index].valid_running)
         self._held: dict[int, Value] = {}
         """What outputs that are valid while the program runs, and hold their value otherwise, last were meanwhile."""
+        self._stopped = False
+        """Whether the outputs that are valid while the program runs were last shown while it did not."""
         self._covered: dict[int, Value] = {}
         """What the robot reports for outputs that show something else, because the program does not run."""
         self._exceptions = frozenset(
@@ -240,13 +244,16 @@ class ProcessImage:
         """Show what is valid only while the program runs, or its policy, after a package. Whether a quality changed."""
         values, quality, changed = self.values, self.quality, False
         if self.running:
-            for index in self._running_only:
-                if quality[index] is Quality.NOT_RUNNING:
-                    changed = True
-                    quality[index] = self.judged(index)
+            if self._stopped:
+                self._stopped = False
+                for index in self._running_only:
+                    if quality[index] is Quality.NOT_RUNNING:
+                        changed = True
+                        quality[index] = self.judged(index)
             for index in self._held:
                 self._held[index] = values[index]
             return changed
+        self._stopped = True
         for index in self._running_only:
             if not self.available[index]:
                 continue
@@ -274,13 +281,13 @@ def _is_restricted(variable: Variable) -> bool:
 
 
 def _bounds(variable: Variable) -> tuple[float, float, bool]:
-    low, high = variable.shown or (-math.inf, math.inf)
+    low, high = variable.shown or (-sys.float_info.max, sys.float_info.max)
     return low, high, variable.shows_nan
 
 
 def _judged(value: Value, low: float, high: float, nan: bool) -> Quality:
-    """Good if every place can show it."""
-    fits = low <= value <= high or (nan and math.isnan(value))
+    """Good if every place can show it; `nan`: also NaN and the infinities, which have no place between the bounds."""
+    fits = low <= value <= high or (nan and not math.isfinite(value))
     return Quality.GOOD if fits else Quality.OUT_OF_RANGE
 
 

@@ -38,8 +38,8 @@ class Lag:
         self._baseline = math.inf
         self._raw = -math.inf
         self._timestamp = -math.inf
-        self._level = 0.0
-        """Lag from which the later ones differ by jitter only, since `_steady_since`."""
+        self._level = -math.inf
+        """Lag from which those of later packages differ by jitter only, since `_steady_since`."""
         self._steady_since = -math.inf
         self._asked = -math.inf
 
@@ -49,25 +49,26 @@ class Lag:
         A timestamp that goes back is a controller that booted: a new baseline. One that goes back by no more than the
         limit is none, as nothing boots so soon after it booted; otherwise a clock that creeps back would never be late.
         """
-        offset = raw - timestamp
-        if timestamp < self._timestamp - self.limit:
-            self._baseline = offset
-        elif self.seconds <= self.limit:
-            self._baseline += self._drift(raw - self._raw)
-        self._baseline = min(self._baseline, offset)
-        self._raw, self._timestamp = raw, timestamp
-        self.seconds = offset - self._baseline
-        return self.seconds
+        offset, baseline, limit = raw - timestamp, self._baseline, self.limit
+        if self.seconds <= limit:
+            drift = DRIFT * (raw - self._raw)
+            # Time without packages must not let a backlog pass for drift.
+            baseline += min(drift, limit / 2)
+        if offset < baseline or timestamp < self._timestamp - limit:
+            baseline = offset
+        self._baseline, self._raw, self._timestamp = baseline, raw, timestamp
+        self.seconds = lag = offset - baseline
+        return lag
 
-    def _drift(self, elapsed: float) -> float:
-        """What the clocks may have drifted apart. Time without packages must not let a backlog pass for drift."""
-        return min(DRIFT * elapsed, self.limit / 2) if elapsed < math.inf else 0.0
-
-    def watch(self, now: float, *, late: bool) -> None:
-        """Follow whether the lag is steady; called with every package, after `package`."""
-        if not late or abs(self.seconds - self._level) > self.limit / 2:
+    def stays_late(self, now: float) -> None:
+        """A late package, after `package`: follow whether the lag is steady."""
+        if abs(self.seconds - self._level) > self.limit / 2:
             self._level = self.seconds
             self._steady_since = now
+
+    def in_time(self) -> None:
+        """Packages come in time again."""
+        self._level = -math.inf
 
     def doubtful(self, now: float) -> bool:
         """Whether the lag has been steady for so long that the controller should be asked; at most once a second.

@@ -116,11 +116,14 @@ def test_an_output_that_a_place_cannot_show_is_not_good(
 
 
 @pytest.mark.parametrize("nan", [True, False])
-def test_what_is_no_number_is_good_where_every_place_can_show_it(press: CellDefinition, nan: bool) -> None:
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_is_good_where_every_place_can_show_it(
+    press: CellDefinition, nan: bool, value: float
+) -> None:
     image = restricted(press, LEVEL, SPEED, nan=nan)
-    image.values[LEVEL] = math.nan
+    image.values[LEVEL] = value
     image.outputs_told(1.0)
-    image.tell(SPEED, math.nan, 1.0)
+    image.tell(SPEED, value, 1.0)
     expected = Quality.GOOD if nan else Quality.OUT_OF_RANGE
     assert (image.quality[LEVEL], image.quality[SPEED]) == (expected, expected)
 
@@ -133,7 +136,7 @@ def test_a_range_that_shows_no_nan_need_not_be_bounded(press: CellDefinition) ->
         image.values[LEVEL] = value
         image.outputs_told(1.0)
         qualities.append(image.quality[LEVEL])
-    assert qualities == [Quality.GOOD, Quality.GOOD, Quality.OUT_OF_RANGE, Quality.GOOD]
+    assert qualities == [Quality.GOOD, Quality.OUT_OF_RANGE, Quality.OUT_OF_RANGE, Quality.GOOD]
 
 
 def test_an_input_that_a_place_cannot_show_is_not_good(press: CellDefinition) -> None:

@@ -17,10 +17,10 @@ def lag() -> Lag:
     return lag
 
 
-def feed(lag: Lag, packages: Iterable[tuple[float, float]], *, late: bool = True) -> None:
+def feed(lag: Lag, packages: Iterable[tuple[float, float]]) -> None:
     for timestamp, raw in packages:
         lag.package(timestamp, raw)
-        lag.watch(raw, late=late)
+        lag.stays_late(raw)
 
 
 def test_the_lag_is_what_a_package_needs_more_than_the_quickest(lag: Lag) -> None:
