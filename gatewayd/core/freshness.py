@@ -111,15 +111,16 @@ class Freshness:
         return self.state is Source.FRESH
 
     def tick(self, now: float) -> None:
-        """Notice silence, a frozen timestamp, and packages that grow too old before the next one comes."""
-        if self.state in (Source.LOST, Source.WAITING) or now - self.last_progress <= self.stale_after:
+        """Notice that what was reported last is too old, and by what: lag most of all, a frozen timestamp, silence."""
+        limit = self.stale_after
+        if self.state in (Source.LOST, Source.WAITING) or now - self.last_progress <= limit:
             return
-        if now - self.last_package > self.stale_after:
-            self._move(Happening.NO_PACKAGE)
-        elif self.last_package > self.last_arrival and now - self.last_arrival > self.stale_after:
+        if self.last_arrival - self.last_progress > limit / 2 and now - self.last_arrival <= limit:
+            self._move(Happening.TOO_LATE)
+        elif self.last_package > self.last_arrival and now - self.last_package <= limit:
             self._move(Happening.NO_PROGRESS)
         else:
-            self._move(Happening.TOO_LATE)
+            self._move(Happening.NO_PACKAGE)
 
     def succeed(self, former: Freshness) -> None:
         """Go on where `former` stands, with this one's own `stale_after`."""

@@ -137,6 +137,17 @@ def test_what_grows_too_old_before_the_next_package_is_late_silent_only_later(so
     assert states == [Source.FRESH, Source.LATE, Source.LATE, Source.SILENT]
 
 
+@pytest.mark.parametrize("repeated, state", [(False, Source.SILENT), (True, Source.FROZEN)])
+def test_a_small_lag_is_not_what_makes_a_cut_line_stale(
+    source: Freshness, repeated: bool, state: Source
+) -> None:
+    source.package(1.0, 10.0, 0.1)
+    if repeated:
+        source.package(1.0, 10.3, 0.1)
+    source.tick(10.41)
+    assert source.state is state
+
+
 def test_a_frozen_timestamp_is_frozen_though_it_was_late_before(source: Freshness) -> None:
     states = []
     source.package(1.0, 10.0, 0.4)
