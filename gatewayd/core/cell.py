@@ -17,8 +17,10 @@ from gatewayd.core.forcing import Force, Forcing
 from gatewayd.core.freshness import Freshness, Source
 from gatewayd.core.health import Health
 from gatewayd.core.image import ProcessImage
+from gatewayd.core.lag import Lag
 from gatewayd.core.limits import within
 from gatewayd.core.ownership import Act, LockTable, Move
+from gatewayd.core.program import is_running
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.refusal_log import REFUSAL_INTERVAL, RefusalLog
 from gatewayd.core.requester import LOCAL_OPERATOR, Requester
@@ -55,6 +57,7 @@ class Cell:
         self.ownership = LockTable(definition.locks)
         self.writers = WriterTable(definition.writers)
         self.freshness = Freshness(definition.stale_after)
+        self.lag = Lag(definition.stale_after)
         self.events = EventRing()
         self.health = Health()
         self.forcing = Forcing(self.image)
@@ -246,6 +249,8 @@ class Cell:
         self.freshness.lost()
         self._adopted = False
         self.health.frequency = 0.0
+        self.health.lag = 0.0
+        self.program(None)
         self.events.append(Event(now, EventKind.ROBOT_LOST, detail=reason))
         self.forcing.lift()
         self.image.inputs_lost()
@@ -253,25 +258,61 @@ class Cell:
             self._outputs_lost()
         self._notify(Direction.INPUT)
 
-    def package_arrived(self, timestamp: float | None, now: float) -> bool:
-        """Whether the package tells anything new. If so, the link copies its values and calls `outputs_written`."""
+    def package_arrived(self, timestamp: float | None, now: float, raw: float | None = None) -> bool:
+        """Whether the package is to be shown. If so, the link copies its values and calls `outputs_written`.
+
+        It is not if it reports nothing new, or came later than `stale_after`; `freshness` knows which. `raw` is the
+        time by a clock that no time service adjusts.
+        """
         if self.freshness.state is Source.LOST:
             return False
         self.health.packages += 1
         was_fresh = self.freshness.state is Source.FRESH
-        news = self.freshness.package(timestamp, now)
-        if news and not was_fresh:
-            self.events.append(Event(now, EventKind.FRESH))
-        if news:
+        shown = self.freshness.package(
+            timestamp, now, self._measure_lag(timestamp, now if raw is None else raw)
+        )
+        if shown:
+            if not was_fresh:
+                self.lag.in_time()
+                self.events.append(Event(now, EventKind.FRESH))
             self.forcing.lift()
-        return news
+            self.image.uncover()
+        elif self.freshness.state is Source.LATE:
+            self.lag.stays_late(now)
+            if was_fresh:
+                self._source_stale(now)
+        return shown
+
+    def program(self, state: int | None) -> None:
+        """The `runtime_state` of a package, before its `outputs_written`; None: the controller does not report it."""
+        self.health.program = state
+        self.image.running = is_running(state)
 
     def outputs_written(self, now: float) -> None:
-        """The link has copied a package's values into the image: they are good from now on."""
+        """The link has copied a package's values into the image: they are good from now on, and as old as they are."""
         if self.freshness.state is not Source.FRESH:
             return
-        self.image.outputs_told(now)
+        self.image.outputs_told(min(now, self.freshness.last_progress))
         self._notify(Direction.OUTPUT)
+
+    def lag_doubtful(self, now: float) -> bool:
+        """Whether to ask the controller something: packages stay late, and there may be no backlog behind it.
+
+        At most once a second. What is asked has to be answered behind the packages that the controller had sent before.
+        """
+        return self.freshness.state is Source.LATE and self.lag.doubtful(now)
+
+    def backlog_probed(self, delay: float, now: float) -> bool:
+        """The controller answered `delay` seconds after the question.
+
+        True: so quickly that there is no backlog; its clock stood still for a while. What it sends now counts as in
+        time, and the link begins one new session, so that nothing is left of what may have queued. False: no change.
+        """
+        if self.freshness.state is not Source.LATE or not self.lag.probed(delay):
+            return False
+        self.health.lag = self.lag.seconds
+        self.lag.in_time()
+        return True
 
     def adopt(self, values: Mapping[int, Value], now: float) -> None:
         """Take over what the controller's inputs hold, then apply the fallbacks that fell due meanwhile.
@@ -327,8 +368,7 @@ class Cell:
         was_fresh = self.freshness.state is Source.FRESH
         self.freshness.tick(now)
         if was_fresh and self.freshness.state is not Source.FRESH:
-            self.events.append(Event(now, EventKind.STALE, detail=self.freshness.state.name.lower()))
-            self._outputs_lost()
+            self._source_stale(now)
         self._refusals.tick(now)
         self._beat(now)
 
@@ -484,6 +524,17 @@ class Cell:
         if changed:
             for listener in self.write_listeners:
                 listener(writer, changed, now)
+
+    def _measure_lag(self, timestamp: float | None, raw: float) -> float:
+        if timestamp is None or not math.isfinite(timestamp):
+            return 0.0
+        self.health.lag = self.lag.package(timestamp, raw)
+        return self.health.lag
+
+    def _source_stale(self, now: float) -> None:
+        """The robot is connected and was fresh until now."""
+        self.events.append(Event(now, EventKind.STALE, detail=self.freshness.state.name.lower()))
+        self._outputs_lost()
 
     def _outputs_lost(self) -> None:
         self.forcing.lift()

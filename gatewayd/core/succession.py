@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from gatewayd.core.cell import Cell, LastRefusal
 from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, FallbackKind, Lock, Variable
 from gatewayd.core.events import Event
-from gatewayd.core.image import Quality
 
 __all__ = ["Succession", "succeed"]
 
@@ -40,7 +39,7 @@ def succeed(old: Cell, definition: CellDefinition, now: float) -> Succession:
     stranded = _release(old, match, now)
     old.forcing.lift()
     new = Cell(definition)
-    _take_image(old, new, match)
+    new.image.succeed(old.image, match.variables)
     _take_locks(old, new, match, now)
     _take_writers(old, new, match)
     _take_source(old, new)
@@ -146,21 +145,6 @@ def _inputs_without_successor(match: _Match) -> list[int]:
 # -- after: what stays is taken over ---------------------------------------------------------------------------------
 
 
-def _take_image(old: Cell, new: Cell, match: _Match) -> None:
-    former, image = old.image, new.image
-    image.output_time = former.output_time
-    for source, target in match.variables.items():
-        variable = image.variables[target]
-        value, quality = former.values[source], former.quality[source]
-        if variable.direction is Direction.OUTPUT and quality is not Quality.GOOD:
-            value = variable.on_stale.apply(value, variable.kind)
-        image.values[target] = value
-        image.times[target] = former.times[source]
-        image.quality[target] = quality
-        image.available[target] = former.available[source]
-    image.find_unreadable()
-
-
 def _take_locks(old: Cell, new: Cell, match: _Match, now: float) -> None:
     former, table = old.ownership, new.ownership
     for source, target in match.locks.items():
@@ -186,11 +170,8 @@ def _take_writers(old: Cell, new: Cell, match: _Match) -> None:
 
 
 def _take_source(old: Cell, new: Cell) -> None:
-    former, freshness = old.freshness, new.freshness
-    freshness.state = former.state
-    freshness.timestamp = former.timestamp
-    freshness.last_package = former.last_package
-    freshness.last_progress = former.last_progress
+    new.freshness.succeed(old.freshness)
+    new.lag.succeed(old.lag)
     new.health = replace(old.health)
 
 

@@ -85,7 +85,7 @@ class CellProbe:
     def _changed(self, direction: Direction) -> None:
         """The last listener of the cell: all images have the package by now."""
         assert self._cell is not None
-        arrived = self._cell.image.output_time
+        arrived = self._cell.freshness.last_arrival
         if direction is Direction.OUTPUT and arrived != self._image_time:
             self._image_time = arrived
             self.package_to_image.observe(clock.now() - arrived)

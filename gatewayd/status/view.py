@@ -191,7 +191,7 @@ def _ages(cell: Cell, now: float) -> list[int | None]:
     """Milliseconds since the source told each value; None: never."""
     image = cell.image
     shared = _milliseconds(now - image.output_time)
-    outputs = set(image.outputs)
+    outputs = {index for index in image.outputs if not image.variables[index].valid_running}
     told = (Quality.GOOD, Quality.STALE)
     return [
         shared if index in outputs and quality in told else _milliseconds(image.age(index, now))

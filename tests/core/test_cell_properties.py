@@ -555,7 +555,7 @@ class CellMachine(RuleBasedStateMachine):
     @rule(frozen=st.booleans(), number=st.integers(1, 9), flag=st.booleans())
     def package(self, frozen: bool, number: int, flag: bool) -> None:
         self.timestamp += 0 if frozen else 1
-        news = self.cell.package_arrived(self.timestamp, self.now)
+        news = self.cell.package_arrived(self.timestamp, self.now, raw=self.timestamp)
         assert news == self.model.package(self.timestamp, self.now)
         if news:
             values: dict[int, Value] = {8: number, 9: number / 4, 10: -number, 11: flag}
@@ -576,7 +576,7 @@ class CellMachine(RuleBasedStateMachine):
     @rule()
     def late_package(self) -> None:
         self.timestamp += 1
-        assert not self.cell.package_arrived(self.timestamp, self.now)
+        assert not self.cell.package_arrived(self.timestamp, self.now, raw=self.timestamp)
         self.cell.outputs_written(self.now)
 
     @rule(chosen=st.lists(st.integers(0, len(VARIABLES) - 1), min_size=1, max_size=4), gone=st.booleans())

@@ -26,8 +26,10 @@ variables:
 """
 COMMAND, SETPOINT, CLEARED, HELD, VALUED, EXCEPTED, LAMP, FRAGILE = range(1, 9)
 GOOD, STALE, UNAVAILABLE, NEVER = range(4)
-LOST, WAITING, FRESH, SILENT, FROZEN = range(5)
+LOST, WAITING, FRESH, SILENT, FROZEN, LATE = range(6)
 """Values of the status block."""
+ROBOT_AGE, PACKAGES, LAG = 11, 15, 45
+"""Offsets of the lower words of its numbers."""
 
 
 def start(plant: Plant, text: str = CELL, **options: str) -> tuple[Simulator, Daemon, Plc]:
@@ -124,6 +126,31 @@ def test_a_robot_that_cannot_be_reached_is_one_line(plant: Plant, host: str) -> 
     assert host in daemon.lines("no robot")[0]
     assert plc.robot_state == LOST
     assert "Traceback" not in daemon.text()
+
+
+def test_delay_in_small_steps_and_a_clock_that_creeps_are_late(plant: Plant) -> None:
+    """Each package has a new timestamp and comes in time after the last one; only the lag says how old it is."""
+    simulator, daemon, plc = start(plant)
+    assert plc.write_integers(0, 7) == 0
+    wait_for(lambda: plc.integers(20, 4) == [7] * 4, "the echo")
+    for step in range(1, 21):
+        simulator.do(f"delay {step * 0.05}")
+        began = plc.status(PACKAGES)
+        wait_for(lambda began=began: plc.status(PACKAGES) - began & 0xFFFF > 5, "packages")  # type: ignore[misc]
+    wait_for(lambda: plc.robot_state == LATE, "late values to count as such")
+    assert_fallbacks(plc)
+    assert plc.status(LAG) >= 400
+    assert plc.status(ROBOT_AGE) >= 400
+
+    simulator.do("delay 0")
+    wait_for(lambda: plc.robot_state == FRESH, "quick packages")
+    wait_for(lambda: plc.integers(20, 4) == [7] * 4, "good values")
+    assert plc.status(LAG) < 400
+
+    simulator.do("creep on")
+    wait_for(lambda: plc.robot_state == LATE, "a clock that creeps to count as late")
+    assert_fallbacks(plc)
+    assert len([line for line in daemon.lines("robot values stale") if "detail=late" in line]) == 2
 
 
 def test_frozen_timestamp_is_stale_though_packages_come(plant: Plant) -> None:
