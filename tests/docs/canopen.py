@@ -246,6 +246,8 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.WRITE_CLAIMED_ELSEWHERE: "an RPDO was dropped: the controller gave a register to another client",
     ErrorCode.WRITE_NEVER: "an RPDO was dropped: this writer may never write a variable of it",
     ErrorCode.WRITE_HEARTBEAT_LOST: "an RPDO was dropped: the heartbeat that its writer promised stays away",
+    ErrorCode.WRITE_PARTIAL_TAKEOVER: "an RPDO was dropped: it would take over a part of a `whole` group",
+    ErrorCode.WRITE_WAITED: "an RPDO was dropped: it waited too long while the gateway stood still",
 }
 
 
