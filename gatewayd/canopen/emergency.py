@@ -174,7 +174,7 @@ class Emergency:
             message = self._waiting.popleft()
             if self._cob_id.number & INVALID:
                 continue
-            self._send(Frame(self._cob_id.number & BASIC_FRAME, message), Priority.ORDERED)
+            self._send(Frame(self._cob_id.number & BASIC_FRAME, message), Priority.EVENT)
             if self._inhibit.number:
                 self._not_before = now + self._inhibit.number / 10_000
 

@@ -64,7 +64,7 @@ class NodeGuarding:
         if not frame.remote or self._heartbeat() or self._state() is NmtState.INITIALISING:
             return
         answer = bytes([self._state() | self._toggle])
-        self._send(Frame(Function.ERROR_CONTROL + self._node(), answer), Priority.ORDERED)
+        self._send(Frame(Function.ERROR_CONTROL + self._node(), answer), Priority.NEWEST)
         self._toggle ^= TOGGLE
         self._asked = now
         was_lost, self._is_lost = self._is_lost, False

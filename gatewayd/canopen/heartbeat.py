@@ -67,12 +67,17 @@ class HeartbeatProducer:
             return
         period = self._period.number / 1000
         self._due = self._due + period if now < self._due + period else now + period
-        if self._state() is NmtState.INITIALISING:
-            return
-        if not self._alive(now):
+        frame = self.frame(now)
+        if frame is not None:
+            self._send(frame, Priority.NEWEST)
+        elif self._state() is not NmtState.INITIALISING:
             self.withheld += 1
-            return
-        self._send(Frame(Function.ERROR_CONTROL + self._node(), bytes([self._state()])), Priority.ORDERED)
+
+    def frame(self, now: float) -> Frame | None:
+        """The heartbeat as it would be sent now; None if there is none."""
+        if not self.enabled or self._state() is NmtState.INITIALISING or not self._alive(now):
+            return None
+        return Frame(Function.ERROR_CONTROL + self._node(), bytes([self._state()]))
 
     def next_deadline(self, now: float) -> float:
         """When `tick` has something to do."""

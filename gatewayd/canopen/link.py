@@ -49,7 +49,7 @@ class CanLink(Observer):
         self._plan = plan
         self._cell = cell
         self._bus: Bus | None = None
-        self._transmitter = Transmitter(self._offer)
+        self._transmitter = Transmitter(self._offer, self._renew, punctual=self._offer_at_once)
         self._timer: asyncio.TimerHandle | None = None
         self._due = math.inf
         self._runs = False
@@ -245,6 +245,14 @@ class CanLink(Observer):
 
     def _offer(self, frame: Frame) -> bool:
         return self._bus is not None and self._bus.send(frame)
+
+    def _offer_at_once(self, frame: Frame) -> bool:
+        """A frame that may not be late: not where older ones still wait in the kernel."""
+        bus = self._bus
+        return bus is not None and not bus.lags(self.node.bit_rate) and bus.send(frame)
+
+    def _renew(self, can_id: int) -> Frame | None:
+        return self.node.renew(can_id, clock.now())
 
     def _close_bus(self, reason: str) -> None:
         bus, self._bus = self._bus, None

@@ -323,6 +323,13 @@ class Node:
             ),
         )
 
+    def renew(self, can_id: int, now: float) -> Frame | None:
+        """The cyclic frame that would be sent with this COB-ID now, in place of one that waited; None: none."""
+        self._now = now
+        if can_id == Function.ERROR_CONTROL + self.node_id:
+            return self.producer.frame(now)
+        return self.transmit.renew(can_id)
+
     # -- received frames -----------------------------------------------------------------------------------------
 
     def _route(self) -> None:
@@ -374,9 +381,8 @@ class Node:
         for data in answers:
             self._send(Frame(Function.SDO_RESPONSE + self.node_id, data), Priority.ORDERED)
 
-    def _send(self, frame: Frame, priority: Priority) -> None:
-        if self.bus.carries:
-            self._link(frame, priority)
+    def _send(self, frame: Frame, priority: Priority) -> bool:
+        return self.bus.carries and self._link(frame, priority)
 
     # -- NMT -----------------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.frame import Frame, Priority
+from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
 from gatewayd.canopen.node import OVERRUN_TIME, Node, Observer
 from gatewayd.canopen.plan import CanopenPlan, Consumer, ObjectPlan, PdoEntry, PdoPlan, SyncPlan
@@ -977,15 +977,24 @@ def test_whatever_comes_the_node_stands_and_its_answers_are_bounded(
     assert deadline > plant.now
 
 
-def test_pdos_may_be_replaced_while_they_wait_and_nothing_else() -> None:
-    plant = Plant(replace(PLAN, autostart=True)).power_on()
+def test_how_each_frame_waits_for_the_bus() -> None:
+    sync = SyncPlan(producer=True, period=500_000)
+    plant = Plant(replace(PLAN, autostart=True, sync=sync)).power_on()
     plant.hear(0x80)
     plant.heartbeat()
     plant.read(0x1000)
     plant.run(1.0)
     sent = plant.wire.sent
-    assert {frame.can_id for frame, _ in sent} == {0x705, 0x185, 0x285, 0x585, 0x085}
-    assert {frame.can_id for frame, priority in sent if priority is Priority.PDO} == {0x185, 0x285}
+    found = {(frame.can_id, priority.name) for frame, priority in sent}
+    assert found == {
+        (0x080, "AT_ONCE"),
+        (0x085, "EVENT"),
+        (0x705, "EVENT"),
+        (0x705, "NEWEST"),
+        (0x185, "NEWEST"),
+        (0x285, "NEWEST"),
+        (0x585, "ORDERED"),
+    }
 
 
 def test_sdo_server_tells_its_cob_ids_whatever_the_node_id() -> None:

@@ -257,6 +257,21 @@ class TransmitEngine:
                 self._timer(pdo, now)
         self._deadline = None
 
+    def renew(self, can_id: int) -> Frame | None:
+        """In place of a frame that has waited too long for the bus: what it would hold now; None if it is nothing.
+
+        A synchronous PDO holds the moment of its SYNC, which is over.
+        """
+        pdo = next((pdo for pdo in self._pdos.values() if pdo.can_id == can_id), None)
+        if pdo is None or not self.is_operational or pdo.is_stopped:
+            return None
+        if pdo.configuration.is_synchronous:
+            pdo.forced = True
+            return None
+        pdo.content = pdo.gather(self._values)
+        pdo.data = pdo.pack(pdo.content)
+        return Frame(can_id, pdo.data)
+
     def next_deadline(self, now: float = 0.0) -> float:
         """When `tick` is wanted, not before `now`; infinity if never. It may turn out then that nothing is due yet."""
         if self._deadline is None:
@@ -358,7 +373,7 @@ class TransmitEngine:
             if configuration.event:
                 pdo.due = now + configuration.event
                 self._expect(pdo.due)
-        self._send(Frame(pdo.can_id, data), Priority.PDO)
+        self._send(Frame(pdo.can_id, data), Priority.NEWEST)
 
     def _expect(self, deadline: float) -> None:
         if self._deadline is not None and deadline < self._deadline:
