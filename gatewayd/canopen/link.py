@@ -19,7 +19,8 @@ from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.lss import BIT_RATES
 from gatewayd.canopen.nmt import NmtState
-from gatewayd.canopen.node import Node, Observer
+from gatewayd.canopen.node import Node
+from gatewayd.canopen.observer import Observer
 from gatewayd.canopen.plan import CanopenPlan, by_name
 from gatewayd.canopen.queue import Transmitter
 from gatewayd.canopen.storage import Store
@@ -49,7 +50,7 @@ class CanLink(Observer):
         self._plan = plan
         self._cell = cell
         self._bus: Bus | None = None
-        self._transmitter = Transmitter(self._offer, self._renew, punctual=self._offer_at_once)
+        self._transmitter = Transmitter(self._offer, self._renew, now=clock.now, punctual=self._offer_at_once)
         self._timer: asyncio.TimerHandle | None = None
         self._due = math.inf
         self._runs = False

@@ -5,9 +5,11 @@ What befalls the node, and what follows:
 | happening | writers of the cell | NMT (1029h = 0 / 1 / 2) | EMCY |
 |---|---|---|---|
 | RPDO in OPERATIONAL, SDO request | the writer is alive | | |
-| heartbeat of a watched node lost, or owed and not come | its writer is lost, and refused till it is back \
+| heartbeat of a node of 1016h ends | its writer is lost, and refused till it is back \
 | PRE-OPERATIONAL / as it is / STOPPED | 8130h till it is back |
-| watched node boots | its writer is lost | as it is | |
+| heartbeat that the mapping promises ends, or does not come after the first write or lock request \
+| its writer is lost, and refused till it is back | as it is | |
+| node whose heartbeat is promised boots | its writer is lost | as it is | |
 | guarding stays away | | PRE-OPERATIONAL / as it is / STOPPED | 8130h until it is back |
 | RPDO deadline passes | the RPDO writer is lost | as it is | 8250h until it is received |
 | OPERATIONAL left | the RPDO writer is lost | | |
@@ -26,8 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from datetime import datetime
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -42,11 +43,13 @@ from gatewayd.canopen.heartbeat import HeartbeatConsumer, HeartbeatProducer
 from gatewayd.canopen.identity import ErrorBehaviour, Identity, identity_objects
 from gatewayd.canopen.lss import LssSlave
 from gatewayd.canopen.nmt import ALLOWED, UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
+from gatewayd.canopen.observer import NodeCounters, Observer
 from gatewayd.canopen.pdo.parameters import Configuration, PdoTable
 from gatewayd.canopen.pdo.receive import Fault, ReceiveEngine
 from gatewayd.canopen.pdo.transmit import TransmitEngine
 from gatewayd.canopen.peers import Peers
 from gatewayd.canopen.plan import CanopenPlan
+from gatewayd.canopen.promise import Promises
 from gatewayd.canopen.sdo import SdoServer
 from gatewayd.canopen.sdo.parameters import server_parameter
 from gatewayd.canopen.status_objects import StatusObjects
@@ -55,9 +58,10 @@ from gatewayd.canopen.sync import Sync
 from gatewayd.canopen.variables import VariableObjects
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
+from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 
-__all__ = ["OVERRUN_TIME", "Node", "NodeCounters", "Observer"]
+__all__ = ["OVERRUN_TIME", "Node"]
 
 OVERRUN_TIME: Final = 1.0
 """Seconds without a lost frame after which the overrun is over."""
@@ -66,41 +70,6 @@ SDO_LENGTH: Final = 8
 """Bytes of every SDO frame."""
 
 Handler = Callable[[Frame, float], None]
-
-
-class Observer:
-    """Whom a node tells what is not for the bus; does nothing by itself."""
-
-    def cob_ids_changed(self) -> None:
-        """`Node.cob_ids` or `Node.remote_ids` is another one now."""
-
-    def nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
-        """The NMT state is another one now."""
-
-    def report(self, text: str) -> None:
-        """Something for the log."""
-
-    def time_told(self, moment: datetime, now: float) -> None:
-        """The network's wall clock (TIME)."""
-
-    def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
-        """An LSS master demands it: be silent for `delay` seconds, switch, be silent for as long again."""
-
-
-@dataclass(slots=True)
-class NodeCounters:
-    """Since the node was made."""
-
-    received: int = 0
-    """Frames that were handed to the node."""
-    ignored: int = 0
-    """Frames with a COB-ID that means nothing in the present NMT state."""
-    outside_window: int = 0
-    """Synchronous RPDOs that came after the synchronous window (1007h)."""
-    communication_errors: int = 0
-    """Losses of heartbeat, guarding or bus."""
-    overruns: int = 0
-    """Received frames that were lost."""
 
 
 class Node:
@@ -131,6 +100,8 @@ class Node:
         self._started = False
         self._fell = self._was_off = False
         self._store_damaged = False
+        self._weaker: frozenset[tuple[int, float]] = frozenset()
+        """Nodes whose heartbeat 1016h watches less closely than the mapping, and its time."""
         self._overrun_until = math.inf
         self._routes: dict[int, tuple[Service, Handler]] = {}
         self._handlers: dict[int, Handler] = {}
@@ -162,10 +133,15 @@ class Node:
             plan.consumers,
             lost=self._heartbeat_lost,
             back=self._heartbeat_back,
-            booted=self._peer_booted,
-            changed=self._route,
+            changed=self._watch_changed,
         )
-        self._peers = Peers(cell, plan.consumers, self.consumer)
+        self.promises = Promises(
+            plan.consumers,
+            also=self.consumer.time,
+            broken=partial(self._lose_node, "no heartbeat of node {}"),
+            booted=partial(self._lose_node, "node {} has restarted"),
+        )
+        self._peers = Peers(cell, self.promises, self.consumer)
         self.guarding = NodeGuarding(
             self._send,
             self._node,
@@ -224,6 +200,7 @@ class Node:
         """Power-on: once, before anything else but `bus_changed`."""
         self._now = now
         self._started = True
+        self.parameters.report_differences()
         self._reset(NmtCommand.RESET_NODE, now)
         if self.bus.carries:
             self.nmt.boot(now)
@@ -238,6 +215,7 @@ class Node:
         self._started = True
         self.bus, self.counters = former.bus, former.counters
         self._fell, self._was_off = former._fell, former._was_off
+        self._weaker = former._weaker
         self._reset(NmtCommand.RESET_NODE, now)
         for one in former.dictionary:
             for entry in one.entries:
@@ -246,6 +224,7 @@ class Node:
         self.pdos.reload()
         self.consumer.restart(now)
         self.consumer.resume(former.consumer)
+        self.promises.resume(former.promises)
         self.guarding.restart(now)
         self.sync.restart(now)
         self.emergency.resume(former.emergency)
@@ -299,6 +278,7 @@ class Node:
         self.receive_pdos.tick(now)
         self.producer.tick(now)
         self.consumer.tick(now)
+        self.promises.tick(now)
         self.guarding.tick(now)
         self.emergency.tick(now)
         self._answer(self.sdo.tick(now))
@@ -316,6 +296,7 @@ class Node:
                 self.receive_pdos.next_deadline(now),
                 self.producer.next_deadline(now),
                 self.consumer.next_deadline(now),
+                self.promises.next_deadline(now),
                 self.guarding.next_deadline(now),
                 self.emergency.next_deadline(now),
                 self.sdo.next_deadline(now),
@@ -341,7 +322,7 @@ class Node:
             if time is not None:
                 routes[time] = (Service.TIME, self.time.receive)
             routes[self.sync.cob_id] = (Service.SYNC, self.sync.receive)
-            for node in self.consumer.nodes:
+            for node in self.consumer.nodes | self.promises.nodes:
                 routes[Function.ERROR_CONTROL + node] = (Service.ERROR_CONTROL, self._receive_heartbeat)
             routes[Function.ERROR_CONTROL + self.node_id] = (Service.ERROR_CONTROL, self.guarding.receive)
             routes[Function.SDO_REQUEST + self.node_id] = (Service.SDO, self._receive_sdo)
@@ -365,6 +346,7 @@ class Node:
         if frame.can_id in self._synchronous and not self.sync.window_open(now):
             self.counters.outside_window += 1
             return
+        self.promises.write(self.plan.rpdo_writer, now)
         self._peers.connect(self.plan.rpdo_writer, "RPDO", now)
         self.receive_pdos.receive(frame.can_id, frame.data, now)
 
@@ -375,7 +357,8 @@ class Node:
 
     def _receive_heartbeat(self, frame: Frame, now: float) -> None:
         self.consumer.receive(frame, now)
-        self._peers.heartbeat(frame.can_id - Function.ERROR_CONTROL, now)
+        if self.promises.receive(frame, now):
+            self._peers.heartbeat(frame.can_id - Function.ERROR_CONTROL, now)
 
     def _answer(self, answers: Iterable[bytes]) -> None:
         for data in answers:
@@ -416,6 +399,7 @@ class Node:
                 f"stored parameters of these PDOs make no PDO, defaults are used: {indices}"
             )
         self.consumer.restart(now)
+        self.promises.restart()
         self.guarding.restart(now)
         self.sync.restart(now)
         self._route()
@@ -442,16 +426,33 @@ class Node:
 
     def _heartbeat_lost(self, node: int, now: float) -> None:
         self.emergency.raise_error(ErrorCode.HEARTBEAT, now, bytes([node]), instance=node)
-        for writer in self._peers.of(node):
-            self._lose(writer, f"no heartbeat of node {node}", now)
+        self._lose_node("no heartbeat of node {}", node, now)
         self._communication_error(now)
 
     def _heartbeat_back(self, node: int, now: float) -> None:
         self.emergency.clear(ErrorCode.HEARTBEAT, now, instance=node)
 
-    def _peer_booted(self, node: int, now: float) -> None:
-        for writer in self._peers.of(node):
-            self._lose(writer, f"node {node} has restarted", now)
+    def _lose_node(self, reason: str, node: int, now: float) -> None:
+        """Its writers are lost; by the mapping's promise that is no communication error, whoever else is."""
+        for writer in self.promises.of(node):
+            self._lose(writer, reason.format(node), now)
+
+    def _watch_changed(self) -> None:
+        """1016h is another one: it may watch more, but what the mapping says of writers holds whatever it says."""
+        self._route()
+        weaker = frozenset(
+            (node, self.consumer.time(node))
+            for node in self.promises.nodes
+            if self.consumer.time(node) > self.promises.promised(node)
+        )
+        for node, time in sorted(weaker - self._weaker):
+            watched = "does not watch" if time == math.inf else f"allows {time * 1000:.0f} ms of"
+            names = ", ".join(self.cell.definition.writers[one].name for one in self.promises.of(node))
+            self._observer.report(
+                f"1016h {watched} the heartbeat of node {node}; "
+                f"the {self.promises.promised(node) * 1000:.0f} ms of the mapping hold for its writer {names}"
+            )
+        self._weaker = weaker
 
     def _guarding_lost(self, now: float) -> None:
         self.emergency.raise_error(ErrorCode.HEARTBEAT, now)
@@ -520,6 +521,10 @@ class Node:
     def _objects(self, identity: Identity) -> Iterable[Object]:
         status = StatusBlock(self.cell)
         requester = partial(self._peers.requester, self.plan.sdo_writer)
+
+        def asking() -> Requester:
+            return self._peers.asking(self.plan.sdo_writer, self._now)
+
         yield from identity_objects(identity, lambda: int.from_bytes(status.read(1, 1, self._now), "big"))
         yield from server_parameter(self.parameters.node)
         for service in (
@@ -532,8 +537,8 @@ class Node:
             self.producer,
             self.behaviour,
             self.pdos,
-            VariableObjects(self.plan, self.cell, self._clock, requester),
-            StatusObjects(self.cell, self._clock, requester),
+            VariableObjects(self.plan, self.cell, self._clock, asking),
+            StatusObjects(self.cell, self._clock, requester, asking),
         ):
             yield from service.objects()
 

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from gatewayd import clock
 from gatewayd.canopen.frame import Frame, Priority
 
 __all__ = [
@@ -162,8 +161,8 @@ class Transmitter:
         offer: Callable[[Frame], bool],
         renew: Renew,
         *,
+        now: Callable[[], float],
         punctual: Callable[[Frame], bool] | None = None,
-        now: Callable[[], float] = clock.now,
         queue: TransmitQueue | None = None,
     ) -> None:
         self.queue = TransmitQueue() if queue is None else queue

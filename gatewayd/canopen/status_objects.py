@@ -39,12 +39,22 @@ _TYPES = {1: CanType.UNSIGNED16, 2: CanType.UNSIGNED32}
 class StatusObjects:
     """The objects of one cell's status block."""
 
-    def __init__(self, cell: Cell, clock: Callable[[], float], requester: Callable[[], Requester]) -> None:
-        """`clock`: the moment of the request that is being served; `requester`: who SDO clients are now."""
+    def __init__(
+        self,
+        cell: Cell,
+        clock: Callable[[], float],
+        requester: Callable[[], Requester],
+        asking: Callable[[], Requester],
+    ) -> None:
+        """`clock`: the moment of the request that is being served; `requester`: who SDO clients are now.
+
+        `asking`: the same, when one asks for a lock.
+        """
         self._block = StatusBlock(cell)
         self._definition = cell.definition
         self._clock = clock
         self._requester = requester
+        self._asking = asking
 
     def objects(self) -> Iterator[Object]:
         """5F00h and the tables that have entries."""
@@ -98,6 +108,7 @@ class StatusObjects:
 
     def _write(self, offset: int, data: bytes) -> None:
         word = int.from_bytes(data, "little")
-        refusal = self._block.write(self._requester(), offset, (word,), self._clock())
+        requester = self._asking() if offset == REQUEST and word else self._requester()
+        refusal = self._block.write(requester, offset, (word,), self._clock())
         if refusal is not None:
             raise Abort(ABORT_OF[refusal.reason])

@@ -218,6 +218,10 @@ class Parameters:
             )
         self._saved = replace(self._saved, values=kept, layout=self._layout)
 
+    def report_differences(self) -> None:
+        """Report what was stored and is not what the mapping says."""
+        self._report_stored(self._saved.values, "stored parameters are used in place of the mapping's")
+
     def apply(self, command: NmtCommand, node: int) -> None:
         """Give the entries their power-on values: after "reset communication" those of communication alone.
 
@@ -277,6 +281,17 @@ class Parameters:
                     if entry.stored and entry.value != entry.default
                 )
         self._commit(values)
+        self._report_stored(values, "parameters were stored that are not the mapping's")
+
+    def _report_stored(self, values: Mapping[Key, bytes], what: str) -> None:
+        assert self._dictionary is not None
+        found = [
+            f"{index:04X}h:{sub:02X}"
+            for (index, sub), value in sorted(values.items())
+            if value != self._dictionary.entry(index, sub).default
+        ]
+        if found:
+            self._report(f"{what}: {', '.join(found)}")
 
     def _restore(self, indices: range, signature: bytes) -> None:
         """Forget what was saved; the present values stay until the next reset."""

@@ -14,7 +14,8 @@ from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
-from gatewayd.canopen.node import OVERRUN_TIME, Node, Observer
+from gatewayd.canopen.node import OVERRUN_TIME, Node
+from gatewayd.canopen.observer import Observer
 from gatewayd.canopen.plan import CanopenPlan, Consumer, ObjectPlan, PdoEntry, PdoPlan, SyncPlan
 from gatewayd.canopen.storage import MemoryStore, Saved, Store
 from gatewayd.core.cell import Cell, Change
@@ -550,24 +551,107 @@ def test_a_writer_that_never_tells_its_heartbeat_is_lost_after_the_time(service:
         assert plant.write(0x5F00, 26, PART + 1, 2) == 0
     assert _emergencies(plant.run(0.49)) == []
     assert plant.cell.ownership.owners == [LINE, None]
-    assert _emergencies(plant.run(0.02)) == [0x8130]
+    assert _emergencies(plant.run(0.02)) == []
     assert not _line_alive(plant)
     assert plant.cell.ownership.owners == [None, None]
     assert plant.cell.image.values[PART] == 0
-    assert plant.node.counters.communication_errors == 1
+    assert plant.node.counters.communication_errors == 0
+    assert _emergencies(plant.part(8)) == [0xFF06]
 
 
-@pytest.mark.parametrize(
-    "behaviour, state",
-    [(0, NmtState.PRE_OPERATIONAL), (1, NmtState.OPERATIONAL), (2, NmtState.STOPPED)],
-)
-def test_a_heartbeat_that_never_came_is_a_communication_error_like_a_lost_one(
-    behaviour: int, state: NmtState
-) -> None:
+@pytest.mark.parametrize("behaviour", [0, 1, 2])
+def test_a_heartbeat_that_never_came_is_no_communication_error(behaviour: int) -> None:
+    """CiA 301 supervises from the first heartbeat on; the mapping's promise is another matter."""
     plant = _promised(behaviour)
     plant.part(7)
     plant.run(0.6)
-    assert (plant.state, _line_alive(plant)) == (state, False)
+    assert (plant.state, _line_alive(plant)) == (NmtState.OPERATIONAL, False)
+
+
+@pytest.mark.parametrize("behaviour, state", [(0, NmtState.PRE_OPERATIONAL), (2, NmtState.STOPPED)])
+def test_a_heartbeat_that_ends_is_a_communication_error_whoever_wrote(
+    behaviour: int, state: NmtState
+) -> None:
+    plant = _promised(behaviour)
+    plant.heartbeat()
+    assert _emergencies(plant.run(0.6)) == [0x8130]
+    assert (plant.state, plant.node.counters.communication_errors) == (state, 1)
+
+
+def test_a_read_begins_nothing() -> None:
+    plant = _promised()
+    plant.read(0x2001, 1)
+    plant.read(0x5F00, 2)
+    plant.write(0x5F00, 27, PART + 1, 2)
+    plant.run(9.0)
+    assert _line_alive(plant)
+    assert plant.write(0x2001, 1, 7) == 0
+
+
+@pytest.mark.parametrize("time", [0, 60_000])
+def test_a_promise_cannot_be_switched_off_from_the_bus(time: int) -> None:
+    """The configuration tool is confirmed, its value is read back and stored; the master dies, and its command ends."""
+    store = MemoryStore()
+    plant = Plant(replace(PLAN, sdo_writer=LINE), store).power_on()
+    value = MASTER << 16 | time if time else 0
+    for _ in range(2):
+        assert plant.write(0x1016, 1, value) == 0
+        plant.run(0.01)
+    assert plant.write(0x1010, 1, b"save") == 0
+    assert plant.read(0x1016, 1) == value
+    told = [text for text in plant.notebook.reports if "1016h" in text]
+    assert len(told) == 2, told
+    assert "line" in told[0]
+    assert "1016h:01" in told[1]
+    for _ in range(2):
+        plant.hear(0, START)
+        plant.heartbeat()
+        plant.part(7)
+        plant.run(0.4)
+        assert plant.cell.image.values[PART] == 7
+        assert _emergencies(plant.run(0.2)) == []
+        assert (plant.cell.image.values[PART], plant.cell.ownership.owners[0]) == (0, None)
+        assert _emergencies(plant.part(8)) == [0xFF06]
+        plant = Plant(replace(PLAN, sdo_writer=LINE), store).power_on()
+        assert plant.read(0x1016, 1) == value
+        assert len(plant.notebook.reports) == 2
+
+
+def test_1016h_may_be_stricter_than_the_promise() -> None:
+    plant = _promised()
+    plant.write(0x1016, 1, MASTER << 16 | 200)
+    plant.part(7)
+    plant.run(0.25)
+    assert _refused_for(plant) is None
+    assert plant.cell.image.values[PART] == 0
+    plant.heartbeat()
+    plant.part(7)
+    assert _emergencies(plant.run(0.25)) == [0x8130]
+    assert plant.cell.image.values[PART] == 0
+    assert plant.notebook.reports == []
+
+
+def test_a_stricter_mapping_counts_at_once_whatever_was_stored() -> None:
+    store = MemoryStore()
+    plant = Plant(PLAN, store).power_on()
+    plant.write(0x1016, 1, MASTER << 16 | 400)
+    plant.write(0x1010, 1, b"save")
+    stricter = replace(PLAN, consumers=(Consumer(MASTER, 100, LINE),))
+    plant = Plant(stricter, store).operational()
+    assert plant.read(0x1016, 1) == MASTER << 16 | 400
+    plant.heartbeat()
+    plant.part(7)
+    plant.run(0.11)
+    assert (plant.cell.image.values[PART], plant.state) == (0, NmtState.OPERATIONAL)
+
+
+def test_writing_1016h_over_and_over_does_not_put_off_the_loss() -> None:
+    plant = _promised()
+    plant.part(7)
+    for number in range(10):
+        plant.write(0x1016, 1, MASTER << 16 | 500 + number)
+        plant.run(0.06)
+    assert plant.cell.image.values[PART] == 0
 
 
 def test_a_watched_node_that_uses_nothing_is_not_missed() -> None:
@@ -631,6 +715,7 @@ def test_a_synchronous_rpdo_of_a_lost_writer_is_refused_and_not_kept() -> None:
 def test_being_started_again_is_no_heartbeat() -> None:
     """A lost heartbeat ends OPERATIONAL; the master that starts the node is not heard by that."""
     plant = _promised(behaviour=0)
+    plant.heartbeat()
     plant.part(7)
     plant.run(0.6)
     plant.hear(0, START)
@@ -648,7 +733,7 @@ def test_after_a_reset_the_heartbeat_is_waited_for_anew(command: bytes) -> None:
     plant.hear(0, START)
     plant.part(8)
     assert plant.cell.image.values[PART] == 8
-    assert _emergencies(plant.run(0.6)) == [0x8130]
+    assert _emergencies(plant.run(0.6)) == []
     assert plant.cell.image.values[PART] == 0
 
 
@@ -810,7 +895,9 @@ def test_saved_communication_parameters_and_mappings_survive_a_restart() -> None
     assert first.write(0x1800, 1, 0x4000_0185) == 0
     assert first.write(0x1010, 1, b"save") == 0
     second = Plant(store=store).operational()
-    assert second.notebook.reports == []
+    assert second.notebook.reports == [
+        "stored parameters are used in place of the mapping's: 1017h:00, 1A00h:01"
+    ]
     assert (second.read(0x1017), second.read(0x1A00, 1)) == (250, 0x2402_0120)
     assert second.show(FORCE, 1.5) == [Frame(0x185, CanType.REAL32.pack(1.5))]
 

@@ -296,7 +296,7 @@ def test_a_frame_that_the_bus_failed_at_does_not_stop_those_after_it() -> None:
         sent.append(frame)
         return True
 
-    transmitter = Transmitter(offer, lambda _can_id: None)
+    transmitter = Transmitter(offer, lambda _can_id: None, now=lambda: 0.0)
     transmitter.open()
     transmitter.send(Frame(0x281, b"old"), Priority.NEWEST)
     assert (len(transmitter.queue), transmitter.discarded) == (0, 1)

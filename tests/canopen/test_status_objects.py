@@ -20,6 +20,9 @@ COUNT = 300
 """More variables than an array has entries."""
 
 
+_NOBODY = (partial(Requester, None), partial(Requester, None))
+
+
 def _definition(count: int = COUNT, writers: tuple[str, ...] = ("line", "hmi")) -> CellDefinition:
     variables = tuple(
         Variable(
@@ -56,9 +59,15 @@ class Node:
         self.cell.robot_connected(0.0)
         self.cell.adopt(dict.fromkeys(range(COUNT), 0), 0.0)
         self.heard = True
+        self.asked = 0
+        """Requests of a lock."""
+        self._writer = writer
         self.dictionary = Dictionary(
             StatusObjects(
-                self.cell, lambda: self.now, lambda: Requester(writer, trusted=self.heard)
+                self.cell,
+                lambda: self.now,
+                lambda: Requester(writer, trusted=self.heard),
+                self._asking,
             ).objects()
         )
         self.subindices = {
@@ -67,6 +76,10 @@ class Node:
             for entry in one.entries
             if one.index == HEADER
         }
+
+    def _asking(self) -> Requester:
+        self.asked += 1
+        return Requester(self._writer, trusted=self.heard)
 
     def field(self, name: str) -> int:
         return int.from_bytes(self.dictionary.read(HEADER, self.subindices[name]), "little")
@@ -112,11 +125,9 @@ def test_indices_are_fixed_and_apart() -> None:
         "quality": 0x5F40,
     }
     largest = Cell(_definition(1024, tuple(f"w{number}" for number in range(32))))
-    indices = [one.index for one in StatusObjects(largest, float, partial(Requester, None)).objects()]
+    indices = [one.index for one in StatusObjects(largest, float, *_NOBODY).objects()]
     assert len(indices) == len(set(indices)) == 3 + 4 * 5
-    assert all(
-        len(one.entries) <= 255 for one in StatusObjects(largest, float, partial(Requester, None)).objects()
-    )
+    assert all(len(one.entries) <= 255 for one in StatusObjects(largest, float, *_NOBODY).objects())
 
 
 def test_every_word_is_that_of_the_block(node: Node) -> None:
@@ -157,7 +168,7 @@ def test_entries_are_named_after_variables_and_writers(node: Node) -> None:
 
 def test_a_cell_without_writers_has_no_table_of_them() -> None:
     bare = Cell(CellDefinition("bare", 1, (), (), (), 0.1))
-    assert [one.index for one in StatusObjects(bare, float, partial(Requester, None)).objects()] == [HEADER]
+    assert [one.index for one in StatusObjects(bare, float, *_NOBODY).objects()] == [HEADER]
 
 
 def test_tables_are_read_only(node: Node) -> None:
@@ -212,3 +223,12 @@ def test_an_sdo_client_that_is_not_heard_moves_no_lock_and_reads_on(node: Node) 
     assert node.put("release", RELEASE_ALL) is AbortCode.DEVICE_STATE
     assert (node.entry("owner", 2), node.entry("owner", 3)) == (LINE + 1, 0)
     assert node.field("refusal_reason") == Reason.HEARTBEAT_LOST
+
+
+def test_a_release_and_a_read_are_no_request(node: Node) -> None:
+    node.put("release", 2)
+    node.put("request", 0)
+    node.field("heartbeat")
+    assert node.asked == 0
+    node.put("request", 2)
+    assert node.asked == 1

@@ -78,7 +78,8 @@ _MEANINGS: Mapping[int, str | Mapping[int, str]] = {
     0x1012: "where TIME is heard, bit 31: at all; for the log",
     0x1014: "where EMCY is sent; bit 31: not at all",
     0x1015: "least time between two EMCYs in 0.1 ms",
-    0x1016: "a node whose heartbeat is watched: bits 16-22 its node-ID, bits 0-15 milliseconds",
+    0x1016: "a node whose heartbeat is watched: bits 16-22 its node-ID, bits 0-15 milliseconds; "
+    "makes what the mapping promises shorter, never longer",
     0x1017: "milliseconds between two heartbeats; 0: none, and guarding is answered",
     0x1018: {
         1: "0: CiA has assigned none",
@@ -234,7 +235,7 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.STORED_PARAMETERS: "the stored parameters cannot be read; defaults are used",
     ErrorCode.OVERRUN: "received frames were lost for want of room",
     ErrorCode.PASSIVE: "the controller is error-passive",
-    ErrorCode.HEARTBEAT: "the heartbeat of a watched node stayed away (byte 4: its node-ID), or the guarding did",
+    ErrorCode.HEARTBEAT: "the heartbeat of a node of 1016h ended (byte 4: its node-ID), or the guarding did",
     ErrorCode.BUS_OFF_RECOVERED: "the controller was off the bus and is back",
     ErrorCode.PDO_TOO_SHORT: "an RPDO was shorter than its mapping and was dropped (bytes 4-5: its number)",
     ErrorCode.PDO_TOO_LONG: "an RPDO was longer than its mapping; its first bytes were used",

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from gatewayd import clock
 from gatewayd.canopen.bus import BusError, BusState
 from gatewayd.canopen.errors import ErrorClass
 from gatewayd.canopen.frame import Frame, Priority
@@ -290,7 +291,7 @@ async def test_full_queue_of_the_kernel_loses_nothing(adapter: SerialAdapter, qu
     await adapter.up()
     async with opened(adapter.name) as station:
         await station.become(BusState.ACTIVE)
-        transmitter = Transmitter(station.bus.send, lambda _can_id: None)
+        transmitter = Transmitter(station.bus.send, lambda _can_id: None, now=clock.now)
         transmitter.open()
         station.recorder.room = transmitter.flush
         adapter.stop_reading()
