@@ -191,6 +191,7 @@ PURE = (
     "canopen.emergency",
     "canopen.errors",
     "canopen.frame",
+    "canopen.gap",
     "canopen.guarding",
     "canopen.heartbeat",
     "canopen.identity",

@@ -11,6 +11,7 @@ from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
+from gatewayd.canopen.gap import spared
 from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.plan import Consumer
 
@@ -121,6 +122,8 @@ class _Watched:
     timeout: float
     state: Watch = Watch.WAITING
     due: float = math.inf
+    spared: bool = False
+    """We stood still since it was heard."""
 
 
 class HeartbeatConsumer:
@@ -180,11 +183,12 @@ class HeartbeatConsumer:
         watched = self._watched.get(node)
         return watched.timeout if watched is not None else math.inf
 
-    def gap(self, now: float) -> None:
-        """We stood still and heard nobody: who was alive has its whole time again."""
+    def gap(self, since: float, now: float) -> None:
+        """We stood still and heard nobody: who was alive has its time again."""
         for watched in self._watched.values():
             if watched.state is Watch.ALIVE:
-                watched.due = now + watched.timeout
+                watched.due = spared(watched.due, watched.timeout, since, now, again=watched.spared)
+                watched.spared = True
 
     def restart(self, now: float) -> None:
         """Wait for every node's first heartbeat anew, without a word about those that were lost."""
@@ -225,6 +229,7 @@ class HeartbeatConsumer:
         old = watched.state
         watched.state = WATCH.get((old, seen), old)
         watched.due = now + watched.timeout if watched.state is Watch.ALIVE else math.inf
+        watched.spared = False
         if old is Watch.LOST and watched.state is Watch.ALIVE:
             self._back(watched.node, now)
         elif old is not Watch.LOST and watched.state is Watch.LOST:

@@ -114,7 +114,17 @@ class CanLink(Observer):
         self._transmitter.flush()
 
     def gap(self, since: float, now: float) -> None:
-        """The process stood still from `since` to `now`: frames that are read now may have waited that long."""
+        """The process stood still from `since` to `now`: frames that are read now may have waited that long.
+
+        They are read before the loop serves anything else; what waits to be sent is made anew.
+        """
+        self.node.gap(since, now)
+        self._beat = (self._beat[0], now)
+        self._transmitter.renew()
+        if self._runs:
+            asyncio.get_running_loop().call_soon(self._catch_up)
+        else:
+            self.node.caught_up()
 
     # -- called by the driver ------------------------------------------------------------------------------------
 
@@ -246,6 +256,13 @@ class CanLink(Observer):
 
     def _offer(self, frame: Frame) -> bool:
         return self._bus is not None and self._bus.send(frame)
+
+    def _catch_up(self) -> None:
+        if self._bus is not None:
+            self._bus.catch_up()
+        self.node.caught_up()
+        if self._runs:
+            self._schedule(clock.now())
 
     def _offer_at_once(self, frame: Frame) -> bool:
         """A frame that may not be late: not where older ones still wait in the kernel."""

@@ -35,7 +35,7 @@ from typing import Final
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.clock import TimeConsumer
 from gatewayd.canopen.cob_ids import Function
-from gatewayd.canopen.dictionary import Dictionary, Entry, Object
+from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary, Entry, Object
 from gatewayd.canopen.emergency import Emergency, ErrorCode
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.guarding import NodeGuarding
@@ -61,13 +61,19 @@ from gatewayd.core.definition import Direction
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 
-__all__ = ["OVERRUN_TIME", "Node"]
+__all__ = ["LATE_PARAMETER", "OVERRUN_TIME", "Node"]
 
 OVERRUN_TIME: Final = 1.0
 """Seconds without a lost frame after which the overrun is over."""
 
+LATE_PARAMETER: Final = 0.5
+"""Seconds that a download of a parameter may have waited while the process stood still."""
+
 SDO_LENGTH: Final = 8
 """Bytes of every SDO frame."""
+
+_FIRST_OF_CELL: Final = 0x2000
+"""Where the objects of the communication end."""
 
 Handler = Callable[[Frame, float], None]
 
@@ -100,8 +106,8 @@ class Node:
         self._started = False
         self._fell = self._was_off = False
         self._store_damaged = False
-        self._weaker: frozenset[tuple[int, float]] = frozenset()
-        """Nodes whose heartbeat 1016h watches less closely than the mapping, and its time."""
+        self._waiting_since = math.inf
+        """Since when what is received may have waited; infinity: it came in time."""
         self._overrun_until = math.inf
         self._routes: dict[int, tuple[Service, Handler]] = {}
         self._handlers: dict[int, Handler] = {}
@@ -169,7 +175,7 @@ class Node:
             self._find,
             self._pdo_changed,
         )
-        self.dictionary = Dictionary(self._objects(identity))
+        self.dictionary = Dictionary(self._objects(identity), self._permit)
         self.parameters.bind(self.dictionary)
         self.sdo = SdoServer(self.dictionary)
 
@@ -215,7 +221,8 @@ class Node:
         self._started = True
         self.bus, self.counters = former.bus, former.counters
         self._fell, self._was_off = former._fell, former._was_off
-        self._weaker = former._weaker
+        self._waiting_since, self._peers.waited = former._waiting_since, former._peers.waited
+        self.promises.resume(former.promises)
         self._reset(NmtCommand.RESET_NODE, now)
         for one in former.dictionary:
             for entry in one.entries:
@@ -269,6 +276,20 @@ class Node:
         self.counters.overruns += count
         self._overrun_until = now + OVERRUN_TIME
         self.emergency.raise_error(ErrorCode.OVERRUN, now)
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`. What is received until `caught_up` may have waited so long."""
+        self._now = now
+        self._waiting_since = min(self._waiting_since, since)
+        self._peers.waited = now - self._waiting_since
+        self.consumer.gap(since, now)
+        self.promises.gap(since, now)
+        self.guarding.gap(since, now)
+        self.receive_pdos.gap(since, now)
+
+    def caught_up(self) -> None:
+        """Everything that waited was received."""
+        self._waiting_since, self._peers.waited = math.inf, 0.0
 
     def tick(self, now: float) -> None:
         """Do what time brings. Cheap before `next_deadline`."""
@@ -324,7 +345,7 @@ class Node:
             routes[self.sync.cob_id] = (Service.SYNC, self.sync.receive)
             for node in self.consumer.nodes | self.promises.nodes:
                 routes[Function.ERROR_CONTROL + node] = (Service.ERROR_CONTROL, self._receive_heartbeat)
-            routes[Function.ERROR_CONTROL + self.node_id] = (Service.ERROR_CONTROL, self.guarding.receive)
+            routes[Function.ERROR_CONTROL + self.node_id] = (Service.ERROR_CONTROL, self._receive_guarding)
             routes[Function.SDO_REQUEST + self.node_id] = (Service.SDO, self._receive_sdo)
             routes[Function.NMT] = (Service.NODE_CONTROL, self.nmt.receive)
         changed = routes.keys() != self._routes.keys()
@@ -359,6 +380,14 @@ class Node:
         self.consumer.receive(frame, now)
         if self.promises.receive(frame, now):
             self._peers.heartbeat(frame.can_id - Function.ERROR_CONTROL, now)
+
+    def _receive_guarding(self, frame: Frame, now: float) -> None:
+        self.guarding.receive(frame, now, late=self._peers.waited > 0)
+
+    def _permit(self, index: int) -> None:
+        """A parameter is not set by a client that has given up; what variables and locks wait for the cell judges."""
+        if index < _FIRST_OF_CELL and self._peers.waited > LATE_PARAMETER:
+            raise Abort(AbortCode.DEVICE_STATE)
 
     def _answer(self, answers: Iterable[bytes]) -> None:
         for data in answers:
@@ -440,19 +469,9 @@ class Node:
     def _watch_changed(self) -> None:
         """1016h is another one: it may watch more, but what the mapping says of writers holds whatever it says."""
         self._route()
-        weaker = frozenset(
-            (node, self.consumer.time(node))
-            for node in self.promises.nodes
-            if self.consumer.time(node) > self.promises.promised(node)
-        )
-        for node, time in sorted(weaker - self._weaker):
-            watched = "does not watch" if time == math.inf else f"allows {time * 1000:.0f} ms of"
-            names = ", ".join(self.cell.definition.writers[one].name for one in self.promises.of(node))
-            self._observer.report(
-                f"1016h {watched} the heartbeat of node {node}; "
-                f"the {self.promises.promised(node) * 1000:.0f} ms of the mapping hold for its writer {names}"
-            )
-        self._weaker = weaker
+        names = [writer.name for writer in self.cell.definition.writers]
+        for text in self.promises.weakened(names):
+            self._observer.report(text)
 
     def _guarding_lost(self, now: float) -> None:
         self.emergency.raise_error(ErrorCode.HEARTBEAT, now)
@@ -562,7 +581,7 @@ class Node:
 
     def _on_sync(self, counter: int | None, now: float) -> None:
         self.emergency.clear(ErrorCode.SYNC_LENGTH, now)
-        self.transmit.on_sync(counter, now)
+        self.transmit.on_sync(counter, now, late=self._peers.waited > 0)
         self.receive_pdos.on_sync(now)
 
     def _store_lss(self, node: int, bit_rate: int) -> bool:

@@ -10,12 +10,13 @@ its breach costs the writer its locks, and what it asks for is refused until it 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.frame import Frame
+from gatewayd.canopen.gap import spared
 from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.plan import Consumer
 
@@ -63,7 +64,9 @@ class _Node:
     writers: tuple[int, ...]
     state: Promise = Promise.IDLE
     since: float = math.inf
-    """The last heartbeat, or the write that began it, or the end of a gap of our own."""
+    """The last heartbeat, or the write that began it; later, if we stood still since."""
+    spared: bool = False
+    """We stood still since."""
 
 
 class Promises:
@@ -92,6 +95,8 @@ class Promises:
                 writers = (*known.writers, one.writer)
                 found[one.node] = _Node(one.node, min(known.timeout, timeout), writers)
         self._nodes = found
+        self._weaker: frozenset[tuple[int, float]] = frozenset()
+        """What was reported: nodes to which 1016h gives more than the mapping, and how much."""
         self._of = {writer: node for node in found.values() for writer in node.writers}
 
     @property
@@ -143,15 +148,40 @@ class Promises:
 
     def resume(self, former: Promises) -> None:
         """Go on as another one of the same plan."""
+        self._weaker = former._weaker
         for node, found in former._nodes.items():
             if node in self._nodes:
-                self._nodes[node].state, self._nodes[node].since = found.state, found.since
+                present = self._nodes[node]
+                present.state, present.since, present.spared = found.state, found.since, found.spared
 
-    def gap(self, now: float) -> None:
-        """We stood still and heard nobody: silence counts anew."""
+    def weakened(self, names: Sequence[str]) -> list[str]:
+        """What is to be reported of 1016h after a change: where it is weaker than the mapping. Each is told once.
+
+        `names`: those of the writers.
+        """
+        weaker = frozenset(
+            (node, self._also(node))
+            for node, found in self._nodes.items()
+            if self._also(node) > found.timeout
+        )
+        news, self._weaker = weaker - self._weaker, weaker
+        return [self._comparison(self._nodes[node], time, names) for node, time in sorted(news)]
+
+    @staticmethod
+    def _comparison(found: _Node, time: float, names: Sequence[str]) -> str:
+        watched = "does not watch" if time == math.inf else f"allows {time * 1000:.0f} ms of silence to"
+        writers = ", ".join(names[writer] for writer in found.writers)
+        promised = f"{found.timeout * 1000:.0f} ms"
+        return (
+            f"1016h {watched} node {found.node}; the {promised} of the mapping hold for its writer {writers}"
+        )
+
+    def gap(self, since: float, now: float) -> None:
+        """We stood still and heard nobody: who is bound has its time again."""
         for found in self._nodes.values():
             if found.state in _BOUND:
-                found.since = now
+                found.since = spared(found.since, 0.0, since, now, again=found.spared)
+                found.spared = True
 
     def tick(self, now: float) -> None:
         """Notice silence."""
@@ -173,5 +203,6 @@ class Promises:
         found.state = PROMISE.get((old, sign), old)
         if sign is Sign.HEARTBEAT or (found.state is Promise.OWED and old is not Promise.OWED):
             found.since = now
+            found.spared = False
         if found.state is Promise.BROKEN and old is not Promise.BROKEN:
             self._broken(found.node, now)

@@ -159,12 +159,24 @@ def test_another_consumer_goes_on_with_what_is_lost() -> None:
 def test_after_a_gap_of_our_own_a_node_has_its_whole_time_again() -> None:
     watcher = Watcher(MASTER, Consumer(2, 500, None))
     watcher.hear(1, 0.0)
-    watcher.service.gap(9.0)
+    watcher.service.gap(0.1, 9.0)
     watcher.service.tick(9.49)
     assert (watcher.told, watcher.service.state(2)) == ([], Watch.WAITING)
     watcher.service.tick(9.5)
-    watcher.service.gap(20.0)
+    watcher.service.gap(10.0, 20.0)
     assert (watcher.told, watcher.service.state(1)) == ([("lost", 1)], Watch.LOST)
+
+
+def test_a_process_that_stands_still_over_and_over_misses_a_silent_node_all_the_same() -> None:
+    watcher = Watcher(MASTER)
+    watcher.hear(1, 0.0)
+    now = 0.0
+    while not watcher.told:
+        watcher.service.gap(now, now + 0.1)
+        now += 0.2
+        watcher.service.tick(now)
+        assert now < 2.0
+    assert now > 0.8
 
 
 def test_cct_heartbeat_07_one_node_twice_is_refused() -> None:

@@ -793,6 +793,98 @@ def test_the_node_of_a_succeeding_cell_goes_on_with_what_is_owed_and_what_is_los
     assert plant.cell.image.values[PART] == 8
 
 
+# -- a gap of our own ------------------------------------------------------------------------------------------------
+
+
+def _stand_still(plant: Plant, seconds: float) -> None:
+    """The process stands still; what follows has waited, until `caught_up`."""
+    since, plant.now = plant.now, plant.now + seconds
+    plant.node.gap(since, plant.now)
+
+
+@pytest.mark.parametrize("heard", [False, True])
+def test_nobody_is_accused_for_our_own_silence(heard: bool) -> None:
+    first, *others = PLAN.pdos
+    plant = _promised(pdos=(replace(first, event=300), *others))
+    plant.heartbeat()
+    plant.part(7)
+    _stand_still(plant, 5.0)
+    if heard:
+        plant.heartbeat()
+        plant.part(7)
+    plant.node.caught_up()
+    assert _emergencies(plant.run(0.25)) == []
+    assert (_line_alive(plant), plant.node.counters.communication_errors) == (True, 0)
+    assert _emergencies(plant.run(0.35)) == [0x8250, 0x8130]
+    assert not _line_alive(plant)
+
+
+def test_a_guarding_master_is_not_accused_and_gets_no_answer_that_it_waits_for_no_more() -> None:
+    plant = Plant(replace(PLAN, heartbeat=0)).operational()
+    plant.write(0x100C, 0, 100, 2)
+    plant.write(0x100D, 0, 3, 1)
+    plant.node.receive(Frame(0x705, b"", remote=True), plant.now)
+    assert plant.take() == [Frame(0x705, b"\5")]
+    _stand_still(plant, 5.0)
+    for _ in range(9):
+        plant.node.receive(Frame(0x705, b"", remote=True), plant.now)
+    plant.node.caught_up()
+    assert plant.run(0.29) == []
+    plant.node.receive(Frame(0x705, b"", remote=True), plant.now)
+    assert plant.take() == [Frame(0x705, b"\x85")], "the toggle bit that it expects"
+    _stand_still(plant, 5.0)
+    plant.node.caught_up()
+    assert _emergencies(plant.run(0.29)) == []
+    assert _emergencies(plant.run(0.02)) == [0x8130]
+
+
+def test_syncs_that_waited_send_nothing_and_count() -> None:
+    second = replace(PLAN.pdos[3], transmission=2)
+    plant = Plant(replace(PLAN, pdos=(*PLAN.pdos[:3], second))).operational()
+    assert [frame.can_id for frame in plant.hear(0x80)] == [0x285]
+    _stand_still(plant, 5.0)
+    assert [frame for _ in range(499) for frame in plant.hear(0x80)] == []
+    plant.node.caught_up()
+    assert [frame.can_id for frame in plant.hear(0x80)] == [0x285]
+    assert plant.node.sync.count == 501
+
+
+def test_a_gap_brings_one_heartbeat_and_one_sync() -> None:
+    sync = SyncPlan(producer=True, period=10_000)
+    plant = Plant(replace(PLAN, heartbeat=100, sync=sync)).operational()
+    _stand_still(plant, 5.0)
+    plant.node.caught_up()
+    plant.node.tick(plant.now)
+    sent = [frame.can_id for frame in plant.take()]
+    assert (sent.count(0x80), sent.count(0x705)) == (1, 1)
+
+
+def test_parameters_of_a_client_that_has_given_up_are_not_set() -> None:
+    plant = Plant().power_on()
+    _stand_still(plant, 0.4)
+    assert plant.write(0x1017, 0, 100, 2) == 0
+    plant.node.caught_up()
+    _stand_still(plant, 3.0)
+    assert plant.write(0x1017, 0, 50, 2) == -0x0800_0022
+    assert plant.read(0x1017) == 100
+    plant.node.caught_up()
+    assert plant.write(0x1017, 0, 50, 2) == 0
+
+
+def test_commands_of_the_master_are_carried_out_however_late() -> None:
+    plant = Plant().operational()
+    _stand_still(plant, 5.0)
+    plant.hear(0, STOP)
+    assert plant.state is NmtState.STOPPED
+
+
+def test_two_gaps_in_a_row_are_one_wait() -> None:
+    plant = Plant().operational()
+    _stand_still(plant, 0.3)
+    _stand_still(plant, 0.3)
+    assert plant.write(0x1017, 0, 50, 2) == -0x0800_0022
+
+
 # -- bus -------------------------------------------------------------------------------------------------------------
 
 

@@ -105,14 +105,14 @@ def test_of_two_times_for_one_node_the_shorter_holds() -> None:
 
 
 def test_after_a_gap_of_our_own_silence_counts_anew(bench: Bench) -> None:
-    bench.promises.gap(5.0)
+    bench.promises.gap(4.0, 5.0)
     assert bench.promises.next_deadline(5.0) == math.inf
     bench.promises.write(LINE, 5.0)
-    bench.promises.gap(9.0)
+    bench.promises.gap(5.1, 9.0)
     bench.promises.tick(9.4)
     assert bench.told == []
     bench.promises.tick(9.5)
-    bench.promises.gap(20.0)
+    bench.promises.gap(10.0, 20.0)
     assert bench.state is Promise.BROKEN
 
 
@@ -160,6 +160,8 @@ class Both:
         self.heard = False
         """A heartbeat came since 1016h watches the node as it does."""
         self.bound = False
+        self.spared = False
+        """A gap has given a whole time since."""
 
     @property
     def is_broken(self) -> bool:
@@ -184,7 +186,7 @@ class Both:
 
     def write(self) -> None:
         if self.promises.state(NODE) is Promise.IDLE:
-            self.sign, self.bound = self.now, True
+            self.sign, self.bound, self.spared = self.now, True, False
         self.promises.write(LINE, self.now)
 
     def hear(self, data: bytes) -> None:
@@ -194,7 +196,7 @@ class Both:
 
     def heartbeat(self) -> None:
         self.hear(HEARTBEAT)
-        self.sign, self.heard = self.now, True
+        self.sign, self.heard, self.spared = self.now, True, False
 
     def boot(self) -> None:
         self.bound = self.is_broken
@@ -202,9 +204,12 @@ class Both:
         self.heard = self.heard and self.consumer.state(NODE) is Watch.LOST
 
     def gap(self) -> None:
-        self.sign = self.now
-        self.consumer.gap(self.now)
-        self.promises.gap(self.now)
+        """The process stands still for a quarter of a second; nobody is silent in it."""
+        since, self.now = self.now, self.now + 0.25
+        self.sign = min(self.sign + 0.25, self.now) if self.spared else self.now
+        self.spared = self.bound
+        self.consumer.gap(since, self.now)
+        self.promises.gap(since, self.now)
 
     def read(self) -> None:
         """Nothing is written and nobody is heard."""

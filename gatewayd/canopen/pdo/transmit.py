@@ -139,6 +139,14 @@ class TransmitPdo:
         self.waits = self.forced = False
         self.due = math.inf
 
+    def count(self) -> bool:
+        """Count a SYNC. Returns whether it is one to send with."""
+        self.countdown = (self.countdown or 1) - 1
+        if self.countdown:
+            return False
+        self.countdown = self.configuration.transmission
+        return True
+
     def news(self, content: Sequence[Value]) -> bytes | None:
         """The bytes to send; None if nothing differs enough from what was sent last."""
         if not self.forced and self.deadbands is not None and not self._has_moved(content, self.deadbands):
@@ -233,15 +241,21 @@ class TransmitEngine:
             if pdo.gather(values) != pdo.content and not pdo.waits and not pdo.is_stopped:
                 self._happened(pdo, Happening.CHANGE, now)
 
-    def on_sync(self, counter: int | None, now: float) -> None:
-        """A SYNC was received, with this counter if it has one."""
+    def on_sync(self, counter: int | None, now: float, *, late: bool = False) -> None:
+        """A SYNC was received, with this counter if it has one.
+
+        `late`: it waited while the process stood still. It is counted, but what it asked for is over.
+        """
         if not self.is_operational:
             return
         self._look(now)
         for pdo in self._synchronous:
             if pdo.is_stopped or not _counts(pdo, counter):
                 continue
-            self._happened(pdo, Happening.SYNC, now)
+            if not late:
+                self._happened(pdo, Happening.SYNC, now)
+            elif pdo.moves.get(Happening.SYNC) is Move.COUNT:
+                pdo.count()
 
     def tick(self, now: float) -> None:
         """Send what time makes due. Cheap before `next_deadline`."""
@@ -355,9 +369,7 @@ class TransmitEngine:
         pdo.countdown = None
 
     def _count(self, pdo: TransmitPdo, now: float) -> None:
-        pdo.countdown = (pdo.countdown or 1) - 1
-        if pdo.countdown == 0:
-            pdo.countdown = pdo.configuration.transmission
+        if pdo.count():
             content = pdo.gather(self._values)
             self._emit(pdo, content, pdo.pack(content), now)
 
