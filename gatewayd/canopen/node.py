@@ -258,6 +258,8 @@ class Node:
         self._now = now
         if direction is Direction.OUTPUT:
             self.transmit.image_changed(now)
+        else:
+            self.transmit.status_changed(now)
 
     def bus_changed(self, state: BusState, now: float) -> None:
         """The bus is in another state, or told for the first time."""
@@ -330,7 +332,7 @@ class Node:
         self._now = now
         if can_id == Function.ERROR_CONTROL + self.node_id:
             return self.producer.frame(now)
-        return self.transmit.renew(can_id)
+        return self.transmit.renew(can_id, now)
 
     # -- received frames -----------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
@@ -23,6 +24,7 @@ from gatewayd.core.definition import CellDefinition, Direction, Lock, Value, Val
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
+from gatewayd.mapping.loader import load
 from tests.canopen.wire import Wire
 
 NODE = 5
@@ -521,6 +523,117 @@ def test_heartbeat_feeds_a_writer_that_sends_only_changes() -> None:
         plant.run(0.4)
         cell.tick(plant.now)
     assert _line_alive(plant)
+
+
+# -- status words in PDOs --------------------------------------------------------------------------------------------
+
+_ROBOT_STATE, _HEARTBEAT_WORD = 7, 4
+"""Sub-indices of 5F00h."""
+
+
+def _status_pdo(transmission: int, *words: tuple[int, int], inhibit: int = 0) -> Plant:
+    """TPDO 3 carries words of the status block behind an output."""
+    cycles = PdoEntry(CYCLES, 0x2401, 1, 32)
+    status = tuple(PdoEntry(None, index, subindex, 16) for index, subindex in words)
+    pdo = PdoPlan(3, Direction.OUTPUT, 0x385, True, transmission, inhibit, 0, (cycles, *status))
+    return Plant(replace(PLAN, pdos=(*PLAN.pdos, pdo)))
+
+
+_STATUS_MAPPING = b"""\
+gatewayd: 1
+cell: sample
+robot: {host: robot}
+canopen:
+  channel: can0
+  bitrate: 500000
+  node: 1
+  pdos:
+    state: {status: [flags, robot_state, quality of ready], event: 500ms}
+writers: {line: {canopen: any}}
+variables:
+  start: {robot: input_bit_register_0, canopen: auto, owner: line}
+  ready: {robot: output_int_register_0, canopen: auto}
+"""
+
+
+def _told_by_tpdo_3(frames: list[Frame]) -> list[tuple[int, ...]]:
+    """The words behind the output."""
+    return [struct.unpack_from("<2H", frame.data, 4) for frame in frames if frame.can_id == 0x385]
+
+
+def test_an_event_driven_tpdo_tells_states_and_qualities_when_the_robot_is_lost() -> None:
+    plant = _status_pdo(255, (0x5F00, _ROBOT_STATE), (0x5F40, CYCLES + 1))
+    plant.operational()
+    plant.show(CYCLES, 5)
+    plant.cell.robot_lost("cable", plant.now)
+    assert _told_by_tpdo_3(plant.take())[-1] == (0, 1)
+    plant.cell.robot_connected(plant.now)
+    plant.cell.adopt({}, plant.now)
+    assert _told_by_tpdo_3(plant.take())[-1] == (1, 1)
+    plant.cell.package_arrived(2.0, plant.now)
+    assert _told_by_tpdo_3(plant.show(CYCLES, 5)) == [(2, 0)]
+    assert _told_by_tpdo_3(plant.run(5.0)) == []
+
+
+def test_an_owner_in_a_tpdo_is_told_when_it_changes() -> None:
+    plant = _status_pdo(254, (0x5F10, PART + 1), (0x5F10, SPEED + 1))
+    plant.operational()
+    assert _told_by_tpdo_3(plant.part(7)) == [(1, 0)]
+    assert _told_by_tpdo_3(plant.heartbeat(0)) == [(0, 0)], "a master that boots has lost its lock"
+    assert plant.write(0x5F00, 26, SPEED + 1, 2) == 0
+    assert _told_by_tpdo_3(plant.run(0.11)) == [(0, 2)], "a lock request changes no value"
+
+
+def test_a_word_that_changes_with_time_is_sent_as_the_inhibit_time_allows() -> None:
+    for inhibit, least, most in ((0, 9, 11), (5000, 1, 3)):
+        plant = _status_pdo(255, (0x5F00, _HEARTBEAT_WORD), (0x5F00, _ROBOT_STATE), inhibit=inhibit)
+        plant.operational()
+        told = []
+        for _ in range(10):
+            plant.cell.health.heartbeat += 1
+            told += _told_by_tpdo_3(plant.run(0.1))
+        assert least <= len(told) <= most
+
+
+def test_status_words_with_sync() -> None:
+    plant = _status_pdo(1, (0x5F00, _ROBOT_STATE), (0x5F40, CYCLES + 1))
+    plant.operational()
+    plant.show(CYCLES, 5)
+    assert _told_by_tpdo_3(plant.hear(0x80)) == [(2, 0)]
+    plant.cell.robot_lost("cable", plant.now)
+    assert _told_by_tpdo_3(plant.hear(0x80)) == [(0, 1)]
+
+
+def test_words_that_a_mapping_puts_into_a_tpdo_are_shown_as_its_mapping_and_sent() -> None:
+    plan = load(_STATUS_MAPPING, "cell").plan
+    assert plan is not None
+    assert plan.canopen is not None
+    wire, cell = Wire(), Cell(plan.cell)
+    node = Node(plan.canopen, cell, wire.send, MemoryStore(), lambda _now: True)
+    node.bus_changed(BusState.ACTIVE, 1.0)
+    node.start(1.0)
+    number = next(pdo.number for pdo in plan.canopen.pdos if any(one.is_status for one in pdo.entries))
+    shown = [node.dictionary.read(0x1A00 + number - 1, slot)[::-1].hex() for slot in (1, 2, 3)]
+    assert sorted(shown) == ["5f000210", "5f000710", "5f400210"]
+    node.receive(Frame(0, bytes([1, 1])), 1.0)
+    values = {"5f000210": 0, "5f000710": 0, "5f400210": 3}
+    expected = struct.pack("<3H", *(values[one] for one in shown))
+    assert expected in [frame.data[-6:] for frame in wire.take()]
+
+
+def test_a_master_maps_status_words_by_sdo_but_no_request() -> None:
+    plant = Plant().power_on()
+    assert plant.write(0x1A02, 1, 0x5F00_0710) == 0
+    assert plant.write(0x1A02, 2, 0x5F40_0310) == 0
+    assert plant.write(0x1A02, 3, 0x5F00_1A10) == -0x0604_0041
+    assert plant.write(0x1A02, 3, 0x5F40_0510) == -0x0602_0000
+    assert plant.write(0x1602, 1, 0x5F00_0710) == -0x0604_0041
+    assert plant.write(0x1A02, 0, 2, 1) == 0
+    assert plant.write(0x1802, 1, 0x4000_0385) == 0
+    plant.hear(0, START)
+    plant.take()
+    plant.cell.robot_lost("cable", plant.now)
+    assert [frame.data for frame in plant.take() if frame.can_id == 0x385][-1] == bytes([0, 0, 3, 0])
 
 
 # -- a promised heartbeat --------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import pytest
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Pdo
-from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES, StatusObjects
+from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES, StatusObjects, status_word
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.refusal import Reason
@@ -110,7 +110,8 @@ def test_header_has_every_field_by_its_name() -> None:
     assert {one.type for one in header.entries[1:]} == {CanType.UNSIGNED16, CanType.UNSIGNED32}
     writable = [one.name for one in header.entries if one.access is Access.RW]
     assert writable == ["request", "release"]
-    assert all(one.pdo is Pdo.NONE for one in header.entries)
+    unmapped = [one.name for one in header.entries[1:] if one.pdo is Pdo.NONE]
+    assert unmapped == ["request", "release"]
 
 
 def test_indices_are_fixed_and_apart() -> None:
@@ -232,3 +233,24 @@ def test_a_release_and_a_read_are_no_request(node: Node) -> None:
     assert node.asked == 0
     node.put("request", 2)
     assert node.asked == 1
+
+
+def test_what_a_tpdo_may_carry_is_where_the_dictionary_has_it(node: Node) -> None:
+    """And holds the same bytes."""
+    block = StatusBlock(node.cell)
+    for one in node.dictionary:
+        for entry in one.entries:
+            word = status_word(one.index, entry.subindex)
+            assert (word is not None) == (entry.pdo is Pdo.TRANSMIT)
+            if word is not None:
+                assert word.type is entry.type
+                assert word.offset is not None
+                words = word.type.bits // 16
+                assert block.read(word.offset, words, node.now)[::-1] == entry.read()
+
+
+@pytest.mark.parametrize(
+    "index, subindex", [(0x5EFF, 1), (0x5F00, 0), (0x5F00, 255), (0x5F03, 1), (0x5F15, 1), (0x5F40, 0)]
+)
+def test_nothing_of_the_status_block_lies_elsewhere(index: int, subindex: int) -> None:
+    assert status_word(index, subindex) is None

@@ -412,7 +412,8 @@ def pdo_kinds() -> str:
         ("output (from the robot)", "`ro`", "TPDO"),
         ("input (towards the robot), some CANopen writer", "`rww`", "RPDO"),
         ("input without a CANopen writer", "`ro`", "none"),
-        ("status block", "`ro`, request and release `rw`", "none"),
+        ("status block", "`ro`", "TPDO"),
+        ("its words request and release", "`rw`", "none"),
     ]
     return table(("what", "access", "may be mapped into"), rows)
 
