@@ -204,6 +204,7 @@ PURE = (
     "canopen.plan",
     "canopen.promise",
     "canopen.queue",
+    "canopen.robot_errors",
     "canopen.sdo",
     "canopen.status_objects",
     "canopen.storage",

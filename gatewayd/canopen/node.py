@@ -19,6 +19,8 @@ What befalls the node, and what follows:
 bus-off |
 | controller passive | | as it is | 8120h until it is no more |
 | received frames lost | | as it is | 8110h until none was lost for `OVERRUN_TIME` |
+| robot lost / stale / holds something else / registers unavailable | | as it is | FF10h / FF11h / FF12h / FF13h until \
+that has not been so for `QUIET` |
 
 Nothing is sent while the bus carries nothing: a queue would only send old news later. A node that is started while the
 bus carries nothing boots when it does.
@@ -30,7 +32,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
-from typing import Final
+from typing import Final, Protocol
 
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.clock import TimeConsumer
@@ -50,6 +52,7 @@ from gatewayd.canopen.pdo.transmit import TransmitEngine
 from gatewayd.canopen.peers import Peers
 from gatewayd.canopen.plan import CanopenPlan
 from gatewayd.canopen.promise import Promises
+from gatewayd.canopen.robot_errors import RobotErrors
 from gatewayd.canopen.sdo import SdoServer
 from gatewayd.canopen.sdo.parameters import server_parameter
 from gatewayd.canopen.status_objects import StatusObjects
@@ -76,6 +79,12 @@ _FIRST_OF_CELL: Final = 0x2000
 """Where the objects of the communication end."""
 
 Handler = Callable[[Frame, float], None]
+
+
+class _Timed(Protocol):
+    def tick(self, now: float) -> None: ...
+
+    def next_deadline(self, now: float) -> float: ...
 
 
 class Node:
@@ -106,8 +115,6 @@ class Node:
         self._started = False
         self._fell = self._was_off = False
         self._store_damaged = False
-        self._waiting_since = math.inf
-        """Since when what is received may have waited; infinity: it came in time."""
         self._overrun_until = math.inf
         self._routes: dict[int, tuple[Service, Handler]] = {}
         self._handlers: dict[int, Handler] = {}
@@ -133,6 +140,9 @@ class Node:
         )
         self.nmt = NmtSlave(self._send, self._node, self._nmt_changed, self._reset, autostart=plan.autostart)
         self.emergency = Emergency(self._send, node, self._emergencies_allowed)
+        self.robot_errors = RobotErrors(
+            cell, self.emergency, lambda: self._started and self.nmt.state is not NmtState.INITIALISING
+        )
         self.behaviour = ErrorBehaviour()
         self.producer = HeartbeatProducer(self._send, self._node, self._state, alive, plan.heartbeat)
         self.consumer = HeartbeatConsumer(
@@ -178,6 +188,17 @@ class Node:
         self.dictionary = Dictionary(self._objects(identity), self._permit)
         self.parameters.bind(self.dictionary)
         self.sdo = SdoServer(self.dictionary)
+        self._timed: tuple[_Timed, ...] = (
+            self.sync,
+            self.transmit,
+            self.receive_pdos,
+            self.producer,
+            self.consumer,
+            self.promises,
+            self.guarding,
+            self.robot_errors,
+            self.emergency,
+        )
 
     # -- what the link calls -------------------------------------------------------------------------------------
 
@@ -221,8 +242,7 @@ class Node:
         self._started = True
         self.bus, self.counters = former.bus, former.counters
         self._fell, self._was_off = former._fell, former._was_off
-        self._waiting_since, self._peers.waited = former._waiting_since, former._peers.waited
-        self.promises.resume(former.promises)
+        self.promises.resume(former.promises)  # what was reported, before the reset compares again
         self._reset(NmtCommand.RESET_NODE, now)
         for one in former.dictionary:
             for entry in one.entries:
@@ -260,6 +280,7 @@ class Node:
             self.transmit.image_changed(now)
         else:
             self.transmit.status_changed(now)
+        self.robot_errors.tick(now)
 
     def bus_changed(self, state: BusState, now: float) -> None:
         """The bus is in another state, or told for the first time."""
@@ -282,8 +303,7 @@ class Node:
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`. What is received until `caught_up` may have waited so long."""
         self._now = now
-        self._waiting_since = min(self._waiting_since, since)
-        self._peers.waited = now - self._waiting_since
+        self._peers.gap(since, now)
         self.consumer.gap(since, now)
         self.promises.gap(since, now)
         self.guarding.gap(since, now)
@@ -291,19 +311,13 @@ class Node:
 
     def caught_up(self) -> None:
         """Everything that waited was received."""
-        self._waiting_since, self._peers.waited = math.inf, 0.0
+        self._peers.caught_up()
 
     def tick(self, now: float) -> None:
         """Do what time brings. Cheap before `next_deadline`."""
         self._now = now
-        self.sync.tick(now)
-        self.transmit.tick(now)
-        self.receive_pdos.tick(now)
-        self.producer.tick(now)
-        self.consumer.tick(now)
-        self.promises.tick(now)
-        self.guarding.tick(now)
-        self.emergency.tick(now)
+        for service in self._timed:
+            service.tick(now)
         self._answer(self.sdo.tick(now))
         if now >= self._overrun_until:
             self._overrun_until = math.inf
@@ -311,25 +325,11 @@ class Node:
 
     def next_deadline(self, now: float) -> float:
         """When `tick` is wanted, not before `now`; infinity if time alone brings nothing."""
-        return max(
-            now,
-            min(
-                self.sync.next_deadline(now),
-                self.transmit.next_deadline(now),
-                self.receive_pdos.next_deadline(now),
-                self.producer.next_deadline(now),
-                self.consumer.next_deadline(now),
-                self.promises.next_deadline(now),
-                self.guarding.next_deadline(now),
-                self.emergency.next_deadline(now),
-                self.sdo.next_deadline(now),
-                self._overrun_until,
-            ),
-        )
+        due = min(service.next_deadline(now) for service in self._timed)
+        return max(now, min(due, self.sdo.next_deadline(now), self._overrun_until))
 
     def renew(self, can_id: int, now: float) -> Frame | None:
         """The cyclic frame that would be sent with this COB-ID now, in place of one that waited; None: none."""
-        self._now = now
         if can_id == Function.ERROR_CONTROL + self.node_id:
             return self.producer.frame(now)
         return self.transmit.renew(can_id, now)
@@ -414,6 +414,7 @@ class Node:
             self._lose(self.plan.rpdo_writer, f"NMT state {new.name}", now)
         self.receive_pdos.nmt(operational, now)
         self.transmit.nmt(operational, now)
+        self.robot_errors.tick(now)
         self.emergency.tick(now)
         self._observer.nmt_changed(old, new, now)
 
@@ -471,8 +472,7 @@ class Node:
     def _watch_changed(self) -> None:
         """1016h is another one: it may watch more, but what the mapping says of writers holds whatever it says."""
         self._route()
-        names = [writer.name for writer in self.cell.definition.writers]
-        for text in self.promises.weakened(names):
+        for text in self.promises.weakened([writer.name for writer in self.cell.definition.writers]):
             self._observer.report(text)
 
     def _guarding_lost(self, now: float) -> None:

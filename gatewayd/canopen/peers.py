@@ -7,6 +7,7 @@ One that is not believed is neither alive nor connected here, and what it asks o
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from gatewayd.canopen.heartbeat import HeartbeatConsumer, Watch
@@ -18,13 +19,12 @@ __all__ = ["Peers"]
 
 
 class Peers:
-    """The CANopen writers of one cell. A writer of None is nobody.
-
-    `waited`: seconds for which what is served now may have waited while the process stood still.
-    """
+    """The CANopen writers of one cell. A writer of None is nobody."""
 
     def __init__(self, cell: Cell, promises: Promises, watch: HeartbeatConsumer) -> None:
         self.waited = 0.0
+        """Seconds for which what is served now may have waited while the process stood still."""
+        self._waiting_since = math.inf
         self._cell = cell
         self._promises = promises
         self._watch = watch
@@ -36,6 +36,7 @@ class Peers:
 
     def resume(self, former: Peers) -> None:
         """The living writers of the cell that this one succeeded, by name; the cell has them counted already."""
+        self.waited, self._waiting_since = former.waited, former._waiting_since
         names = {one.name: index for index, one in enumerate(self._cell.definition.writers)}
         before = former._cell.definition.writers
         self._alive = {names[before[writer].name] for writer in former._alive if before[writer].name in names}
@@ -43,6 +44,15 @@ class Peers:
             index = None if writer is None else names.get(before[writer].name)
             if (writer is None) is (index is None):
                 self._requesters[index] = replace(requester, writer=index)
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still: until `caught_up`, what is served may have waited so long."""
+        self._waiting_since = min(self._waiting_since, since)
+        self.waited = now - self._waiting_since
+
+    def caught_up(self) -> None:
+        """What is served from now on came in time."""
+        self._waiting_since, self.waited = math.inf, 0.0
 
     def believed(self, writer: int | None) -> bool:
         """Whether the writer keeps what it promised, as far as can be known yet."""

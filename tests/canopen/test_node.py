@@ -636,6 +636,26 @@ def test_a_master_maps_status_words_by_sdo_but_no_request() -> None:
     assert [frame.data for frame in plant.take() if frame.can_id == 0x385][-1] == bytes([0, 0, 3, 0])
 
 
+@pytest.mark.parametrize("behaviour", [0, 1, 2])
+def test_a_lost_robot_is_an_emergency_and_no_communication_error(behaviour: int) -> None:
+    plant = Plant().power_on()
+    plant.node.dictionary.write(0x1029, 1, bytes([behaviour]))
+    plant.hear(0, START)
+    plant.take()
+    plant.cell.robot_lost("cable", plant.now)
+    assert _emergencies(plant.take()) == [0xFF10]
+    assert plant.read(0x1001) == 0x81
+    assert (plant.state, plant.node.counters.communication_errors) == (NmtState.OPERATIONAL, 0)
+    plant.hear(0, RESET_COMMUNICATION)
+    assert _emergencies(plant.run(0.0)) in ([0xFF10], [])
+    assert plant.read(0x1001) == 0x81
+    plant.cell.robot_connected(plant.now)
+    plant.cell.package_arrived(2.0, plant.now)
+    plant.show(CYCLES, 5)
+    assert _emergencies(plant.run(1.1)) == [0]
+    assert plant.read(0x1001) == 0
+
+
 # -- a promised heartbeat --------------------------------------------------------------------------------------------
 
 

@@ -17,6 +17,7 @@ from gatewayd.canopen.identity import REACTIONS
 from gatewayd.canopen.lss import Command
 from gatewayd.canopen.nmt import ALLOWED, NmtState, Service
 from gatewayd.canopen.node import OVERRUN_TIME
+from gatewayd.canopen.robot_errors import QUIET
 from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES
 from gatewayd.canopen.variables import ABORT_OF
 from gatewayd.core.refusal import Reason
@@ -59,7 +60,7 @@ variables:
 
 _MEANINGS: Mapping[int, str | Mapping[int, str]] = {
     0x1000: "0: no device profile",
-    0x1001: "bit 0 any error, bit 4 communication, bit 7 manufacturer's (a refused RPDO)",
+    0x1001: "bit 0 any error, bit 4 communication, bit 7 manufacturer's (a refused RPDO, the robot)",
     0x1002: "the flags of the status block, as 5F00h:02",
     0x1003: {
         0: "how many; write 0 to forget them",
@@ -248,6 +249,11 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.WRITE_NEVER: "an RPDO was dropped: this writer may never write a variable of it",
     ErrorCode.WRITE_HEARTBEAT_LOST: "an RPDO was dropped: the heartbeat that its writer promised stays away",
     ErrorCode.WRITE_PARTIAL_TAKEOVER: "an RPDO was dropped: it would take over a part of a `whole` group",
+    ErrorCode.ROBOT_LOST: "the robot is not connected",
+    ErrorCode.ROBOT_STALE: "it is connected, and its values are stale (byte 4: `robot_state`)",
+    ErrorCode.ROBOT_DIFFERS: "the robot holds something else than it was given (bytes 4-5: how many inputs)",
+    ErrorCode.ROBOT_UNAVAILABLE: "the controller does not have, or gave to another client, what is mapped "
+    "(bytes 4-5: how many variables)",
     ErrorCode.WRITE_WAITED: "an RPDO was dropped: it waited too long while the gateway stood still",
 }
 
@@ -263,7 +269,8 @@ def emergencies() -> str:
 
 def happenings() -> str:
     """What befalls the node, and what follows."""
-    return _docstring_table("node.py").replace("`OVERRUN_TIME`", f"{OVERRUN_TIME:g} s")
+    text = _docstring_table("node.py").replace("`OVERRUN_TIME`", f"{OVERRUN_TIME:g} s")
+    return text.replace("`QUIET`", f"{QUIET:g} s")
 
 
 def received_pdos() -> str:
