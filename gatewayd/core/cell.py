@@ -7,11 +7,13 @@ Links call it; it calls its `listeners` after values or qualities changed. Every
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gatewayd.core.admission import Admission, Change
-from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, FallbackKind, Value
+from gatewayd.core.adoption import Adoption, Step
+from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, Fallback, FallbackKind, Value
+from gatewayd.core.delivery import Delivery
 from gatewayd.core.events import Event, EventKind, EventRing
 from gatewayd.core.forcing import Force, Forcing
 from gatewayd.core.freshness import Freshness, Source
@@ -32,6 +34,10 @@ HEARTBEAT_PERIOD = 0.1
 """Seconds between two counts of the heartbeat."""
 NOTABLE_GAP = 0.5
 """Seconds for which the gateway stood still, from which on it is an event, and requests that waited are refused."""
+
+_NAMED = 2
+"""Variables that an event names one by one."""
+_NOT_READABLE = "the robot does not say what it holds"
 
 Written = Sequence[tuple[int, Value, Value]]
 """What a write changed: variable, old and new value."""
@@ -61,6 +67,8 @@ class Cell:
         self.events = EventRing()
         self.health = Health()
         self.forcing = Forcing(self.image)
+        self.delivery = Delivery(self.image, self.health, self.events.append)
+        self.adoption = Adoption(definition.adopt_for)
         self.listeners: list[Callable[[Direction], None]] = []
         self.write_listeners: list[Callable[[int, Written, float], None]] = []
         """Told of every accepted write that changes something: writer, changes, time. They must not raise."""
@@ -68,8 +76,6 @@ class Cell:
         self._admission = Admission(definition.variables, self.ownership, self.image)
         self._refusals = RefusalLog(self.events.append)
         self._adopted = False
-        self._due_fallbacks: set[int] = set()
-        """Inputs that could not be given their release fallback, because the robot or the register was not there."""
         self._next_heartbeat: float | None = None
 
     @property
@@ -253,6 +259,7 @@ class Cell:
         self.program(None)
         self.events.append(Event(now, EventKind.ROBOT_LOST, detail=reason))
         self.forcing.lift()
+        self.delivery.lost()
         self.image.inputs_lost()
         if was_fresh:
             self._outputs_lost()
@@ -315,10 +322,10 @@ class Cell:
         return True
 
     def adopt(self, values: Mapping[int, Value], now: float) -> None:
-        """Take over what the controller's inputs hold, then apply the fallbacks that fell due meanwhile.
+        """Take over what the controller's inputs hold, then apply the fallbacks that are owed.
 
         Called once per session, and again (after `set_availability`) when registers became available later. An input
-        that is not among `values`, because the controller does not tell it, is not good before it is written.
+        that is not among `values`, because the controller does not say what it holds, is not good before it is given.
         """
         if self.freshness.state is Source.LOST:
             return
@@ -326,13 +333,43 @@ class Cell:
         self.forcing.lift()
         for index, value in values.items():
             self.image.tell(index, value, now)
+        entered = self.delivery.adopted(values.keys())
         if first:
-            self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=f"{len(values)} variables"))
-        wanted = self._due_fallbacks.copy()
+            self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=self._adopted_text(len(values))))
+        wanted = self.delivery.owed.copy()
         if self.definition.clear_on_connect:
-            wanted.update(filter(self._wants_fallback, self.image.inputs if first else values))
+            wanted.update(filter(self._is_ownerless, entered.union(values)))
+        elif self.adoption.over:
+            wanted.update(self._would_fall_back(entered.union(values)))
         self._fall_back(sorted(wanted), now)
         self._force_inputs(now)
+        self._notify(Direction.INPUT)
+
+    def complete(self, variables: Iterable[int], now: float) -> None:
+        """Inputs that go out with one that was written, and of which nobody knows what the robot holds, fall back.
+
+        Where their policy is to hold there is nothing to be held: they become zero.
+        """
+        for index in variables:
+            variable = self.definition.variables[index]
+            value = variable.on_release.apply(variable.kind.zero, variable.kind)
+            self.image.tell(index, value, now)
+            self.delivery.give(((index, value),), now)
+            self.events.append(Event(now, EventKind.FALLBACK, variable=index, new=value, detail=_NOT_READABLE))
+        self._notify(Direction.INPUT)
+
+    def read_back(
+        self, differ: Mapping[int, str], agree: Collection[int], follow: Mapping[int, Value], now: float
+    ) -> None:
+        """What the comparison of a package with what was sent came to.
+
+        `differ`: given inputs for which the robot holds something else, in words; `agree`: inputs that read back as
+        sent; `follow`: what the robot holds in inputs that nobody gave in this session.
+        """
+        self.forcing.lift()
+        self.delivery.agree(agree)
+        self.delivery.differ(differ, now)
+        self.delivery.follow(follow, now)
         self._notify(Direction.INPUT)
 
     def set_availability(self, variables: Iterable[int], available: bool, reason: str, now: float) -> None:
@@ -348,6 +385,8 @@ class Cell:
         kind = EventKind.AVAILABLE if available else EventKind.UNAVAILABLE
         self.forcing.lift()
         for index in changed:
+            if not available:
+                self.delivery.leave(index)
             self.image.set_available(index, available)
             self.events.append(Event(now, kind, variable=index, detail=reason))
         self._notify(Direction.INPUT)
@@ -369,6 +408,7 @@ class Cell:
         self.freshness.tick(now)
         if was_fresh and self.freshness.state is not Source.FRESH:
             self._source_stale(now)
+        self._count_adoption(now)
         self._refusals.tick(now)
         self._beat(now)
 
@@ -467,6 +507,7 @@ class Cell:
         for index, force in self.forcing.forces.items():
             if self.definition.variables[index].direction is Direction.INPUT and self.image.available[index]:
                 self.image.tell(index, force.value, now)
+                self.delivery.give(((index, force.value),), now)
 
     def _release_expired(self, now: float) -> None:
         forces, holds = self.forcing.due(now)
@@ -491,29 +532,68 @@ class Cell:
         self.events.append(Event(now, EventKind.WRITER_LOST, writer=writer, detail=reason))
         self._free(self.ownership.held_by(writer), now, f"owner lost: {reason}")
 
-    def _wants_fallback(self, index: int) -> bool:
+    def _is_ownerless(self, index: int) -> bool:
         lock = self.definition.variables[index].lock
         return lock is not None and self.ownership.owners[lock] is None and self.image.available[index]
+
+    def _would_fall_back(self, variables: Iterable[int]) -> list[int]:
+        """Those that nobody owns and for which a fallback would change something, as far as that is known."""
+        unread = self.delivery.unread
+        return [
+            index
+            for index in variables
+            if self._is_ownerless(index)
+            and (fallback := self.definition.variables[index].on_release).kind is not FallbackKind.HOLD
+            and (index in unread or self._fallback_value(index, fallback) != self.image.values[index])
+        ]
+
+    def _fallback_value(self, index: int, fallback: Fallback) -> Value:
+        return fallback.apply(self.image.values[index], self.definition.variables[index].kind)
+
+    def _count_adoption(self, now: float) -> None:
+        """What nobody has claimed by the end of `adopt_for` falls back."""
+        step = self.adoption.look(now, adopted=self._adopted)
+        left = self.adoption.left(now)
+        if step is Step.NOTHING and not left:
+            self.health.adoption = 0.0
+            return
+        pending = self._would_fall_back(self.image.inputs)
+        self.health.adoption = left if pending else 0.0
+        if step is Step.BEGIN and pending:
+            names = self._named(pending)
+            text = f"in {left:g} s, without an owner by then: {names}"
+            self.events.append(Event(now, EventKind.ADOPTION_ENDS, detail=text))
+        elif step is Step.END and self._adopted:
+            self._fall_back(pending, now)
+            self._notify(Direction.INPUT)
+
+    def _adopted_text(self, count: int) -> str:
+        unread = sorted(self.delivery.unread)
+        return f"{count} variables" + (f"; not readable: {self._named(unread)}" if unread else "")
+
+    def _named(self, variables: Sequence[int]) -> str:
+        names = ", ".join(self.definition.variables[index].name for index in variables[:_NAMED])
+        return f"{names} and {len(variables) - _NAMED} more" if len(variables) > _NAMED else names
 
     def _fall_back(self, variables: Iterable[int], now: float) -> None:
         for index in variables:
             if not (self._adopted and self.image.available[index]):
-                self._due_fallbacks.add(index)
+                self.delivery.owed.add(index)
                 continue
-            self._due_fallbacks.discard(index)
+            self.delivery.owed.discard(index)
             variable = self.definition.variables[index]
             if variable.on_release.kind is FallbackKind.HOLD:
                 continue
             old = self.image.values[index]
             new = variable.on_release.apply(old, variable.kind)
             self.image.tell(index, new, now)
+            self.delivery.release(index, new, now)
             if new != old:
                 self.events.append(Event(now, EventKind.FALLBACK, variable=index, old=old, new=new))
 
     def _set_inputs(self, values: Sequence[tuple[int, Value]], now: float) -> None:
         self.image.tell_all(values, now)
-        if self._due_fallbacks:
-            self._due_fallbacks.difference_update(index for index, _value in values)
+        self.delivery.give(values, now)
         self._notify(Direction.INPUT)
 
     def _tell_written(self, writer: int, values: Sequence[tuple[int, Value]], now: float) -> None:
