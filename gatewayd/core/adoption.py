@@ -8,9 +8,16 @@ adopts without an owner falls back at once.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Iterable, Sequence
 from enum import Enum
 
-__all__ = ["Adoption", "Step"]
+from gatewayd.core.definition import FallbackKind
+from gatewayd.core.image import ProcessImage
+
+__all__ = ["Adoption", "Step", "adopted", "named", "would_fall_back"]
+
+_NAMED = 2
+"""Variables that an event names one by one."""
 
 
 class Step(Enum):
@@ -29,7 +36,7 @@ class Adoption:
     def __init__(self, adopt_for: float | None) -> None:
         self.adopt_for = adopt_for
         self.reachable = False
-        """Whether a writer could have reached the cell since the start: a listener listens, or the node is on its bus."""
+        """Whether a writer could have reached the cell since the start: a listener, or the node on its bus."""
         self.began = math.inf
         """When the count began."""
         self.over = False
@@ -58,3 +65,27 @@ class Adoption:
     def succeed(self, former: Adoption) -> None:
         """Go on where `former` stands."""
         self.reachable, self.began, self.over = former.reachable, former.began, former.over
+
+
+def would_fall_back(image: ProcessImage, inputs: Iterable[int], unread: Collection[int]) -> list[int]:
+    """Those whose release fallback would change something, as far as it is known what the robot holds."""
+    return [index for index in inputs if _changes(image, index, is_unread=index in unread)]
+
+
+def _changes(image: ProcessImage, index: int, *, is_unread: bool) -> bool:
+    variable, value = image.variables[index], image.values[index]
+    fallback = variable.on_release
+    if fallback.kind is FallbackKind.HOLD:
+        return False
+    return is_unread or fallback.apply(value, variable.kind) != value
+
+
+def named(image: ProcessImage, inputs: Sequence[int]) -> str:
+    """Their names, as far as an event has room for them: `a, b and 3 more`."""
+    names = ", ".join(image.variables[index].name for index in inputs[:_NAMED])
+    return f"{names} and {len(inputs) - _NAMED} more" if len(inputs) > _NAMED else names
+
+
+def adopted(image: ProcessImage, count: int, unread: Collection[int]) -> str:
+    """What an adoption came to: `58 variables; not readable: a, b and 3 more`."""
+    return f"{count} variables" + (f"; not readable: {named(image, sorted(unread))}" if unread else "")

@@ -11,8 +11,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gatewayd.core.admission import Admission, Change
-from gatewayd.core.adoption import Adoption, Step
-from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, Fallback, FallbackKind, Value
+from gatewayd.core.adoption import Adoption, Step, adopted, named, would_fall_back
+from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, FallbackKind, Value
 from gatewayd.core.delivery import Delivery
 from gatewayd.core.events import Event, EventKind, EventRing
 from gatewayd.core.forcing import Force, Forcing
@@ -35,8 +35,6 @@ HEARTBEAT_PERIOD = 0.1
 NOTABLE_GAP = 0.5
 """Seconds for which the gateway stood still, from which on it is an event, and requests that waited are refused."""
 
-_NAMED = 2
-"""Variables that an event names one by one."""
 _NOT_READABLE = "the robot does not say what it holds"
 
 Written = Sequence[tuple[int, Value, Value]]
@@ -335,12 +333,13 @@ class Cell:
             self.image.tell(index, value, now)
         entered = self.delivery.adopted(values.keys())
         if first:
-            self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=self._adopted_text(len(values))))
+            detail = adopted(self.image, len(values), self.delivery.unread)
+            self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=detail))
         wanted = self.delivery.owed.copy()
         if self.definition.clear_on_connect:
             wanted.update(filter(self._is_ownerless, entered.union(values)))
         elif self.adoption.over:
-            wanted.update(self._would_fall_back(entered.union(values)))
+            wanted.update(self._adopted_for_nobody(entered.union(values)))
         self._fall_back(sorted(wanted), now)
         self._force_inputs(now)
         self._notify(Direction.INPUT)
@@ -355,7 +354,9 @@ class Cell:
             value = variable.on_release.apply(variable.kind.zero, variable.kind)
             self.image.tell(index, value, now)
             self.delivery.give(((index, value),), now)
-            self.events.append(Event(now, EventKind.FALLBACK, variable=index, new=value, detail=_NOT_READABLE))
+            self.events.append(
+                Event(now, EventKind.FALLBACK, variable=index, new=value, detail=_NOT_READABLE)
+            )
         self._notify(Direction.INPUT)
 
     def read_back(
@@ -536,44 +537,21 @@ class Cell:
         lock = self.definition.variables[index].lock
         return lock is not None and self.ownership.owners[lock] is None and self.image.available[index]
 
-    def _would_fall_back(self, variables: Iterable[int]) -> list[int]:
-        """Those that nobody owns and for which a fallback would change something, as far as that is known."""
-        unread = self.delivery.unread
-        return [
-            index
-            for index in variables
-            if self._is_ownerless(index)
-            and (fallback := self.definition.variables[index].on_release).kind is not FallbackKind.HOLD
-            and (index in unread or self._fallback_value(index, fallback) != self.image.values[index])
-        ]
-
-    def _fallback_value(self, index: int, fallback: Fallback) -> Value:
-        return fallback.apply(self.image.values[index], self.definition.variables[index].kind)
+    def _adopted_for_nobody(self, variables: Iterable[int]) -> list[int]:
+        """Those that nobody owns and for which a fallback would change something."""
+        return would_fall_back(self.image, filter(self._is_ownerless, variables), self.delivery.unread)
 
     def _count_adoption(self, now: float) -> None:
         """What nobody has claimed by the end of `adopt_for` falls back."""
-        step = self.adoption.look(now, adopted=self._adopted)
-        left = self.adoption.left(now)
-        if step is Step.NOTHING and not left:
-            self.health.adoption = 0.0
-            return
-        pending = self._would_fall_back(self.image.inputs)
+        step, left = self.adoption.look(now, adopted=self._adopted), self.adoption.left(now)
+        pending = self._adopted_for_nobody(self.image.inputs) if left or step is Step.END else []
         self.health.adoption = left if pending else 0.0
         if step is Step.BEGIN and pending:
-            names = self._named(pending)
-            text = f"in {left:g} s, without an owner by then: {names}"
-            self.events.append(Event(now, EventKind.ADOPTION_ENDS, detail=text))
+            detail = f"in {left:g} s, without an owner by then: {named(self.image, pending)}"
+            self.events.append(Event(now, EventKind.ADOPTION_ENDS, detail=detail))
         elif step is Step.END and self._adopted:
             self._fall_back(pending, now)
             self._notify(Direction.INPUT)
-
-    def _adopted_text(self, count: int) -> str:
-        unread = sorted(self.delivery.unread)
-        return f"{count} variables" + (f"; not readable: {self._named(unread)}" if unread else "")
-
-    def _named(self, variables: Sequence[int]) -> str:
-        names = ", ".join(self.definition.variables[index].name for index in variables[:_NAMED])
-        return f"{names} and {len(variables) - _NAMED} more" if len(variables) > _NAMED else names
 
     def _fall_back(self, variables: Iterable[int], now: float) -> None:
         for index in variables:

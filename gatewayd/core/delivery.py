@@ -1,8 +1,8 @@
 """What of the inputs was given to the robot in the present session, and what became of it.
 
-An input is *given* when it is written, forced, or falls back; one that was only adopted follows the robot. A release is
-done when its fallback has reached the robot, not when it stands in the image: until the link says so (`delivered`) it is
-under way, and if the session ends before, it is owed to the next one.
+An input is *given* when it is written, forced, or falls back; one that was only adopted follows the robot. A release
+is done when its fallback has reached the robot, not when it stands in the image: until the link says so (`delivered`)
+it is under way, and if the session ends before, it is owed to the next one.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ class Delivery:
         variables: Mapping[int, int],
         places: Callable[[set[int]], Iterable[int]],
     ) -> None:
-        """Go on where `former` stands: old -> new indices; `places` finds what has another name in the same register."""
+        """Go on where `former` stands; `variables`: old -> new index, `places`: the same by what is in a register."""
         self._health = health
         for source, target in variables.items():
             self.given_at[target] = former.given_at[source]

@@ -20,7 +20,7 @@ from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
 from gatewayd.mapping.loader import load
-from gatewayd.robot import inputs as inputs_module
+from gatewayd.robot import readback as readback_module
 from gatewayd.robot.link import RobotLink
 from gatewayd.rtde.catalogue import SoftwareVersion
 from gatewayd.simulator.controller import Controller
@@ -201,7 +201,7 @@ async def test_a_value_that_does_not_arrive_is_told_once(
     rigged: Rigged, until: Until, monkeypatch: pytest.MonkeyPatch, cyclic: bool
 ) -> None:
     """Also while the PLC writes another variable, or the same value, again and again."""
-    monkeypatch.setattr(inputs_module, "VERIFY_AFTER", 0.1)
+    monkeypatch.setattr(readback_module, "VERIFY_AFTER", 0.1)
     async with rigged() as rig:
         await until(lambda: rig.cell.accepts_writes)
         rig.write((NUMBER, 7), (REAL, 1.0))
@@ -320,7 +320,7 @@ async def test_what_an_old_controller_lacks_costs_only_itself(rigged: Rigged, un
 async def test_checking_can_be_switched_off(
     rigged: Rigged, until: Until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(inputs_module, "VERIFY_AFTER", 0.0)
+    monkeypatch.setattr(readback_module, "VERIFY_AFTER", 0.0)
     async with rigged(options=", verify: false") as rig:
         await until(lambda: rig.cell.accepts_writes)
         _make_stubborn(rig.robot)
