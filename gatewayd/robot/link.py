@@ -74,6 +74,8 @@ class RobotLink:
         self._inputs = ClaimedInputs()
         self._session: Session | None = None
         """What was agreed and is not adopted yet."""
+        self._agreed: Session | None = None
+        """What the recipes in use are of: a newer session has registers that were not read yet."""
         self._adopting = False
         """Whether recipes and image are being taken over, so that they do not fit each other."""
         self._cycle = _CYCLE_UNKNOWN
@@ -184,7 +186,7 @@ class RobotLink:
             self._cell.listeners.remove(self._on_change)
         self._plan, self._cell = plan, cell
         cell.listeners.append(self._on_change)
-        session = self._client.session
+        session = self._agreed
         if session is None:
             return True
         variables = cell.definition.variables
@@ -222,7 +224,7 @@ class RobotLink:
         self._outputs = OutputTransfer(variables, self._slots, reasons)
         self._cycle = 1 / session.series.base_rate if session.series is not None else _CYCLE_UNKNOWN
         self._inputs = ClaimedInputs(variables, session, self._driven, self._cycle)
-        self._session = session
+        self._session = self._agreed = session
         self._loss_told = ("", -math.inf)
         rate = f"{1 / session.period:g} Hz"
         self._cell.robot_connected(
@@ -263,7 +265,7 @@ class RobotLink:
         """The session has ended, or an attempt at one has failed."""
         now = clock.now()
         self._inputs = ClaimedInputs()
-        self._session = None
+        self._session = self._agreed = None
         self._cancel_timers()
         self._cell.health.watchdog_fed = False
         if loss.started:
@@ -307,7 +309,7 @@ class RobotLink:
 
     def _adopt(self, session: Session, flat: Sequence[Value], now: float) -> None:
         """Take over what the controller's inputs hold, as the package reads them back."""
-        self._session = None
+        self._session, self._agreed = None, session
         reasons = unavailable(session, self._cell.definition.variables)
         self._adopting = True
         adopted = self._inputs.adopt(session, flat, now, reasons)
