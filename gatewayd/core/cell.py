@@ -11,10 +11,11 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gatewayd.core.admission import Admission, Change
-from gatewayd.core.adoption import Adoption, Step, adopted, named, would_fall_back
-from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, FallbackKind, Value
+from gatewayd.core.adoption import Adoption, Step, adopted, named
+from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, Value
 from gatewayd.core.delivery import Delivery
 from gatewayd.core.events import Event, EventKind, EventRing
+from gatewayd.core.fallbacks import Fallbacks
 from gatewayd.core.forcing import Force, Forcing
 from gatewayd.core.freshness import Freshness, Source
 from gatewayd.core.health import Health
@@ -34,8 +35,6 @@ HEARTBEAT_PERIOD = 0.1
 """Seconds between two counts of the heartbeat."""
 NOTABLE_GAP = 0.5
 """Seconds for which the gateway stood still, from which on it is an event, and requests that waited are refused."""
-
-_NOT_READABLE = "the robot does not say what it holds"
 
 Written = Sequence[tuple[int, Value, Value]]
 """What a write changed: variable, old and new value."""
@@ -67,6 +66,7 @@ class Cell:
         self.forcing = Forcing(self.image)
         self.delivery = Delivery(self.image, self.health, self.events.append)
         self.adoption = Adoption(definition.adopt_for)
+        self._fallbacks = Fallbacks(definition, self.image, self.ownership, self.delivery, self.events.append)
         self.listeners: list[Callable[[Direction], None]] = []
         self.write_listeners: list[Callable[[int, Written, float], None]] = []
         """Told of every accepted write that changes something: writer, changes, time. They must not raise."""
@@ -335,28 +335,13 @@ class Cell:
         if first:
             detail = adopted(self.image, len(values), self.delivery.unread)
             self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=detail))
-        wanted = self.delivery.owed.copy()
-        if self.definition.clear_on_connect:
-            wanted.update(filter(self._is_ownerless, entered.union(values)))
-        elif self.adoption.over:
-            wanted.update(self._adopted_for_nobody(entered.union(values)))
-        self._fall_back(sorted(wanted), now)
+        self._fall_back(self._fallbacks.due(entered.union(values), over=self.adoption.over), now)
         self._force_inputs(now)
         self._notify(Direction.INPUT)
 
     def complete(self, variables: Iterable[int], now: float) -> None:
-        """Inputs that go out with one that was written, and of which nobody knows what the robot holds, fall back.
-
-        Where their policy is to hold there is nothing to be held: they become zero.
-        """
-        for index in variables:
-            variable = self.definition.variables[index]
-            value = variable.on_release.apply(variable.kind.zero, variable.kind)
-            self.image.tell(index, value, now)
-            self.delivery.give(((index, value),), now)
-            self.events.append(
-                Event(now, EventKind.FALLBACK, variable=index, new=value, detail=_NOT_READABLE)
-            )
+        """Inputs that go out with one that was written, and of which nobody knows what the robot holds, fall back."""
+        self._fallbacks.complete(variables, now)
         self._notify(Direction.INPUT)
 
     def read_back(
@@ -533,18 +518,10 @@ class Cell:
         self.events.append(Event(now, EventKind.WRITER_LOST, writer=writer, detail=reason))
         self._free(self.ownership.held_by(writer), now, f"owner lost: {reason}")
 
-    def _is_ownerless(self, index: int) -> bool:
-        lock = self.definition.variables[index].lock
-        return lock is not None and self.ownership.owners[lock] is None and self.image.available[index]
-
-    def _adopted_for_nobody(self, variables: Iterable[int]) -> list[int]:
-        """Those that nobody owns and for which a fallback would change something."""
-        return would_fall_back(self.image, filter(self._is_ownerless, variables), self.delivery.unread)
-
     def _count_adoption(self, now: float) -> None:
         """What nobody has claimed by the end of `adopt_for` falls back."""
         step, left = self.adoption.look(now, adopted=self._adopted), self.adoption.left(now)
-        pending = self._adopted_for_nobody(self.image.inputs) if left or step is Step.END else []
+        pending = self._fallbacks.of_nobody(self.image.inputs) if left or step is Step.END else []
         self.health.adoption = left if pending else 0.0
         if step is Step.BEGIN and pending:
             detail = f"in {left:g} s, without an owner by then: {named(self.image, pending)}"
@@ -554,20 +531,7 @@ class Cell:
             self._notify(Direction.INPUT)
 
     def _fall_back(self, variables: Iterable[int], now: float) -> None:
-        for index in variables:
-            if not (self._adopted and self.image.available[index]):
-                self.delivery.owed.add(index)
-                continue
-            self.delivery.owed.discard(index)
-            variable = self.definition.variables[index]
-            if variable.on_release.kind is FallbackKind.HOLD:
-                continue
-            old = self.image.values[index]
-            new = variable.on_release.apply(old, variable.kind)
-            self.image.tell(index, new, now)
-            self.delivery.release(index, new, now)
-            if new != old:
-                self.events.append(Event(now, EventKind.FALLBACK, variable=index, old=old, new=new))
+        self._fallbacks.apply(variables, now, adopted=self._adopted)
 
     def _set_inputs(self, values: Sequence[tuple[int, Value]], now: float) -> None:
         self.image.tell_all(values, now)

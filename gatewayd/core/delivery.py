@@ -130,7 +130,7 @@ class Delivery:
         for index in self.differing.intersection(indices):
             self.differing.discard(index)
             if quality[index] is Quality.DIFFERS:
-                quality[index] = Quality.GOOD
+                quality[index] = self._image.judged(index)
         self._health.differing = len(self.differing)
 
     def follow(self, held: Mapping[int, Value], now: float) -> None:
@@ -182,7 +182,7 @@ class Delivery:
     def _mark(self, indices: Iterable[int]) -> None:
         quality = self._image.quality
         for index in indices:
-            if quality[index] is Quality.GOOD:
+            if quality[index] in (Quality.GOOD, Quality.OUT_OF_RANGE):
                 quality[index] = Quality.DIFFERS
 
     def _report(self, event: Event) -> None:

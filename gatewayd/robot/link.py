@@ -36,6 +36,7 @@ LOSS_INTERVAL = 60.0
 LAST_WORDS = 0.4
 """Seconds for which the end of the link waits until what is due has been sent."""
 _LOOK = 0.005
+_PROGRAM = "runtime_state"
 _CYCLE_UNKNOWN = 0.002
 _FEED_LIMIT = 1 << 31
 
@@ -71,6 +72,8 @@ class RobotLink:
         self._outputs = OutputTransfer((), {})
         self._slots: dict[str, slice] = {}
         self._has_timestamp = False
+        self._program: int | None = None
+        """Where packages tell the state of the robot program."""
         self._inputs = ClaimedInputs()
         self._session: Session | None = None
         """What was agreed and is not adopted yet."""
@@ -220,6 +223,7 @@ class RobotLink:
         variables = self._cell.definition.variables
         self._slots = session.outputs.slots
         self._has_timestamp = "timestamp" in self._slots
+        self._program = self._slots[_PROGRAM].start if _PROGRAM in self._slots else None
         reasons = unavailable(session, variables)
         self._outputs = OutputTransfer(variables, self._slots, reasons)
         self._cycle = 1 / session.series.base_rate if session.series is not None else _CYCLE_UNKNOWN
@@ -246,9 +250,10 @@ class RobotLink:
         if cell.freshness.state is not Source.FRESH:
             self._outputs.forget()
         timestamp = float(flat[self._slots["timestamp"]][0]) if self._has_timestamp else None
-        news = cell.package_arrived(timestamp, now)
+        news = cell.package_arrived(timestamp, now, clock.raw())
         if news:
             self._outputs.copy(flat, cell.image.values)
+            cell.program(int(flat[self._program]) if self._program is not None else None)
             cell.outputs_written(now)
             self._inputs.look(flat)
             if self._session is not None:
@@ -260,6 +265,8 @@ class RobotLink:
                 flat if news else None, tuple(cell.delivery.under_way), cell.image.values, now
             ):
                 cell.delivery.delivered(index)
+        if not news and cell.lag_doubtful(now):
+            self._client.probe()
 
     def session_lost(self, loss: Loss) -> None:
         """The session has ended, or an attempt at one has failed."""
@@ -279,7 +286,9 @@ class RobotLink:
             )
 
     def probed(self, delay: float) -> None:
-        """A probe was answered; this link sends none."""
+        """The controller answered behind all that it had sent before."""
+        if self._cell.backlog_probed(delay, clock.now()):
+            self._client.reconnect("its clock stood still for a while, or what it sent was held up")
 
     def text(self, message: TextMessage) -> None:
         """The controller says something; it goes to the log."""

@@ -122,15 +122,15 @@ def test_the_command_of_a_dead_plc_falls_back_after_a_restart(plant: Plant) -> N
 
 
 def test_a_living_plc_keeps_what_it_claims_in_time(plant: Plant) -> None:
-    simulator, daemon, plc = start(plant, robot_options=", adopt_for: 1500ms")
+    simulator, daemon, plc = start(plant, robot_options=", adopt_for: 3s")
     drive(simulator, plc)
     daemon.kill()
     again = plant.daemon(plant.directory / "cell.yaml")
     plc = plant.ready_plc()
+    again.wait_for_line("adopted values fall back soon")
     assert plc.write_integers(0, 7) == 0
     assert plc.write(6, [0b11]) == 0
-    again.wait_for_line("adopted values fall back soon")
-    passed(plc, 300)
+    passed(plc, 600)
     assert (simulator.integer("input_int_register_0"), outputs(simulator)) == (7, 4)
     assert not again.lines("fallback applied")
 
