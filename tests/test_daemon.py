@@ -113,8 +113,8 @@ async def test_a_cell_is_reachable_once_its_listener_listens(running: Running) -
         other.bind(("127.0.0.1", 0))
         other.listen()
         port = int(other.getsockname()[1])
-        async with SimulatedController() as robot:
-            daemon = Daemon(plans((1, robot.port, port), (2, robot.port, free_port())), STATE)
+        async with SimulatedController() as robot, SimulatedController() as another:
+            daemon = Daemon(plans((1, robot.port, port), (2, another.port, free_port())), STATE)
             waiting, served = (station.cell for station in daemon.stations)
             async with running(daemon):
                 await until(lambda: waiting.accepts_writes and served.adoption.reachable)
