@@ -76,6 +76,8 @@ def test_robot_killed_and_restarted_with_other_values(plant: Plant) -> None:
         "demo",
         "--program",
         "output_int_register_1 = count input_int_register_0",
+        "--uptime",
+        "5",  # as a restarted controller: its clock has gone back
         port=simulator.port,
     )
     # Before the gateway is back, the robot's own program (or another tool) has put other values there.
