@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from gatewayd.core.definition import Value
@@ -42,7 +42,7 @@ class Package:
     flat: Sequence[Value]
     given_at: Sequence[float]
     """When each variable was given in this session; minus infinity: it was not."""
-    differing: Container[int]
+    differing: Collection[int]
     """Variables that are known to differ."""
     lag: float
     """Seconds by which the package is late."""
@@ -89,11 +89,14 @@ class ReadBack:
     def compare(self, transfer: InputTransfer, sent: Sequence[Value], package: Package) -> Finding:
         """Judge the fields of a recipe by a package."""
         finding = Finding()
+        is_calm = not self._since and not package.differing
         for name, wanted in transfer.slots.items():
             place = self._slots.get(name)
             if place is None:
                 continue
             held = package.flat[place]
+            if held == sent[wanted] == self._shown.get(name) and is_calm:
+                continue  # the usual field, in a tenth of the time
             self._measure(name, held, package.now)
             if same(held, sent[wanted]):
                 self._in_flight(transfer.parts[name])
