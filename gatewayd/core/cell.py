@@ -7,12 +7,15 @@ Links call it; it calls its `listeners` after values or qualities changed. Every
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gatewayd.core.admission import Admission, Change
-from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, FallbackKind, Value
+from gatewayd.core.adoption import Adoption, Step, adopted, named
+from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, Value
+from gatewayd.core.delivery import Delivery
 from gatewayd.core.events import Event, EventKind, EventRing
+from gatewayd.core.fallbacks import Fallbacks
 from gatewayd.core.forcing import Force, Forcing
 from gatewayd.core.freshness import Freshness, Source
 from gatewayd.core.health import Health
@@ -61,6 +64,9 @@ class Cell:
         self.events = EventRing()
         self.health = Health()
         self.forcing = Forcing(self.image)
+        self.delivery = Delivery(self.image, self.health, self.events.append)
+        self.adoption = Adoption(definition.adopt_for)
+        self._fallbacks = Fallbacks(definition, self.image, self.ownership, self.delivery, self.events.append)
         self.listeners: list[Callable[[Direction], None]] = []
         self.write_listeners: list[Callable[[int, Written, float], None]] = []
         """Told of every accepted write that changes something: writer, changes, time. They must not raise."""
@@ -68,8 +74,6 @@ class Cell:
         self._admission = Admission(definition.variables, self.ownership, self.image)
         self._refusals = RefusalLog(self.events.append)
         self._adopted = False
-        self._due_fallbacks: set[int] = set()
-        """Inputs that could not be given their release fallback, because the robot or the register was not there."""
         self._next_heartbeat: float | None = None
 
     @property
@@ -253,6 +257,7 @@ class Cell:
         self.program(None)
         self.events.append(Event(now, EventKind.ROBOT_LOST, detail=reason))
         self.forcing.lift()
+        self.delivery.lost()
         self.image.inputs_lost()
         if was_fresh:
             self._outputs_lost()
@@ -315,10 +320,10 @@ class Cell:
         return True
 
     def adopt(self, values: Mapping[int, Value], now: float) -> None:
-        """Take over what the controller's inputs hold, then apply the fallbacks that fell due meanwhile.
+        """Take over what the controller's inputs hold, then apply the fallbacks that are owed.
 
         Called once per session, and again (after `set_availability`) when registers became available later. An input
-        that is not among `values`, because the controller does not tell it, is not good before it is written.
+        that is not among `values`, because the controller does not say what it holds, is not good before it is given.
         """
         if self.freshness.state is Source.LOST:
             return
@@ -326,13 +331,31 @@ class Cell:
         self.forcing.lift()
         for index, value in values.items():
             self.image.tell(index, value, now)
+        entered = self.delivery.adopted(values.keys())
         if first:
-            self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=f"{len(values)} variables"))
-        wanted = self._due_fallbacks.copy()
-        if self.definition.clear_on_connect:
-            wanted.update(filter(self._wants_fallback, self.image.inputs if first else values))
-        self._fall_back(sorted(wanted), now)
+            detail = adopted(self.image, len(values), self.delivery.unread)
+            self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=detail))
+        self._fall_back(self._fallbacks.due(entered.union(values), over=self.adoption.over), now)
         self._force_inputs(now)
+        self._notify(Direction.INPUT)
+
+    def complete(self, variables: Iterable[int], now: float) -> None:
+        """Inputs that go out with one that was written, and of which nobody knows what the robot holds, fall back."""
+        self._fallbacks.complete(variables, now)
+        self._notify(Direction.INPUT)
+
+    def read_back(
+        self, differ: Mapping[int, str], agree: Collection[int], follow: Mapping[int, Value], now: float
+    ) -> None:
+        """What the comparison of a package with what was sent came to.
+
+        `differ`: given inputs for which the robot holds something else, in words; `agree`: inputs that read back as
+        sent; `follow`: what the robot holds in inputs that nobody gave in this session.
+        """
+        self.forcing.lift()
+        self.delivery.agree(agree)
+        self.delivery.differ(differ, now)
+        self.delivery.follow(follow, now)
         self._notify(Direction.INPUT)
 
     def set_availability(self, variables: Iterable[int], available: bool, reason: str, now: float) -> None:
@@ -348,6 +371,8 @@ class Cell:
         kind = EventKind.AVAILABLE if available else EventKind.UNAVAILABLE
         self.forcing.lift()
         for index in changed:
+            if not available:
+                self.delivery.leave(index)
             self.image.set_available(index, available)
             self.events.append(Event(now, kind, variable=index, detail=reason))
         self._notify(Direction.INPUT)
@@ -369,6 +394,7 @@ class Cell:
         self.freshness.tick(now)
         if was_fresh and self.freshness.state is not Source.FRESH:
             self._source_stale(now)
+        self._count_adoption(now)
         self._refusals.tick(now)
         self._beat(now)
 
@@ -467,6 +493,7 @@ class Cell:
         for index, force in self.forcing.forces.items():
             if self.definition.variables[index].direction is Direction.INPUT and self.image.available[index]:
                 self.image.tell(index, force.value, now)
+                self.delivery.give(((index, force.value),), now)
 
     def _release_expired(self, now: float) -> None:
         forces, holds = self.forcing.due(now)
@@ -491,29 +518,24 @@ class Cell:
         self.events.append(Event(now, EventKind.WRITER_LOST, writer=writer, detail=reason))
         self._free(self.ownership.held_by(writer), now, f"owner lost: {reason}")
 
-    def _wants_fallback(self, index: int) -> bool:
-        lock = self.definition.variables[index].lock
-        return lock is not None and self.ownership.owners[lock] is None and self.image.available[index]
+    def _count_adoption(self, now: float) -> None:
+        """What nobody has claimed by the end of `adopt_for` falls back."""
+        step, left = self.adoption.look(now, adopted=self._adopted), self.adoption.left(now)
+        pending = self._fallbacks.of_nobody(self.image.inputs) if left or step is Step.END else []
+        self.health.adoption = left if pending else 0.0
+        if step is Step.BEGIN and pending:
+            detail = f"in {left:g} s, without an owner by then: {named(self.image, pending)}"
+            self.events.append(Event(now, EventKind.ADOPTION_ENDS, detail=detail))
+        elif step is Step.END and self._adopted:
+            self._fall_back(pending, now)
+            self._notify(Direction.INPUT)
 
     def _fall_back(self, variables: Iterable[int], now: float) -> None:
-        for index in variables:
-            if not (self._adopted and self.image.available[index]):
-                self._due_fallbacks.add(index)
-                continue
-            self._due_fallbacks.discard(index)
-            variable = self.definition.variables[index]
-            if variable.on_release.kind is FallbackKind.HOLD:
-                continue
-            old = self.image.values[index]
-            new = variable.on_release.apply(old, variable.kind)
-            self.image.tell(index, new, now)
-            if new != old:
-                self.events.append(Event(now, EventKind.FALLBACK, variable=index, old=old, new=new))
+        self._fallbacks.apply(variables, now, adopted=self._adopted)
 
     def _set_inputs(self, values: Sequence[tuple[int, Value]], now: float) -> None:
         self.image.tell_all(values, now)
-        if self._due_fallbacks:
-            self._due_fallbacks.difference_update(index for index, _value in values)
+        self.delivery.give(values, now)
         self._notify(Direction.INPUT)
 
     def _tell_written(self, writer: int, values: Sequence[tuple[int, Value]], now: float) -> None:

@@ -46,7 +46,8 @@ def succeed(old: Cell, definition: CellDefinition, now: float) -> Succession:
     _take_history(old, new, match)
     _take_forcing(old, new, match)
     new._adopted = old._adopted
-    new._due_fallbacks = set(match.due(old._due_fallbacks))
+    new.adoption.succeed(old.adoption)
+    new.delivery.succeed(old.delivery, new.health, match.variables, match.due)
     new._next_heartbeat = old._next_heartbeat
     return Succession(new, stranded)
 
@@ -124,7 +125,7 @@ def _release(old: Cell, match: _Match, now: float) -> tuple[str, ...]:
     if old.accepts_writes:
         old._fall_back([index for index in gone if index not in released and old.image.available[index]], now)
         old._notify(Direction.INPUT)
-    owed = (old.definition.variables[index] for index in gone if index in old._due_fallbacks)
+    owed = (old.definition.variables[index] for index in gone if index in old.delivery.owed)
     return tuple(variable.name for variable in owed if variable.on_release.kind is not FallbackKind.HOLD)
 
 

@@ -165,6 +165,8 @@ class Model:
         self.ever: set[int] = set()
         self.gone: set[int] = set()
         self.due: set[int] = set()
+        self.under_way: set[int] = set()
+        self.entered: set[int] = set()
         self.connections: Counter[int] = Counter()
         self.alive: set[int] = set()
         self.heard: dict[int, float] = {}
@@ -243,6 +245,7 @@ class Model:
         if self.value[index] != new:
             self.events[EventKind.FALLBACK] += 1
         self.put(index, new, now)
+        self.under_way.add(index)
 
     def fits(self, index: int, value: Value) -> Value | None:
         if index == 4:
@@ -308,6 +311,7 @@ class Model:
                 value = self.fits(change.variable, change.value)
                 assert value is not None
                 self.due.discard(change.variable)
+                self.under_way.discard(change.variable)
                 self.put(change.variable, value, now)
         self.accepted += 1
         return None
@@ -357,6 +361,9 @@ class Model:
             self.connected = self.adopted = False
             self.source = Source.LOST
             self.good -= set(INPUTS)
+            self.due |= self.under_way
+            self.under_way.clear()
+            self.entered.clear()
             self.dim()
             self.events[EventKind.ROBOT_LOST] += 1
 
@@ -388,9 +395,11 @@ class Model:
         for index, value in held.items():
             self.put(index, value, now)
         self.events[EventKind.INPUTS_ADOPTED] += first
+        new = set(INPUTS) - self.gone - self.entered
+        self.entered |= new
         for index in INPUTS:
             ownerless = self.owner[LOCK_OF[index]] is None and index not in self.gone
-            if index in self.due or (self.clear_on_connect and ownerless and (first or index in held)):
+            if index in self.due or (self.clear_on_connect and ownerless and (index in new or index in held)):
                 self.fall_back(index, now)
 
     def set_gone(self, index: int, *, gone: bool) -> None:
@@ -400,6 +409,10 @@ class Model:
         self.gone ^= {index}
         if gone:
             self.good.discard(index)
+            self.entered.discard(index)
+            if index in self.under_way:
+                self.under_way.discard(index)
+                self.due.add(index)
         if index in OUTPUTS:
             self.ever.discard(index)
             self.show_policy(index)
@@ -551,6 +564,12 @@ class CellMachine(RuleBasedStateMachine):
         self.cell.adopt(held, self.now)
         self.model.adopt(held, self.now)
 
+    @rule(index=st.sampled_from(INPUTS))
+    def fallback_arrives(self, index: int) -> None:
+        """Before it does, the end of the session makes it due again."""
+        self.cell.delivery.delivered(index)
+        self.model.under_way.discard(index)
+
     @precondition(lambda self: self.model.connected)
     @rule(frozen=st.booleans(), number=st.integers(1, 9), flag=st.booleans())
     def package(self, frozen: bool, number: int, flag: bool) -> None:
@@ -604,6 +623,11 @@ class CellMachine(RuleBasedStateMachine):
             assert owner is None or owner in declared.owners
             assert table.expires[lock] == self.model.until[lock], declared.name
             assert owner is None or self.cell.writers.alive[owner]
+
+    @invariant()
+    def what_is_due_to_the_robot_is_known(self) -> None:
+        assert self.cell.delivery.owed == self.model.due
+        assert self.cell.delivery.under_way == self.model.under_way
 
     @invariant()
     def stale_never_looks_fresh(self) -> None:
