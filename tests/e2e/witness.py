@@ -14,7 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 __all__ = ["Change", "Witness"]
 
@@ -23,6 +23,8 @@ _CODES = {"DOUBLE": "d", "INT32": "i", "UINT32": "I", "BOOL": "?", "UINT64": "Q"
 _FREQUENCY = 500.0
 _TIMEOUT = 1.0
 _RETRY = 0.02
+_SIGHT = 0.1
+"""Seconds without a package after which something may have escaped it."""
 _TICKS = 100_000
 """Readings of the controller's clock that are kept."""
 
@@ -33,6 +35,8 @@ class Change(NamedTuple):
     time: float
     """time.monotonic."""
     value: float
+    blind: float
+    """Seconds before `time` in which it may have come."""
 
 
 class Witness(threading.Thread):
@@ -44,11 +48,13 @@ class Witness(threading.Thread):
         self._fields = list(fields)
         self._over = threading.Event()
         self.changes: dict[str, list[Change]] = {field: [] for field in fields}
-        """Begins anew with each spell: the first entry of a spell is what was found."""
         self.spells: list[tuple[float, float]] = []
         """From when to when it was watching; the last spell grows."""
         self.ticks: deque[tuple[float, float]] = deque(maxlen=_TICKS)
         """When which timestamp of the controller came."""
+        self._held: dict[str, float] = {}
+        self._last = -math.inf
+        """When the last package came."""
 
     def run(self) -> None:
         while not self._over.is_set():
@@ -88,24 +94,24 @@ class Witness(threading.Thread):
         package = struct.Struct(">B" + "".join(_CODES[one] for one in types))
         connected.sendall(_message(b"S", b""))
         _answer(messages, b"S")
-        last: tuple[Any, ...] = (None,) * len(self._fields)
         for kind, payload in messages:
             if self._over.is_set():
                 return
             if kind == b"U":
-                last = self._take(package.unpack(payload), last)
+                self._take(*package.unpack(payload)[1:])
 
-    def _take(self, package: tuple[Any, ...], last: tuple[Any, ...]) -> tuple[Any, ...]:
-        _, timestamp, *values = package
+    def _take(self, timestamp: float, *values: float) -> None:
         now = time.monotonic()
-        for field, value, former in zip(self._fields, values, last, strict=True):
-            if value != former:
-                self.changes[field].append(Change(now, value))
-        if last and last[0] is None:
+        blind = now - self._last
+        for field, value in zip(self._fields, values, strict=True):
+            if value != self._held.get(field):
+                self._held[field] = value
+                self.changes[field].append(Change(now, value, blind))
+        if blind > _SIGHT:
             self.spells.append((now, now))
+        self._last = now
         self.spells[-1] = (self.spells[-1][0], now)
         self.ticks.append((now, timestamp))
-        return tuple(values)
 
 
 def _message(kind: bytes, payload: bytes) -> bytes:
