@@ -55,6 +55,8 @@ class Witness(threading.Thread):
         self._held: dict[str, float] = {}
         self._last = -math.inf
         """When the last package came."""
+        self._anew = True
+        """Whether a connection has just begun: one that was cut took with it what others had sent as well."""
 
     def run(self) -> None:
         while not self._over.is_set():
@@ -94,6 +96,7 @@ class Witness(threading.Thread):
         package = struct.Struct(">B" + "".join(_CODES[one] for one in types))
         connected.sendall(_message(b"S", b""))
         _answer(messages, b"S")
+        self._anew = True
         for kind, payload in messages:
             if self._over.is_set():
                 return
@@ -107,7 +110,8 @@ class Witness(threading.Thread):
             if value != self._held.get(field):
                 self._held[field] = value
                 self.changes[field].append(Change(now, value, blind))
-        if blind > _SIGHT:
+        if self._anew or blind > _SIGHT:
+            self._anew = False
             self.spells.append((now, now))
         self._last = now
         self.spells[-1] = (self.spells[-1][0], now)
