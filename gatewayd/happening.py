@@ -29,7 +29,6 @@ BAD = frozenset(
         EventKind.STALE,
         EventKind.UNAVAILABLE,
         EventKind.READ_BACK_DIFFERS,
-        EventKind.DIFFERS,
         EventKind.ADOPTION_ENDS,
         EventKind.STOOD_STILL,
         EventKind.WRITER_LOST,
@@ -53,14 +52,12 @@ _SENTENCES = {
     EventKind.UNAVAILABLE.value: "{variable} {are} unavailable",
     EventKind.AVAILABLE.value: "{variable} {are} available",
     EventKind.READ_BACK_DIFFERS.value: "read-back of {variable} differs",
-    EventKind.DIFFERS.value: "the robot holds {new} for {variable} instead of {old}",
     EventKind.FOLLOWED.value: "{variable} follows the robot: {old} -> {new}",
     EventKind.ADOPTION_ENDS.value: "{variable} {fall} back soon: adopted, and owned by nobody",
 }
 """What is not told by its name and its detail."""
 _WITHOUT_VALUES = {
     EventKind.FALLBACK.value: "{variable} fell back",
-    EventKind.DIFFERS.value: "the robot holds something else for {variable}",
     EventKind.FOLLOWED.value: "{variable} {follow} the robot",
 }
 """The same where the values are not known, or where it happened to several, each with a value of its own."""

@@ -81,11 +81,6 @@ def cell() -> Cell:
             Event(0, EventKind.READ_BACK_DIFFERS, LIMIT, detail="sent 1, the controller holds 2"),
             "read-back of limit differs: sent 1, the controller holds 2",
         ),
-        (
-            Event(0, EventKind.DIFFERS, LIMIT, old=7.0, new=99.0),
-            "the robot holds 99 N for limit instead of 7",
-        ),
-        (Event(0, EventKind.DIFFERS, LIMIT), "the robot holds something else for limit"),
         (Event(0, EventKind.FOLLOWED, LIMIT, old=7.0, new=99.0), "limit follows the robot: 7 -> 99 N"),
         (Event(0, EventKind.FOLLOWED, LIMIT), "limit follows the robot"),
         (
@@ -155,7 +150,6 @@ def test_only_what_somebody_should_look_at_is_bad(cell: Cell) -> None:
         EventKind.STALE,
         EventKind.UNAVAILABLE,
         EventKind.READ_BACK_DIFFERS,
-        EventKind.DIFFERS,
         EventKind.ADOPTION_ENDS,
         EventKind.STOOD_STILL,
         EventKind.WRITER_LOST,
@@ -169,6 +163,6 @@ def test_several_at_one_moment_are_told_without_values(cell: Cell) -> None:
     def told(kind: EventKind) -> str:
         return Happening.of(Event(0, kind, LIMIT, old=1.0, new=2.0), cell.definition).of_several(3).sentence()
 
-    assert told(EventKind.DIFFERS) == "the robot holds something else for limit and 3 more"
+    assert told(EventKind.READ_BACK_DIFFERS) == "read-back of limit and 3 more differs"
     assert told(EventKind.FOLLOWED) == "limit and 3 more follow the robot"
     assert told(EventKind.ADOPTION_ENDS) == "limit and 3 more fall back soon: adopted, and owned by nobody"

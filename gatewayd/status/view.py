@@ -41,7 +41,7 @@ _IN_RUNS = frozenset(
         EventKind.UNAVAILABLE,
         EventKind.AVAILABLE,
         EventKind.ADOPTION_ENDS,
-        EventKind.DIFFERS,
+        EventKind.READ_BACK_DIFFERS,
         EventKind.FOLLOWED,
     }
 )
