@@ -1,15 +1,17 @@
-"""The `gatewayd` command: runs the command line and turns whatever goes wrong into one line and an exit code."""
+"""The `gatewayd` command: runs the command line and turns whatever goes wrong into one line and an exit code.
+
+Little is imported before the signals have their effects: what takes long is imported by `_run`.
+"""
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
-import traceback
-from pathlib import Path
+from contextlib import suppress
+from typing import NoReturn
 
-import click
-
-from gatewayd.cli import command
+from gatewayd.signals import SIGNALS
 
 __all__ = ["main"]
 
@@ -21,23 +23,51 @@ READER_GONE = 1
 """Exit code when the reader of a pipe went away; click's own, wherever in the output that is noticed."""
 
 
-def main() -> None:
+def main() -> NoReturn:
     """Run `sys.argv` and exit. GATEWAYD_TRACEBACK=1 shows where an internal error came from."""
+    is_daemon = sys.argv[1:2] == ["run"]
+    if is_daemon:
+        SIGNALS.install()
+    try:
+        code = _run()
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    if is_daemon:
+        _leave(code)
+    # From here on nothing is left to be interrupted: Ctrl-C ends the process, and prints nothing.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    sys.exit(code)
+
+
+def _run() -> int:
+    """The exit code of the command."""
+    import click
+
+    from gatewayd.cli import command
+
     try:
         result = command.main(prog_name="gatewayd", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as problem:
         problem.show()
-        sys.exit(problem.exit_code)
-    except (KeyboardInterrupt, click.Abort):
-        sys.exit(INTERRUPTED)
+        return problem.exit_code
+    except click.Abort:
+        return INTERRUPTED
     except BrokenPipeError:
         _forget_stdout()
-        sys.exit(READER_GONE)
+        return READER_GONE
     except Exception as defect:  # noqa: BLE001 - the last line of defence: no traceback reaches a user
         _report(defect)
-        sys.exit(INTERNAL_ERROR)
-    sys.exit(result if isinstance(result, int) else 0)
+        return INTERNAL_ERROR
+    return result if isinstance(result, int) else 0
+
+
+def _leave(code: int) -> NoReturn:
+    """End without the interpreter's own end, which would give every signal its deadly default back."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(AttributeError, OSError, ValueError):
+            stream.flush()
+    os._exit(code)
 
 
 def _forget_stdout() -> None:
@@ -46,10 +76,15 @@ def _forget_stdout() -> None:
 
 
 def _report(defect: Exception) -> None:
+    import traceback
+    from pathlib import Path
+
+    from gatewayd.printable import printable
+
     if os.environ.get("GATEWAYD_TRACEBACK") == "1":
         traceback.print_exception(defect)
     place = traceback.extract_tb(defect.__traceback__)[-1]
-    what = " ".join(f"{type(defect).__name__}: {defect}".split())
+    what = printable(" ".join(f"{type(defect).__name__}: {defect}".split()))
     print(  # noqa: T201 - logging may be what failed
         f"gatewayd: internal error: {what} ({Path(place.filename).name}:{place.lineno}); please report with the log",
         file=sys.stderr,

@@ -17,10 +17,12 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell, Written
 from gatewayd.core.definition import Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.happening import ACCEPTED, Happening
+from gatewayd.printable import json_text
 
 __all__ = ["CAPACITY", "KINDS", "MERGED", "Audit", "Record", "plain_value", "utc"]
 
@@ -35,6 +37,7 @@ KINDS = frozenset(
         EventKind.TAKEN_OVER,
         EventKind.RELEASED,
         EventKind.FALLBACK,
+        EventKind.FOLLOWED,
         EventKind.FORCED,
         EventKind.UNFORCED,
     }
@@ -125,7 +128,7 @@ class Audit:
         try:
             while True:
                 self.follow(cells())
-                self.tick(time.monotonic())
+                self.tick(clock.now())
                 await asyncio.sleep(_PERIOD)
         finally:
             self.follow(())
@@ -135,7 +138,8 @@ class Audit:
         self._records.append(record)
         self.count += 1
         if self._sink is not None:
-            self._sink(json.dumps(record.as_json(), ensure_ascii=False, separators=(",", ":")))
+            text = json.dumps(record.as_json(), ensure_ascii=False, separators=(",", ":"))
+            self._sink(json_text(text))
 
     def wall(self, ago: float = 0.0) -> float:
         """The wall clock so many seconds ago."""

@@ -2,7 +2,8 @@
 
 - `now`: the time of everything in the daemon, leases and ages included. CLOCK_MONOTONIC, which stands still while
   the machine is suspended, and all the time it was suspended for. Equal to `loop.time()` of a `ClockedLoop`.
-- `raw`: CLOCK_MONOTONIC_RAW, for comparisons with another machine's clock: no time service adjusts its speed.
+- `raw`: CLOCK_MONOTONIC_RAW, for comparisons with another machine's clock: no time service adjusts its speed. It
+  goes on in suspension too, as the other machine's does; packages from before would not look late otherwise.
 
 asyncio serves sockets before timers. After the process stood still (stopped, suspended, starved of the CPU) what
 waited in the sockets would therefore be served before anything notices that time has passed. The selector is what
@@ -57,8 +58,8 @@ def now() -> float:
 
 
 def raw() -> float:
-    """Seconds of CLOCK_MONOTONIC_RAW, which no time service corrects."""
-    return _read(_CLOCK_RAW)
+    """Seconds of CLOCK_MONOTONIC_RAW, which no time service corrects; goes on while the machine is suspended."""
+    return _read(_CLOCK_RAW) + _suspension.total
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,8 @@
 """Mapping files are read, checked and compiled by a process of their own, which ends with its work.
 
+Nobody else ends it: signals, which a terminal and a service manager send to it as well, do not reach it. When this
+process is gone, however that came, it ends too.
+
 What is needed for that would be a third of the gateway's memory, and on its loop or beside it the work would take time
 from the robots. Whatever a file does to that process, the gateway goes on with the mapping it has.
 """
@@ -8,9 +11,11 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import subprocess
 import sys
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Self
 
@@ -22,12 +27,18 @@ __all__ = ["LIMIT", "Compilation", "CompilationError"]
 LIMIT = 20.0
 """Seconds that all files together may take; hundreds take two."""
 
-_BOOT = (
-    "import gc, sys; gc.disable(); sys.path.insert(0, sys.argv.pop(1)); "
-    "from gatewayd.mapping.worker import main; main()"
-)
+_BOOT = """
+import gc, os, sys, threading
+threading.Thread(target=lambda: os.read(0, 1) or os._exit(1), daemon=True).start()
+gc.disable()
+sys.path.insert(0, sys.argv.pop(1))
+from gatewayd.mapping.worker import main
+main()
+"""
 """Isolated (-I), so that no environment variable and no directory decides what is imported; this very gatewayd is.
-What lives for a moment needs no collection of garbage."""
+What lives for a moment needs no collection of garbage. Standard input ends when who started it ends."""
+_LOOK = 0.05
+"""Seconds between two looks whether the result is still wanted."""
 _ENVIRONMENT = {"PYDANTIC_DISABLE_PLUGINS": "1"}
 """Looking for plugins of pydantic, of which there are none, would take a tenth of the time."""
 _ROOT = str(Path(gatewayd.__file__).parents[1])
@@ -42,15 +53,8 @@ class Compilation:
 
     def __init__(self, names: Iterable[Path]) -> None:
         """Raises CompilationError if there can be no such process."""
-        command = [sys.executable, "-I", "-c", _BOOT, _ROOT, *map(str, names)]
         try:
-            self._process = subprocess.Popen(  # noqa: S603 - this interpreter and files that are only read
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                env=os.environ | _ENVIRONMENT,
-            )
+            self._process, self._lifeline = _start(map(str, names))
         except (OSError, ValueError) as error:
             text = f"the process that reads the mapping files cannot be started: {error}"
             raise CompilationError(text) from error
@@ -62,21 +66,15 @@ class Compilation:
     def __exit__(self, *_exception: object) -> None:
         # Whoever waits in `result`, maybe in another thread, comes back by this and closes the pipes.
         self._process.kill()
+        os.close(self._lifeline)
         if not self._asked:
             self._process.communicate()
 
-    def result(self) -> Compiled:
-        """What the files come to. Waits; to be called once. Raises CompilationError."""
+    def result(self, given_up: Callable[[], bool] = lambda: False) -> Compiled:
+        """What the files come to. Waits until it is `given_up`; to be called once. Raises CompilationError."""
         self._asked = True
         process = self._process
-        try:
-            answer, said = process.communicate(timeout=LIMIT)
-        except subprocess.TimeoutExpired as error:
-            process.kill()
-            process.communicate()
-            raise CompilationError(
-                f"reading the mapping files takes longer than {LIMIT:g} s: does `gatewayd check` end?"
-            ) from error
+        answer, said = self._communicate(given_up)
         if process.returncode:
             last = said.decode("utf-8", "replace").strip().rpartition("\n")[2]
             raise CompilationError(
@@ -86,6 +84,46 @@ class Compilation:
         compiled = pickle.loads(answer)  # noqa: S301 - written by our own code in our own process
         assert isinstance(compiled, Compiled)
         return compiled
+
+    def _communicate(self, given_up: Callable[[], bool]) -> tuple[bytes, bytes]:
+        """Output and errors, once it has ended."""
+        process, until = self._process, time.monotonic() + LIMIT
+        while True:
+            try:
+                return process.communicate(timeout=_LOOK)
+            except subprocess.TimeoutExpired:
+                late = time.monotonic() >= until
+                if not late and not given_up():
+                    continue
+            process.kill()
+            process.communicate()
+            raise CompilationError(
+                f"reading the mapping files takes longer than {LIMIT:g} s: does `gatewayd check` end?"
+                if late
+                else "reading the mapping files was given up"
+            )
+
+
+def _start(names: Iterable[str]) -> tuple[subprocess.Popen[bytes], int]:
+    """The process, and the descriptor whose end is its end too."""
+    theirs, ours = os.pipe()
+    # It inherits what this thread blocks: from its first instruction on no signal reaches it.
+    former = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+    try:
+        process = subprocess.Popen(  # noqa: S603 - this interpreter and files that are only read
+            [sys.executable, "-I", "-c", _BOOT, _ROOT, *names],
+            stdin=theirs,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=os.environ | _ENVIRONMENT,
+        )
+    except BaseException:
+        os.close(ours)
+        raise
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, former)
+        os.close(theirs)
+    return process, ours
 
 
 def _ending(code: int) -> str:

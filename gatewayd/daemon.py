@@ -209,9 +209,27 @@ class Daemon:
             self._begin(listener, partial(self._open, listener))
 
     def _begin_station(self, station: Station) -> None:
-        self._begin(station, partial(self._keep_running, station, partial(_tick, station)))
+        self._begin(station, partial(self._keep_running, station, partial(self._tick, station)))
         for link in station.links:
             self._begin(link, partial(self._keep_running, link, link.run))
+
+    async def _tick(self, station: Station) -> None:
+        while True:
+            adoption = station.cell.adoption
+            adoption.reachable = adoption.reachable or self._is_reachable(station)
+            station.cell.tick(clock.now())
+            await asyncio.sleep(TICK)
+
+    def _is_reachable(self, station: Station) -> bool:
+        """Whether a writer can reach the cell; one without a fieldbus waits for none."""
+        modbus = station.plan.modbus
+        if modbus is None and station.can is None:
+            return True
+        served = modbus is not None and any(
+            listener.listening and listener.address == (modbus.host, modbus.port)
+            for listener in self.listeners
+        )
+        return served or station.is_on_bus
 
     def _begin(
         self, part: object, work: Callable[[], Awaitable[None]], former: asyncio.Task[None] | None = None
@@ -276,12 +294,6 @@ class Daemon:
         with suppress(TimeoutError):
             async with asyncio.timeout(CLOSING_TIME):
                 await asyncio.gather(*(link.close() for station in self.stations for link in station.links))
-
-
-async def _tick(station: Station) -> None:
-    while True:
-        station.cell.tick(clock.now())
-        await asyncio.sleep(TICK)
 
 
 async def _after(former: asyncio.Task[None] | None, work: Callable[[], Awaitable[None]]) -> None:

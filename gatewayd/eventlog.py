@@ -23,6 +23,8 @@ LEVELS = {
     EventKind.STALE: logging.WARNING,
     EventKind.UNAVAILABLE: logging.WARNING,
     EventKind.READ_BACK_DIFFERS: logging.WARNING,
+    EventKind.ADOPTION_ENDS: logging.WARNING,
+    EventKind.STOOD_STILL: logging.WARNING,
     EventKind.WRITER_LOST: logging.WARNING,
     EventKind.TAKEN_OVER: logging.WARNING,
     EventKind.FALLBACK: logging.WARNING,

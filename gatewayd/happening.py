@@ -12,6 +12,7 @@ from gatewayd.core.definition import CellDefinition, Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
 from gatewayd.figures import value
+from gatewayd.printable import printable
 
 __all__ = ["ACCEPTED", "BAD", "GATEWAY", "STRANGER", "UNDECLARED", "Happening", "limits_of", "stranger"]
 
@@ -28,6 +29,8 @@ BAD = frozenset(
         EventKind.STALE,
         EventKind.UNAVAILABLE,
         EventKind.READ_BACK_DIFFERS,
+        EventKind.ADOPTION_ENDS,
+        EventKind.STOOD_STILL,
         EventKind.WRITER_LOST,
         EventKind.REFUSED,
         EventKind.FORCED,
@@ -49,10 +52,15 @@ _SENTENCES = {
     EventKind.UNAVAILABLE.value: "{variable} {are} unavailable",
     EventKind.AVAILABLE.value: "{variable} {are} available",
     EventKind.READ_BACK_DIFFERS.value: "read-back of {variable} differs",
+    EventKind.FOLLOWED.value: "{variable} follows the robot: {old} -> {new}",
+    EventKind.ADOPTION_ENDS.value: "{variable} {fall} back soon: adopted, and owned by nobody",
 }
 """What is not told by its name and its detail."""
-_WITHOUT_VALUES = {EventKind.FALLBACK.value: "{variable} fell back"}
-"""The same where it befell several, each with a value of its own."""
+_WITHOUT_VALUES = {
+    EventKind.FALLBACK.value: "{variable} fell back",
+    EventKind.FOLLOWED.value: "{variable} {follow} the robot",
+}
+"""The same where the values are not known, or where it happened to several, each with a value of its own."""
 _ASIDE = frozenset(
     {ACCEPTED, _REFUSED, EventKind.ACQUIRED.value, EventKind.TAKEN_OVER.value, EventKind.FORCED.value}
 )
@@ -124,7 +132,11 @@ class Happening:
         """Who did what, with value and unit, why, who stood in the way and how often. `refused` may say how.
 
         An event whose variable, lock or writer a reload has removed is told by its kind; the detail has the names.
+        What came from outside is escaped, as everything that people read.
         """
+        return printable(self._sentence(refused))
+
+    def _sentence(self, refused: str) -> str:
         text = self._refusal(refused) if self.what == _REFUSED else self._told()
         if self.what not in _ASIDE:
             return f"{text}: {self.detail}" if self.detail else text
@@ -143,6 +155,8 @@ class Happening:
         others = f" and {self.others} more" if self.others else ""
         known = {
             "are": "are" if others else "is",
+            "fall": "fall" if others else "falls",
+            "follow": "follow" if others else "follows",
             "writer": self.writer,
             "variable": self.variable and self.variable + others,
             "lock": self.lock and self.lock + others,
@@ -151,11 +165,12 @@ class Happening:
             "new": None if self.new is None else value(self.new, self.unit),
         }
         names = {name: text for name, text in known.items() if text is not None}
-        sentences = _SENTENCES | _WITHOUT_VALUES if others else _SENTENCES
-        try:
-            return sentences[self.what].format_map(names)
-        except KeyError:
-            return f"{self.what} {self.variable}" if self.variable else self.what
+        for sentences in (_SENTENCES | _WITHOUT_VALUES if others else _SENTENCES, _WITHOUT_VALUES):
+            try:
+                return sentences[self.what].format_map(names)
+            except KeyError:
+                continue
+        return f"{self.what} {self.variable}" if self.variable else self.what
 
 
 def limits_of(event: Event, definition: CellDefinition) -> str:

@@ -2,7 +2,7 @@
 
 An event is an ordinary logging call whose fields travel beside its text:
 `log.info("robot connected", extra=fields(cell="press-3"))`.
-Whatever a peer sent stays on its line: no field and no text can break it or colour a terminal.
+Whatever a peer sent stays on its line (`gatewayd.printable`): no field and no text can break it or colour a terminal.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from enum import Enum
 from math import isfinite
 from pathlib import Path
 from typing import Protocol
+
+from gatewayd.printable import printable
 
 __all__ = ["Format", "Stream", "configure", "fields"]
 
@@ -124,7 +126,7 @@ def _level(record: logging.LogRecord) -> tuple[str, int]:
 def _event(record: logging.LogRecord) -> str:
     """The text and the fields as logfmt, on one line."""
     pairs = (f"{name}={_logfmt(value)}" for name, value in _fields(record).items())
-    return " ".join([_escape(record.getMessage()), *pairs])
+    return " ".join([printable(record.getMessage()), *pairs])
 
 
 def _fields(record: logging.LogRecord) -> dict[str, object]:
@@ -146,9 +148,10 @@ def _logfmt(value: object) -> str:
     if value is None or isinstance(value, bool):
         return json.dumps(value)
     text = str(value)
-    if _PLAIN.fullmatch(text) and text.isprintable():
+    shown = printable(text)
+    if shown == text and _PLAIN.fullmatch(text):
         return text
-    return '"' + _escape(text.replace("\\", "\\\\").replace('"', '\\"')) + '"'
+    return '"' + printable(text.replace("\\", "\\\\").replace('"', '\\"')) + '"'
 
 
 def _json(value: object) -> object:
@@ -157,13 +160,6 @@ def _json(value: object) -> object:
         value is None or isinstance(value, (str, bool, int)) or (isinstance(value, float) and isfinite(value))
     )
     return value if plain else str(value)
-
-
-def _escape(text: str) -> str:
-    """`text` with everything that is not printable (controls, line separators, direction marks) as an escape."""
-    if text.isprintable():
-        return text
-    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
 
 
 def _is_journal(stream: Stream) -> bool:

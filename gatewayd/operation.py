@@ -8,18 +8,38 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
+from gatewayd import clock
 from gatewayd.audit import Audit
 from gatewayd.auditfile import AuditFile
 from gatewayd.control.api import Api, Gateway
 from gatewayd.control.endpoint import Endpoint, Reload
 from gatewayd.core.cell import Cell
 
-__all__ = ["RETRY_PERIOD", "Operated", "Operation"]
+__all__ = ["JUST_NOW", "RETRY_PERIOD", "Operated", "Operation", "Standstill"]
 
 RETRY_PERIOD = 2.0
 """Seconds before what ended in a defect is started again."""
 
+JUST_NOW = 0.1
+"""Seconds after the process stood still in which what waited meanwhile is served."""
+
 log = logging.getLogger("gatewayd.operation")
+
+
+class Standstill:
+    """Remembers the last gap of the loop, and says how long it was while it counts as of just now."""
+
+    def __init__(self) -> None:
+        self._gap: clock.Gap | None = None
+
+    def gap(self, gap: clock.Gap) -> None:
+        """The process stood still. For `gatewayd.clock.on_gap`."""
+        self._gap = gap
+
+    def seconds(self) -> float:
+        """For how long the process stood still until just now; 0.0: it did not."""
+        gap = self._gap
+        return gap.length if gap is not None and clock.now() - gap.until <= JUST_NOW else 0.0
 
 
 class Operated(Gateway, Protocol):
@@ -46,6 +66,8 @@ class Operation:
         audit_file: Path | None,
         notes: Callable[[], Sequence[str]] = lambda: (),
         reload: Reload | None = None,
+        *,
+        stood_still: Callable[[], float] = lambda: 0.0,
     ) -> None:
         self.reload = reload
         self._daemon = daemon
@@ -53,7 +75,7 @@ class Operation:
         self._file = AuditFile(audit_file) if audit_file is not None else None
         self.audit = Audit(self._file.write if self._file is not None else None)
         daemon.observe(self.audit.watch)
-        self.api = Api(daemon, self.audit, lambda: (*notes(), *self._troubles()))
+        self.api = Api(daemon, self.audit, lambda: (*notes(), *self._troubles()), stood_still)
 
     async def run(self) -> None:
         """Run until cancelled; then write what is still to be written."""

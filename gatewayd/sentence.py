@@ -44,7 +44,8 @@ def sentence(cells: Sequence[Cell], troubles: Iterable[str] = ()) -> str:
 
 
 def _is_well(cell: Cell) -> bool:
-    troubled = _unavailable(cell) or cell.health.can_trouble
+    health = cell.health
+    troubled = _unavailable(cell) or health.can_trouble or health.differing or health.unadopted
     return cell.freshness.state is Source.FRESH and not troubled and all(cell.writers.alive)
 
 
@@ -56,6 +57,10 @@ def _told(cell: Cell) -> str:
             facts.append("its inputs not adopted yet")
     if cell.health.can_trouble:
         facts.append(f"CAN bus {cell.health.can_trouble}")
+    if cell.health.unadopted:
+        facts.append(f"{counted(cell.health.unadopted, 'input')} not known")
+    if cell.health.differing:
+        facts.append(f"{counted(cell.health.differing, 'input')} different in the robot")
     unavailable = _unavailable(cell)
     if unavailable:
         facts.append(f"{counted(unavailable, 'variable')} unavailable")

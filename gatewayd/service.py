@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Protocol
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell
 from gatewayd.liveness import Liveness, Turned
 from gatewayd.logs import fields
@@ -64,7 +65,7 @@ class Service:
         period = PERIOD if after is None else min(PERIOD, after / 4)
         while not stop.is_set():
             try:
-                self.look(time.monotonic())
+                self.look(clock.now())
             except Exception as error:
                 if self._failed != str(error):
                     self._failed = str(error)

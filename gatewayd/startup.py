@@ -59,14 +59,18 @@ def mapping_files(paths: Iterable[Path]) -> list[Path]:
     return found
 
 
-def load_plans(paths: Sequence[Path], meanwhile: Callable[[], object] = lambda: None) -> Startup:
+def load_plans(
+    paths: Sequence[Path],
+    meanwhile: Callable[[], object] = lambda: None,
+    given_up: Callable[[], bool] = lambda: False,
+) -> Startup:
     """Read and check everything; log what cannot be served and why. Raises CompilationError.
 
-    `meanwhile` is called while another process reads.
+    `meanwhile` is called while another process reads; that ends early once it is `given_up`.
     """
     with Compilation(mapping_files(paths)) as compilation:
         meanwhile()
-        compiled = compilation.result()
+        compiled = compilation.result(given_up)
     for unread in compiled.unreadable:
         log.error("cannot read the mapping file", extra=fields(file=unread.name, reason=unread.reason))
     tell_findings(compiled.files)

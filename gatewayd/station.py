@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition
+from gatewayd.core.health import CAN_BUS
 from gatewayd.core.succession import Succession, succeed
 from gatewayd.eventlog import EventLog
 from gatewayd.mapping.plan import Plan
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from gatewayd.canopen.link import CanLink
 
 __all__ = ["Link", "Station"]
+
+_CARRYING = ("passive", "warning", "active")
+"""States of a CAN bus in which a master can reach us."""
 
 
 class Link(Protocol):
@@ -52,6 +56,11 @@ class Station:
     def links(self) -> tuple[Link, ...]:
         """What is to be run."""
         return (self.robot,) if self.can is None else (self.robot, self.can)
+
+    @property
+    def is_on_bus(self) -> bool:
+        """Whether the cell has a CANopen node and its bus carries frames."""
+        return self.can is not None and CAN_BUS[self.cell.health.can_bus] in _CARRYING
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`: the cell judges the time first, then its links."""

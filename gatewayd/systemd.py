@@ -10,6 +10,8 @@ import socket
 from collections.abc import Mapping
 from contextlib import suppress
 
+from gatewayd.printable import printable
+
 __all__ = ["LONGEST_STATUS", "Notifier"]
 
 LONGEST_STATUS = 1000
@@ -85,7 +87,7 @@ def _address(name: str) -> bytes:
 
 def _status(text: str) -> str:
     """The assignment, after a line break; a status of several lines would be several assignments."""
-    return f"\nSTATUS={' '.join(text.split())[:LONGEST_STATUS]}" if text else ""
+    return f"\nSTATUS={printable(' '.join(text.split()), LONGEST_STATUS)}" if text else ""
 
 
 def _watchdog(environment: Mapping[str, str], process: int) -> float | None:

@@ -93,6 +93,7 @@ def test_a_suspended_machine_ages_everything(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(clock, "_suspension", suspension)
     monkeypatch.setattr(clock, "_read", lambda which: real(which) + asleep[0] * (which == clock._CLOCK_BOOT))
     gaps: list[clock.Gap] = []
+    raw = clock.raw() - time.monotonic()
 
     async def main() -> None:
         loop = asyncio.get_running_loop()
@@ -108,6 +109,7 @@ def test_a_suspended_machine_ages_everything(monkeypatch: pytest.MonkeyPatch) ->
     _run(main())
     assert gaps[0].length == pytest.approx(90.0, abs=1.0)
     assert clock.now() - time.monotonic() == pytest.approx(90.0, abs=0.1)
+    assert clock.raw() - time.monotonic() - raw == pytest.approx(90.0, abs=0.1)
 
 
 _CHILD = """

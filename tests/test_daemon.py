@@ -107,6 +107,29 @@ async def test_a_defect_in_one_cell_costs_neither_the_others_nor_the_process(
     assert len([record for record in caplog.records if "internal error" in record.getMessage()]) == 1
 
 
+async def test_a_cell_is_reachable_once_its_listener_listens(running: Running) -> None:
+    """Adopted values wait for an owner from then on, not while nobody could come."""
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = int(other.getsockname()[1])
+        async with SimulatedController() as robot, SimulatedController() as another:
+            daemon = Daemon(plans((1, robot.port, port), (2, another.port, free_port())), STATE)
+            waiting, served = (station.cell for station in daemon.stations)
+            async with running(daemon):
+                await until(lambda: waiting.accepts_writes and served.adoption.reachable)
+                assert not waiting.adoption.reachable
+
+
+async def test_a_cell_without_a_fieldbus_waits_for_none(running: Running) -> None:
+    text = "gatewayd: 1\ncell: a\nrobot: {host: 127.0.0.1, port: 9}\nvariables: {x: {robot: output_int_register_0}}\n"
+    (loaded,) = load_together([("a.yaml", text.encode())])
+    assert loaded.plan is not None, loaded.diagnostics
+    daemon = Daemon([loaded.plan], STATE)
+    async with running(daemon):
+        await until(lambda: daemon.cells[0].adoption.reachable)
+
+
 async def test_a_link_that_ends_by_a_defect_is_started_again(
     running: Running, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -117,12 +140,12 @@ async def test_a_link_that_ends_by_a_defect_is_started_again(
         original = station.cell.package_arrived
         failures = 2
 
-        def fail(timestamp: float | None, now: float) -> bool:
+        def fail(timestamp: float | None, now: float, raw: float | None = None) -> bool:
             nonlocal failures
             if failures:
                 failures -= 1
                 raise RuntimeError("a defect")
-            return original(timestamp, now)
+            return original(timestamp, now, raw)
 
         monkeypatch.setattr(station.cell, "package_arrived", fail)
         async with running(daemon):

@@ -81,6 +81,18 @@ def cell() -> Cell:
             Event(0, EventKind.READ_BACK_DIFFERS, LIMIT, detail="sent 1, the controller holds 2"),
             "read-back of limit differs: sent 1, the controller holds 2",
         ),
+        (Event(0, EventKind.FOLLOWED, LIMIT, old=7.0, new=99.0), "limit follows the robot: 7 -> 99 N"),
+        (Event(0, EventKind.FOLLOWED, LIMIT), "limit follows the robot"),
+        (
+            Event(0, EventKind.ADOPTION_ENDS, LIMIT, detail="in 2 s"),
+            "limit falls back soon: adopted, and owned by nobody: in 2 s",
+        ),
+        (Event(0, EventKind.ADOPTION_ENDS, detail="3 inputs"), "adopted values fall back soon: 3 inputs"),
+        (Event(0, EventKind.STOOD_STILL, detail="4.8 s"), "gateway stood still: 4.8 s"),
+        (
+            Event(0, EventKind.UNAVAILABLE, CYCLES, detail="\x1b[31mINT\u202e\r\n"),
+            "cycles is unavailable: \\x1b[31mINT\\u202e\\r\\n",
+        ),
     ],
 )
 def test_an_event_is_one_sentence(cell: Cell, event: Event, text: str) -> None:
@@ -138,8 +150,19 @@ def test_only_what_somebody_should_look_at_is_bad(cell: Cell) -> None:
         EventKind.STALE,
         EventKind.UNAVAILABLE,
         EventKind.READ_BACK_DIFFERS,
+        EventKind.ADOPTION_ENDS,
+        EventKind.STOOD_STILL,
         EventKind.WRITER_LOST,
         EventKind.REFUSED,
         EventKind.FORCED,
     }
     assert ACCEPTED not in BAD
+
+
+def test_several_at_one_moment_are_told_without_values(cell: Cell) -> None:
+    def told(kind: EventKind) -> str:
+        return Happening.of(Event(0, kind, LIMIT, old=1.0, new=2.0), cell.definition).of_several(3).sentence()
+
+    assert told(EventKind.READ_BACK_DIFFERS) == "read-back of limit and 3 more differs"
+    assert told(EventKind.FOLLOWED) == "limit and 3 more follow the robot"
+    assert told(EventKind.ADOPTION_ENDS) == "limit and 3 more fall back soon: adopted, and owned by nobody"

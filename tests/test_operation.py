@@ -6,13 +6,16 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+import pytest
+
+from gatewayd import clock
 from gatewayd.control.api import Moment
 from gatewayd.control.client import Client
 from gatewayd.control.views import StationView
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.requester import Requester
-from gatewayd.operation import Operation
+from gatewayd.operation import JUST_NOW, Operation, Standstill
 
 
 class Gateway:
@@ -84,3 +87,13 @@ async def test_the_socket_comes_and_goes(tmp_path: Path) -> None:
     task.cancel()
     await asyncio.wait((task,))
     assert not await asyncio.to_thread(path.exists)
+
+
+def test_a_standstill_counts_for_a_moment(monkeypatch: pytest.MonkeyPatch) -> None:
+    standstill = Standstill()
+    assert standstill.seconds() == 0.0
+    now = clock.now()
+    standstill.gap(clock.Gap(now - 4.8, now))
+    assert standstill.seconds() == pytest.approx(4.8)
+    monkeypatch.setattr(clock, "now", lambda: now + JUST_NOW + 0.01)
+    assert standstill.seconds() == 0.0

@@ -103,3 +103,13 @@ def test_many_cells_are_counted() -> None:
 
 def test_no_cell() -> None:
     assert sentence([]) == "no cell to serve"
+
+
+def test_what_the_robot_holds_is_told() -> None:
+    one = all_well()
+    one.health.differing, one.health.unadopted = 1, 2
+    assert sentence([one, all_well("weld")]).startswith(
+        "press-3: robot fresh at 500 Hz, 2 inputs not known, 1 input different in the robot, 2 of 2 writers"
+    )
+    many = [one, *(all_well(f"cell-{number}") for number in range(5))]
+    assert "the other 5 cells well" in sentence(many), "it is no good cell"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gatewayd.core.health import CAN_BUS
 from gatewayd.core.requester import Requester
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
@@ -44,6 +45,16 @@ def test_a_cell_without_canopen_has_the_robot_alone(tmp_path: Path) -> None:
 def test_a_cell_with_canopen_has_both_links(tmp_path: Path) -> None:
     station = Station(plan(), tmp_path)
     assert station.links == (station.robot, station.can)
+
+
+def test_a_node_is_on_its_bus_while_that_carries_frames(tmp_path: Path) -> None:
+    station = Station(plan(), tmp_path)
+    found = {}
+    for state, name in enumerate(CAN_BUS):
+        station.cell.health.can_bus = state
+        found[name] = station.is_on_bus
+    assert {name for name, on in found.items() if on} == {"passive", "warning", "active"}
+    assert not Station(without_can(), tmp_path).is_on_bus
 
 
 def test_another_policy_goes_on_with_values_and_node(tmp_path: Path) -> None:

@@ -79,8 +79,11 @@ def test_a_status_cannot_smuggle_in_another_assignment(manager: Manager, notifie
 
 
 def test_a_status_is_cut_and_never_fails_to_encode(manager: Manager, notifier: Notifier) -> None:
-    assert notifier.status("\udcff" + 5000 * "x")
-    assert manager.read() == "STATUS=?" + (LONGEST_STATUS - 1) * "x"
+    assert notifier.status("\udcff\x1b[31m\u202e" + 5000 * "x")
+    told = manager.read().removeprefix("STATUS=")
+    assert told.startswith("\\udcff\\x1b[31m\\u202exxx")
+    assert told.endswith("... (5007 characters)")
+    assert len(told) == LONGEST_STATUS
 
 
 @pytest.mark.parametrize(

@@ -108,5 +108,11 @@ class Bus(Protocol):
     def send(self, frame: Frame) -> bool:
         """Hand over a frame, without waiting. False: not now; `on_writable` or `on_state` will tell when."""
 
+    def lags(self, bit_rate: int | None) -> bool:
+        """Whether a frame that is sent now would be late, because older ones still wait for the bus."""
+
+    def catch_up(self) -> None:
+        """Hand over all received frames that wait, instead of leaving the loop its turns in between."""
+
     def set_filters(self, can_ids: Iterable[int], remote_ids: Iterable[int] = ()) -> None:
         """Receive data frames of `can_ids` and remote frames of `remote_ids`, and nothing else."""

@@ -188,9 +188,10 @@ class Object:
 
 
 class Dictionary:
-    """All objects of a node by index and sub-index."""
+    """All objects of a node by index and sub-index. `permit` is asked before each write; raises Abort to refuse it."""
 
-    def __init__(self, objects: Iterable[Object]) -> None:
+    def __init__(self, objects: Iterable[Object], permit: Callable[[int], None] | None = None) -> None:
+        self._permit = permit
         self._objects = {one.index: one for one in sorted(objects, key=lambda one: one.index)}
         self._entries = {
             index << 8 | entry.subindex: entry
@@ -220,6 +221,8 @@ class Dictionary:
         entry = self.entry(index, subindex)
         if not entry.access.writable:
             raise Abort(AbortCode.READ_ONLY)
+        if self._permit is not None:
+            self._permit(index)
         entry.write(data)
 
 

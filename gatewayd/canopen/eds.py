@@ -63,8 +63,9 @@ def objects_of(plan: CanopenPlan, definition: CellDefinition) -> Dictionary:
     return Node(plan, Cell(definition), _send_nowhere, MemoryStore(), _lives).dictionary
 
 
-def _send_nowhere(_frame: Frame, _priority: Priority) -> None:
+def _send_nowhere(_frame: Frame, _priority: Priority) -> bool:
     """Nobody is on the bus."""
+    return False
 
 
 def _lives(_now: float) -> bool:

@@ -49,6 +49,10 @@ class ErrorCode(IntEnum):
     WRITE_HEARTBEAT_LOST = 0xFF06
     WRITE_PARTIAL_TAKEOVER = 0xFF07
     WRITE_WAITED = 0xFF08
+    ROBOT_LOST = 0xFF10
+    ROBOT_STALE = 0xFF11
+    ROBOT_DIFFERS = 0xFF12
+    ROBOT_UNAVAILABLE = 0xFF13
 
 
 class Register(IntFlag):
@@ -103,6 +107,11 @@ class Emergency:
             check=self._check_cob_id,
         )
         self._inhibit = Entry(0, "Inhibit time EMCY", CanType.UNSIGNED16, Access.RW, bytes(2), stored=True)
+
+    @property
+    def inhibit(self) -> float:
+        """Seconds between two messages (1015h)."""
+        return self._inhibit.number / 10_000
 
     @property
     def register(self) -> Register:
@@ -174,9 +183,9 @@ class Emergency:
             message = self._waiting.popleft()
             if self._cob_id.number & INVALID:
                 continue
-            self._send(Frame(self._cob_id.number & BASIC_FRAME, message), Priority.ORDERED)
+            self._send(Frame(self._cob_id.number & BASIC_FRAME, message), Priority.EVENT)
             if self._inhibit.number:
-                self._not_before = now + self._inhibit.number / 10_000
+                self._not_before = now + self.inhibit
 
     def next_deadline(self, now: float) -> float:
         """When `tick` has something to do; a change of the NMT state makes it tick anyway."""

@@ -23,11 +23,15 @@ class Frame(NamedTuple):
 class Priority(IntEnum):
     """What becomes of a frame that cannot be sent at once."""
 
-    PDO = 0
-    """The newest of each COB-ID replaces the one that waits."""
-    ORDERED = 1
-    """First in, first out: NMT, SYNC, heartbeat, EMCY, SDO, LSS."""
+    AT_ONCE = 0
+    """It goes out at once or not at all: SYNC, which is worth nothing later."""
+    NEWEST = 1
+    """The newest of each COB-ID replaces the one that waits: PDO, heartbeat, guarding."""
+    EVENT = 2
+    """First in, first out, with room of their own: boot-up and EMCY."""
+    ORDERED = 3
+    """First in, first out: SDO, LSS."""
 
 
-Send = Callable[[Frame, Priority], None]
-"""Hands a frame to the bus; never waits, never fails."""
+Send = Callable[[Frame, Priority], bool]
+"""Hands a frame to the bus; never waits, never fails. False: it was dropped, and will not go out."""

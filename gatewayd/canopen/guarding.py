@@ -9,6 +9,7 @@ from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Entry, Object, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
+from gatewayd.canopen.gap import spared
 from gatewayd.canopen.nmt import NmtState
 
 __all__ = ["TOGGLE", "NodeGuarding"]
@@ -44,6 +45,7 @@ class NodeGuarding:
         self._due = math.inf
         self._asked = -math.inf
         self._is_lost = False
+        self._spared = False
         self._time = self._parameter("Guard time", CanType.UNSIGNED16)
         self._factor = self._parameter("Life time factor", CanType.UNSIGNED8)
 
@@ -59,18 +61,30 @@ class NodeGuarding:
         self._asked = -math.inf
         self._is_lost = False
 
-    def receive(self, frame: Frame, now: float) -> None:
-        """A frame with this node's error control COB-ID; only remote frames mean anything."""
+    def receive(self, frame: Frame, now: float, *, late: bool = False) -> None:
+        """A frame with this node's error control COB-ID; only remote frames mean anything.
+
+        `late`: it waited while the process stood still. It is a sign of the master, who waits for no answer any more.
+        """
         if not frame.remote or self._heartbeat() or self._state() is NmtState.INITIALISING:
             return
-        answer = bytes([self._state() | self._toggle])
-        self._send(Frame(Function.ERROR_CONTROL + self._node(), answer), Priority.ORDERED)
-        self._toggle ^= TOGGLE
+        if not late:
+            answer = bytes([self._state() | self._toggle])
+            self._send(Frame(Function.ERROR_CONTROL + self._node(), answer), Priority.NEWEST)
+            self._toggle ^= TOGGLE
         self._asked = now
+        self._spared = False
         was_lost, self._is_lost = self._is_lost, False
         self._supervise()
         if was_lost:
             self._back(now)
+
+    def gap(self, since: float, now: float) -> None:
+        """We stood still and heard nobody: a master that was asking has its time again."""
+        if self._due < math.inf:
+            self._asked = spared(self._asked, 0.0, since, now, again=self._spared)
+            self._spared = True
+            self._supervise()
 
     def tick(self, now: float) -> None:
         """Notice that the master has stopped asking."""

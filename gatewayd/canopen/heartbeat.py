@@ -11,6 +11,7 @@ from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
+from gatewayd.canopen.gap import spared
 from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.plan import Consumer
 
@@ -67,12 +68,17 @@ class HeartbeatProducer:
             return
         period = self._period.number / 1000
         self._due = self._due + period if now < self._due + period else now + period
-        if self._state() is NmtState.INITIALISING:
-            return
-        if not self._alive(now):
+        frame = self.frame(now)
+        if frame is not None:
+            self._send(frame, Priority.NEWEST)
+        elif self._state() is not NmtState.INITIALISING:
             self.withheld += 1
-            return
-        self._send(Frame(Function.ERROR_CONTROL + self._node(), bytes([self._state()])), Priority.ORDERED)
+
+    def frame(self, now: float) -> Frame | None:
+        """The heartbeat as it would be sent now; None if there is none."""
+        if not self.enabled or self._state() is NmtState.INITIALISING or not self._alive(now):
+            return None
+        return Frame(Function.ERROR_CONTROL + self._node(), bytes([self._state()]))
 
     def next_deadline(self, now: float) -> float:
         """When `tick` has something to do."""
@@ -101,15 +107,13 @@ class Seen(Enum):
 
 WATCH: dict[tuple[Watch, Seen], Watch] = {
     (Watch.WAITING, Seen.HEARTBEAT): Watch.ALIVE,
-    (Watch.WAITING, Seen.TIMEOUT): Watch.LOST,
     (Watch.ALIVE, Seen.HEARTBEAT): Watch.ALIVE,
     (Watch.ALIVE, Seen.BOOT_UP): Watch.WAITING,
     (Watch.ALIVE, Seen.TIMEOUT): Watch.LOST,
     (Watch.LOST, Seen.HEARTBEAT): Watch.ALIVE,
 }
 """A pair that is not listed leaves the state. A node that boots is waited for again: supervision starts with its
-first heartbeat, and what it wrote before is nobody's any more. Time runs out for a node that is waited for only if it
-owes a heartbeat (`HeartbeatConsumer.expect`)."""
+first heartbeat (CiA 301, 7.5.2.19)."""
 
 
 @dataclass(slots=True)
@@ -118,15 +122,15 @@ class _Watched:
     timeout: float
     state: Watch = Watch.WAITING
     due: float = math.inf
-    owes: bool = False
-    """It was `expect`ed since it booted."""
+    spared: bool = False
+    """We stood still since it was heard."""
 
 
 class HeartbeatConsumer:
-    """Watches the nodes of 1016h, each from its first heartbeat on, or from when one is expected of it.
+    """Watches the nodes of 1016h, each from its first heartbeat on.
 
     `lost(node, now)`: its heartbeat stays away. `back(node, now)`: it is heard after it was lost, or its watch ended.
-    `booted(node, now)`: it was alive, or owed a heartbeat, and has restarted.
+    `changed()`: other nodes or times are watched now.
     """
 
     def __init__(
@@ -135,13 +139,11 @@ class HeartbeatConsumer:
         *,
         lost: Callable[[int, float], None],
         back: Callable[[int, float], None],
-        booted: Callable[[int, float], None],
         changed: Callable[[], None],
     ) -> None:
         self._lost = lost
         self._back = back
-        self._booted = booted
-        self._cob_ids_changed = changed
+        self._nodes_changed = changed
         self._stale = False
         self._watched: dict[int, _Watched] = {}
         count = max(LEAST_CONSUMERS, len(consumers))
@@ -176,24 +178,23 @@ class HeartbeatConsumer:
         watched = self._watched.get(node)
         return watched.state if watched is not None else None
 
-    def expect(self, node: int, now: float) -> bool:
-        """Some other sign of a node that promised its heartbeat. Returns whether to believe it: it is not lost.
-
-        The first sign since its boot gives it the consumer heartbeat time. No later sign prolongs that, and only a
-        heartbeat or a boot-up ends it: else a node that comes and goes would never be missed.
-        """
+    def time(self, node: int) -> float:
+        """Seconds for which a node may be silent; infinity if it is not watched."""
         watched = self._watched.get(node)
-        if watched is None:
-            return True
-        if not watched.owes:
-            self._owe(watched, now)
-        return watched.state is not Watch.LOST
+        return watched.timeout if watched is not None else math.inf
+
+    def gap(self, since: float, now: float) -> None:
+        """We stood still and heard nobody: who was alive has its time again."""
+        for watched in self._watched.values():
+            if watched.state is Watch.ALIVE:
+                watched.due = spared(watched.due, watched.timeout, since, now, again=watched.spared)
+                watched.spared = True
 
     def restart(self, now: float) -> None:
         """Wait for every node's first heartbeat anew, without a word about those that were lost."""
         self._watched = self._configured()
         self._stale = False
-        self._cob_ids_changed()
+        self._nodes_changed()
 
     def resume(self, former: HeartbeatConsumer) -> None:
         """Go on watching as another consumer did, where both watch the same."""
@@ -225,44 +226,26 @@ class HeartbeatConsumer:
         return min((watched.due for watched in self._watched.values()), default=math.inf)
 
     def _see(self, watched: _Watched, seen: Seen, now: float) -> None:
-        old, had_begun = watched.state, watched.due < math.inf
+        old = watched.state
         watched.state = WATCH.get((old, seen), old)
-        if seen is Seen.HEARTBEAT:
-            watched.due = now + watched.timeout
-        elif watched.state is not Watch.ALIVE:
-            watched.due = math.inf
-        if seen is Seen.BOOT_UP:
-            watched.owes = False
+        watched.due = now + watched.timeout if watched.state is Watch.ALIVE else math.inf
+        watched.spared = False
         if old is Watch.LOST and watched.state is Watch.ALIVE:
             self._back(watched.node, now)
         elif old is not Watch.LOST and watched.state is Watch.LOST:
             self._lost(watched.node, now)
-        elif seen is Seen.BOOT_UP and had_begun:
-            self._booted(watched.node, now)
-
-    @staticmethod
-    def _owe(watched: _Watched, now: float) -> None:
-        watched.owes = True
-        if watched.state is Watch.WAITING:
-            watched.due = now + watched.timeout
 
     def _adopt(self, now: float) -> None:
-        """Changed entries wait for their first heartbeat, where one is owed no longer than their new time.
-
-        The others go on as they were.
-        """
+        """Changed entries wait for their first heartbeat; the others go on as they were."""
         self._stale = False
         old, self._watched = self._watched, self._configured()
         for node, watched in old.items():
             present = self._watched.get(node)
             if present is not None and present.timeout == watched.timeout:
                 self._watched[node] = watched
-                continue
-            if present is not None and watched.owes:
-                self._owe(present, now)
-            if watched.state is Watch.LOST:
+            elif watched.state is Watch.LOST:
                 self._back(node, now)
-        self._cob_ids_changed()
+        self._nodes_changed()
 
     def _configured(self) -> dict[int, _Watched]:
         found = {}

@@ -19,7 +19,8 @@ from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.lss import BIT_RATES
 from gatewayd.canopen.nmt import NmtState
-from gatewayd.canopen.node import Node, Observer
+from gatewayd.canopen.node import Node
+from gatewayd.canopen.observer import Observer
 from gatewayd.canopen.plan import CanopenPlan, by_name
 from gatewayd.canopen.queue import Transmitter
 from gatewayd.canopen.storage import Store
@@ -49,7 +50,7 @@ class CanLink(Observer):
         self._plan = plan
         self._cell = cell
         self._bus: Bus | None = None
-        self._transmitter = Transmitter(self._offer)
+        self._transmitter = Transmitter(self._offer, self._renew, now=clock.now, punctual=self._offer_at_once)
         self._timer: asyncio.TimerHandle | None = None
         self._due = math.inf
         self._runs = False
@@ -113,7 +114,17 @@ class CanLink(Observer):
         self._transmitter.flush()
 
     def gap(self, since: float, now: float) -> None:
-        """The process stood still from `since` to `now`: frames that are read now may have waited that long."""
+        """The process stood still from `since` to `now`: frames that are read now may have waited that long.
+
+        They are read before the loop serves anything else; what waits to be sent is made anew.
+        """
+        self.node.gap(since, now)
+        self._beat = (self._beat[0], now)
+        self._transmitter.renew()
+        if self._runs:
+            asyncio.get_running_loop().call_soon(self._catch_up)
+        else:
+            self.node.caught_up()
 
     # -- called by the driver ------------------------------------------------------------------------------------
 
@@ -245,6 +256,21 @@ class CanLink(Observer):
 
     def _offer(self, frame: Frame) -> bool:
         return self._bus is not None and self._bus.send(frame)
+
+    def _catch_up(self) -> None:
+        if self._bus is not None:
+            self._bus.catch_up()
+        self.node.caught_up()
+        if self._runs:
+            self._schedule(clock.now())
+
+    def _offer_at_once(self, frame: Frame) -> bool:
+        """A frame that may not be late: not where older ones still wait in the kernel."""
+        bus = self._bus
+        return bus is not None and not bus.lags(self.node.bit_rate) and bus.send(frame)
+
+    def _renew(self, can_id: int) -> Frame | None:
+        return self.node.renew(can_id, clock.now())
 
     def _close_bus(self, reason: str) -> None:
         bus, self._bus = self._bus, None

@@ -125,7 +125,7 @@ class NmtSlave:
         """
         if self.state is not NmtState.INITIALISING or self._node() == UNCONFIGURED:
             return
-        self._send(Frame(Function.ERROR_CONTROL + self._node(), bytes([0])), Priority.ORDERED)
+        self._send(Frame(Function.ERROR_CONTROL + self._node(), bytes([0])), Priority.EVENT)
         self._enter(NmtState.PRE_OPERATIONAL, now)
         if self._autostart:
             self._enter(NmtState.OPERATIONAL, now)

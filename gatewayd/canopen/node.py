@@ -5,9 +5,11 @@ What befalls the node, and what follows:
 | happening | writers of the cell | NMT (1029h = 0 / 1 / 2) | EMCY |
 |---|---|---|---|
 | RPDO in OPERATIONAL, SDO request | the writer is alive | | |
-| heartbeat of a watched node lost, or owed and not come | its writer is lost, and refused till it is back \
+| heartbeat of a node of 1016h ends | its writer is lost, and refused till it is back \
 | PRE-OPERATIONAL / as it is / STOPPED | 8130h till it is back |
-| watched node boots | its writer is lost | as it is | |
+| heartbeat that the mapping promises ends, or does not come after the first write or lock request \
+| its writer is lost, and refused till it is back | as it is | |
+| node whose heartbeat is promised boots | its writer is lost | as it is | |
 | guarding stays away | | PRE-OPERATIONAL / as it is / STOPPED | 8130h until it is back |
 | RPDO deadline passes | the RPDO writer is lost | as it is | 8250h until it is received |
 | OPERATIONAL left | the RPDO writer is lost | | |
@@ -17,6 +19,8 @@ What befalls the node, and what follows:
 bus-off |
 | controller passive | | as it is | 8120h until it is no more |
 | received frames lost | | as it is | 8110h until none was lost for `OVERRUN_TIME` |
+| robot lost / stale / holds something else / registers unavailable | | as it is | FF10h / FF11h / FF12h / FF13h until \
+that has not been so for `QUIET` |
 
 Nothing is sent while the bus carries nothing: a queue would only send old news later. A node that is started while the
 bus carries nothing boots when it does.
@@ -26,15 +30,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from datetime import datetime
+from dataclasses import replace
 from functools import partial
-from typing import Final
+from typing import Final, Protocol
 
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.clock import TimeConsumer
 from gatewayd.canopen.cob_ids import Function
-from gatewayd.canopen.dictionary import Dictionary, Entry, Object
+from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary, Entry, Object
 from gatewayd.canopen.emergency import Emergency, ErrorCode
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.guarding import NodeGuarding
@@ -42,11 +45,14 @@ from gatewayd.canopen.heartbeat import HeartbeatConsumer, HeartbeatProducer
 from gatewayd.canopen.identity import ErrorBehaviour, Identity, identity_objects
 from gatewayd.canopen.lss import LssSlave
 from gatewayd.canopen.nmt import ALLOWED, UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
+from gatewayd.canopen.observer import NodeCounters, Observer
 from gatewayd.canopen.pdo.parameters import Configuration, PdoTable
 from gatewayd.canopen.pdo.receive import Fault, ReceiveEngine
 from gatewayd.canopen.pdo.transmit import TransmitEngine
 from gatewayd.canopen.peers import Peers
 from gatewayd.canopen.plan import CanopenPlan
+from gatewayd.canopen.promise import Promises
+from gatewayd.canopen.robot_errors import RobotErrors
 from gatewayd.canopen.sdo import SdoServer
 from gatewayd.canopen.sdo.parameters import server_parameter
 from gatewayd.canopen.status_objects import StatusObjects
@@ -55,52 +61,30 @@ from gatewayd.canopen.sync import Sync
 from gatewayd.canopen.variables import VariableObjects
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
+from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 
-__all__ = ["OVERRUN_TIME", "Node", "NodeCounters", "Observer"]
+__all__ = ["LATE_PARAMETER", "OVERRUN_TIME", "Node"]
 
 OVERRUN_TIME: Final = 1.0
 """Seconds without a lost frame after which the overrun is over."""
 
+LATE_PARAMETER: Final = 0.5
+"""Seconds that a download of a parameter may have waited while the process stood still."""
+
 SDO_LENGTH: Final = 8
 """Bytes of every SDO frame."""
+
+_FIRST_OF_CELL: Final = 0x2000
+"""Where the objects of the communication end."""
 
 Handler = Callable[[Frame, float], None]
 
 
-class Observer:
-    """Whom a node tells what is not for the bus; does nothing by itself."""
+class _Timed(Protocol):
+    def tick(self, now: float) -> None: ...
 
-    def cob_ids_changed(self) -> None:
-        """`Node.cob_ids` or `Node.remote_ids` is another one now."""
-
-    def nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
-        """The NMT state is another one now."""
-
-    def report(self, text: str) -> None:
-        """Something for the log."""
-
-    def time_told(self, moment: datetime, now: float) -> None:
-        """The network's wall clock (TIME)."""
-
-    def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
-        """An LSS master demands it: be silent for `delay` seconds, switch, be silent for as long again."""
-
-
-@dataclass(slots=True)
-class NodeCounters:
-    """Since the node was made."""
-
-    received: int = 0
-    """Frames that were handed to the node."""
-    ignored: int = 0
-    """Frames with a COB-ID that means nothing in the present NMT state."""
-    outside_window: int = 0
-    """Synchronous RPDOs that came after the synchronous window (1007h)."""
-    communication_errors: int = 0
-    """Losses of heartbeat, guarding or bus."""
-    overruns: int = 0
-    """Received frames that were lost."""
+    def next_deadline(self, now: float) -> float: ...
 
 
 class Node:
@@ -156,16 +140,24 @@ class Node:
         )
         self.nmt = NmtSlave(self._send, self._node, self._nmt_changed, self._reset, autostart=plan.autostart)
         self.emergency = Emergency(self._send, node, self._emergencies_allowed)
+        self.robot_errors = RobotErrors(
+            cell, self.emergency, lambda: self._started and self.nmt.state is not NmtState.INITIALISING
+        )
         self.behaviour = ErrorBehaviour()
         self.producer = HeartbeatProducer(self._send, self._node, self._state, alive, plan.heartbeat)
         self.consumer = HeartbeatConsumer(
             plan.consumers,
             lost=self._heartbeat_lost,
             back=self._heartbeat_back,
-            booted=self._peer_booted,
-            changed=self._route,
+            changed=self._watch_changed,
         )
-        self._peers = Peers(cell, plan.consumers, self.consumer)
+        self.promises = Promises(
+            plan.consumers,
+            also=self.consumer.time,
+            broken=partial(self._lose_node, "no heartbeat of node {}"),
+            booted=partial(self._lose_node, "node {} has restarted"),
+        )
+        self._peers = Peers(cell, self.promises, self.consumer)
         self.guarding = NodeGuarding(
             self._send,
             self._node,
@@ -193,9 +185,20 @@ class Node:
             self._find,
             self._pdo_changed,
         )
-        self.dictionary = Dictionary(self._objects(identity))
+        self.dictionary = Dictionary(self._objects(identity), self._permit)
         self.parameters.bind(self.dictionary)
         self.sdo = SdoServer(self.dictionary)
+        self._timed: tuple[_Timed, ...] = (
+            self.sync,
+            self.transmit,
+            self.receive_pdos,
+            self.producer,
+            self.consumer,
+            self.promises,
+            self.guarding,
+            self.robot_errors,
+            self.emergency,
+        )
 
     # -- what the link calls -------------------------------------------------------------------------------------
 
@@ -224,6 +227,7 @@ class Node:
         """Power-on: once, before anything else but `bus_changed`."""
         self._now = now
         self._started = True
+        self.parameters.report_differences()
         self._reset(NmtCommand.RESET_NODE, now)
         if self.bus.carries:
             self.nmt.boot(now)
@@ -238,6 +242,7 @@ class Node:
         self._started = True
         self.bus, self.counters = former.bus, former.counters
         self._fell, self._was_off = former._fell, former._was_off
+        self.promises.resume(former.promises)  # what was reported, before the reset compares again
         self._reset(NmtCommand.RESET_NODE, now)
         for one in former.dictionary:
             for entry in one.entries:
@@ -246,6 +251,7 @@ class Node:
         self.pdos.reload()
         self.consumer.restart(now)
         self.consumer.resume(former.consumer)
+        self.promises.resume(former.promises)
         self.guarding.restart(now)
         self.sync.restart(now)
         self.emergency.resume(former.emergency)
@@ -272,6 +278,9 @@ class Node:
         self._now = now
         if direction is Direction.OUTPUT:
             self.transmit.image_changed(now)
+        else:
+            self.transmit.status_changed(now)
+        self.robot_errors.tick(now)
 
     def bus_changed(self, state: BusState, now: float) -> None:
         """The bus is in another state, or told for the first time."""
@@ -291,16 +300,24 @@ class Node:
         self._overrun_until = now + OVERRUN_TIME
         self.emergency.raise_error(ErrorCode.OVERRUN, now)
 
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`. What is received until `caught_up` may have waited so long."""
+        self._now = now
+        self._peers.gap(since, now)
+        self.consumer.gap(since, now)
+        self.promises.gap(since, now)
+        self.guarding.gap(since, now)
+        self.receive_pdos.gap(since, now)
+
+    def caught_up(self) -> None:
+        """Everything that waited was received."""
+        self._peers.caught_up()
+
     def tick(self, now: float) -> None:
         """Do what time brings. Cheap before `next_deadline`."""
         self._now = now
-        self.sync.tick(now)
-        self.transmit.tick(now)
-        self.receive_pdos.tick(now)
-        self.producer.tick(now)
-        self.consumer.tick(now)
-        self.guarding.tick(now)
-        self.emergency.tick(now)
+        for service in self._timed:
+            service.tick(now)
         self._answer(self.sdo.tick(now))
         if now >= self._overrun_until:
             self._overrun_until = math.inf
@@ -308,20 +325,14 @@ class Node:
 
     def next_deadline(self, now: float) -> float:
         """When `tick` is wanted, not before `now`; infinity if time alone brings nothing."""
-        return max(
-            now,
-            min(
-                self.sync.next_deadline(now),
-                self.transmit.next_deadline(now),
-                self.receive_pdos.next_deadline(now),
-                self.producer.next_deadline(now),
-                self.consumer.next_deadline(now),
-                self.guarding.next_deadline(now),
-                self.emergency.next_deadline(now),
-                self.sdo.next_deadline(now),
-                self._overrun_until,
-            ),
-        )
+        due = min(service.next_deadline(now) for service in self._timed)
+        return max(now, min(due, self.sdo.next_deadline(now), self._overrun_until))
+
+    def renew(self, can_id: int, now: float) -> Frame | None:
+        """The cyclic frame that would be sent with this COB-ID now, in place of one that waited; None: none."""
+        if can_id == Function.ERROR_CONTROL + self.node_id:
+            return self.producer.frame(now)
+        return self.transmit.renew(can_id, now)
 
     # -- received frames -----------------------------------------------------------------------------------------
 
@@ -334,9 +345,9 @@ class Node:
             if time is not None:
                 routes[time] = (Service.TIME, self.time.receive)
             routes[self.sync.cob_id] = (Service.SYNC, self.sync.receive)
-            for node in self.consumer.nodes:
+            for node in self.consumer.nodes | self.promises.nodes:
                 routes[Function.ERROR_CONTROL + node] = (Service.ERROR_CONTROL, self._receive_heartbeat)
-            routes[Function.ERROR_CONTROL + self.node_id] = (Service.ERROR_CONTROL, self.guarding.receive)
+            routes[Function.ERROR_CONTROL + self.node_id] = (Service.ERROR_CONTROL, self._receive_guarding)
             routes[Function.SDO_REQUEST + self.node_id] = (Service.SDO, self._receive_sdo)
             routes[Function.NMT] = (Service.NODE_CONTROL, self.nmt.receive)
         changed = routes.keys() != self._routes.keys()
@@ -358,6 +369,7 @@ class Node:
         if frame.can_id in self._synchronous and not self.sync.window_open(now):
             self.counters.outside_window += 1
             return
+        self.promises.write(self.plan.rpdo_writer, now)
         self._peers.connect(self.plan.rpdo_writer, "RPDO", now)
         self.receive_pdos.receive(frame.can_id, frame.data, now)
 
@@ -368,15 +380,23 @@ class Node:
 
     def _receive_heartbeat(self, frame: Frame, now: float) -> None:
         self.consumer.receive(frame, now)
-        self._peers.heartbeat(frame.can_id - Function.ERROR_CONTROL, now)
+        if self.promises.receive(frame, now):
+            self._peers.heartbeat(frame.can_id - Function.ERROR_CONTROL, now)
+
+    def _receive_guarding(self, frame: Frame, now: float) -> None:
+        self.guarding.receive(frame, now, late=self._peers.waited > 0)
+
+    def _permit(self, index: int) -> None:
+        """A parameter is not set by a client that has given up; what variables and locks wait for the cell judges."""
+        if index < _FIRST_OF_CELL and self._peers.waited > LATE_PARAMETER:
+            raise Abort(AbortCode.DEVICE_STATE)
 
     def _answer(self, answers: Iterable[bytes]) -> None:
         for data in answers:
             self._send(Frame(Function.SDO_RESPONSE + self.node_id, data), Priority.ORDERED)
 
-    def _send(self, frame: Frame, priority: Priority) -> None:
-        if self.bus.carries:
-            self._link(frame, priority)
+    def _send(self, frame: Frame, priority: Priority) -> bool:
+        return self.bus.carries and self._link(frame, priority)
 
     # -- NMT -----------------------------------------------------------------------------------------------------
 
@@ -394,6 +414,7 @@ class Node:
             self._lose(self.plan.rpdo_writer, f"NMT state {new.name}", now)
         self.receive_pdos.nmt(operational, now)
         self.transmit.nmt(operational, now)
+        self.robot_errors.tick(now)
         self.emergency.tick(now)
         self._observer.nmt_changed(old, new, now)
 
@@ -410,6 +431,7 @@ class Node:
                 f"stored parameters of these PDOs make no PDO, defaults are used: {indices}"
             )
         self.consumer.restart(now)
+        self.promises.restart()
         self.guarding.restart(now)
         self.sync.restart(now)
         self._route()
@@ -436,16 +458,22 @@ class Node:
 
     def _heartbeat_lost(self, node: int, now: float) -> None:
         self.emergency.raise_error(ErrorCode.HEARTBEAT, now, bytes([node]), instance=node)
-        for writer in self._peers.of(node):
-            self._lose(writer, f"no heartbeat of node {node}", now)
+        self._lose_node("no heartbeat of node {}", node, now)
         self._communication_error(now)
 
     def _heartbeat_back(self, node: int, now: float) -> None:
         self.emergency.clear(ErrorCode.HEARTBEAT, now, instance=node)
 
-    def _peer_booted(self, node: int, now: float) -> None:
-        for writer in self._peers.of(node):
-            self._lose(writer, f"node {node} has restarted", now)
+    def _lose_node(self, reason: str, node: int, now: float) -> None:
+        """Its writers are lost; by the mapping's promise that is no communication error, whoever else is."""
+        for writer in self.promises.of(node):
+            self._lose(writer, reason.format(node), now)
+
+    def _watch_changed(self) -> None:
+        """1016h is another one: it may watch more, but what the mapping says of writers holds whatever it says."""
+        self._route()
+        for text in self.promises.weakened([writer.name for writer in self.cell.definition.writers]):
+            self._observer.report(text)
 
     def _guarding_lost(self, now: float) -> None:
         self.emergency.raise_error(ErrorCode.HEARTBEAT, now)
@@ -514,6 +542,10 @@ class Node:
     def _objects(self, identity: Identity) -> Iterable[Object]:
         status = StatusBlock(self.cell)
         requester = partial(self._peers.requester, self.plan.sdo_writer)
+
+        def asking() -> Requester:
+            return self._peers.asking(self.plan.sdo_writer, self._now)
+
         yield from identity_objects(identity, lambda: int.from_bytes(status.read(1, 1, self._now), "big"))
         yield from server_parameter(self.parameters.node)
         for service in (
@@ -526,8 +558,8 @@ class Node:
             self.producer,
             self.behaviour,
             self.pdos,
-            VariableObjects(self.plan, self.cell, self._clock, requester),
-            StatusObjects(self.cell, self._clock, requester),
+            VariableObjects(self.plan, self.cell, self._clock, asking),
+            StatusObjects(self.cell, self._clock, requester, asking),
         ):
             yield from service.objects()
 
@@ -551,7 +583,7 @@ class Node:
 
     def _on_sync(self, counter: int | None, now: float) -> None:
         self.emergency.clear(ErrorCode.SYNC_LENGTH, now)
-        self.transmit.on_sync(counter, now)
+        self.transmit.on_sync(counter, now, late=self._peers.waited > 0)
         self.receive_pdos.on_sync(now)
 
     def _store_lss(self, node: int, bit_rate: int) -> bool:

@@ -7,7 +7,19 @@ from dataclasses import astuple, dataclass, replace
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import CellDefinition, Direction
 
-__all__ = ["CanopenPlan", "Consumer", "ObjectPlan", "PdoEntry", "PdoPlan", "SyncPlan", "by_name"]
+__all__ = [
+    "FIRST_STATUS_OBJECT",
+    "CanopenPlan",
+    "Consumer",
+    "ObjectPlan",
+    "PdoEntry",
+    "PdoPlan",
+    "SyncPlan",
+    "by_name",
+]
+
+FIRST_STATUS_OBJECT = 0x5F00
+"""Where the status block begins in the object dictionary."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +35,20 @@ class ObjectPlan:
 
 @dataclass(frozen=True, slots=True)
 class PdoEntry:
-    """One mapped object of a PDO; `variable` is None for a dummy entry that fills a gap."""
+    """One mapped object of a PDO: a variable, a word of the status block, or a dummy that fills a gap."""
 
     variable: int | None
+    """Index of the variable; None for a word of the status block and for a dummy."""
     index: int
     subindex: int
     bits: int
+    quality_of: int | None = None
+    """Index of the variable whose quality this word of the status block is."""
+
+    @property
+    def is_status(self) -> bool:
+        """Whether it is a word of the status block, which only a TPDO carries."""
+        return self.variable is None and self.index >= FIRST_STATUS_OBJECT
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +143,10 @@ def by_name(plan: CanopenPlan, definition: CellDefinition) -> tuple[object, ...]
         [
             (
                 astuple(replace(pdo, entries=())),
-                [(variable(one.variable), one.index, one.subindex, one.bits) for one in pdo.entries],
+                [
+                    (variable(one.variable), one.index, one.subindex, one.bits, variable(one.quality_of))
+                    for one in pdo.entries
+                ],
             )
             for pdo in plan.pdos
         ],

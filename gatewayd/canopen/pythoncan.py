@@ -10,9 +10,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import fcntl
 import logging
 import select
 import socket
+import struct
+import termios
 from collections.abc import Iterable
 from functools import partial
 from typing import Any
@@ -34,6 +37,8 @@ ASK = 0.001
 """Seconds between two questions to an interface without a file descriptor, while frames come."""
 ASK_LIMIT = 0.008
 """The same after a while without frames."""
+CATCH_UP = 0.25
+"""Longest time for reading in one go after the process stood still."""
 SLICE = 0.005
 """Longest time for reading before the loop has its turn: an adapter may hand over its frames byte by byte."""
 
@@ -41,6 +46,9 @@ _OPTIONS: dict[str, dict[str, Any]] = {
     # It would sleep two seconds for boards that restart when they are opened, and a millisecond for every read.
     "slcan": {"sleep_after_open": 0, "timeout": 0},
 }
+_SIOCOUTQNSD = 0x894B
+"""linux/sockios.h: bytes of a connection that were not sent yet."""
+_INT = struct.Struct("i")
 _LIKE_SOCKETCAN = {"socketcan", "socketcand", "udp_multicast", "virtual"}
 """Interfaces whose error frames have the layout of SocketCAN."""
 
@@ -120,9 +128,20 @@ class PythonCanBus(SupervisedBus):
                 self._lose(error)
             return False
         self.counters.sent += 1
+        self._handed_over = clock.now()
         return True
 
+    def _pending(self) -> int:
+        """Bytes that the operating system has not passed on; an adapter's own buffers are not known."""
+        return _unsent(self._descriptor) if self._descriptor >= 0 else 0
+
     # Receiving
+
+    def catch_up(self) -> None:
+        """See Bus; for at most `CATCH_UP` seconds."""
+        end = clock.now() + CATCH_UP
+        while self._bus is not None and not self._read(self._bus) and clock.now() < end:
+            pass
 
     def _readable(self) -> None:
         """The descriptor has something."""
@@ -269,7 +288,9 @@ class PythonCanBus(SupervisedBus):
         port = _serial_port(bus)
         if port is not None:
             port.flush = _do_nothing  # it would wait until the wire has carried the frame
-            if _connection(port) is not None:
+            connection = _connection(port)
+            if connection is not None:
+                connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 port.close = partial(_hang_up, port)
         return bus
 
@@ -309,6 +330,16 @@ def _descriptor(bus: can.BusABC) -> int:
         return bus.fileno()
     except (NotImplementedError, can.CanError, OSError):
         return -1
+
+
+def _unsent(descriptor: int) -> int:
+    """Bytes that the operating system still has: of a connection those not sent yet, of a serial port all."""
+    for request in (_SIOCOUTQNSD, termios.TIOCOUTQ):
+        try:
+            return int(_INT.unpack(fcntl.ioctl(descriptor, request, bytes(_INT.size)))[0])
+        except OSError:
+            continue
+    return 0
 
 
 def _serial_port(bus: can.BusABC) -> Any:

@@ -22,22 +22,26 @@ from gatewayd.canopen.supervision import LOOK, Event, event_of_errno
 
 __all__ = ["RECEIVE_BUFFER", "SEND_BUFFER", "SocketCanBus", "filters", "pack", "seen"]
 
+CATCH_UP_FRAMES = 16_384
+"""Most frames that are read in one go after the process stood still: more than any receive buffer holds."""
 RECEIVE_BUFFER = 2 << 20
 """Bytes asked for: some 2,700 frames, 0.3 s of a saturated bus of 1 Mbit/s. net.core.rmem_max may allow less."""
-SEND_BUFFER = 3584
-"""Bytes of a send buffer that takes about ten frames: so few that a PDO that waits is still ours to replace, and no
-more than the interface's own queue takes (txqueuelen, by default ten), so that the kernel tells when there is room."""
+SEND_BUFFER = 2304
+"""Bytes asked for: the least that the kernel gives, room for some six frames. What is in there goes out late when a
+bus that stood still recovers, so that it must not be much; the interface's own queue takes more (txqueuelen, by
+default ten), so that the kernel tells when there is room."""
 
 _FRAME = struct.Struct("=IB3x8s")
 """struct can_frame: identifier with flags, length, eight bytes."""
 _FILTER = struct.Struct("=II")
 _MEMORY_INFO = struct.Struct("=9I")
-"""SO_MEMINFO, whose last word is the count of dropped frames (linux/sock_diag.h)."""
+"""SO_MEMINFO: among others the bytes that wait to be sent and the count of dropped frames (linux/sock_diag.h)."""
 _EXTENDED, _REMOTE, _ERROR = 0x8000_0000, 0x4000_0000, 0x2000_0000
 _BASIC = 0x7FF
 _EXACT = _BASIC | _EXTENDED | _REMOTE
 """Mask of a filter for one identifier and data frames; the kernel finds the socket for it by a table."""
 _GREATEST_FILTERS = 512
+_MEMINFO_SENDING, _MEMINFO_DROPS = 2, 8
 _SO_MEMINFO, _CAN_RAW_ERR_FILTER = 55, 2
 _EVERY_ERROR = 0x1FFF_FFFF
 _NO_ROOM = (errno.ENOBUFS, errno.EAGAIN)
@@ -150,19 +154,31 @@ class SocketCanBus(SupervisedBus):
                 self._failed(error)
             return False
         self.counters.sent += 1
+        self._handed_over = clock.now()
         return True
+
+    def _pending(self) -> int:
+        return _memory(self._socket)[_MEMINFO_SENDING] if self._socket is not None else 0
 
     # Receiving
 
+    def catch_up(self) -> None:
+        """See Bus."""
+        self._read(clock.now(), CATCH_UP_FRAMES)
+
     def _readable(self) -> None:
-        assert self._socket is not None
-        now = clock.now()
+        self._read(clock.now(), DRAIN)
+
+    def _read(self, now: float, most: int) -> None:
+        """Hand over at most so many frames that wait."""
+        if self._socket is None:
+            return
         frames: list[Frame] = []
         errors: list[ErrorFrame] = []
         failure: OSError | None = None
         receive, append = self._socket.recv, frames.append
         try:
-            for _ in range(DRAIN):
+            for _ in range(most):
                 parts = can_id, length, data = _unpack(receive(_FRAME.size))
                 if can_id <= _BASIC:
                     append(_new_frame(Frame, (can_id, data[:length], False, 0)))
@@ -185,7 +201,7 @@ class SocketCanBus(SupervisedBus):
 
         Asked for with each look it costs nothing per frame, and tells of the last frames too, which none follows.
         """
-        total = _MEMORY_INFO.unpack(raw.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMORY_INFO.size))[-1]
+        total = _memory(raw)[_MEMINFO_DROPS]
         lost = (total - self._lost) & 0xFFFF_FFFF
         if lost:
             self._lost = total
@@ -286,6 +302,10 @@ class SocketCanBus(SupervisedBus):
         self._socket.close()
         self._socket = None
         self._index = 0
+
+
+def _memory(raw: socket.socket) -> tuple[int, ...]:
+    return _MEMORY_INFO.unpack(raw.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMORY_INFO.size))
 
 
 def _take_other(parts: tuple[int, int, bytes], frames: list[Frame], errors: list[ErrorFrame]) -> None:

@@ -11,15 +11,17 @@ from functools import partial
 from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Abort, Access, Entry, Object, array, record
+from gatewayd.canopen.dictionary import Abort, Access, Entry, Object, Pdo, array, record
+from gatewayd.canopen.pdo.codec import Mapped
+from gatewayd.canopen.plan import FIRST_STATUS_OBJECT
 from gatewayd.canopen.variables import ABORT_OF
 from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import FIELDS, RELEASE, REQUEST, TABLES, StatusBlock, StatusField, StatusTable
 
-__all__ = ["HEADER", "TABLE_INDICES", "StatusObjects"]
+__all__ = ["HEADER", "TABLE_INDICES", "StatusObjects", "status_word"]
 
-HEADER: Final = 0x5F00
+HEADER: Final = FIRST_STATUS_OBJECT
 """The record of the header's fields, in the order of `core.status.FIELDS`."""
 TABLE_INDICES: Final = {
     "good": 0x5F01,
@@ -36,15 +38,42 @@ _TYPES = {1: CanType.UNSIGNED16, 2: CanType.UNSIGNED32}
 """By words of the block."""
 
 
+def status_word(index: int, subindex: int) -> Mapped | None:
+    """What a TPDO carries of the status block there; None if it may carry nothing.
+
+    Whether a table has so many entries, the dictionary knows.
+    """
+    if index == HEADER:
+        field = FIELDS[subindex - 1] if 0 < subindex <= len(FIELDS) else None
+        if field is None or field.offset in (REQUEST, RELEASE):
+            return None
+        return Mapped(None, _TYPES[field.words], field.offset)
+    for table in TABLES:
+        chunk = index - TABLE_INDICES[table.name]
+        if subindex and 0 <= chunk < -(-table.words // _LARGEST_ARRAY):
+            return Mapped(None, CanType.UNSIGNED16, table.offset + chunk * _LARGEST_ARRAY + subindex - 1)
+    return None
+
+
 class StatusObjects:
     """The objects of one cell's status block."""
 
-    def __init__(self, cell: Cell, clock: Callable[[], float], requester: Callable[[], Requester]) -> None:
-        """`clock`: the moment of the request that is being served; `requester`: who SDO clients are now."""
+    def __init__(
+        self,
+        cell: Cell,
+        clock: Callable[[], float],
+        requester: Callable[[], Requester],
+        asking: Callable[[], Requester],
+    ) -> None:
+        """`clock`: the moment of the request that is being served; `requester`: who SDO clients are now.
+
+        `asking`: the same, when one asks for a lock.
+        """
         self._block = StatusBlock(cell)
         self._definition = cell.definition
         self._clock = clock
         self._requester = requester
+        self._asking = asking
 
     def objects(self) -> Iterator[Object]:
         """5F00h and the tables that have entries."""
@@ -66,6 +95,7 @@ class StatusObjects:
             _TYPES[field.words],
             Access.RW if writable else Access.RO,
             bytes(2 * field.words),
+            pdo=Pdo.NONE if writable else Pdo.TRANSMIT,
             source=partial(self._read, field.offset, field.words),
             sink=partial(self._write, field.offset) if writable else None,
         )
@@ -89,6 +119,7 @@ class StatusObjects:
                 CanType.UNSIGNED16,
                 Access.RO,
                 bytes(2),
+                pdo=Pdo.TRANSMIT,
                 source=partial(self._read, offset, 1),
             )
 
@@ -98,6 +129,7 @@ class StatusObjects:
 
     def _write(self, offset: int, data: bytes) -> None:
         word = int.from_bytes(data, "little")
-        refusal = self._block.write(self._requester(), offset, (word,), self._clock())
+        requester = self._asking() if offset == REQUEST and word else self._requester()
+        refusal = self._block.write(requester, offset, (word,), self._clock())
         if refusal is not None:
             raise Abort(ABORT_OF[refusal.reason])

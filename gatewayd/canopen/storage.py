@@ -21,6 +21,7 @@ from typing import Any, Protocol
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, Object, Pdo, array
 from gatewayd.canopen.nmt import NmtCommand
+from gatewayd.canopen.plan import FIRST_STATUS_OBJECT
 
 __all__ = [
     "ALL",
@@ -48,6 +49,7 @@ GROUPS: Mapping[int, tuple[str, range]] = {
 }
 """Sub-indices of 1010h and 1011h."""
 _PDOS = range(0x1400, 0x1C00)
+_MAPPINGS = range(0x1A00, 0x1C00)
 _BOUND_TO_LAYOUT = (_PDOS, range(0x2000, 0x1_0000))
 _SAVE = b"save"
 _LOAD = b"load"
@@ -146,14 +148,16 @@ class JsonStore:
             raise StoreError(f"{self.path}: cannot be written: {error}") from None
 
 
-def layout_of(dictionary: Iterable[Object], node: int) -> int:
+def layout_of(dictionary: Iterable[Object], node: int, values: Mapping[Key, bytes] | None = None) -> int:
     """32 bits that change when the defaults of a PDO change, or an object that it may carry, or one that is stored.
 
-    Defaults that contain the node-ID count without it: another node-ID is not another layout.
+    Defaults that contain the node-ID count without it: another node-ID is not another layout. The status block lies
+    where it lies; which variable an entry of its tables tells of counts only where `values` put one into a PDO.
     """
     digest = 0
+    tables = any(map(_maps_status_table, (values or {}).items()))
     for one in dictionary:
-        if not _is_bound(one.index):
+        if not _is_bound(one.index) or (one.index >= FIRST_STATUS_OBJECT and not tables):
             continue
         for entry in one.entries:
             if not entry.stored and entry.pdo is Pdo.NONE:
@@ -209,7 +213,7 @@ class Parameters:
     def bind(self, dictionary: Dictionary) -> None:
         """Take the dictionary whose entries are kept, and drop what no longer fits it."""
         self._dictionary = dictionary
-        self._layout = layout_of(dictionary, self._node)
+        self._layout = layout_of(dictionary, self._node, self._saved.values)
         kept = {key: value for key, value in self._saved.values.items() if self._fits(key, value)}
         dropped = [f"{index:04X}h:{sub:02X}" for index, sub in self._saved.values if (index, sub) not in kept]
         if dropped:
@@ -217,6 +221,10 @@ class Parameters:
                 "stored parameters do not fit this mapping, defaults are used: " + ", ".join(sorted(dropped))
             )
         self._saved = replace(self._saved, values=kept, layout=self._layout)
+
+    def report_differences(self) -> None:
+        """Report what was stored and is not what the mapping says."""
+        self._report_stored(self._saved.values, "stored parameters are used in place of the mapping's")
 
     def apply(self, command: NmtCommand, node: int) -> None:
         """Give the entries their power-on values: after "reset communication" those of communication alone.
@@ -277,6 +285,17 @@ class Parameters:
                     if entry.stored and entry.value != entry.default
                 )
         self._commit(values)
+        self._report_stored(values, "parameters were stored that are not the mapping's")
+
+    def _report_stored(self, values: Mapping[Key, bytes], what: str) -> None:
+        assert self._dictionary is not None
+        found = [
+            f"{index:04X}h:{sub:02X}"
+            for (index, sub), value in sorted(values.items())
+            if value != self._dictionary.entry(index, sub).default
+        ]
+        if found:
+            self._report(f"{what}: {', '.join(found)}")
 
     def _restore(self, indices: range, signature: bytes) -> None:
         """Forget what was saved; the present values stay until the next reset."""
@@ -291,6 +310,7 @@ class Parameters:
 
     def _commit(self, values: Mapping[Key, bytes]) -> None:
         try:
+            self._layout = layout_of(self._dictionary or (), self._node, values)
             self._replace(replace(self._saved, values=values, layout=self._layout))
         except StoreError:
             raise Abort(AbortCode.HARDWARE) from None
@@ -316,6 +336,11 @@ class Parameters:
 
 def _is_bound(index: int) -> bool:
     return any(index in indices for indices in _BOUND_TO_LAYOUT)
+
+
+def _maps_status_table(item: tuple[Key, bytes]) -> bool:
+    (index, subindex), value = item
+    return index in _MAPPINGS and subindex > 0 and int.from_bytes(value, "little") >> 16 > FIRST_STATUS_OBJECT
 
 
 def _rebased(entry: Entry, old: int, new: int) -> bytes:

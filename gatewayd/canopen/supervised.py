@@ -9,10 +9,14 @@ from gatewayd.canopen.bus import BusCounters, BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.supervision import Event, Supervisor, event_of_error
 
-__all__ = ["ROOM_RETRY", "SupervisedBus"]
+__all__ = ["LAG", "ROOM_RETRY", "SupervisedBus"]
 
 ROOM_RETRY = 0.001
 """Seconds to wait for room of which nobody tells."""
+LAG = 0.005
+"""Seconds after which a frame that was taken should have gone out."""
+_LAG_BITS = 1350
+"""Bits that may go before it: ten frames. On slow buses they take longer than `LAG`."""
 
 
 class SupervisedBus:
@@ -29,11 +33,22 @@ class SupervisedBus:
         self._writable = -1
         """The descriptor that will tell of room; -1 where there is none, or nothing is waited for."""
         self._retrying: asyncio.TimerHandle | None = None
+        self._handed_over = 0.0
+        """When the last frame was taken."""
 
     @property
     def state(self) -> BusState:
         """As far as the interface tells it."""
         return self._supervisor.state
+
+    def lags(self, bit_rate: int | None) -> bool:
+        """Whether frames that were taken some time ago have still not gone out, as far as that can be known."""
+        lag = max(LAG, _LAG_BITS / bit_rate) if bit_rate else LAG
+        return clock.now() - self._handed_over > lag and self._pending() > 0
+
+    def _pending(self) -> int:
+        """Bytes that were taken and have not gone out; 0 where nobody knows."""
+        return 0
 
     def _feed(self, event: Event, now: float, reason: str) -> None:
         """Judge an event, and tell of the state if it is another one now."""

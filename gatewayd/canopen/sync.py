@@ -49,6 +49,8 @@ class Sync:
         self._last = -math.inf
         self.count = 0
         """SYNC messages heard or sent."""
+        self.missed = 0
+        """SYNC messages that were due and that the bus did not take."""
         u32 = CanType.UNSIGNED32
         self._cob_id = Entry(
             0,
@@ -123,7 +125,11 @@ class Sync:
         return window == 0 or now - self._last <= window / 1e6
 
     def tick(self, now: float) -> None:
-        """Send the SYNC that is due. Cycles that were missed are not made up for."""
+        """Send the SYNC that is due. Cycles that were missed are not made up for.
+
+        A SYNC that the bus did not take is none: it is dropped rather than late, the counter counts those that were
+        transmitted (CiA 301, 7.2.5), and nothing happens with it here that happens nowhere else.
+        """
         if now < self._due:
             return
         period = self._period.number / 1e6
@@ -131,7 +137,11 @@ class Sync:
         if not self._allowed():
             return
         counter = self._next_counter()
-        self._send(Frame(self.cob_id, b"" if counter is None else bytes([counter])), Priority.ORDERED)
+        frame = Frame(self.cob_id, b"" if counter is None else bytes([counter]))
+        if not self._send(frame, Priority.AT_ONCE):
+            self.missed += 1
+            return
+        self._counter = counter or 0
         self._sync(counter, now)
 
     def next_deadline(self, now: float) -> float:
@@ -146,8 +156,7 @@ class Sync:
     def _next_counter(self) -> int | None:
         if not self._overflow.number:
             return None
-        self._counter = self._counter % self._overflow.number + 1
-        return self._counter
+        return self._counter % self._overflow.number + 1
 
     def _configured(self) -> None:
         # The first SYNC has to come within one period: the next tick sends it.

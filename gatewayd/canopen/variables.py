@@ -57,7 +57,7 @@ class VariableObjects:
     def __init__(
         self, plan: CanopenPlan, cell: Cell, clock: Callable[[], float], requester: Callable[[], Requester]
     ) -> None:
-        """`clock`: the moment of the request that is being served; `requester`: who SDO clients are now."""
+        """`clock`: the moment of the request that is being served; `requester`: who SDO clients are when they write."""
         self._plan = plan
         self._cell = cell
         self._clock = clock

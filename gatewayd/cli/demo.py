@@ -126,6 +126,8 @@ def _stop_on_signals(stop: asyncio.Event, console: Console) -> None:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, on_signal)
+    # A terminal that is closed says so twice, by the shell and by the system: that is no second Ctrl-C.
+    asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, stop.set)
 
 
 async def _live(console: Console, scene: Scene, stop: asyncio.Event, seconds: float | None) -> None:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gatewayd.printable import printable
+
 if TYPE_CHECKING:
     from gatewayd.mapping.plan import Plan
 
@@ -76,7 +78,7 @@ def _load(file: str) -> Plan | None:
         )
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        click.echo(f"{name}: cannot be read: {reason}", err=True)
+        click.echo(printable(f"{name}: cannot be read: {reason}"), err=True)
         return None
     if loaded.plan is None:
         click.echo(as_text(Outcome((name,), loaded.diagnostics)), nl=False, err=True)

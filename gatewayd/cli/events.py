@@ -8,7 +8,16 @@ from typing import Any
 
 import click
 
-from gatewayd.cli.remote import UNREACHABLE, cell_option, connect, json_option, refusals, socket_option
+from gatewayd.cli.remote import (
+    UNREACHABLE,
+    cell_option,
+    connect,
+    echo_json,
+    json_option,
+    readable,
+    refusals,
+    socket_option,
+)
 
 __all__ = ["command"]
 
@@ -70,10 +79,8 @@ def _print(found: Mapping[str, Any], *, as_json: bool) -> None:
     from gatewayd.cli.phrases import clock
 
     if as_json:
-        import json
-
-        # At once: whoever follows through a pipe wants to see it now.
-        click.echo(json.dumps(found, ensure_ascii=False))
+        echo_json(found, indent=None)
         return
+    found = readable(found)
     text = click.style(found["text"], fg="yellow" if found["bad"] else None)
     click.echo(f"{clock(found['time'])} {found['cell']}  {text}")

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from gatewayd.printable import printable
+
 if TYPE_CHECKING:
     from gatewayd.canopen.dictionary import Dictionary
     from gatewayd.canopen.plan import CanopenPlan
@@ -186,10 +188,10 @@ def _reason(error: OSError | ValueError) -> str:
 
 
 def _stop(context: click.Context, message: str) -> NoReturn:
-    click.echo(message, err=True)
+    click.echo(printable(message), err=True)
     context.exit(BROKEN)
 
 
 def _fail(context: click.Context, message: str) -> NoReturn:
-    click.echo(message, err=True)
+    click.echo(printable(message), err=True)
     context.exit(UNREADABLE)

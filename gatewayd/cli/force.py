@@ -7,7 +7,15 @@ from typing import Any
 
 import click
 
-from gatewayd.cli.remote import DURATION, cell_option, complete_variables, connect, refusals, socket_option
+from gatewayd.cli.remote import (
+    DURATION,
+    cell_option,
+    complete_variables,
+    connect,
+    readable,
+    refusals,
+    socket_option,
+)
 
 __all__ = ["command"]
 
@@ -51,9 +59,8 @@ def command(name: str, value: str, seconds: float, socket: Path | None, cell: st
     body: dict[str, Any] = {"value": _parse(value), "for": seconds}
     client = connect(socket)
     with refusals(client, name):
-        found = client.post(
-            f"/v1/variables/{segment(name)}/force", body if cell is None else {**body, "cell": cell}
-        )
+        path = f"/v1/variables/{segment(name)}/force"
+        found = readable(client.post(path, body if cell is None else {**body, "cell": cell}))
     side = "the robot gets it" if found["direction"] == "input" else "the fieldbus sees it"
     click.echo(
         f"{found['name']} is forced to {shown(found['value'], found['unit'])} for {span(seconds)}: {side}"

@@ -13,7 +13,9 @@ from gatewayd.cli.remote import (
     cell_option,
     complete_locks,
     connect,
+    echo_json,
     json_option,
+    readable,
     refusals,
     socket_option,
 )
@@ -50,11 +52,9 @@ def command(context: click.Context, socket: Path | None, cell: str | None, *, as
     with refusals():
         locks = client.get("/v1/locks", cell=cell)["locks"]
     if as_json:
-        import json
-
-        click.echo(json.dumps(locks, indent=2, ensure_ascii=False))
+        echo_json(locks)
         return
-    _print(locks)
+    _print(readable(locks))
 
 
 @command.command(
@@ -78,7 +78,7 @@ def take(
 ) -> None:
     """Take lock NAME (of a variable or group) from whoever holds it, until it is released. Values stay as they are."""
     where = socket or context.obj["socket"], cell or context.obj["cell"]
-    lock = _post(where, name, "take", {} if seconds is None else {"for": seconds})
+    lock = readable(_post(where, name, "take", {} if seconds is None else {"for": seconds}))
     until = "until you release it" if seconds is None else f"for {seconds:g} s"
     members = "" if lock["members"] == [lock["name"]] else f": {_members(lock)}"
     click.echo(f"{lock['name']} is the operator's {until}{members}")
@@ -98,7 +98,8 @@ Examples:
 @click.pass_context
 def release(context: click.Context, name: str, socket: Path | None, cell: str | None) -> None:
     """Release lock NAME, whoever holds it; the release fallbacks apply. A writer that goes on writing gets it again."""
-    lock = _post((socket or context.obj["socket"], cell or context.obj["cell"]), name, "release", {})
+    where = socket or context.obj["socket"], cell or context.obj["cell"]
+    lock = readable(_post(where, name, "release", {}))
     click.echo(f"{lock['name']} is free")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from gatewayd.figures import age
 
-__all__ = ["clock", "owner", "places"]
+__all__ = ["clock", "owner", "places", "quality"]
 
 
 def owner(variable: Mapping[str, Any]) -> str:
@@ -19,6 +19,11 @@ def owner(variable: Mapping[str, Any]) -> str:
         return "robot"
     name = variable["owner"] or "free"
     return name if variable["lease"] is None else f"{name}, {age(variable['lease'])} left"
+
+
+def quality(name: str) -> str:
+    """`out of range` for `out_of_range`."""
+    return name.replace("_", " ")
 
 
 def places(variable: Mapping[str, Any]) -> str:

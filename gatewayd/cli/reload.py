@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gatewayd.cli.remote import REFUSED, Refused, Unreachable, json_option, socket_option
+from gatewayd.cli.remote import (
+    REFUSED,
+    Refused,
+    Unreachable,
+    echo_json,
+    json_option,
+    readable,
+    socket_option,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -44,7 +52,6 @@ def command(context: click.Context, socket: Path | None, *, force: bool, as_json
 
     Links whose settings did not change stay up; owners and values of variables that did not change stay as they are.
     """
-    import json
     import os
 
     from gatewayd.control.client import Client, ControlError, NoDaemon, find_socket
@@ -60,9 +67,9 @@ def command(context: click.Context, socket: Path | None, *, force: bool, as_json
         answer = error.body
     done = answer.get("result") in ("applied", "unchanged")
     if as_json:
-        click.echo(json.dumps(answer, indent=2, ensure_ascii=False))
+        echo_json(answer)
     else:
-        for line in _lines(answer):
+        for line in _lines(readable(answer)):
             click.echo(line, err=not done)
     context.exit(0 if done else REFUSED)
 

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
+from gatewayd.printable import json_text, printable, printable_answer
+
 if TYPE_CHECKING:
     from gatewayd.control.client import Client
 
@@ -27,7 +29,9 @@ __all__ = [
     "complete_locks",
     "complete_variables",
     "connect",
+    "echo_json",
     "json_option",
+    "readable",
     "refusals",
     "socket_option",
 ]
@@ -44,11 +48,17 @@ class Unreachable(click.ClickException):
 
     exit_code = UNREACHABLE
 
+    def __init__(self, message: str) -> None:
+        super().__init__(printable(message))
+
 
 class Refused(click.ClickException):
     """The gateway does not do it."""
 
     exit_code = REFUSED
+
+    def __init__(self, message: str) -> None:
+        super().__init__(printable(message))
 
 
 def connect(socket: Path | None) -> Client:
@@ -96,6 +106,18 @@ def _meant(client: Client, kind: str, name: str) -> str:
     return f"; did you mean {' or '.join(close)}?" if close else ""
 
 
+def readable(answer: Any) -> Any:
+    """What the gateway answered, for people: everything in it may go to a terminal. Programs get `echo_json`."""
+    return printable_answer(answer)
+
+
+def echo_json(answer: Any, *, indent: int | None = 2) -> None:
+    """Print the answer as JSON with its exact content."""
+    import json
+
+    click.echo(json_text(json.dumps(answer, indent=indent, ensure_ascii=False)))
+
+
 class Duration(click.ParamType):  # type: ignore[type-arg]
     """`30s`, `1.5min`, `200ms`, `2h`, as seconds."""
 
@@ -125,7 +147,9 @@ def _names(context: click.Context, path: str, kind: str) -> list[dict[str, Any]]
 
     try:
         client = Client(find_socket(context.params.get("socket"), os.environ), _COMPLETION_PATIENCE)
-        return list(client.get(path, cell=context.params.get("cell"))[kind])
+        found = client.get(path, cell=context.params.get("cell"))[kind]
+        # A shell would take what is not printable for something else.
+        return [one for one in found if printable(one["name"]) == one["name"]]
     except (NoDaemon, ControlError, OSError):
         return []
 
@@ -135,7 +159,7 @@ def complete_variables(
 ) -> list[CompletionItem]:
     """Names of variables, with what they are in the robot."""
     return [
-        CompletionItem(one["name"], help=one["robot"])
+        CompletionItem(one["name"], help=printable(one["robot"]))
         for one in _names(context, "/v1/variables", "variables")
         if one["name"].startswith(incomplete)
     ]
@@ -144,7 +168,7 @@ def complete_variables(
 def complete_locks(context: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Names of locks, with their owners."""
     return [
-        CompletionItem(one["name"], help=one["owner"] or "free")
+        CompletionItem(one["name"], help=printable(one["owner"] or "free"))
         for one in _names(context, "/v1/locks", "locks")
         if one["name"].startswith(incomplete)
     ]

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
-import signal
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from gatewayd.signals import SIGNALS
+
 if TYPE_CHECKING:
+    import asyncio
+
     from gatewayd.daemon import Daemon
+    from gatewayd.signals import Effect
     from gatewayd.startup import Startup
     from gatewayd.status.launch import Settings
 
 __all__ = ["command"]
 
-FORCED = 130
-"""Exit code after a second signal."""
+STOPPED = 0
 NOTHING_TO_RUN = 1
 UNREADABLE = 2
 DEFECT = 70
@@ -36,7 +41,7 @@ Examples:
 
 \b
 Exit codes:
-  0    stopped by SIGTERM or SIGINT, or by the end of its terminal; SIGHUP otherwise means: reload
+  0    stopped by SIGTERM, SIGINT or SIGQUIT, or by the end of its terminal; SIGHUP otherwise means: reload
   1    no mapping could be served (each reason stands in the log), or --strict and one of them could not
   2    wrong usage, or none of the files could be read
   70   the process that reads the files could not do so; the log says why
@@ -114,6 +119,9 @@ def command(
     configure(Format(log_format), logging.getLevelNamesMapping()[log_level.upper()], stream)
     try:
         found = _load(files, strict=strict)
+        if SIGNALS.stopping:
+            _log_stop("stopped before anything was served")
+            return STOPPED
         if isinstance(found, int):
             return found
         return _run(found, files, state, page=page, control=control, audit=audit)
@@ -142,9 +150,10 @@ def _load(files: Sequence[Path], *, strict: bool) -> Startup | int:
     from gatewayd.startup import load_plans
 
     try:
-        found = load_plans(files, _import_the_daemon)
+        found = load_plans(files, _import_the_daemon, lambda: SIGNALS.stopping)
     except CompilationError as error:
-        logging.getLogger("gatewayd.startup").error("%s", error)  # noqa: TRY400 - the text says it all
+        if not SIGNALS.stopping:
+            logging.getLogger("gatewayd.startup").error("%s", error)  # noqa: TRY400 - the text says it all
         return DEFECT
     if not found.plans and not found.broken:
         return UNREADABLE
@@ -171,7 +180,14 @@ def _run(
     daemon = Daemon(found.plans, state or state_directory(os.environ))
     with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
         runner.run(_serve(daemon, files, _notes(found), page=page, control=_socket(control), audit=audit))
-    return 0
+    return STOPPED
+
+
+def _log_stop(text: str) -> None:
+    from gatewayd.logs import fields
+    from gatewayd.signals import name_of
+
+    logging.getLogger("gatewayd.run").info(text, extra=fields(signal=name_of(SIGNALS.stopped_by)))
 
 
 def _import_the_daemon() -> None:
@@ -218,7 +234,8 @@ async def _serve(
 ) -> None:
     import asyncio
 
-    from gatewayd.operation import Operation
+    from gatewayd import clock
+    from gatewayd.operation import Operation, Standstill
     from gatewayd.reload import Reloader
     from gatewayd.service import Service
     from gatewayd.status.launch import serve
@@ -229,27 +246,18 @@ async def _serve(
     reloader = Reloader(
         daemon, files, service.reload_begins, lambda outcome: service.reload_ended(outcome.notes)
     )
-    loop = asyncio.get_running_loop()
-
-    def on_signal() -> None:
-        if stop.is_set():
-            os._exit(FORCED)
-        stop.set()
-
-    in_terminal = os.isatty(0)
-
-    def on_hangup() -> None:
-        # Whoever closes the terminal in which it runs wants it gone; anybody else who sends SIGHUP wants a reload.
-        if in_terminal and not os.isatty(0):
-            on_signal()
-        else:
-            reloader.ask()
-
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, on_signal)
-    loop.add_signal_handler(signal.SIGHUP, on_hangup)
+    SIGNALS.follow(asyncio.get_running_loop(), _Obedience(stop, reloader.ask))
+    if stop.is_set():
+        return
+    standstill = Standstill()
+    clock.on_gap(standstill.gap)
     operation = Operation(
-        daemon, control, audit, lambda: service.notes, lambda force: reloader.reload(force=force)
+        daemon,
+        control,
+        audit,
+        lambda: service.notes,
+        lambda force: reloader.reload(force=force),
+        stood_still=standstill.seconds,
     )
     operating = asyncio.create_task(operation.run())
     reporting = asyncio.create_task(service.run(stop))
@@ -266,3 +274,29 @@ async def _serve(
         showing.cancel()
     await asyncio.wait((operating,))
     await reporting
+    SIGNALS.leave()
+
+
+class _Obedience:
+    """Carries out what a signal asks for."""
+
+    QUIET = 10.0
+    """Seconds for which further signals of a kind that is ignored are not logged."""
+
+    def __init__(self, stop: asyncio.Event, reload: Callable[[], None]) -> None:
+        self._stop = stop
+        self._reload = reload
+        self._logged: dict[int, float] = {}
+
+    def __call__(self, number: int, effect: Effect) -> None:
+        from gatewayd.logs import fields
+        from gatewayd.signals import Effect, name_of
+
+        if effect is Effect.END:
+            _log_stop("stopping")
+            self._stop.set()
+        elif effect is Effect.RELOAD:
+            self._reload()
+        elif time.monotonic() - self._logged.get(number, -math.inf) >= self.QUIET:
+            self._logged[number] = time.monotonic()
+            logging.getLogger("gatewayd.run").warning("signal ignored", extra=fields(signal=name_of(number)))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from gatewayd.printable import printable
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -91,7 +93,7 @@ def _load(context: click.Context, file: str) -> Loaded:
         return load(read_bytes(Path(file)), name)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        click.echo(f"{name}: cannot be read: {reason}", err=True)
+        click.echo(printable(f"{name}: cannot be read: {reason}"), err=True)
         context.exit(UNREADABLE)
 
 
@@ -112,14 +114,14 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
     entries = [(row, row) for row in rows(loaded.cell)] if every else list(by_line(loaded.cell))
     known = sys.stdout.isatty() or "COLUMNS" in os.environ
     console = Console(width=None if known else PIPE_WIDTH, markup=False, highlight=False)
-    console.print(_heading(plan), style="bold")
+    console.print(printable(_heading(plan)), style="bold")
     console.print(_table(entries, wide=console.width >= _WIDE))
     if loaded.cell.canopen is not None:
         console.print(_pdo_table(loaded))
         for line in _loads(loaded):
             console.print(line, soft_wrap=True)
     for line in _notes(loaded, plan, shortened=any(first is not last for first, last in entries)):
-        console.print(line, style="dim", soft_wrap=True)
+        console.print(printable(line), style="dim", soft_wrap=True)
 
 
 def _heading(plan: Plan) -> str:
@@ -148,8 +150,16 @@ def _notes(loaded: Loaded, plan: Plan, *, shortened: bool) -> list[str]:
         peers = ", ".join(known)
         silence = writer.timeout if writer.timeout is not None else spec.heartbeat
         watch = "no timeout" if silence is None else f"lost after {silence:.6g}s of silence"
+        watch += " (only writes count)" if writer.counts_writes else ""
+        watch += f", keeps what it owns for {writer.grace:.6g}s without a connection" if writer.grace else ""
         notes.append(f"writer {writer.name}: {peers}, {watch}")
     notes.append("-> towards the robot, <- from the robot; addresses from 0; bit 0 is the least significant")
+    if plan.cell.locks and plan.cell.adopt_for is not None and not plan.cell.clear_on_connect:
+        notes.append(
+            f"what the controller holds at the start falls back after {plan.cell.adopt_for:.6g}s without an owner"
+        )
+    if any(variable.valid_running for variable in plan.cell.variables):
+        notes.append("running: not good while the robot program does not run")
     if plan.modbus is not None:
         notes.append("status of the gateway: holding and input registers from 60000 (460001, 360001)")
     if plan.canopen is not None:
@@ -164,7 +174,7 @@ def _table(entries: list[tuple[Row, Row]], *, wide: bool) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    from gatewayd.mapping.table import formula, limits, policy
+    from gatewayd.mapping.table import formula, limits, lost, policy
 
     table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False)
     for title, whole in _COLUMNS.items():
@@ -197,9 +207,9 @@ def _table(entries: list[tuple[Row, Row]], *, wide: bool) -> Table:
             Text(place),
             Text(_notations(first, last)),
             Text(type_name),
-            Text(", ".join(filter(None, (formula(first), limits(first))))),
+            Text(printable(", ".join(filter(None, (formula(first), limits(first)))))),
             Text(policy(first)),
-            Text(first.on_release or first.on_stale),
+            Text(lost(first)),
         )
         table.add_row(*texts)
     return table

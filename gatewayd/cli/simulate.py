@@ -14,6 +14,7 @@ import click
 if TYPE_CHECKING:
     from gatewayd.rtde.catalogue import Series, SoftwareVersion
     from gatewayd.simulator.controller import Controller
+    from gatewayd.simulator.faults import DropAt
     from gatewayd.simulator.program import Rule
 
 __all__ = ["command"]
@@ -63,8 +64,9 @@ comment.
 \b
 Commands on standard input (--control stdin), each answered with `ok`, `ok RESULT` or `error REASON`:
   get FIELD            set FIELD VALUE[,VALUE...]    hold FIELD[,FIELD...]    free FIELD[,FIELD...]
-  freeze on|off        silence on|off                drop-clients             text MESSAGE
-  restart              clients                       quit (as does the end of input)
+  freeze on|off        silence on|off                creep on|off             overwrite FIELD VALUE[,...]|off
+  pause SECONDS        delay SECONDS                 drop-clients             drop-at STEP[:NUMBER]|off
+  text MESSAGE         clients                       restart                  quit (as does the end of input)
 
 \b
 Examples:
@@ -147,7 +149,39 @@ Exit codes:
     help="Fault: a fieldbus adapter owns registers 0-23, bits 0-63 and the IO.",
 )
 @click.option("--hold", metavar="FIELD,...", help="Fault: inputs that the controller itself has claimed.")
-@click.option("--strict-lists", is_flag=True, help="Fault: ignore lists of names of more than 2048 bytes.")
+@click.option(
+    "--unreadable",
+    metavar="FIELD,...",
+    help="Fault: inputs that can be claimed and are NOT_FOUND where they are read back.",
+)
+@click.option(
+    "--strict-lists",
+    is_flag=False,
+    flag_value="complain",
+    type=click.Choice(["refuse", "complain", "ignore", "close"]),
+    help="Fault: lists of names of more than 2048 bytes are refused with id 0, answered by a text message only "
+    "(the default), not answered, or end the connection.",
+)
+@click.option(
+    "--drop-at",
+    metavar="STEP[:NUMBER]",
+    help="Fault: close a connection at this step of it, before it is answered: version, controller, outputs, "
+    "inputs, start, pause, write, data; NUMBER: the first, second, ... of that kind on a connection.",
+)
+@click.option(
+    "--drop-times",
+    type=click.IntRange(0),
+    default=1,
+    show_default=True,
+    help="Connections that --drop-at closes; 0: each.",
+)
+@click.option(
+    "--delay",
+    callback=_seconds,
+    default="0",
+    metavar="SECONDS",
+    help="Fault: packages and answers leave this late.",
+)
 @click.option(
     "--linger",
     type=click.IntRange(0, 3_600_000),
@@ -170,6 +204,7 @@ Exit codes:
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the three probabilities.")
 @click.option("--freeze", is_flag=True, help="Fault: the timestamp stands still, packages go on.")
+@click.option("--creep", is_flag=True, help="Fault: as --freeze, but the timestamp goes on by 1 ns a cycle.")
 @click.option("--silence", is_flag=True, help="Fault: no data packages.")
 @click.option("--control", type=click.Choice(["stdin"]), help="Take commands (below) from standard input.")
 @click.option("-q", "--quiet", is_flag=True, help="Log warnings only.")
@@ -211,16 +246,24 @@ def _controller(
     programs: tuple[str, ...],
     program_files: tuple[Path, ...],
     hold: str | None,
+    unreadable: str | None,
+    strict_lists: str | None,
+    drop_at: str | None,
+    drop_times: int,
     linger: int,
     overflow_close: float,
     **switches: Any,
 ) -> Controller:
     from gatewayd.simulator.controller import Controller
-    from gatewayd.simulator.faults import Faults
+    from gatewayd.simulator.faults import Faults, LongLists
     from gatewayd.simulator.program import ProgramError
 
     faults = Faults(
-        hold=tuple(name.strip() for name in (hold or "").split(",") if name.strip()),
+        hold=_fields(hold),
+        unreadable=_inputs(unreadable),
+        long_lists=LongLists(strict_lists or "take"),
+        drop_at=_drop_at(drop_at),
+        drop_times=drop_times or math.inf,
         linger=linger / 1000,
         overflow_close=None if overflow_close == math.inf else overflow_close,
         **switches,
@@ -235,6 +278,32 @@ def _controller(
         raise _ProgramMistakeError(str(error)) from error
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--hold") from error
+
+
+def _fields(text: str | None) -> tuple[str, ...]:
+    return tuple(name.strip() for name in (text or "").split(",") if name.strip())
+
+
+def _inputs(text: str | None) -> frozenset[str]:
+    from gatewayd.rtde.catalogue import INPUTS
+
+    fields = frozenset(_fields(text))
+    unknown = sorted(fields - INPUTS.keys())
+    if unknown:
+        message = f"no such input: {', '.join(unknown)}"
+        raise click.BadParameter(message, param_hint="--unreadable")
+    return fields
+
+
+def _drop_at(text: str | None) -> DropAt | None:
+    from gatewayd.simulator.faults import DropAt
+
+    if text is None:
+        return None
+    try:
+        return DropAt.parse(text)
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="--drop-at") from error
 
 
 def _generation(series: str | None, version: str | None) -> tuple[Series, SoftwareVersion | None]:

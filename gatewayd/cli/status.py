@@ -8,14 +8,23 @@ from typing import Any
 
 import click
 
-from gatewayd.cli.remote import cell_option, connect, json_option, refusals, socket_option
+from gatewayd.cli.remote import (
+    cell_option,
+    connect,
+    echo_json,
+    json_option,
+    readable,
+    refusals,
+    socket_option,
+)
 
 __all__ = ["DEGRADED", "command"]
 
 DEGRADED = 1
 """Exit code when something is wrong."""
 _EVENTS = 5
-_QUALITIES = ("stale", "unavailable", "never", "forced")
+_LAG = 0.1
+"""Seconds of lag that are worth a word."""
 
 Answer = Mapping[str, Any]
 
@@ -30,7 +39,8 @@ Examples:
 
 \b
 Exit codes:
-  0  healthy: robots fresh and writable, no variable unavailable, nothing forced or held by hand, no writer lost
+  0  healthy: robots fresh, writable and as they were told, no variable unavailable or out of range, nothing forced
+     or held by hand, no writer lost
   1  degraded: what is wrong is printed
   2  wrong usage, or no gateway could be reached
 """,
@@ -51,11 +61,9 @@ def command(context: click.Context, socket: Path | None, cell: str | None, *, as
             events = client.get("/v1/events", limit=_EVENTS * max(1, len(answer["cells"])))["events"]
         locks = client.get("/v1/locks", cell=cell)["locks"]
     if as_json:
-        import json
-
-        click.echo(json.dumps(answer, indent=2, ensure_ascii=False))
+        echo_json(answer)
     else:
-        for line in _lines(answer, locks, events):
+        for line in _lines(*readable([answer, locks, events])):
             click.echo(line)
     context.exit(0 if answer["healthy"] else DEGRADED)
 
@@ -97,7 +105,11 @@ def _lines(answer: Answer, locks: list[Answer], events: list[Answer]) -> Iterato
 def _cell(cell: Answer, locks: list[Answer]) -> Iterator[str]:
     from gatewayd.figures import counted
 
-    yield click.style(cell["name"], bold=True) + f"  {cell['source']}, mapping {cell['fingerprint']}"
+    yield (
+        click.style(cell["name"], bold=True)
+        + f"  {cell['source']}, mapping {cell['fingerprint']}"
+        + (f", the gateway stood still {counted(cell['gaps'], 'time')}" if cell["gaps"] else "")
+    )
     yield from _part("robot", _robot(cell["robot"]))
     modbus = cell["modbus"]
     if modbus is not None:
@@ -126,6 +138,7 @@ _STATES = {
     "fresh": ("fresh", "green"),
     "silent": ("silent", "red"),
     "frozen": ("frozen, its clock stands still", "red"),
+    "late": ("late, its values are too old when they come", "red"),
 }
 
 
@@ -144,6 +157,14 @@ def _robot(robot: Answer) -> list[str]:
     counts += [counted(robot["sessions"], "session")]
     if robot["mismatches"]:
         counts.append(click.style(f"{robot['mismatches']} read back differently", fg="red"))
+    for count, words in ((robot["unadopted"], "not known"), (robot["differing"], "different in the robot")):
+        if count:
+            counts.append(click.style(f"{counted(count, 'input')} {words}", fg="red"))
+    if robot["lag"] >= _LAG:
+        counts.append(click.style(f"{age(robot['lag'])} behind", fg="yellow"))
+    if robot["adoption"]:
+        left = age(robot["adoption"])
+        counts.append(click.style(f"adopted values without an owner fall back in {left}", fg="yellow"))
     if robot["watchdog"] is not None:
         counts.append("watchdog fed" if robot["watchdog"] else click.style("watchdog not fed", fg="red"))
     return [first, ", ".join(counts)]
@@ -164,7 +185,11 @@ def _writer(writer: Answer, locks: int) -> str:
 def _variables(counts: Answer) -> str:
     if counts["good"] == counts["total"]:
         return f"{counts['total']}, all good"
-    others = [f"{counts[one]} {one}" for one in _QUALITIES if counts[one]]
+    from gatewayd.cli.phrases import quality
+
+    others = [
+        f"{count} {quality(one)}" for one, count in counts.items() if count and one not in ("total", "good")
+    ]
     return f"{counts['total']}: {counts['good']} good, " + click.style(", ".join(others), fg="yellow")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gatewayd.cli.remote import cell_option, complete_variables, connect, refusals, socket_option
+from gatewayd.cli.remote import cell_option, complete_variables, connect, readable, refusals, socket_option
 
 __all__ = ["command"]
 
@@ -45,7 +45,7 @@ def command(name: str | None, socket: Path | None, cell: str | None, *, every: b
             wanted = [(one["name"], one["cell"]) for one in variables if one["forced"] is not None]
         for one, its_cell in wanted:
             body = {} if its_cell is None else {"cell": its_cell}
-            found = client.post(f"/v1/variables/{segment(one)}/unforce", body)
+            found = readable(client.post(f"/v1/variables/{segment(one)}/unforce", body))
             shown = value(found["value"], found["unit"])
             click.echo(f"{found['name']} is no longer forced: {shown}, {found['quality']}")
     if not wanted:

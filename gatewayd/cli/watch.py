@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import select
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,13 +16,14 @@ import click
 
 from gatewayd.cli.remote import (
     DURATION,
-    UNREACHABLE,
     cell_option,
     complete_variables,
     connect,
+    readable,
     refusals,
     socket_option,
 )
+from gatewayd.printable import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -81,10 +83,13 @@ def command(
     view = View(filter=text)
     with refusals():
         first = _look(client, cell)
-    if once or not console.is_terminal or console.is_dumb_terminal or not sys.stdin.isatty():
-        _lines(client, cell, first, view, interval=0.0 if once else interval)
-        context.exit(0 if once else UNREACHABLE)
-    _live(console, lambda: _look(client, cell), first, view, interval)
+    # Ctrl-C is a way to end it, not to break it off; whatever else ends it leaves the terminal as it was.
+    with suppress(KeyboardInterrupt), _ending_on_signals():
+        if once or not console.is_terminal or console.is_dumb_terminal or not sys.stdin.isatty():
+            _lines(client, cell, first, view, interval=0.0 if once else interval)
+        else:
+            _live(console, lambda: _look(client, cell), first, view, interval)
+    context.exit(0)
 
 
 def _look(client: Client, cell: str | None) -> Glimpse:
@@ -93,11 +98,9 @@ def _look(client: Client, cell: str | None) -> Glimpse:
     status = client.get("/v1/status")
     if cell is not None:
         status["cells"] = [one for one in status["cells"] if one["name"] == cell]
-    return Glimpse(
-        status,
-        client.get("/v1/variables", cell=cell)["variables"],
-        client.get("/v1/events", cell=cell, limit=_EVENTS)["events"],
-    )
+    variables = client.get("/v1/variables", cell=cell)["variables"]
+    events = client.get("/v1/events", cell=cell, limit=_EVENTS)["events"]
+    return Glimpse(*readable([status, variables, events]))
 
 
 def _lines(client: Client, cell: str | None, first: Glimpse, view: View, interval: float) -> None:
@@ -135,7 +138,7 @@ def _live(console: Console, look: Callable[[], Glimpse], first: Glimpse, view: V
                 try:
                     glimpse, before = look(), glimpse
                 except (NoDaemon, ControlError) as error:
-                    glimpse, before = replace(glimpse, lost=str(error)), None
+                    glimpse, before = replace(glimpse, lost=printable(str(error))), None
 
 
 def keys(descriptor: int, patience: float) -> Iterator[str]:
@@ -168,3 +171,18 @@ def _raw(descriptor: int) -> Iterator[None]:
         yield
     finally:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, former)
+
+
+@contextmanager
+def _ending_on_signals() -> Iterator[None]:
+    """SIGTERM and SIGHUP end what is inside as Ctrl-C does."""
+
+    def interrupt(_number: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    former = {number: signal.signal(number, interrupt) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)

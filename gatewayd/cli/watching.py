@@ -31,6 +31,9 @@ _QUALITY_STYLES = {
     "unavailable": "red",
     "never": "dim",
     "forced": "magenta",
+    "differs": "red",
+    "out_of_range": "yellow",
+    "not_running": "yellow",
 }
 _SOURCE_STYLES = {"fresh": "green", "waiting": "yellow"}
 
@@ -162,10 +165,9 @@ def plain(glimpse: Glimpse, view: View) -> str:
         lines.append("  no variable fits")
     for one in variables:
         arrow = "->" if one["direction"] == "input" else "<-"
-        lines.append(
-            f"  {arrow} {one['name']:<20} {value(one['value'], one['unit']):>14}  {one['quality']:<11} "
-            f"{age(one['age']):>9}  {phrases.owner(one)}".rstrip()
-        )
+        shown, quality = value(one["value"], one["unit"]), phrases.quality(one["quality"])
+        line = f"  {arrow} {one['name']:<20} {shown:>14}  {quality:<12} {age(one['age']):>9}  {phrases.owner(one)}"
+        lines.append(line.rstrip())
     return "\n".join([*lines, ""])
 
 
@@ -212,7 +214,7 @@ def _table(shown: Sequence[Answer], old: Mapping[Any, Any], glimpse: Glimpse, wi
     several = len(glimpse.status.get("cells", ())) > 1
     table.add_column("   variable", no_wrap=True, min_width=18, max_width=32)
     table.add_column("value", justify="right", no_wrap=True, min_width=10)
-    table.add_column("quality", no_wrap=True, min_width=11)
+    table.add_column("quality", no_wrap=True, min_width=12)
     table.add_column("age", justify="right", no_wrap=True, min_width=7)
     table.add_column("owner", no_wrap=True, min_width=18)
     if width >= _WIDE:
@@ -231,7 +233,7 @@ def _cells(one: Answer, old: Mapping[Any, Any], width: int, *, several: bool) ->
     yield Text(" → " if towards else " ← ", f"bold {colour}").append(name, "bold default")
     changed = old.get((one["cell"], one["name"]), one["value"]) != one["value"]
     yield Text(value(one["value"], one["unit"]), "bold yellow" if changed else "bold")
-    yield Text(one["quality"], _QUALITY_STYLES.get(one["quality"], ""))
+    yield Text(phrases.quality(one["quality"]), _QUALITY_STYLES.get(one["quality"], ""))
     yield Text(age(one["age"]), "dim")
     style = "magenta" if one["forced"] or one["owner"] == "operator" else "yellow" if one["lease"] else ""
     yield Text(phrases.owner(one), style if towards or one["forced"] else "dim")

@@ -30,9 +30,11 @@ from gatewayd.core.definition import Value, ValueKind
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["API_VERSION", "LONGEST_FORCE", "Api", "ApiError", "Cursor", "Gateway", "Moment"]
+__all__ = ["API_VERSION", "LONGEST_FORCE", "STALE_ACT", "Api", "ApiError", "Cursor", "Gateway", "Moment"]
 
 API_VERSION = 1
+STALE_ACT = 0.5
+"""Seconds that an act of the operator may have waited while the gateway stood still."""
 LONGEST_FORCE = 24 * 3600.0
 """Seconds that a force may last at most; it can be renewed."""
 _GREATEST = sys.float_info.max
@@ -81,11 +83,19 @@ class Cursor:
 
 
 class Api:
-    """The interface to one gateway. `notes` are standing troubles that no link tells."""
+    """The interface to one gateway. `notes` are standing troubles that no link tells.
+
+    `stood_still` is for how many seconds the process stood still until just now; 0.0: it did not.
+    """
 
     def __init__(
-        self, gateway: Gateway, audit: Audit, notes: Callable[[], Sequence[str]] = lambda: ()
+        self,
+        gateway: Gateway,
+        audit: Audit,
+        notes: Callable[[], Sequence[str]] = lambda: (),
+        stood_still: Callable[[], float] = lambda: 0.0,
     ) -> None:
+        self._stood_still = stood_still
         self._gateway = gateway
         self._audit = audit
         self._notes = notes
@@ -176,6 +186,17 @@ class Api:
         return {"time": utc(moment.wall), "records": [record_view(record) for record in latest]}
 
     # -- acts of the local operator ------------------------------------------------------------------------------
+
+    def refuse_what_waited(self) -> None:
+        """Raise ApiError if what arrives now may have waited for long while the gateway stood still.
+
+        Whoever sent it may have given up since, and the plant is no longer as they saw it.
+        """
+        seconds = self._stood_still()
+        if seconds > STALE_ACT:
+            raise ApiError(
+                503, "stood_still", f"the gateway stood still for {seconds:.1f} s; repeat the command"
+            )
 
     def take(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
         """Take a lock; `for` seconds, or until it is released. The lock as it is then."""

@@ -40,21 +40,23 @@ CELL: Fields = {
     "name": "name of the cell",
     "source": "mapping file as it was named",
     "fingerprint": "32 bits of the mapping's meaning, eight hexadecimal digits",
-    "healthy": "robot fresh and writable, CAN bus active, every variable available, nothing forced, no writer lost",
+    "healthy": "robot fresh and writable, CAN bus active, every variable available, in range and as the robot has it, "
+    "nothing forced, no writer lost",
     "problems": "list of texts: what makes it unhealthy",
     "robot": "the link to the robot",
     "modbus": "the Modbus side, or null",
     "canopen": "the CANopen side, or null",
     "writers": "list of declared writers",
-    "variables": "number of variables by quality: `total`, `good`, `stale`, `unavailable`, `never`, `forced`",
+    "variables": "number of variables: `total`, and by quality as of a variable",
     "locks": "`total`, `owned`, `operator` (held by the local operator)",
     "writes": "requests `accepted` and `refused` since the start",
     "last_refusal": "the last refused request, or null",
     "heartbeat": "counts up every 100 ms",
+    "gaps": "times the gateway stood still, stopped, suspended or starved of the CPU",
 }
 ROBOT: Fields = {
     "address": "host:port of the controller",
-    "state": "`lost`, `waiting`, `fresh`, `silent` or `frozen`",
+    "state": "`lost`, `waiting`, `fresh`, `silent`, `frozen` or `late`",
     "writable": "connected, and its inputs were adopted",
     "age": "seconds since the last package that told anything new, or null",
     "frequency": "packages per second, measured",
@@ -63,6 +65,10 @@ ROBOT: Fields = {
     "late": "packages that came late",
     "sessions": "sessions with the controller; the first one is no reconnect",
     "mismatches": "inputs whose read-back differed from what was written",
+    "lag": "seconds by which the newest package is later than the quickest ones were",
+    "unadopted": "inputs whose content in the robot is not known",
+    "differing": "inputs for which the robot holds something else than it was given",
+    "adoption": "seconds until adopted inputs without an owner fall back; 0: none will",
     "watchdog": "whether the robot's watchdog is fed, or null without one",
 }
 MODBUS: Fields = {
@@ -103,7 +109,8 @@ VARIABLE: Fields = {
     "canopen": "null, or `object` (2010h:01), `type`, and `cob_id` of the PDO that carries it, null for SDO alone",
     "value": "true or false, or a number in the robot's unit; the texts `nan`, `inf`, `-inf`",
     "unit": "unit of the value, may be empty",
-    "quality": "`good`, `stale`, `unavailable`, `never` or `forced`",
+    "quality": "`good`, `stale`, `unavailable`, `never`, `forced`, `differs` (the robot holds something else), "
+    "`out_of_range` (one of its places cannot show the value) or `not_running` (valid only while the program runs)",
     "age": "seconds since its source told it, or null if it never did",
     "lock": "name of the lock that guards it, or null (outputs)",
     "owner": "name of the writer that owns it now, `operator`, or null",
@@ -147,7 +154,7 @@ AUDIT: Fields = {
     "monotonic": "seconds of the gateway's own clock; equal for all changes of one request",
     "cell": "name of the cell",
     "what": "`write accepted`, `write refused`, `lock acquired`, `lock taken over`, `lock released`, "
-    "`fallback applied`, `value forced`, `force ended`",
+    "`fallback applied`, `image follows the robot`, `value forced`, `force ended`",
     "writer": "name of the writer; `operator`, `undeclared` or `gateway`",
     "variable": "name of the variable",
     "lock": "name of the lock",

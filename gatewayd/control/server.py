@@ -16,10 +16,13 @@ from typing import Any
 
 from aiohttp import web
 
+from gatewayd import clock
+from gatewayd.aside import aside
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
 from gatewayd.control.views import Json
 from gatewayd.logs import fields
+from gatewayd.printable import json_text
 
 __all__ = ["ALIVE_PERIOD", "FOLLOWERS", "GREATEST_BODY", "application", "serving"]
 
@@ -116,18 +119,23 @@ class _Routes:
 
     def act(self, act: _Act) -> _Handler:
         async def handle(request: web.Request) -> web.StreamResponse:
+            self._api.refuse_what_waited()
             body, who = await _body(request), await _who(request)
+            self._api.refuse_what_waited()
             return _json(act(request.match_info["name"], body, who, _moment()))
 
         return handle
 
     async def reload(self, request: web.Request) -> web.StreamResponse:
+        self._api.refuse_what_waited()
         force = (await _body(request)).get("force", False)
         if not isinstance(force, bool):
             raise ApiError(400, "bad_request", "`force` must be true or false")
         if self._reload is None:
             raise ApiError(501, "no_reload", "this gateway cannot reload: restart it")
-        log.info("reload asked for", extra=fields(detail=await _who(request), force=force))
+        who = await _who(request)
+        self._api.refuse_what_waited()
+        log.info("reload asked for", extra=fields(detail=who, force=force))
         result = await self._reload(force)
         return _json(dict(result.as_object()), 409 if result.exit_code else 200)
 
@@ -152,12 +160,12 @@ class _Routes:
             headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"}
         )
         await response.prepare(request)
-        told = time.monotonic()
+        told = clock.now()
         # A follower that is gone, or that leaves too much unread, is told nothing more.
         with suppress(ConnectionError, TimeoutError):
             while True:
-                if found or time.monotonic() - told >= ALIVE_PERIOD:
-                    told = time.monotonic()
+                if found or clock.now() - told >= ALIVE_PERIOD:
+                    told = clock.now()
                     async with asyncio.timeout(_WRITE_TIME):
                         await response.write("".join(map(_line, found)).encode() or b"\n")
                 await asyncio.sleep(_FOLLOW_PERIOD)
@@ -173,11 +181,11 @@ _HTTP_ERRORS = {
 
 
 def _moment() -> Moment:
-    return Moment(time.monotonic(), time.time())
+    return Moment(clock.now(), time.time())
 
 
 def _line(event: Json) -> str:
-    return json.dumps(event, ensure_ascii=False, separators=(",", ":")) + "\n"
+    return json_text(json.dumps(event, ensure_ascii=False, separators=(",", ":"))) + "\n"
 
 
 def _json(value: Json, status: int = 200) -> web.Response:
@@ -214,8 +222,8 @@ async def _who(request: web.Request) -> str:
         return f"from {request.remote}" if request.remote else ""
     raw = sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER_CREDENTIALS.size)
     _pid, user, _group = _PEER_CREDENTIALS.unpack(raw)
-    # The user database may be on the network.
-    return f"by {await asyncio.to_thread(_user_name, user)}"
+    # The user database may be on the network, and asyncio's own threads would be waited for at the gateway's end.
+    return f"by {await aside(lambda: _user_name(user), 'user name')}"
 
 
 @lru_cache(maxsize=32)

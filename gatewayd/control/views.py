@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from typing import Any, Protocol
 
 from gatewayd.audit import Record, plain_value, utc
@@ -16,7 +17,7 @@ from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.health import CAN_BUS, NMT_STATES
 from gatewayd.core.image import Quality
-from gatewayd.figures import span
+from gatewayd.figures import counted, span
 from gatewayd.happening import Happening
 from gatewayd.mapping.plan import Placement, Plan
 
@@ -103,6 +104,7 @@ def cell_view(station: StationView, now: float) -> Json:
         "writes": {"accepted": health.writes_accepted, "refused": health.writes_refused},
         "last_refusal": _last_refusal(cell, now),
         "heartbeat": health.heartbeat,
+        "gaps": health.gaps,
     }
 
 
@@ -114,7 +116,7 @@ def problems(cell: Cell, now: float, no_robot: str = "") -> list[str]:
     A writer that has not come yet is no problem: nobody knows whether it should be there. One that was there is.
     """
     found = []
-    state, quality = cell.freshness.state, cell.image.quality
+    state = cell.freshness.state
     if state is not Source.FRESH:
         why = f": {no_robot}" if state is Source.LOST and no_robot else ""
         found.append(_SOURCES[state] + _since(now - cell.freshness.last_progress) + why)
@@ -122,11 +124,7 @@ def problems(cell: Cell, now: float, no_robot: str = "") -> list[str]:
         found.append("the robot's inputs are not adopted yet, nothing can be written")
     if cell.health.can_trouble:
         found.append(f"CAN bus {cell.health.can_trouble}")
-    unavailable = quality.count(Quality.UNAVAILABLE)
-    if unavailable:
-        found.append(
-            f"{unavailable} of {len(quality)} variables unavailable: {_some(cell, Quality.UNAVAILABLE)}"
-        )
+    found += _not_good(cell)
     if cell.forcing.forces:
         names = sorted(cell.definition.variables[index].name for index in cell.forcing.forces)
         found.append(f"forced by the local operator: {_list(names)}")
@@ -139,6 +137,17 @@ def problems(cell: Cell, now: float, no_robot: str = "") -> list[str]:
         if not cell.writers.alive[index] and seen > -math.inf:
             found.append(f"writer {writer.name} lost{_since(now - seen)}")
     return found
+
+
+def _not_good(cell: Cell) -> Iterator[str]:
+    """What is wrong with single variables."""
+    quality = cell.image.quality
+    if cell.health.unadopted:
+        yield f"what the robot holds is not known for {counted(cell.health.unadopted, 'input')}"
+    for its, words in _NOT_GOOD.items():
+        count = quality.count(its)
+        if count:
+            yield f"{count} of {len(quality)} variables {words}: {_some(cell, its)}"
 
 
 def declared_view(plan: Plan) -> tuple[Json, ...]:
@@ -249,6 +258,12 @@ _SOURCES = {
     Source.FROZEN: "robot frozen, its clock stands still",
     Source.LATE: "robot values come too late",
 }
+_NOT_GOOD = {
+    Quality.UNAVAILABLE: "unavailable",
+    Quality.DIFFERS: "different in the robot",
+    Quality.OUT_OF_RANGE: "out of the range of their places",
+}
+"""Qualities of single variables that somebody should look at."""
 _LISTED = 3
 """Names told one by one."""
 
@@ -266,6 +281,10 @@ def _robot(plan: Plan, cell: Cell, now: float) -> Json:
         "late": health.late,
         "sessions": health.sessions,
         "mismatches": health.read_back_mismatches,
+        "lag": round(health.lag, 3),
+        "unadopted": health.unadopted,
+        "differing": health.differing,
+        "adoption": _seconds(health.adoption),
         "watchdog": None if plan.robot.watchdog is None else health.watchdog_fed,
     }
 

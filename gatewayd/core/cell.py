@@ -7,19 +7,24 @@ Links call it; it calls its `listeners` after values or qualities changed. Every
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gatewayd.core.admission import Admission, Change
-from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, FallbackKind, Value
+from gatewayd.core.adoption import Adoption, Step, adopted, named
+from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, Value
+from gatewayd.core.delivery import Delivery
 from gatewayd.core.events import Event, EventKind, EventRing
+from gatewayd.core.fallbacks import Fallbacks
 from gatewayd.core.forcing import Force, Forcing
 from gatewayd.core.freshness import Freshness, Source
 from gatewayd.core.health import Health
 from gatewayd.core.image import ProcessImage
+from gatewayd.core.lag import Lag
 from gatewayd.core.limits import within
 from gatewayd.core.locking import Locking
 from gatewayd.core.ownership import Act, LockTable, Move
+from gatewayd.core.program import is_running
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.refusal_log import REFUSAL_INTERVAL, RefusalLog
 from gatewayd.core.requester import LOCAL_OPERATOR, Requester
@@ -56,9 +61,13 @@ class Cell:
         self.ownership = LockTable(definition.locks)
         self.writers = WriterTable(definition.writers, definition.locks)
         self.freshness = Freshness(definition.stale_after)
+        self.lag = Lag(definition.stale_after)
         self.events = EventRing()
         self.health = Health()
         self.forcing = Forcing(self.image)
+        self.delivery = Delivery(self.image, self.health, self.events.append)
+        self.adoption = Adoption(definition.adopt_for)
+        self._fallbacks = Fallbacks(definition, self.image, self.ownership, self.delivery, self.events.append)
         self.listeners: list[Callable[[Direction], None]] = []
         self.write_listeners: list[Callable[[int, Written, float], None]] = []
         """Told of every accepted write that changes something: writer, changes, time. They must not raise."""
@@ -73,8 +82,6 @@ class Cell:
         )
         self._refusals = RefusalLog(self.events.append)
         self._adopted = False
-        self._due_fallbacks: set[int] = set()
-        """Inputs that could not be given their release fallback, because the robot or the register was not there."""
         self._next_heartbeat: float | None = None
 
     @property
@@ -288,38 +295,77 @@ class Cell:
         self.freshness.lost()
         self._adopted = False
         self.health.frequency = 0.0
+        self.health.lag = 0.0
+        self.program(None)
         self.events.append(Event(now, EventKind.ROBOT_LOST, detail=reason))
         self.forcing.lift()
+        self.delivery.lost()
         self.image.inputs_lost()
         if was_fresh:
             self._outputs_lost()
         self._notify(Direction.INPUT)
 
-    def package_arrived(self, timestamp: float | None, now: float) -> bool:
-        """Whether the package tells anything new. If so, the link copies its values and calls `outputs_written`."""
+    def package_arrived(self, timestamp: float | None, now: float, raw: float | None = None) -> bool:
+        """Whether the package is to be shown. If so, the link copies its values and calls `outputs_written`.
+
+        It is not if it reports nothing new, or came later than `stale_after`; `freshness` knows which. `raw` is the
+        time by a clock that no time service adjusts.
+        """
         if self.freshness.state is Source.LOST:
             return False
         self.health.packages += 1
         was_fresh = self.freshness.state is Source.FRESH
-        news = self.freshness.package(timestamp, now)
-        if news and not was_fresh:
-            self.events.append(Event(now, EventKind.FRESH))
-        if news:
+        shown = self.freshness.package(
+            timestamp, now, self._measure_lag(timestamp, now if raw is None else raw)
+        )
+        if shown:
+            if not was_fresh:
+                self.lag.in_time()
+                self.events.append(Event(now, EventKind.FRESH))
             self.forcing.lift()
-        return news
+            self.image.uncover()
+        elif self.freshness.state is Source.LATE:
+            self.lag.stays_late(now)
+            if was_fresh:
+                self._source_stale(now)
+        return shown
+
+    def program(self, state: int | None) -> None:
+        """The `runtime_state` of a package, before its `outputs_written`; None: the controller does not report it."""
+        self.health.program = state
+        self.image.running = is_running(state)
 
     def outputs_written(self, now: float) -> None:
-        """The link has copied a package's values into the image: they are good from now on."""
+        """The link has copied a package's values into the image: they are good from now on, and as old as they are."""
         if self.freshness.state is not Source.FRESH:
             return
-        self.image.outputs_told(now)
+        self.image.outputs_told(min(now, self.freshness.last_progress))
         self._notify(Direction.OUTPUT)
 
+    def lag_doubtful(self, now: float) -> bool:
+        """Whether to ask the controller something: packages stay late, and there may be no backlog behind it.
+
+        At most once a second. What is asked has to be answered behind the packages that the controller had sent before.
+        """
+        return self.freshness.state is Source.LATE and self.lag.doubtful(now)
+
+    def backlog_probed(self, delay: float, now: float) -> bool:
+        """The controller answered `delay` seconds after the question.
+
+        True: so quickly that there is no backlog; its clock stood still for a while. What it sends now counts as in
+        time, and the link begins one new session, so that nothing is left of what may have queued. False: no change.
+        """
+        if self.freshness.state is not Source.LATE or not self.lag.probed(delay):
+            return False
+        self.health.lag = self.lag.seconds
+        self.lag.in_time()
+        return True
+
     def adopt(self, values: Mapping[int, Value], now: float) -> None:
-        """Take over what the controller's inputs hold, then apply the fallbacks that fell due meanwhile.
+        """Take over what the controller's inputs hold, then apply the fallbacks that are owed.
 
         Called once per session, and again (after `set_availability`) when registers became available later. An input
-        that is not among `values`, because the controller does not tell it, is not good before it is written.
+        that is not among `values`, because the controller does not say what it holds, is not good before it is given.
         """
         if self.freshness.state is Source.LOST:
             return
@@ -327,13 +373,31 @@ class Cell:
         self.forcing.lift()
         for index, value in values.items():
             self.image.tell(index, value, now)
+        entered = self.delivery.adopted(values.keys())
         if first:
-            self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=f"{len(values)} variables"))
-        wanted = self._due_fallbacks.copy()
-        if self.definition.clear_on_connect:
-            wanted.update(filter(self._wants_fallback, self.image.inputs if first else values))
-        self._fall_back(sorted(wanted), now)
+            detail = adopted(self.image, len(values), self.delivery.unread)
+            self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=detail))
+        self._fall_back(self._fallbacks.due(entered.union(values), over=self.adoption.over), now)
         self._force_inputs(now)
+        self._notify(Direction.INPUT)
+
+    def complete(self, variables: Iterable[int], now: float) -> None:
+        """Inputs that go out with one that was written, and of which nobody knows what the robot holds, fall back."""
+        self._fallbacks.complete(variables, now)
+        self._notify(Direction.INPUT)
+
+    def read_back(
+        self, differ: Mapping[int, str], agree: Collection[int], follow: Mapping[int, Value], now: float
+    ) -> None:
+        """What the comparison of a package with what was sent came to.
+
+        `differ`: given inputs for which the robot holds something else, in words; `agree`: inputs that read back as
+        sent; `follow`: what the robot holds in inputs that nobody gave in this session.
+        """
+        self.forcing.lift()
+        self.delivery.agree(agree)
+        self.delivery.differ(differ, now)
+        self.delivery.follow(follow, now)
         self._notify(Direction.INPUT)
 
     def set_availability(self, variables: Iterable[int], available: bool, reason: str, now: float) -> None:
@@ -349,6 +413,8 @@ class Cell:
         kind = EventKind.AVAILABLE if available else EventKind.UNAVAILABLE
         self.forcing.lift()
         for index in changed:
+            if not available:
+                self.delivery.leave(index)
             self.image.set_available(index, available)
             self.events.append(Event(now, kind, variable=index, detail=reason))
         self._notify(Direction.INPUT)
@@ -367,8 +433,8 @@ class Cell:
         was_fresh = self.freshness.state is Source.FRESH
         self.freshness.tick(now)
         if was_fresh and self.freshness.state is not Source.FRESH:
-            self.events.append(Event(now, EventKind.STALE, detail=self.freshness.state.name.lower()))
-            self._outputs_lost()
+            self._source_stale(now)
+        self._count_adoption(now)
         self._refusals.tick(now)
         self._beat(now)
 
@@ -376,7 +442,7 @@ class Cell:
         """The process stood still from `since` to `now`; called before anything that waited is served."""
         if now - since >= NOTABLE_GAP:
             self.health.gaps += 1
-            self.events.append(Event(now, EventKind.STOOD_STILL, detail=f"for {now - since:.1f} s"))
+            self.events.append(Event(now, EventKind.STOOD_STILL, detail=f"{now - since:.1f} s"))
         self._locking.gap(since, now)
         self.tick(now)
 
@@ -451,6 +517,7 @@ class Cell:
         for index, force in self.forcing.forces.items():
             if self.definition.variables[index].direction is Direction.INPUT and self.image.available[index]:
                 self.image.tell(index, force.value, now)
+                self.delivery.give(((index, force.value),), now)
 
     def _release_expired(self, now: float) -> None:
         forces, holds = self.forcing.due(now)
@@ -461,29 +528,24 @@ class Cell:
             self._settle(holds, now, "time limit")
         self._locking.expire(now)
 
-    def _wants_fallback(self, index: int) -> bool:
-        lock = self.definition.variables[index].lock
-        return lock is not None and self.ownership.owners[lock] is None and self.image.available[index]
+    def _count_adoption(self, now: float) -> None:
+        """What nobody has claimed by the end of `adopt_for` falls back."""
+        step, left = self.adoption.look(now, adopted=self._adopted), self.adoption.left(now)
+        pending = self._fallbacks.of_nobody(self.image.inputs) if left or step is Step.END else []
+        self.health.adoption = left if pending else 0.0
+        if step is Step.BEGIN and pending:
+            detail = f"in {left:g} s, without an owner by then: {named(self.image, pending)}"
+            self.events.append(Event(now, EventKind.ADOPTION_ENDS, detail=detail))
+        elif step is Step.END and self._adopted:
+            self._fall_back(pending, now)
+            self._notify(Direction.INPUT)
 
     def _fall_back(self, variables: Iterable[int], now: float) -> None:
-        for index in variables:
-            if not (self._adopted and self.image.available[index]):
-                self._due_fallbacks.add(index)
-                continue
-            self._due_fallbacks.discard(index)
-            variable = self.definition.variables[index]
-            if variable.on_release.kind is FallbackKind.HOLD:
-                continue
-            old = self.image.values[index]
-            new = variable.on_release.apply(old, variable.kind)
-            self.image.tell(index, new, now)
-            if new != old:
-                self.events.append(Event(now, EventKind.FALLBACK, variable=index, old=old, new=new))
+        self._fallbacks.apply(variables, now, adopted=self._adopted)
 
     def _set_inputs(self, values: Sequence[tuple[int, Value]], now: float) -> None:
         self.image.tell_all(values, now)
-        if self._due_fallbacks:
-            self._due_fallbacks.difference_update(index for index, _value in values)
+        self.delivery.give(values, now)
         self._notify(Direction.INPUT)
 
     def _tell_written(self, writer: int, values: Sequence[tuple[int, Value]], now: float) -> None:
@@ -494,6 +556,17 @@ class Cell:
         if changed:
             for listener in self.write_listeners:
                 listener(writer, changed, now)
+
+    def _measure_lag(self, timestamp: float | None, raw: float) -> float:
+        if timestamp is None or not math.isfinite(timestamp):
+            return 0.0
+        self.health.lag = self.lag.package(timestamp, raw)
+        return self.health.lag
+
+    def _source_stale(self, now: float) -> None:
+        """The robot is connected and was fresh until now."""
+        self.events.append(Event(now, EventKind.STALE, detail=self.freshness.state.name.lower()))
+        self._outputs_lost()
 
     def _outputs_lost(self) -> None:
         self.forcing.lift()

@@ -123,7 +123,7 @@ class Variable:
     shown: tuple[float, float] | None = None
     """Least and greatest value that every place of it can show; None: all of them."""
     shows_nan: bool = True
-    """Whether every place of it can show what is no number."""
+    """Whether every place of it can show NaN and the infinities as what they are."""
     valid_running: bool = False
     """Outputs that mean something only while the robot program runs."""
     unit: str = ""

@@ -37,7 +37,6 @@ class EventKind(Enum):
     FORCED = "value forced"
     UNFORCED = "force ended"
     ADOPTION_ENDS = "adopted values fall back soon"
-    DIFFERS = "robot holds something else"
     FOLLOWED = "image follows the robot"
     STOOD_STILL = "gateway stood still"
 

@@ -94,6 +94,6 @@ class Forcing:
                 image.values[index] = force.value
                 image.times[index] = force.since
                 image.quality[index] = Quality.FORCED
-            elif quality is Quality.GOOD:
+            elif quality in (Quality.GOOD, Quality.OUT_OF_RANGE):
                 image.quality[index] = Quality.FORCED
         image.find_unreadable()

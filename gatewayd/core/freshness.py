@@ -1,4 +1,4 @@
-"""Whether the robot still tells: a state machine over packages, silence and a timestamp that stands still."""
+"""Whether the robot is heard in time: a state machine over packages, silence, lag and a timestamp that stands still."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Source(IntEnum):
     FROZEN = 4
     """Packages come, but the controller's timestamp stands still."""
     LATE = 5
-    """Packages come, but so late that what they tell is too old."""
+    """Packages come, but what they report is older than `stale_after`."""
 
 
 class Happening(Enum):
@@ -62,9 +62,13 @@ TRANSITIONS: dict[tuple[Source, Happening], Source] = {
 
 
 class Freshness:
-    """Follows one source. `stale_after` is in seconds; times are of the monotonic clock."""
+    """Follows one source. `stale_after` is in seconds; times are of the monotonic clock.
 
-    __slots__ = ("last_package", "last_progress", "stale_after", "state", "timestamp")
+    A package is as old as it is late. Once late, the source is fresh again when the lag is no more than half of
+    `stale_after`: at the limit itself it would go to and fro with every package.
+    """
+
+    __slots__ = ("last_arrival", "last_package", "last_progress", "stale_after", "state", "timestamp")
 
     def __init__(self, stale_after: float) -> None:
         self.stale_after = stale_after
@@ -72,7 +76,11 @@ class Freshness:
         self.timestamp: float | None = None
         """The controller's own time in the last package."""
         self.last_package = -math.inf
+        """When the last package came."""
+        self.last_arrival = -math.inf
+        """When the last package with a new timestamp came."""
         self.last_progress = -math.inf
+        """When what that package reports was so: it came later by its lag."""
 
     def connected(self) -> None:
         """A session with the controller has begun. One that was frozen and still is does not pass for fresh by it."""
@@ -82,30 +90,45 @@ class Freshness:
         """The session has ended."""
         self._move(Happening.LOST)
 
-    def package(self, timestamp: float | None, now: float) -> bool:
-        """A package came. Returns whether it tells anything new: its timestamp differs from the last one's.
+    def package(self, timestamp: float | None, now: float, lag: float = 0.0) -> bool:
+        """A package came, `lag` seconds late. Whether it reports anything to be shown: new and not too old.
 
-        A controller whose recipe has no timestamp (None) is believed. A package outside a session tells nothing.
+        It is new if its timestamp differs from the last one's. A controller whose recipe has no timestamp (None) is
+        believed; a timestamp that is no number never moves on. A package outside a session reports nothing.
         """
         if self.state is Source.LOST:
             return False
         self.last_package = now
-        if timestamp is not None and timestamp == self.timestamp:
+        if timestamp is not None and (timestamp == self.timestamp or not math.isfinite(timestamp)):
             if self.state is Source.WAITING:
                 self._move(Happening.NO_PROGRESS)
             return False
         self.timestamp = timestamp
-        self.last_progress = now
-        if self.state is not Source.FRESH:
-            self._move(Happening.PROGRESS)
-        return True
+        self.last_arrival = now
+        self.last_progress = now - lag
+        limit = self.stale_after / 2 if self.state is Source.LATE else self.stale_after
+        self._move(Happening.TOO_LATE if lag > limit else Happening.PROGRESS)
+        return self.state is Source.FRESH
 
     def tick(self, now: float) -> None:
-        """Notice silence and a frozen timestamp."""
-        if self.state in (Source.LOST, Source.WAITING) or now - self.last_progress <= self.stale_after:
+        """Notice that what was reported last is too old, and by what: lag most of all, a frozen timestamp, silence."""
+        limit = self.stale_after
+        if self.state in (Source.LOST, Source.WAITING) or now - self.last_progress <= limit:
             return
-        silent = now - self.last_package > self.stale_after
-        self._move(Happening.NO_PACKAGE if silent else Happening.NO_PROGRESS)
+        if self.last_arrival - self.last_progress > limit / 2 and now - self.last_arrival <= limit:
+            self._move(Happening.TOO_LATE)
+        elif self.last_package > self.last_arrival and now - self.last_package <= limit:
+            self._move(Happening.NO_PROGRESS)
+        else:
+            self._move(Happening.NO_PACKAGE)
+
+    def succeed(self, former: Freshness) -> None:
+        """Go on where `former` stands, with this one's own `stale_after`."""
+        self.state = former.state
+        self.timestamp = former.timestamp
+        self.last_package = former.last_package
+        self.last_arrival = former.last_arrival
+        self.last_progress = former.last_progress
 
     def _move(self, happening: Happening) -> None:
         self.state = TRANSITIONS.get((self.state, happening), self.state)

@@ -7,13 +7,16 @@ greatest number of their width, which also stands for "never" (ages) and "no end
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
+from gatewayd.core.program import STATES
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 
@@ -49,6 +52,14 @@ _U16 = 0xFFFF
 _U32 = 0xFFFF_FFFF
 
 
+def _numbered(numbers: Iterable[IntEnum]) -> str:
+    return ", ".join(f"{number.value} {number.name.lower().replace('_', ' ')}" for number in numbers)
+
+
+def _program_states() -> str:
+    return ", ".join(f"{state + 1} {name}" for state, (name, _) in STATES.items())
+
+
 @dataclass(frozen=True, slots=True)
 class StatusField:
     """One number of the header, `offset` words after `BASE`, `words` long."""
@@ -82,9 +93,9 @@ FIELDS = (
     StatusField(4, 1, "heartbeat", "counts up every 100 ms while the gateway lives, wraps"),
     StatusField(5, 1, "variables", "number of variables"),
     StatusField(6, 1, "writers", "number of declared writers"),
-    StatusField(7, 1, "robot_state", "0 lost, 1 waiting, 2 fresh, 3 silent, 4 frozen"),
+    StatusField(7, 1, "robot_state", _numbered(Source)),
     StatusField(8, 2, "uptime", "seconds since the gateway started"),
-    StatusField(10, 2, "robot_age", "milliseconds since the last package that told anything new"),
+    StatusField(10, 2, "robot_age", "age of the newest package that reported anything new, in milliseconds"),
     StatusField(12, 1, "frequency", "packages per second, measured, in 0.1 Hz"),
     StatusField(13, 1, "sessions", "sessions with the controller since the start, wraps"),
     StatusField(14, 2, "packages", "packages received"),
@@ -112,6 +123,22 @@ FIELDS = (
     StatusField(
         RELEASE, 1, "release", "write a variable's number to give its lock back, 65535 for all; reads 0"
     ),
+    StatusField(42, 1, "unadopted", "inputs whose content in the robot is not known"),
+    StatusField(43, 1, "differing", "inputs for which the robot holds something else than it was given"),
+    StatusField(
+        44,
+        2,
+        "lag",
+        "milliseconds by which the newest package came later than the quickest ones; part of ages",
+    ),
+    StatusField(
+        46,
+        1,
+        "adoption",
+        "seconds until adopted inputs that nobody owns fall back; 0: they have, or never will",
+    ),
+    StatusField(47, 1, "program", f"state of the robot program: 0 unknown, {_program_states()}"),
+    StatusField(48, 1, "gaps", "times that the gateway stood still, wraps"),
 )
 HEADER_WORDS = 64
 TABLES = (
@@ -133,13 +160,14 @@ TABLES = (
         3264,
         MAX_VARIABLES,
         "quality",
-        "one word for each variable: 0 good, 1 stale, 2 unavailable, 3 never, 4 forced",
+        f"one word for each variable: {_numbered(Quality)}",
     ),
 )
 LENGTH = 4288
 """Words of the whole block."""
 
-_HEADER = struct.Struct(">HHIHHHHIIHHIIIIIIHHH2xHHHHI")
+_HEADER = struct.Struct(">HHIHHHHIIHHIIIIIIHHH2xHHHHI8x4xHHIHHH")
+"""The fields of the header in order; what lies between them, `request` and `release` among it, reads 0."""
 
 
 _Entries = Callable[[range, float], Iterable[int]]
@@ -241,6 +269,12 @@ class StatusBlock:
             _number(last.writer) if last is not None else 0,
             _number(refusal.holder) if refusal is not None else 0,
             _milliseconds(now - last.time, _U32) if last is not None else _U32,
+            min(_U16, health.unadopted),
+            min(_U16, health.differing),
+            _milliseconds(health.lag, _U32),
+            min(_U16, math.ceil(health.adoption)),
+            0 if health.program is None else min(_U16, health.program + 1),
+            health.gaps & _U16,
         )
 
     def _flags(self) -> int:

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from gatewayd.core.cell import Cell, LastRefusal
 from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, FallbackKind, Lock, Variable
 from gatewayd.core.events import Event
-from gatewayd.core.image import Quality
 
 __all__ = ["Succession", "succeed"]
 
@@ -39,14 +38,15 @@ def succeed(old: Cell, definition: CellDefinition, now: float) -> Succession:
     stranded = _release(old, match, now)
     old.forcing.lift()
     new = Cell(definition)
-    _take_image(old, new, match)
+    new.image.succeed(old.image, match.variables)
     new.ownership.succeed(old.ownership, match.locks, match.writers, now)
     new.writers.succeed(old.writers, match.writers)
     _take_source(old, new)
     _take_history(old, new, match)
     _take_forcing(old, new, match)
     new._adopted = old._adopted
-    new._due_fallbacks = set(match.due(old._due_fallbacks))
+    new.adoption.succeed(old.adoption)
+    new.delivery.succeed(old.delivery, new.health, match.variables, match.due)
     new._next_heartbeat = old._next_heartbeat
     return Succession(new, stranded)
 
@@ -124,7 +124,7 @@ def _release(old: Cell, match: _Match, now: float) -> tuple[str, ...]:
     if old.accepts_writes:
         old._fall_back([index for index in gone if index not in released and old.image.available[index]], now)
         old._notify(Direction.INPUT)
-    owed = (old.definition.variables[index] for index in gone if index in old._due_fallbacks)
+    owed = (old.definition.variables[index] for index in gone if index in old.delivery.owed)
     return tuple(variable.name for variable in owed if variable.on_release.kind is not FallbackKind.HOLD)
 
 
@@ -145,27 +145,9 @@ def _inputs_without_successor(match: _Match) -> list[int]:
 # -- after: what stays is taken over ---------------------------------------------------------------------------------
 
 
-def _take_image(old: Cell, new: Cell, match: _Match) -> None:
-    former, image = old.image, new.image
-    image.output_time = former.output_time
-    for source, target in match.variables.items():
-        variable = image.variables[target]
-        value, quality = former.values[source], former.quality[source]
-        if variable.direction is Direction.OUTPUT and quality is not Quality.GOOD:
-            value = variable.on_stale.apply(value, variable.kind)
-        image.values[target] = value
-        image.times[target] = former.times[source]
-        image.quality[target] = quality
-        image.available[target] = former.available[source]
-    image.find_unreadable()
-
-
 def _take_source(old: Cell, new: Cell) -> None:
-    former, freshness = old.freshness, new.freshness
-    freshness.state = former.state
-    freshness.timestamp = former.timestamp
-    freshness.last_package = former.last_package
-    freshness.last_progress = former.last_progress
+    new.freshness.succeed(old.freshness)
+    new.lag.succeed(old.lag)
     new.health = replace(old.health)
 
 

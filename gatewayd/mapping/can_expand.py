@@ -17,6 +17,7 @@ from gatewayd.mapping.can_model import AUTO, NO_PDO, Canopen, CanopenPlace, PdoD
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Part
 from gatewayd.mapping.pdo_layout import PDO_BITS, PDO_NUMBERS, Slot, assign, place_objects, split_into_pdos
+from gatewayd.mapping.status_words import StatusWord, field_word, quality_word
 from gatewayd.rtde.types import DataType
 
 __all__ = [
@@ -49,6 +50,8 @@ class Candidate:
     """Position among the variables of the cell."""
     line: str
     """Name of its line."""
+    name: str
+    """Its own: `start`, `recipe[3]`."""
     member: int | None
     """Index within the family of its line; None for a single variable."""
     direction: Direction
@@ -82,7 +85,7 @@ class ConcretePdo:
     position: Position
     """Place of its name, or of the first variable that asks for it."""
     direction: Direction
-    """That of its first variable."""
+    """From the robot where it carries status words; else that of its first variable."""
     slot: Slot
     transmission: int
     inhibit: float | None
@@ -91,6 +94,9 @@ class ConcretePdo:
     """Seconds: event timer, or deadline towards the robot."""
     sync_start: int
     entries: tuple[MappedObject, ...]
+    """Variables, in their order."""
+    status: tuple[StatusWord, ...] = ()
+    """Words of the status block, which come before the variables."""
 
     @property
     def label(self) -> str:
@@ -101,12 +107,24 @@ class ConcretePdo:
     @property
     def bits(self) -> int:
         """Bits that are mapped."""
-        return sum(entry.plan.type.bits for entry in self.entries)
+        return self._status_bits + sum(entry.plan.type.bits for entry in self.entries)
+
+    @property
+    def _status_bits(self) -> int:
+        return sum(word.type.bits for word in self.status)
+
+    @property
+    def status_offsets(self) -> Iterator[tuple[int, StatusWord]]:
+        """Each word of the status block with the bit where it begins."""
+        offset = 0
+        for word in self.status:
+            yield offset, word
+            offset += word.type.bits
 
     @property
     def offsets(self) -> Iterator[tuple[int, MappedObject]]:
-        """Each entry with the bit where it begins."""
-        offset = 0
+        """Each variable with the bit where it begins."""
+        offset = self._status_bits
         for entry in self.entries:
             yield offset, entry
             offset += entry.plan.type.bits
@@ -195,11 +213,13 @@ class _Layout:
         self._of: dict[int, str] = {}
         """Variable -> the PDO that it is in."""
         self._members: dict[str, list[int]] = {name: [] for name in part.spec.pdos}
+        self._status: dict[str, list[StatusWord]] = {name: [] for name in part.spec.pdos}
         self._objects: dict[int, MappedObject] = {}
 
     def name_members(self) -> None:
         """Collect the variables of the PDOs of the file: those they list, then those that ask for them."""
         for name, pdo in self.part.spec.pdos.items():
+            self._name_status(name, pdo)
             for number, member in enumerate(pdo.variables):
                 position = self.part.at("pdos", name, "variables", number)
                 if len(self._misnamed) > _MANY:
@@ -214,6 +234,18 @@ class _Layout:
             wanted = candidate.place.pdo if candidate.place is not None else NO_PDO
             if wanted in self._members and self._of.get(candidate.index) != wanted:
                 self._enter(wanted, candidate.line, candidate, None)
+
+    def _name_status(self, name: str, pdo: PdoSpec) -> None:
+        for number, member in enumerate(pdo.status):
+            if member.variables is None:
+                self._status[name].append(field_word(member.field))
+                continue
+            found = self._find(member.variables.name, member.variables.members)
+            if found is None:
+                position = self.part.at("pdos", name, "status", number)
+                self._misnamed.append(Misnamed(name, member.variables.text, MemberProblem.UNKNOWN, position))
+            else:
+                self._status[name] += (quality_word(one.index, one.name) for one in found)
 
     def _find(self, name: str, members: range | None) -> list[Candidate] | None:
         family = self._lines.get(name)
@@ -259,15 +291,15 @@ class _Layout:
             self.part,
             tuple(self._objects.values()),
             tuple(pdos),
-            tuple(name for name, members in self._members.items() if not members),
+            tuple(name for name, members in self._members.items() if not members and not self._status[name]),
             tuple(self._misnamed),
         )
 
     def _direction(self, direction: Direction) -> list[ConcretePdo]:
         named = [
-            (name, tuple(self._objects[index] for index in members))
-            for name, members in self._members.items()
-            if members and self.candidates[members[0]].direction is direction
+            (name, tuple(self._objects[index] for index in self._members[name]))
+            for name in self._members
+            if self._direction_of(name) is direction
         ]
         automatic = [
             self._objects[one.index].plan
@@ -297,6 +329,13 @@ class _Layout:
         ]
         return sorted(made, key=lambda pdo: pdo.slot.number)
 
+    def _direction_of(self, name: str) -> Direction | None:
+        """Which way a PDO of the file goes; None for an empty one."""
+        if self._status[name]:
+            return Direction.OUTPUT
+        members = self._members[name]
+        return self.candidates[members[0]].direction if members else None
+
     def _pdo(
         self, name: str, direction: Direction, slot: Slot, entries: tuple[MappedObject, ...]
     ) -> ConcretePdo:
@@ -314,6 +353,7 @@ class _Layout:
             _given(spec, defaults, timer),
             spec.sync_start if isinstance(spec, PdoSpec) else 0,
             entries,
+            tuple(self._status[name]) if name else (),
         )
 
 

@@ -13,6 +13,7 @@ from gatewayd.mapping.can_scalars import (
     InhibitTime,
     Members,
     MillisecondTime,
+    StatusMembers,
     Transmission,
 )
 from gatewayd.mapping.rules import syntax
@@ -122,6 +123,11 @@ class PdoSpec(Section):
     )
     sync_start: Whole = Field(
         default=0, ge=0, le=240, description="counter value of the first SYNC that counts; 0: any"
+    )
+    status: StatusMembers = Field(
+        default=(),
+        description="words of the status block, before the variables, in a PDO from the robot: names of its fields "
+        "(flags, robot_state), 'quality of force'",
     )
     variables: Members = Field(
         default=(),

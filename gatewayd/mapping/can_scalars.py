@@ -5,6 +5,7 @@ As `scalars`: what cannot be read raises `PydanticCustomError` with the rule tha
 
 from __future__ import annotations
 
+import difflib
 import re
 from dataclasses import dataclass
 from typing import Annotated, Final, Literal
@@ -21,6 +22,7 @@ from gatewayd.mapping.scalars import (
     span,
     written,
 )
+from gatewayd.mapping.status_words import FIELD_NAMES
 
 __all__ = [
     "EVENT",
@@ -30,6 +32,8 @@ __all__ = [
     "Member",
     "Members",
     "MillisecondTime",
+    "StatusMember",
+    "StatusMembers",
     "Transmission",
 ]
 
@@ -195,3 +199,58 @@ Members = Annotated[
     Field(strict=False, max_length=_MOST_MEMBERS),
 ]
 """Variables by name, or a single one."""
+
+
+@dataclass(frozen=True, slots=True)
+class StatusMember:
+    """Words of the status block: a field (`flags`), or the quality of variables (`quality of recipe[0..3]`)."""
+
+    text: str
+    field: str
+    """Name of the field; empty for qualities."""
+    variables: Member | None = None
+    """The variables whose quality is meant."""
+
+    def __str__(self) -> str:
+        """As written."""
+        return self.text
+
+
+_QUALITY_OF: Final = "quality of "
+
+
+def _status_member(value: object) -> StatusMember:
+    if isinstance(value, StatusMember):
+        return value
+    hint = "write a field of the status block such as flags or robot_state, or `quality of` and a variable"
+    text = scalar(value, "a word of the status block", hint)
+    if text.startswith(_QUALITY_OF):
+        return StatusMember(text, "", _member(text.removeprefix(_QUALITY_OF).strip()))
+    if text not in FIELD_NAMES:
+        close = difflib.get_close_matches(text, FIELD_NAMES, n=1, cutoff=0.6)
+        hint = f"did you mean `{close[0]}`?" if close else hint
+        refuse(syntax.BAD_CHOICE, f"`{text}` is no word of the status block that a PDO can carry", hint)
+    return StatusMember(text, text)
+
+
+_STATUS_SCHEMA = (
+    Annotated[str, Field(json_schema_extra={"enum": [*FIELD_NAMES]})]
+    | Annotated[
+        str,
+        Field(
+            pattern=r"^quality of +[A-Za-z][A-Za-z0-9_]*(\[[0-9]+(\.\.[0-9]+)?\])?$",
+            examples=["quality of force"],
+        ),
+    ]
+)
+StatusMembers = Annotated[
+    tuple[
+        Annotated[
+            InstanceOf[StatusMember], BeforeValidator(_status_member, json_schema_input_type=_STATUS_SCHEMA)
+        ],
+        ...,
+    ],
+    BeforeValidator(one_or_many, json_schema_input_type=_STATUS_SCHEMA | list[_STATUS_SCHEMA]),
+    Field(strict=False, max_length=_MOST_MEMBERS),
+]
+"""Words of the status block by name, or a single one."""

@@ -29,11 +29,12 @@ from gatewayd.core.definition import (
 from gatewayd.mapping.can_expand import CanopenCell, ConcretePdo
 from gatewayd.mapping.codec import Codec
 from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
-from gatewayd.mapping.model import Modbus, Robot
+from gatewayd.mapping.model import ADOPT_FOR, Modbus, Robot, WriterSpec
 from gatewayd.mapping.plan import ModbusPlan, Network, Placement, Plan, RobotPlan, WatchdogPlan
+from gatewayd.mapping.shown import Shown, shown_of
 from gatewayd.rtde.catalogue import Series
 
-__all__ = ["compile_plan", "fingerprint", "package_period"]
+__all__ = ["PROGRAM_STATE", "compile_plan", "fingerprint", "package_period"]
 
 _STALE_PERIODS: Final = 5
 _LEAST_STALE_AFTER: Final = 0.1
@@ -43,6 +44,8 @@ _CASTS: Final[dict[ValueKind, Callable[[Value], Value]]] = {
     ValueKind.FLOAT: float,
 }
 _TIMESTAMP: Final = "timestamp"
+PROGRAM_STATE: Final = "runtime_state"
+"""The field that says whether the robot program runs."""
 
 
 def compile_plan(cell: ExpandedCell) -> Plan:
@@ -55,7 +58,7 @@ def compile_plan(cell: ExpandedCell) -> Plan:
     definition = CellDefinition(
         name=document.cell,
         fingerprint=0,
-        variables=tuple(_variable(variable) for variable in cell.variables),
+        variables=tuple(map(_variable, cell.variables, shown_of(cell))),
         locks=tuple(
             Lock(
                 lock.name,
@@ -63,12 +66,14 @@ def compile_plan(cell: ExpandedCell) -> Plan:
                 tuple(writers[name] for name in lock.owners),
                 lock.takeover,
                 lock.lease,
+                lock.whole,
             )
             for lock in cell.locks
         ),
-        writers=tuple(Writer(name, part.spec.timeout) for name, part in document.writers.items()),
+        writers=tuple(_writer(name, part.spec) for name, part in document.writers.items()),
         stale_after=robot.stale_after or max(_STALE_PERIODS * package_period(robot), _LEAST_STALE_AFTER),
         clear_on_connect=robot.on_connect == "fallback",
+        adopt_for=robot.adopt_for,
     )
     modbus = _modbus(cell, document.modbus.spec) if document.modbus is not None else None
     canopen = _canopen(cell, cell.canopen) if cell.canopen is not None else None
@@ -89,7 +94,7 @@ def package_period(robot: Robot) -> float:
     return max(int(base / robot.frequency), 1) / base
 
 
-def _variable(variable: ConcreteVariable) -> Variable:
+def _variable(variable: ConcreteVariable, shown: Shown) -> Variable:
     spec, kind = variable.spec, variable.kind
     is_input = variable.direction is Direction.INPUT
     return Variable(
@@ -109,6 +114,19 @@ def _variable(variable: ConcreteVariable) -> Variable:
         deadband=spec.deadband,
         unit=spec.unit,
         comment=spec.comment,
+        shown=shown.bounds,
+        shows_nan=shown.nan,
+        valid_running=variable.valid_running,
+    )
+
+
+def _writer(name: str, spec: WriterSpec) -> Writer:
+    return Writer(
+        name,
+        timeout=spec.timeout,
+        grace=spec.grace or 0.0,
+        counts_writes=spec.timeout_counts == "writes",
+        heartbeat=spec.heartbeat if spec.node is not None else None,
     )
 
 
@@ -125,7 +143,7 @@ def _robot(cell: ExpandedCell, robot: Robot, writers: dict[str, int]) -> RobotPl
         host=robot.host,
         port=robot.port,
         frequency=robot.frequency,
-        outputs=tuple(name for name in _fields(cell, Direction.OUTPUT) if name != _TIMESTAMP),
+        outputs=tuple(name for name in _subscribed(cell) if name != _TIMESTAMP),
         inputs=_fields(cell, Direction.INPUT),
         verify=robot.verify,
         watchdog=None
@@ -136,6 +154,14 @@ def _robot(cell: ExpandedCell, robot: Robot, writers: dict[str, int]) -> RobotPl
             tuple(writers[name] for name in dict.fromkeys(watchdog.requires or ())),
         ),
     )
+
+
+def _subscribed(cell: ExpandedCell) -> tuple[str, ...]:
+    """Fields of outputs, and what says whether the program runs where the quality of one hangs on it."""
+    fields = _fields(cell, Direction.OUTPUT)
+    if not any(variable.valid_running for variable in cell.variables):
+        return fields
+    return tuple(dict.fromkeys((*fields, PROGRAM_STATE)))
 
 
 def _fields(cell: ExpandedCell, direction: Direction) -> tuple[str, ...]:
@@ -204,9 +230,15 @@ def _pdo(pdo: ConcretePdo) -> PdoPlan:
         transmission=pdo.transmission,
         inhibit=_ticks(pdo.inhibit, 10_000),
         event=_ticks(pdo.event, 1000),
-        entries=tuple(
-            PdoEntry(one.variable, one.plan.index, one.plan.subindex, one.plan.type.bits)
-            for one in pdo.entries
+        entries=(
+            *(
+                PdoEntry(None, word.index, word.subindex, word.type.bits, word.quality_of)
+                for word in pdo.status
+            ),
+            *(
+                PdoEntry(one.variable, one.plan.index, one.plan.subindex, one.plan.type.bits)
+                for one in pdo.entries
+            ),
         ),
         sync_start=pdo.sync_start,
         name=pdo.name,
@@ -219,6 +251,13 @@ def _ticks(seconds: float | None, per_second: int) -> int:
 
 
 _FOR_PEOPLE: Final = frozenset({"comment", "source", "fingerprint"})
+_DERIVED: Final = {
+    Variable: frozenset({"shown", "shows_nan"}),
+    Writer: frozenset({"heartbeat"}),
+}
+"""Fields that follow from others, which count: places, and the consumers of CANopen."""
+_DEFAULTS: Final = {(CellDefinition, "adopt_for"): ADOPT_FOR}
+"""What a field is where the file says nothing, as far as the core's default is another."""
 _CODEC_MEANING: Final = ("type", "order", "scale", "offset")
 
 
@@ -257,7 +296,10 @@ _known_fields: dict[type, tuple[tuple[str, Any], ...]] = {}
 def _fields_of(kind: type[Any]) -> tuple[tuple[str, Any], ...]:
     """Names and defaults of the fields that carry meaning."""
     if kind not in _known_fields:
+        without = _FOR_PEOPLE | _DERIVED.get(kind, frozenset())
         _known_fields[kind] = tuple(
-            (field.name, field.default) for field in dataclasses.fields(kind) if field.name not in _FOR_PEOPLE
+            (field.name, _DEFAULTS.get((kind, field.name), field.default))
+            for field in dataclasses.fields(kind)
+            if field.name not in without
         )
     return _known_fields[kind]

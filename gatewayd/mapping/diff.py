@@ -15,6 +15,8 @@ from enum import Enum
 from gatewayd.mapping import facts
 from gatewayd.mapping.facts import Facts
 from gatewayd.mapping.plan import Plan
+from gatewayd.mapping.weakening import weakened
+from gatewayd.printable import json_text, printable
 
 __all__ = [
     "MOST_GONE",
@@ -164,10 +166,15 @@ def _details(old: Facts, new: Facts) -> Iterator[Detail]:
 def objections(changes: Changes, owned: Collection[str]) -> tuple[str, ...]:
     """Why the new mapping must not replace the running one unasked; `owned`: variables that are owned at this moment.
 
-    A machine may be moving by what it owns, a direction that turns round makes a reader a writer, and a file that lost
-    many variables is most often the wrong one.
+    A machine may be moving by what it owns, a direction that turns round makes a reader a writer, a promise that is
+    weakened is one that others rely on, and a file that lost many variables is most often the wrong one.
     """
-    found = [*_touches_owned(changes, owned), *_turns_round(changes), *_cuts_owners_off(changes, owned)]
+    found = [
+        *_touches_owned(changes, owned),
+        *_turns_round(changes),
+        *_cuts_owners_off(changes, owned),
+        *weakened(changes.old.cell, changes.new.cell),
+    ]
     gone, before = len(changes.of(Kind.REMOVED)), len(changes.old.cell.variables)
     if gone > MOST_GONE * before:
         found.append(f"{gone} of {before} variables would be gone: is it the right file?")
@@ -270,7 +277,7 @@ def as_text(changes: Changes) -> str:
             f"note: the status block counts {count} variable{'' if count == 1 else 's'} anew, from `{first.name}` "
             f"({first.old} -> {first.new}) on; what is added at the end of the file moves none"
         )
-    return "".join(f"{line}\n" for line in lines)
+    return "".join(f"{printable(line, None)}\n" for line in lines)
 
 
 def as_json(changes: Changes) -> str:
@@ -296,7 +303,7 @@ def as_json(changes: Changes) -> str:
         },
         "renumbered": [{"name": one.name, "old": one.old, "new": one.new} for one in changes.renumbered],
     }
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
 
 def _identity(plan: Plan) -> dict[str, str]:

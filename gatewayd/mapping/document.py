@@ -179,7 +179,13 @@ _ELSEWHERE: dict[tuple[type[Section], str], str] = {
     },
     **{
         (MappingFile, key): f"`{key}` belongs into the section `robot`"
-        for key in ("host", "frequency", "port", "series", "version")
+        for key in ("host", "frequency", "port", "series", "version", "adopt_for", "valid")
+    },
+    (VariableSpec, "whole"): "`whole` belongs to the group",
+    **{
+        (section, key): f"`{key}` belongs to the writer"
+        for section in (VariableSpec, Group, Modbus)
+        for key in ("grace", "timeout", "timeout_counts")
     },
     **{
         (MappingFile, key): f"`{key}` belongs into the section `modbus`"

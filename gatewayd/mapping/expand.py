@@ -32,6 +32,7 @@ __all__ = [
     "ReferenceProblem",
     "Unresolved",
     "expand",
+    "is_program_output",
 ]
 
 SHARED_LEASE: Final = 5.0
@@ -106,6 +107,8 @@ class ConcreteVariable:
     """Index within the family of its line (`recipe[3]`: 3); None for a single variable."""
     lock: int | None
     """Index into `ExpandedCell.locks`; None for outputs and where the group does not exist."""
+    valid_running: bool
+    """Whether it is good only while the robot program runs."""
 
     @property
     def spec(self) -> VariableSpec:
@@ -186,6 +189,7 @@ class ConcreteLock:
     is_any: bool
     takeover: bool
     lease: float | None
+    whole: bool
     group: Part[Group] | None
     position: Position
     """Place of the owner, or of what declares the lock."""
@@ -212,6 +216,11 @@ class ExpandedCell:
             and all(placement.problem is None for placement in self.placements)
             and (self.canopen is None or self.canopen.is_complete)
         )
+
+
+def is_program_output(field: Field) -> bool:
+    """Whether it is an output register, which only the robot program writes."""
+    return field.name.startswith("output_")
 
 
 def expand(document: Document) -> ExpandedCell:
@@ -269,6 +278,7 @@ class _Builder:
             Candidate(
                 variable.index,
                 variable.part.name,
+                variable.name,
                 variable.member,
                 variable.direction,
                 variable.type,
@@ -297,9 +307,15 @@ class _Builder:
             target.element,
             member,
             lock,
+            direction is Direction.OUTPUT and self._is_valid_running(part, target),
         )
         self.variables.append(variable)
         return variable
+
+    def _is_valid_running(self, part: Part[VariableSpec], target: Target) -> bool:
+        robot = self.document.robot
+        of_all = robot is not None and robot.spec.valid is not None and is_program_output(target.field)
+        return of_all or part.spec.valid is not None
 
     def _lock_index(self, part: Part[VariableSpec], index: int) -> int | None:
         group = part.spec.group
@@ -330,7 +346,8 @@ class _Builder:
         takeover = spec.takeover if spec.takeover is not None else shared and not is_any
         name = group.name if group is not None else self.variables[members[0]].name
         position = declared.at("owner") if spec.owner is not None else declared.key
-        return ConcreteLock(name, members, owners, is_any, takeover, lease, group, position)
+        whole = group is not None and group.spec.whole
+        return ConcreteLock(name, members, owners, is_any, takeover, lease, whole, group, position)
 
     def _place(self, variables: list[ConcreteVariable], spec: PlacementSpec, position: Position) -> None:
         modbus = self.document.modbus

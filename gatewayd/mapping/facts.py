@@ -44,6 +44,7 @@ def variables(plan: Plan) -> dict[str, Facts]:
             "limits": _limits(variable),
             **_policy(plan, variable),
             **_when_lost(variable),
+            "valid": "running" if variable.valid_running else "",
             "deadband": _number(variable.deadband) if variable.deadband else "",
             "unit": variable.unit,
             "comment": variable.comment,
@@ -71,7 +72,18 @@ def writers(plan: Plan) -> dict[str, Facts]:
         networks = plan.modbus.writers if plan.modbus is not None else ()
         peers = ", ".join(_network(network) for network, one in networks if one == index)
         timeout = "" if writer.timeout is None else _seconds(writer.timeout)
-        found[writer.name] = _told({"modbus": peers, "timeout": timeout})
+        heartbeat = "" if writer.heartbeat is None else _seconds(writer.heartbeat)
+        grace = _seconds(writer.grace) if writer.grace else ""
+        counts = "writes" if writer.counts_writes else ""
+        found[writer.name] = _told(
+            {
+                "modbus": peers,
+                "heartbeat": heartbeat,
+                "timeout": timeout,
+                "timeout_counts": counts,
+                "grace": grace,
+            }
+        )
     return found
 
 
@@ -100,6 +112,7 @@ def _robot(plan: Plan) -> dict[str, str]:
         "frequency": f"{_number(robot.frequency)} Hz" if robot.frequency else "the controller's own",
         "stale_after": _seconds(plan.cell.stale_after),
         "on_connect": "fallback" if plan.cell.clear_on_connect else "adopt",
+        "adopt_for": "none" if plan.cell.adopt_for is None else _seconds(plan.cell.adopt_for),
         "verify": str(robot.verify).lower(),
         "watchdog": ""
         if watchdog is None
@@ -134,6 +147,7 @@ def _ownership(plan: Plan, lock: Lock) -> dict[str, str]:
     return {
         "owner": (" > " if lock.takeover else ", ").join(names),
         "lease": "" if lock.lease is None else _seconds(lock.lease),
+        "takeover": "whole" if lock.whole else "",
     }
 
 
@@ -203,10 +217,10 @@ def _fallback(fallback: Fallback) -> str:
 
 
 def _text(plan: Plan, name: str, value: Any) -> str:
-    """Any value of a link's plan; fields called `variable` or `...writer` are indices and told by name."""
+    """Any value of a link's plan; `variable`, `quality_of` and `...writer` are indices and told by name."""
     if value is None:
-        return "none"
-    if name == "variable":
+        return "" if name == "quality_of" else "none"
+    if name in ("variable", "quality_of"):
         return str(plan.cell.variables[value].name)
     if name.endswith("writer"):
         return str(plan.cell.writers[value].name)

@@ -38,6 +38,7 @@ from gatewayd.mapping.section import Section
 from gatewayd.rtde.types import DEFAULT_PORT
 
 __all__ = [
+    "ADOPT_FOR",
     "ANY",
     "FORMAT_VERSION",
     "Group",
@@ -55,6 +56,8 @@ __all__ = [
 
 FORMAT_VERSION = 1
 """Version of the mapping language that this module describes."""
+ADOPT_FOR = 10.0
+"""Seconds that an adopted input waits for an owner where the file says nothing."""
 ANY = "any"
 """The owner that stands for every writer; no writer can have this name."""
 
@@ -99,7 +102,19 @@ class Robot(Section):
         default="adopt",
         description="inputs without an owner after connecting: keep what the controller holds, or give on_release",
     )
-    verify: bool = Field(default=True, description="read inputs back and compare them with what was written")
+    adopt_for: OptionalDuration = Field(
+        default=ADOPT_FOR,
+        description="how long an adopted input waits for an owner, counted once from the start, before it takes "
+        "on_release; none: for ever",
+    )
+    verify: bool = Field(
+        default=True,
+        description="read inputs back all the time and compare them with what was written; false: only when connecting",
+    )
+    valid: Literal["running"] | None = Field(
+        default=None,
+        description="running: the output registers (`output_*`) are good only while the robot program runs",
+    )
     watchdog: Watchdog | None = Field(default=None, description="register that is fed while all is well")
 
 
@@ -153,6 +168,14 @@ class WriterSpec(Section):
         default=None,
         description="time without any request after which the writer counts as lost; default: none",
     )
+    timeout_counts: Literal["requests", "writes"] = Field(
+        default="requests",
+        description="what feeds `timeout`: every request, or only writes and lock requests",
+    )
+    grace: OptionalDuration = Field(
+        default=None,
+        description="how long what it owns outlives a connection that ended; default: none",
+    )
 
     @model_validator(mode="after")
     def _some_link(self) -> Self:
@@ -189,6 +212,9 @@ class Group(Section):
     lease: OptionalDuration = Field(default=None, description="how long the owner keeps it without writing")
     takeover: bool | None = Field(
         default=None, description="whether a writer named earlier takes it over; default: yes for a list"
+    )
+    whole: bool = Field(
+        default=False, description="refuse a takeover that does not write every variable of the group"
     )
     comment: str = Field(default="", max_length=500, description="for people")
 
@@ -322,6 +348,10 @@ class VariableSpec(Section):
         default=Fallback(),
         description="outputs: clear (default), hold, exception, or a value seen when the robot is lost",
         json_schema_extra={"default": "clear"},
+    )
+    valid: Literal["running"] | None = Field(
+        default=None,
+        description="outputs: running makes it good only while the robot program runs; default: always",
     )
     deadband: Real = Field(default=0.0, ge=0, description="least change that makes an event-driven PDO send")
     unit: str = Field(default="", max_length=32, description="unit of the robot's value, for people")

@@ -9,6 +9,7 @@ from gatewayd.core.definition import Direction
 from gatewayd.mapping.bus_load import BIT_RATES, FIRST_EVENT_TYPE, bus_shares, load, pdo_rate, station_of
 from gatewayd.mapping.can_expand import ConcretePdo, MappedObject
 from gatewayd.mapping.expand import ExpandedCell
+from gatewayd.mapping.status_words import StatusWord
 
 __all__ = [
     "PdoRow",
@@ -24,10 +25,10 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Neighbouring variables of one line in a PDO."""
+    """Neighbouring variables of one line in a PDO, or a word of the status block."""
 
     names: str
-    """`start`, or `recipe[0..1]`."""
+    """`start`, or `recipe[0..1]`; `status: flags`."""
     bit: int
     """Where the first begins, 0 the least significant bit of the first byte."""
     bits: int
@@ -149,6 +150,16 @@ def as_document(cell: ExpandedCell) -> dict[str, Any] | None:
                     }
                     for bit, one in pdo.offsets
                 ],
+                "status": [
+                    {
+                        "name": word.name,
+                        "bit": bit,
+                        "bits": word.type.bits,
+                        "object": _status_place(word),
+                        "type": word.type.name,
+                    }
+                    for bit, word in pdo.status_offsets
+                ],
             }
             for row, pdo in zip(pdo_rows(cell), node.pdos, strict=True)
         ],
@@ -163,7 +174,15 @@ def _runs(cell: ExpandedCell, pdo: ConcretePdo) -> tuple[Run, ...]:
             groups[-1].append((bit, one))
         else:
             groups.append([(bit, one)])
-    return tuple(_run(cell, group) for group in groups)
+    words = (
+        Run(f"status: {word.name}", bit, word.type.bits, _status_place(word), word.type.name)
+        for bit, word in pdo.status_offsets
+    )
+    return (*words, *(_run(cell, group) for group in groups))
+
+
+def _status_place(word: StatusWord) -> str:
+    return f"{word.index:04X}h:{word.subindex:02X}"
 
 
 def _follows(cell: ExpandedCell, earlier: MappedObject, later: MappedObject) -> bool:

@@ -6,6 +6,7 @@ import json
 from dataclasses import dataclass
 
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Severity
+from gatewayd.printable import json_text, printable
 
 __all__ = ["Outcome", "Unreadable", "as_github", "as_json", "as_text"]
 
@@ -47,7 +48,7 @@ def as_text(outcome: Outcome, *, colour: bool = False) -> str:
     lines: list[str] = []
     for finding in outcome.findings:
         lines.extend(_finding_lines(finding, colour=colour))
-    lines.extend(_printable(f"{item.file}: cannot be read: {item.reason}") for item in outcome.unreadable)
+    lines.extend(printable(f"{item.file}: cannot be read: {item.reason}") for item in outcome.unreadable)
     if lines:
         lines.append("")
     lines.append(_summary(outcome))
@@ -68,14 +69,14 @@ def as_json(outcome: Outcome) -> str:
         "findings": [_as_object(finding) for finding in outcome.findings],
         "unreadable": [{"file": item.file, "reason": item.reason} for item in outcome.unreadable],
     }
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
 
 def as_github(outcome: Outcome) -> str:
     """Workflow commands that GitHub shows as annotations at the lines of a pull request."""
     lines = [_annotation(finding) for finding in outcome.findings]
     lines.extend(
-        f"::error file={_property(item.file)},title=unreadable::{_data(item.reason)}"
+        f"::error file={_property(item.file)},title=unreadable::{_data(printable(item.reason))}"
         for item in outcome.unreadable
     )
     return "".join(f"{line}\n" for line in lines)
@@ -83,28 +84,16 @@ def as_github(outcome: Outcome) -> str:
 
 def _finding_lines(finding: Diagnostic, *, colour: bool) -> list[str]:
     rule = finding.rule
-    place, label = _printable(str(finding.position)), f"{rule.severity.value} {rule.id}"
+    place, label = printable(str(finding.position)), f"{rule.severity.value} {rule.id}"
     if colour:
         place = f"{_BOLD}{place}{_PLAIN}"
         label = f"{_TINT[rule.severity]}{_BOLD}{label}{_PLAIN}"
-    lines = [f"{place}: {label} {rule.slug}: {_printable(finding.message)}"]
-    details = [f"    {_printable(f'{item.position}: {item.message}')}" for item in finding.related]
+    lines = [f"{place}: {label} {rule.slug}: {printable(finding.message)}"]
+    details = [f"    {printable(f'{item.position}: {item.message}')}" for item in finding.related]
     if finding.hint is not None:
-        details.append(f"    hint: {_printable(finding.hint)}")
+        details.append(f"    hint: {printable(finding.hint)}")
     lines.extend(f"{_DIM}{detail}{_PLAIN}" if colour else detail for detail in details)
     return lines
-
-
-def _printable(text: str) -> str:
-    """Text from a file as it may go to a terminal: line ends and control characters become escapes."""
-    if text.isprintable():
-        return text
-    return "".join(
-        character
-        if character.isprintable()
-        else character.encode("unicode_escape", "backslashreplace").decode()
-        for character in text
-    )
 
 
 def _summary(outcome: Outcome) -> str:
@@ -143,7 +132,7 @@ def _annotation(finding: Diagnostic) -> str:
     text = [finding.message, *(f"{item.position}: {item.message}" for item in finding.related)]
     if finding.hint is not None:
         text.append(f"hint: {finding.hint}")
-    body = "\n".join(text)
+    body = "\n".join(map(printable, text))
     return (
         f"::{rule.severity.value} file={_property(position.file)},line={position.line},col={position.column},"
         f"title={_property(f'{rule.id} {rule.slug}')}::{_data(body)}"
@@ -155,4 +144,4 @@ def _data(text: str) -> str:
 
 
 def _property(text: str) -> str:
-    return _data(text).replace(":", "%3A").replace(",", "%2C")
+    return _data(printable(text)).replace(":", "%3A").replace(",", "%2C")

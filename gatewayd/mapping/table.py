@@ -15,6 +15,7 @@ from gatewayd.mapping.expand import ConcretePlacement, ConcreteVariable, Expande
 from gatewayd.mapping.pdo_table import as_document, load_by_bit_rate, object_place, pdo_rows
 from gatewayd.mapping.plan import AREA_NAMES, Plan
 from gatewayd.mapping.rules.wording import cob, seconds
+from gatewayd.printable import json_text, printable
 
 __all__ = [
     "COLUMNS",
@@ -25,6 +26,7 @@ __all__ = [
     "by_line",
     "formula",
     "limits",
+    "lost",
     "policy",
     "rows",
 ]
@@ -83,6 +85,10 @@ class Row:
     """COB-ID of the PDO, `0x190`."""
     pdo_bit: int | None = None
     """Where it begins in the PDO, 0 the least significant bit of the first byte."""
+    whole: bool = False
+    """Whether its group is taken over only by writing all of it."""
+    valid: str = ""
+    """`running`: good only while the robot program runs; empty: always."""
 
 
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
@@ -169,6 +175,8 @@ def _row(
         on_release=_fallback(spec.on_release) if is_input else "",
         on_stale="" if is_input else _fallback(spec.on_stale),
         comment=spec.comment,
+        whole=lock is not None and lock.whole,
+        valid="running" if variable.valid_running else "",
         **canopen,
     )
 
@@ -204,7 +212,7 @@ def as_json(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
         "canopen": as_document(cell),
         "variables": [dataclasses.asdict(row) for row in table],
     }
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
 
 def as_markdown(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
@@ -279,7 +287,7 @@ def _markdown(row: Row) -> tuple[str, ...]:
         formula(row),
         limits(row),
         policy(row),
-        row.on_release or row.on_stale,
+        lost(row),
         row.comment,
     )
 
@@ -302,17 +310,24 @@ def limits(row: Row) -> str:
 
 
 def policy(row: Row) -> str:
-    """Who may own it and for how long: `plc > hmi, 5s`; with the group that it is owned with."""
+    """Who may own it and for how long: `plc > hmi, 5s`; with the group that it is owned with, `(motion, whole)`."""
     lease = "" if row.lease is None else f", {row.lease:.6g}s"
-    group = f" ({row.group})" if row.group else ""
+    group = f" ({row.group}{', whole' if row.whole else ''})" if row.group else ""
     return f"{row.owner}{lease}{group}"
+
+
+def lost(row: Row) -> str:
+    """What is seen when a side is lost: `clear`; `clear, running` where that is so without a running program too."""
+    return (row.on_release or row.on_stale) + (f", {row.valid}" if row.valid else "")
 
 
 def _plain(value: object) -> object:
     if value is None:
         return ""
+    if isinstance(value, str):
+        return printable(value)
     return str(value).lower() if isinstance(value, bool) else value
 
 
 def _cell(text: str) -> str:
-    return " ".join(text.replace("|", "\\|").split())
+    return printable(" ".join(text.replace("|", "\\|").split()))

@@ -1,7 +1,7 @@
 """The listener: pymodbus's TCP server with its connection handler replaced by ours.
 
 pymodbus brings listening, connection objects and their life cycle; what a connection receives goes to `Session` as
-it comes. All that is known of pymodbus, and all sockets, are in this module.
+it comes. All that is known of pymodbus is in this module.
 """
 
 from __future__ import annotations
@@ -9,11 +9,10 @@ from __future__ import annotations
 import asyncio
 import errno
 import logging
+import math
 import os
-import socket
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, cast
 
@@ -34,6 +33,9 @@ from gatewayd.modbus.peers import (
 )
 from gatewayd.modbus.polling import ReadPoller
 from gatewayd.modbus.session import Access, Session
+from gatewayd.modbus.sockets import has_unread, seconds_since_established, set_options
+from gatewayd.modbus.waiting import SETTLING, Waiting
+from gatewayd.modbus.writers import hold_anything, names_of, succeeded, writers_of
 
 # pymodbus.server imports aiohttp for a web page of its own, if it is there, and does without if not. It is there, for
 # the control interface, but imported at this point it would be most of the time until the gateway serves.
@@ -57,15 +59,6 @@ STALLED_AFTER = 5.0
 _SWEEP = 0.25
 """Seconds between two looks for connections that are idle or stalled."""
 
-# A pulled cable is noticed after KEEPIDLE + KEEPCNT * KEEPINTVL seconds, or TCP_USER_TIMEOUT with answers under way.
-_KEEPALIVE = (
-    (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
-    (socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 2),
-    (socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 1),
-    (socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 3),
-    (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 5000),
-    (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),
-)
 _REMEDIES = {
     errno.EADDRINUSE: "another program listens there; stop it or choose another port under modbus: listen:",
     errno.EACCES: "ports below 1024 need the capability CAP_NET_BIND_SERVICE; grant it or choose a port from 1024 on",
@@ -88,6 +81,9 @@ class _Connection(ServerRequestHandler):
         self.owner = server.owner
         self.poller = server.poller
         self.session = Session()
+        self.receive = self.session.received
+        """What takes the bytes that came in; another function while they may have waited."""
+        self.waiting: Waiting | None = None
         self.number = new_connection()
         self.peer = ""
         self.address: Address | None = None
@@ -95,6 +91,8 @@ class _Connection(ServerRequestHandler):
         self.last_request = 0.0
         """When the last whole request came in; bytes that make none keep no connection open."""
         self.stalled_since: float | None = None
+        self.established = 0.0
+        """When the kernel had the connection; it may have waited for its acceptance."""
         self.reason = "closed by the peer"
         self.descriptor = -1
 
@@ -116,8 +114,9 @@ class _Connection(ServerRequestHandler):
         self.address = address_of(peer[0])
         sock = self.wire.get_extra_info("socket")
         self.descriptor = sock.fileno()
-        _set_options(sock)
-        self.last_request = clock.now()
+        set_options(sock)
+        now = clock.now()
+        self.last_request, self.established = now, now - seconds_since_established(sock)
         if self.owner.connected(self):
             self.poller.add(self.descriptor, self.readable)
             asyncio.get_running_loop().call_soon(self._pause_again)
@@ -144,7 +143,7 @@ class _Connection(ServerRequestHandler):
             self.drop("closed by the peer")
             return
         try:
-            answers = session.received(count, now)
+            answers = self.receive(count, now)
         except Exception:  # noqa: BLE001 - a defect of ours costs this connection, not the others
             received = bytes(session.buffer.data[: session.buffer.end + count]).hex(" ")
             _log.exception("a request could not be answered", extra=fields(peer=self.peer, received=received))
@@ -163,6 +162,33 @@ class _Connection(ServerRequestHandler):
                 self.wire.write(answers[sent:])
         if session.broken:
             self.drop(f"no Modbus TCP: {session.broken}")
+
+    def stood_still(self, since: float, until: float) -> None:
+        """Nothing was read for this time: it is no silence of the peer, and what is in the socket may be that old."""
+        length = until - since
+        self.last_request += length
+        if self.stalled_since is not None:
+            self.stalled_since += length
+        self.wait(since, until)
+
+    def wait(self, since: float, until: float) -> None:
+        """What is in the socket may have waited from `since` to `until`."""
+        unread = bool(self.session.buffer.end) or has_unread(self.descriptor)
+        self.waiting = Waiting(since, until, unread=unread, former=self.waiting)
+        self.receive = self._receive_late
+
+    def _receive_late(self, count: int, now: float) -> bytes:
+        """In place of `session.received`, until all that waited was read."""
+        session, waiting = self.session, self.waiting
+        waited = waiting.seconds(now) if waiting is not None else 0.0
+        if waiting is None or not waited:
+            self.waiting, self.receive = None, session.received
+            return session.received(count, now)
+        asked = len(session.buffer.space[0])
+        answers = session.received_late(count, now, waited)
+        if count < asked and not session.buffer.end:
+            waiting.drained()
+        return answers
 
     def pause_writing(self) -> None:
         """The peer does not read its answers: take no more requests."""
@@ -247,6 +273,8 @@ class ModbusListener:
         self._denials = DenialLog()
         self._server: _Server | None = None
         self._sweeper: asyncio.TimerHandle | None = None
+        self._gap = (-math.inf, -math.inf)
+        """When the process stood still last, if ever."""
         self.turns = 0
         """Moves with each attempt to listen, and several times a second from then on."""
 
@@ -344,6 +372,9 @@ class ModbusListener:
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`: what is in the sockets may have waited that long."""
+        self._gap = since, now
+        for connection in self._connections:
+            connection.stood_still(since, now)
 
     # -- called by connections ------------------------------------------------------------------------------------
 
@@ -358,9 +389,12 @@ class ModbusListener:
             self._refuse(connection, PeerEventKind.FULL, now)
             return False
         self._connections[connection] = None
+        since, until = self._gap
+        if connection.established <= until + SETTLING:
+            connection.wait(min(since, connection.established), until)
         self._admit(connection, now, "")
         self._count()
-        self._observe(PeerEvent(PeerEventKind.CONNECTED, connection.peer, _names(connection)))
+        self._observe(PeerEvent(PeerEventKind.CONNECTED, connection.peer, names_of(connection.accesses)))
         return True
 
     def disconnected(self, connection: _Connection) -> None:
@@ -368,11 +402,11 @@ class ModbusListener:
         if connection not in self._connections:
             return
         del self._connections[connection]
-        names = _names(connection)
+        names = names_of(connection.accesses)
         now = clock.now()
         accesses, connection.accesses = connection.accesses, {}
         connection.session.serve({})
-        for cell, requester in _writers(accesses):
+        for cell, requester in writers_of(accesses):
             cell.writer_disconnected(requester, now, connection.reason)
         self._count()
         self._observe(PeerEvent(PeerEventKind.DISCONNECTED, connection.peer, names, connection.reason))
@@ -398,7 +432,7 @@ class ModbusListener:
             for number, unit in self._units.items()
             if address is not None and may_connect(address, unit.plan)
         }
-        before, after = _succeeded(_writers(connection.accesses), successors), _writers(accesses)
+        before, after = succeeded(writers_of(connection.accesses), successors), writers_of(accesses)
         connection.accesses = accesses
         connection.session.serve(accesses)
         for cell, requester in after:
@@ -420,7 +454,7 @@ class ModbusListener:
         unused = [
             connection
             for connection in self._connections
-            if now - connection.last_request >= UNUSED_AFTER and not _owns_anything(connection)
+            if now - connection.last_request >= UNUSED_AFTER and not hold_anything(connection.accesses)
         ]
         if not unused:
             return False
@@ -444,7 +478,11 @@ class ModbusListener:
         for connection in list(self._connections):
             if connection.stalled_since is not None and now - connection.stalled_since > STALLED_AFTER:
                 connection.abort(f"did not read its answers for {STALLED_AFTER:g} s")
-            elif idle is not None and now - connection.last_request > idle:
+            elif (
+                idle is not None
+                and now - connection.last_request > idle
+                and not hold_anything(connection.accesses)
+            ):
                 connection.abort(f"no request for {idle:g} s")
         delay = _SWEEP if idle is None else min(_SWEEP, idle / 4)
         self._sweeper = asyncio.get_running_loop().call_later(delay, self._sweep)
@@ -456,52 +494,3 @@ class ModbusListener:
     def _sockets(self) -> tuple[Any, ...]:
         transport = self._server.transport if self._server is not None else None
         return tuple(cast("asyncio.Server", transport).sockets) if transport is not None else ()
-
-
-def _set_options(sock: Any) -> None:
-    """Set what the platform knows; a connection that is gone already is none of our business."""
-    try:
-        for level, option, value in _KEEPALIVE:
-            sock.setsockopt(level, option, value)
-    except OSError:
-        return
-
-
-_Writers = list[tuple[Cell, Requester]]
-"""The writers that a connection is, each in its cell."""
-
-
-def _writers(accesses: dict[int, Access]) -> _Writers:
-    return [
-        (access.unit.cell, access.requester)
-        for access in accesses.values()
-        if access.requester.writer is not None
-    ]
-
-
-def _succeeded(writers: _Writers, successors: Mapping[Cell, Cell]) -> _Writers:
-    """The same writers in the cells that go on; without those that are declared no more."""
-    found = []
-    for cell, requester in writers:
-        successor, name = successors.get(cell, cell), _name(cell, requester)
-        indices = (i for i, writer in enumerate(successor.definition.writers) if writer.name == name)
-        index = next(indices, None)
-        if index is not None:
-            found.append((successor, replace(requester, writer=index)))
-    return found
-
-
-def _name(cell: Cell, requester: Requester) -> str:
-    return "" if requester.writer is None else cell.definition.writers[requester.writer].name
-
-
-def _names(connection: _Connection) -> tuple[str, ...]:
-    return tuple(_name(cell, requester) for cell, requester in _writers(connection.accesses))
-
-
-def _owns_anything(connection: _Connection) -> bool:
-    return any(
-        cell.ownership.held_by(requester.writer)
-        for cell, requester in _writers(connection.accesses)
-        if requester.writer is not None
-    )

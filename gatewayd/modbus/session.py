@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -78,7 +79,14 @@ class Session:
                     return answer
         return self._answers(buffer.end + count, now)
 
-    def _answers(self, end: int, now: float) -> bytes:
+    def received_late(self, count: int, now: float, waited: float) -> bytes:
+        """The same for bytes that may have waited so many seconds while the gateway stood still.
+
+        The cell hears of it with every request; it refuses commands that are too old and judges what is a sign of life.
+        """
+        return self._answers(self.buffer.end + count, now, waited)
+
+    def _answers(self, end: int, now: float, waited: float = 0.0) -> bytes:
         """The answers to all requests that are complete before `end` of the buffer."""
         answers = []
         start = 0
@@ -86,19 +94,20 @@ class Session:
             while (frame := split(self.buffer.data, start, end)) is not None:
                 start = frame.end
                 answers.append(
-                    encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now))
+                    encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now, waited))
                 )
         except FramingError as error:
             self.broken = str(error)
         self.buffer.discard(start, end)
         return b"".join(answers)
 
-    def _answer(self, unit: int, pdu: bytes, now: float) -> bytes:
+    def _answer(self, unit: int, pdu: bytes, now: float, waited: float) -> bytes:
         access = self._accesses.get(unit)
         if access is None:
             return exception(pdu[0], ExceptionCode.TARGET_FAILED)
-        access.writer_seen(access.requester, now)
-        return execute(access.unit, access.requester, pdu, now)
+        requester = replace(access.requester, waited=waited) if waited else access.requester
+        access.writer_seen(requester, now)
+        return execute(access.unit, requester, pdu, now)
 
 
 @cache

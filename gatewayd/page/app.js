@@ -2,7 +2,7 @@
 
 import { LEVELS, MARKS, Picture } from "./picture.js";
 import { Variables } from "./variables.js";
-import { OPERATOR, clock, count, make, put, span } from "./words.js";
+import { OPERATOR, clock, count, make, printable, put, span } from "./words.js";
 
 const PERIOD = 250;
 const PATIENCE = 1500;                // without an answer for so long, nothing on the page is believed
@@ -117,7 +117,7 @@ function judge() {
   const since = answeredAt ? `since ${clock(answeredAt)} (${span(age)})` : "so far";
   document.title = `? ${cell ?? ""} - no answer`;
   put(alarm, `No answer from the gateway ${since}. ${answeredAt ? "Everything below is old." : ""}`);
-  alarm.title = trouble;
+  alarm.title = printable(trouble);
 }
 
 async function run() {

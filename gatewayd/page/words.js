@@ -1,6 +1,6 @@
 // Numbers, ages and times in words.
 
-export const QUALITIES = ["good", "stale", "unavailable", "never told", "forced"];
+export const QUALITIES = ["good", "stale", "unavailable", "never told", "forced", "differs in robot", "out of range", "program not running"];
 export const FORCED = 4;
 export const OPERATOR = 254;
 
@@ -35,14 +35,29 @@ export function count(number, noun) {
   return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }
 
+// What Unicode shows as nothing, or what turns the line round: written out, as gatewayd/printable.py does it elsewhere.
+const HIDDEN = /[\p{C}\p{Zl}\p{Zp}\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0\u{e0100}-\u{e01ef}]/gu;
+const NAMED = { "\t": "\\t", "\n": "\\n", "\r": "\\r" };
+const MAX_LENGTH = 4000;
+
+export function printable(text) {
+  const shown = text.length > MAX_LENGTH ? `${text.slice(0, MAX_LENGTH)}... (${text.length} characters)` : text;
+  return shown.replace(HIDDEN, (found) => {
+    if (found in NAMED) return NAMED[found];
+    const code = found.codePointAt(0), digits = code.toString(16);
+    return code < 256 ? `\\x${digits.padStart(2, "0")}` : code < 65536 ? `\\u${digits.padStart(4, "0")}` : `\\U${digits.padStart(8, "0")}`;
+  });
+}
+
 export function make(tag, className = "", text = "") {
   const element = document.createElement(tag);
   if (className) element.className = className;
-  if (text) element.textContent = text;
+  if (text) element.textContent = printable(text);
   return element;
 }
 
 // Writes only what has changed: the browser then has nothing to lay out anew.
 export function put(element, text) {
-  if (element.textContent !== text) element.textContent = text;
+  const shown = printable(text);
+  if (element.textContent !== shown) element.textContent = shown;
 }

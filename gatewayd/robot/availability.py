@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from gatewayd.core.definition import Direction, ValueKind, Variable
-from gatewayd.rtde.negotiation import Session
+from gatewayd.robot.companions import DOMAINS
+from gatewayd.rtde.companions import COMPANIONS
+from gatewayd.rtde.session import Session
 from gatewayd.rtde.types import DataType
 
 __all__ = ["unavailable"]
@@ -25,8 +27,10 @@ def unavailable(session: Session, variables: Sequence[Variable]) -> dict[int, st
     types = {name: kind for recipe in recipes for name, kind in zip(recipe.names, recipe.types, strict=True)}
     reasons: dict[int, str] = {}
     for index, variable in enumerate(variables):
-        reason = refused.get((variable.field, variable.direction is Direction.OUTPUT)) or _misfit(
-            variable, types
+        reason = (
+            refused.get((variable.field, variable.direction is Direction.OUTPUT))
+            or _misfit(variable, types)
+            or _domain_unknown(session, variable, variables, refused)
         )
         if reason is not None:
             reasons[index] = reason
@@ -39,6 +43,25 @@ def _misfit(variable: Variable, types: Mapping[str, DataType]) -> str | None:
     if answered is None or _carries(answered, variable):
         return None
     return f"the controller answers {answered.word}, which is not what the mapping was made for"
+
+
+def _domain_unknown(
+    session: Session,
+    variable: Variable,
+    variables: Sequence[Variable],
+    refused: Mapping[tuple[str, bool], str],
+) -> str | None:
+    """Why a value would act in a domain that nobody asked for: its type can be neither chosen nor kept."""
+    needs = COMPANIONS.get(variable.field) if variable.direction is Direction.INPUT else None
+    if needs is None or needs.type is None:
+        return None
+    if not any(needs.type in accepted.recipe.names for accepted in session.inputs.values()):
+        why = refused.get((needs.type, False), "not claimed")
+        return f"current or voltage cannot be chosen without {needs.type}: {why}"
+    chosen = any(one.field == needs.type and one.bit in (None, needs.bit) for one in variables)
+    if chosen or DOMAINS in session.outputs.names:
+        return None
+    return f"whether it is current or voltage is neither mapped ({needs.type}) nor told by the controller ({DOMAINS})"
 
 
 def _carries(answered: DataType, variable: Variable) -> bool:

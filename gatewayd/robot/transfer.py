@@ -7,14 +7,30 @@ both in the tuple and in the image are moved as one slice; bits of a word are sp
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 from gatewayd.core.definition import Direction, Value, Variable
 
-__all__ = ["InputTransfer", "OutputTransfer", "Slots", "read_back"]
+__all__ = ["InputTransfer", "OutputTransfer", "Part", "Slots"]
 
 Slots = Mapping[str, slice]
 """Where each field of a recipe lies in its flat tuple."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What one variable is in the values of its field."""
+
+    variable: int
+    offset: int
+    """Element of the field."""
+    mask: int | None = None
+    """Its bit of the element; None: the whole of it."""
+
+    def of(self, values: Sequence[Value]) -> Value:
+        """The variable's value in the values of its field."""
+        return values[self.offset] if self.mask is None else bool(int(values[self.offset]) & self.mask)
 
 
 class OutputTransfer:
@@ -58,10 +74,10 @@ class InputTransfer:
     """From the image into the flat tuple of one input recipe.
 
     What no variable is mapped to (other bits of a word, other elements of a vector) keeps the value in `base`, which
-    `rebase` takes from the controller's own read-back.
+    `rebase` takes over from the controller.
     """
 
-    __slots__ = ("_bits", "_singles", "base", "fields", "members", "slots")
+    __slots__ = ("_bits", "_singles", "base", "fields", "members", "parts", "slots")
 
     def __init__(
         self, variables: Sequence[Variable], fields: Sequence[str], slots: Slots, without: Container[int] = ()
@@ -75,6 +91,11 @@ class InputTransfer:
         ]
         self.members = tuple(index for index, _variable in wanted)
         """Indices of the variables that the recipe carries."""
+        self.parts: dict[str, tuple[Part, ...]] = {
+            name: tuple(_part(index, variable) for index, variable in wanted if variable.field == name)
+            for name in self.fields
+        }
+        """The variables of each field."""
         self._singles = tuple((index, self._slot(one)) for index, one in wanted if one.bit is None)
         self._bits = tuple(
             (index, self._slot(one), 1 << one.bit) for index, one in wanted if one.bit is not None
@@ -107,13 +128,19 @@ class InputTransfer:
             flat[slot] = word | mask if values[index] else word & ~mask
         return tuple(flat)
 
+    def free(self, field: str, values: Sequence[Value]) -> list[Value]:
+        """What no variable carries in the values of a field; zero elsewhere."""
+        left = list(values)
+        for part in self.parts[field]:
+            left[part.offset] = 0 if part.mask is None else int(left[part.offset]) & ~part.mask
+        return left
+
     def _slot(self, variable: Variable) -> int:
         return int(self.slots[variable.field].start) + (variable.element or 0)
 
 
-def read_back(flat: Sequence[Value], slots: Slots, fields: Iterable[str]) -> dict[str, Sequence[Value]]:
-    """What a package tells of the controller's inputs: the values of those `fields` that its recipe has."""
-    return {field: flat[slots[field]] for field in fields if field in slots}
+def _part(index: int, variable: Variable) -> Part:
+    return Part(index, variable.element or 0, None if variable.bit is None else 1 << variable.bit)
 
 
 def _runs(pairs: Sequence[tuple[int, int]]) -> Iterable[tuple[slice, slice]]:

@@ -3,13 +3,17 @@
 Pure: requests out, answers in. A recipe with a refused field is refused whole, so the refused ones are left out and
 the rest is asked for again; fields in use elsewhere are asked for again on `retry`, together with those already held,
 so that a group always ends up in one recipe. A client may claim a field in several recipes; ids count 1 to 255.
+
+A register whose content could not be read is moved to a recipe of its own by `separate`: no package that writes
+another register carries it. `join` brings it back once its content is known.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from types import MappingProxyType
 
 from gatewayd.rtde.messages import ERROR_WORDS, IN_USE, InputsSetup, SetupInputs
@@ -24,6 +28,7 @@ __all__ = [
     "Claims",
     "HandshakeError",
     "InputRecipe",
+    "is_long",
     "recipe_key",
     "sort_types",
 ]
@@ -39,6 +44,8 @@ OLD_LIST_LIMIT = 2048
 """Bytes of a list of names that every controller takes (older guide, "Introduction"); newer ones take far more."""
 
 _LAST_ID = 255
+_IDS_FOR_RETRIES = 64
+"""Recipe ids that joins leave over for inputs that become free later."""
 _RETRIED = frozenset({IN_USE, REFUSED})
 _FAMILIES = (
     "speed_slider",
@@ -63,16 +70,9 @@ def recipe_key(name: str) -> str:
     return next((family for family in _FAMILIES if name.startswith(family)), name)
 
 
-def _parts(names: Sequence[str], limit: int | None) -> list[tuple[str, ...]]:
-    """Split so that no part is longer than `limit` when joined by commas."""
-    if limit is None:
-        return [tuple(names)]
-    parts: list[list[str]] = [[]]
-    for name in names:
-        if parts[-1] and len(",".join((*parts[-1], name))) > limit:
-            parts.append([])
-        parts[-1].append(name)
-    return [tuple(part) for part in parts]
+def is_long(names: Sequence[str]) -> bool:
+    """Whether an old controller may refuse a list of these names for its length."""
+    return len(",".join(names)) > OLD_LIST_LIMIT
 
 
 def sort_types(names: Sequence[str], words: Sequence[str]) -> tuple[list[DataType], dict[str, str]]:
@@ -96,16 +96,16 @@ def sort_types(names: Sequence[str], words: Sequence[str]) -> tuple[list[DataTyp
     return types, refused
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class InputRecipe:
-    """An input recipe that the controller has accepted."""
+    """An input recipe that the controller has accepted. It stays valid as long as its connection; equal to itself."""
 
     key: str
     id: int
     recipe: Recipe
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Group:
     key: str
     wanted: tuple[str, ...]
@@ -122,35 +122,54 @@ class _Group:
     def names_held(self) -> tuple[str, ...]:
         return self.held.recipe.names if self.held is not None else ()
 
+    def is_of_registers(self) -> bool:
+        return self.key.split(" ")[0] == REGISTERS_KEY
+
+    def part(self, number: int, names: Sequence[str]) -> _Group:
+        """A group for some of the names; nothing is held by it."""
+        key = self.key.split(" ")[0]
+        refused = {name: self.refused[name] for name in names if name in self.refused}
+        return _Group(key if number == 1 else f"{key} {number}", tuple(names), None, refused)
+
 
 class Claims:
     """The claims of one connection.
 
-    With `list_limit` no list of names is longer, in bytes; groups that are go into several recipes, the later ones
-    under the keys "registers 2" and so on.
+    Where lists are limited none is longer than `OLD_LIST_LIMIT`; groups that are go into several recipes, the later
+    ones under the keys "registers 2" and so on.
     """
 
-    def __init__(
-        self, fields: Sequence[str], watchdog: str | None = None, list_limit: int | None = None
-    ) -> None:
+    def __init__(self, fields: Sequence[str], watchdog: str | None = None, *, limited: bool = False) -> None:
         members: dict[str, list[str]] = {}
         for name in dict.fromkeys((*fields, *((watchdog,) if watchdog else ()))):
             members.setdefault(WATCHDOG_KEY if name == watchdog else recipe_key(name), []).append(name)
-        self._groups = [
-            _Group(key if part == 1 else f"{key} {part}", names)
-            for key, whole in members.items()
-            for part, names in enumerate(_parts(whole, list_limit), 1)
-        ]
+        self._order = {name: place for place, name in enumerate(members.get(REGISTERS_KEY, ()))}
+        self._groups = [_Group(key, tuple(names)) for key, names in members.items()]
         self._queue: deque[_Group] = deque()
+        self._joining: dict[str, None] = {}
+        self._accepted: dict[int, InputRecipe] = {}
         self._used = 0
+        self._asked = False
         self._changed = False
         self._exhausted = False
+        self._limited = False
         self._enqueue(self._groups)
+        if limited:
+            self.limit()
 
     @property
     def recipes(self) -> Mapping[str, InputRecipe]:
         """The newest accepted recipe of each group that has one."""
         return MappingProxyType({group.key: group.held for group in self._groups if group.held is not None})
+
+    @property
+    def types(self) -> Mapping[str, DataType]:
+        """Every field that is claimed, with its type."""
+        return {
+            name: kind
+            for accepted in self.recipes.values()
+            for name, kind in zip(accepted.recipe.names, accepted.recipe.types, strict=True)
+        }
 
     @property
     def refused(self) -> Mapping[str, str]:
@@ -174,28 +193,80 @@ class Claims:
         """Whether an answer is awaited or more is to be asked."""
         return bool(self._queue)
 
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """The list whose answer is awaited."""
+        return self._queue[0].asking if self._asked and self._queue else ()
+
+    def accepted(self, recipe: InputRecipe) -> bool:
+        """Whether the recipe is one of this connection's, be it an older one of its group."""
+        return self._accepted.get(recipe.id) is recipe
+
+    def limit(self) -> None:
+        """Ask by lists that old controllers take from now on; only while no answer is awaited."""
+        self._limited = True
+        for group in tuple(self._groups):
+            if group.held is None and is_long(group.wanted):
+                self._split(group)
+
     def retry(self) -> None:
         """Ask again for the fields that were in use; no effect while asking."""
         if not self._queue:
             self._enqueue([group for group in self._groups if group.retriable()])
 
+    def separate(self, fields: Iterable[str]) -> None:
+        """Give each of these registers a recipe of its own; only while no answer is awaited."""
+        apart = frozenset(fields)
+        for group in tuple(self._groups):
+            leaving = [name for name in group.wanted if name in apart] if group.is_of_registers() else []
+            if not leaving:
+                continue
+            staying = tuple(name for name in group.wanted if name not in apart)
+            alone = [_Group(name, (name,)) for name in leaving]
+            for own in alone:
+                own.refused = {name: group.refused.pop(name) for name in own.wanted if name in group.refused}
+            settled = group not in self._queue and not set(staying) & set(group.names_held())
+            group.wanted, group.held = staying, None
+            self._replace(group, [*([group] if staying else ()), *alone])
+            if settled and staying:
+                self._queue.remove(group)
+
+    def join(self, fields: Iterable[str]) -> None:
+        """Have registers that were separated share a recipe with the others again, at the next request.
+
+        No effect for others, nor once few recipe ids are left.
+        """
+        if self._used < _LAST_ID - _IDS_FOR_RETRIES:
+            alone = {group.key for group in self._groups if group.held is not None}
+            self._joining |= {name: None for name in fields if name in alone and name in self._order}
+
     def request(self) -> SetupInputs | None:
-        """What to send next; None when everything has been asked. Call again after `answer` only."""
+        """What to send next; None while an answer is awaited or when everything has been asked."""
+        if self._asked:
+            return None
+        if not self._queue and self._joining:
+            self._take_in()
         if not self._queue:
             return None
         if self._used >= _LAST_ID:
             self._exhausted = True
             self._queue.clear()
             return None
+        self._asked = True
         return SetupInputs(self._queue[0].asking)
 
     def answer(self, reply: InputsSetup) -> None:
         """Take the answer to the last request."""
-        if not self._queue:
+        if not self._asked:
             msg = "the controller answered an input setup that was not asked for"
             raise HandshakeError(msg)
         group = self._queue[0]
+        if _refused_for_length(group.asking, reply):
+            self._asked = False
+            self._split(group)
+            return
         types, refused = sort_types(group.asking, reply.types)
+        self._asked = False
         if reply.recipe and not refused:
             self._hold(group, InputRecipe(group.key, reply.recipe, Recipe(group.asking, types)))
             return
@@ -203,8 +274,7 @@ class Claims:
             refused = dict.fromkeys(
                 (name for name in group.asking if name not in group.names_held()), REFUSED
             )
-        group.refused.update(refused)
-        group.asking = tuple(name for name in group.asking if name not in refused)
+        self._refuse(group, refused)
         if not group.asking or group.asking == group.names_held():
             self._queue.popleft()
 
@@ -213,16 +283,72 @@ class Claims:
         changed, self._changed = self._changed, False
         return changed
 
-    def _enqueue(self, groups: Sequence[_Group]) -> None:
+    def _enqueue(self, groups: Iterable[_Group]) -> None:
         for group in groups:
             group.asking = group.candidates()
-            if group.asking:
+            if group.asking and group not in self._queue:
                 self._queue.append(group)
+
+    def _replace(self, group: _Group, successors: Sequence[_Group]) -> None:
+        """Put other groups in place of one, and ask for what they hold."""
+        place = self._groups.index(group)
+        self._groups[place : place + 1] = successors
+        if group in self._queue:
+            self._queue.remove(group)
+        self._changed = True
+        self._enqueue(successors)
+
+    def _split(self, group: _Group) -> None:
+        self._limited = True
+        parts = _parts(group.wanted)
+        self._replace(group, [group.part(number, names) for number, names in enumerate(parts, 1)])
+
+    def _take_in(self) -> None:
+        """Have the groups of registers ask for the fields that are to join."""
+        alone = {group.key for group in self._groups}
+        for name in (name for name in self._joining if name in alone):
+            groups = [group for group in self._groups if group.is_of_registers()]
+            roomy = [group for group in groups if not (self._limited and is_long((*group.wanted, name)))]
+            group = roomy[-1] if roomy else self._new_group()
+            group.wanted = tuple(sorted((*group.wanted, name), key=self._order.__getitem__))
+            self._enqueue((group,))
+        self._joining.clear()
+
+    def _new_group(self) -> _Group:
+        """Another group of registers, without any."""
+        first, keys = _Group(REGISTERS_KEY, ()), {group.key for group in self._groups}
+        group = next(part for part in (first.part(n, ()) for n in count(1)) if part.key not in keys)
+        self._groups.append(group)
+        return group
 
     def _hold(self, group: _Group, accepted: InputRecipe) -> None:
         group.held = accepted
+        self._accepted[accepted.id] = accepted
         for name in accepted.recipe.names:
             group.refused.pop(name, None)
+        if group.is_of_registers():
+            self._groups = [one for one in self._groups if one.key not in accepted.recipe.names]
         self._used += 1
         self._changed = True
         self._queue.popleft()
+
+    def _refuse(self, group: _Group, refused: Mapping[str, str]) -> None:
+        """Note refusals; a register that was to join stays in the recipe of its own that it has."""
+        alone = {one.key for one in self._groups if one is not group and one.held is not None}
+        group.wanted = tuple(name for name in group.wanted if not (name in refused and name in alone))
+        group.refused.update({name: word for name, word in refused.items() if name not in alone})
+        group.asking = tuple(name for name in group.asking if name not in refused)
+
+
+def _refused_for_length(names: Sequence[str], reply: InputsSetup) -> bool:
+    return reply.recipe == 0 and ERROR_WORDS.isdisjoint(reply.types) and len(names) > 1 and is_long(names)
+
+
+def _parts(names: Sequence[str]) -> list[list[str]]:
+    """Split so that no part is too long a list."""
+    parts: list[list[str]] = [[]]
+    for name in names:
+        if parts[-1] and is_long((*parts[-1], name)):
+            parts.append([])
+        parts[-1].append(name)
+    return parts

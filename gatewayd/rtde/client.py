@@ -13,12 +13,12 @@ import contextlib
 import socket
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from time import monotonic
 
-from gatewayd.rtde.claims import OLD_LIST_LIMIT
+from gatewayd.rtde.claims import InputRecipe
 from gatewayd.rtde.connection import ClientHandler, Connection, Tolerances
+from gatewayd.rtde.lists import ListMemory
 from gatewayd.rtde.loss import Loss, LossReason, connect_failure
-from gatewayd.rtde.negotiation import Session, State, Unavailable, Wishes
+from gatewayd.rtde.negotiation import Session, Unavailable, Wishes
 from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.resolve import resolve
@@ -55,7 +55,10 @@ class ClientSettings:
     frequency: float = 0.0
     """Packages per second; 0: the controller's own rate. The controller divides its rate by a whole number."""
     read_back: bool = True
-    """Subscribe the claimed `input_*` fields too."""
+    """Subscribe the claimed `input_*` fields too, as far as the controller takes so long a list.
+
+    Else they are read right after they were claimed and not again.
+    """
     connect_timeout: float = 2.0
     handshake_timeout: float = 2.0
     """For each answer of the set-up."""
@@ -90,8 +93,7 @@ class RtdeClient:
             settings.write_buffer,
         )
         self._connection: Connection | None = None
-        self._short_outputs = False
-        self._short_inputs = False
+        self._lists = ListMemory()
         self._paused = False
 
     @property
@@ -99,13 +101,35 @@ class RtdeClient:
         """What is agreed with the controller now; None without a session."""
         return self._connection.session if self._connection is not None else None
 
-    def send(self, key: str, values: Sequence[Scalar]) -> bool:
-        """Send values of a claimed recipe, flat in the order of `session.inputs[key].recipe`, in one package.
+    def send(self, recipe: InputRecipe, values: Sequence[Scalar]) -> bool:
+        """Send values of one of `session.inputs`, flat in the order of its `recipe`, in one package.
 
-        Never waits. False if there is no session, the recipe is not claimed, or the controller has stopped reading.
-        ValueError if a value does not fit its type.
+        A recipe can be sent until its connection ends, also when a later session object has another one in its place.
+        Never waits. False if there is no session, the recipe is another connection's, or the controller has stopped
+        reading. ValueError if a value does not fit its type.
         """
-        return self._connection is not None and self._connection.send(key, values)
+        return self._connection is not None and self._connection.send(recipe, values)
+
+    def join(self, *fields: str) -> None:
+        """Have `session.unread` registers, which have been sent, share a recipe with the others.
+
+        `ClientHandler.inputs_changed` reports the new recipes. No effect without a session, for fields that are no such
+        registers, and where the recipe ids of the connection run short: the field keeps its own recipe then.
+        """
+        if self._connection is not None:
+            self._connection.join(fields)
+
+    def probe(self) -> bool:
+        """Ask the controller something whose answer queues behind the packages: `ClientHandler.probed` tells when.
+
+        False if nothing was asked: without a session, and while the last question is open.
+        """
+        return self._connection is not None and self._connection.probe()
+
+    def reconnect(self, text: str) -> None:
+        """End the connection once, for the reason that `text` gives, and set up a new one."""
+        if self._connection is not None:
+            self._connection.reconnect(text)
 
     async def pause(self) -> None:
         """Have the controller pause its output, in this session and in those to come."""
@@ -146,10 +170,10 @@ class RtdeClient:
             self._connection = None
             self.statistics.frequency = 0.0
             await connection.close()
-        self._consider_list_length(wishes, connection)
+        self._lists.learn(connection.lists, started=connection.started_at is not None)
         if connection.started_at is None:
             return loss, 0.0
-        return replace(loss, started=True), monotonic() - connection.started_at
+        return replace(loss, started=True), asyncio.get_running_loop().time() - connection.started_at
 
     async def _connect(self, wishes: Wishes) -> Connection:
         loop = asyncio.get_running_loop()
@@ -208,20 +232,6 @@ class RtdeClient:
             settings.watchdog,
             settings.frequency,
             settings.read_back,
-            self._short_outputs,
-            self._short_inputs,
+            self._lists.limited,
             not self._paused,
         )
-
-    def _consider_list_length(self, wishes: Wishes, connection: Connection) -> None:
-        """Old controllers take 2048 bytes of names: if a longer list came to nothing, try shorter ones next."""
-        if connection.started_at is not None:
-            self._short_outputs = self._short_inputs = False
-        elif connection.state is State.OUTPUTS and wishes.read_back:
-            self._short_outputs = not wishes.short_outputs and _is_long(wishes.subscription())
-        elif connection.state is State.INPUTS:
-            self._short_inputs = not wishes.short_inputs and _is_long(wishes.wanted_inputs())
-
-
-def _is_long(names: tuple[str, ...]) -> bool:
-    return len(",".join(names)) > OLD_LIST_LIMIT

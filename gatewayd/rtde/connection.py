@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from time import monotonic
 from typing import ClassVar, Protocol, cast
 
-from gatewayd.rtde.claims import HandshakeError
+from gatewayd.rtde.claims import HandshakeError, InputRecipe
 from gatewayd.rtde.codec import ClientProtocol, ProtocolError
+from gatewayd.rtde.lists import ListOutcome
 from gatewayd.rtde.loss import Loss, LossReason, connection_failure
-from gatewayd.rtde.messages import ControllerMessage, DataPackage, ExecutableMessage, TextMessage
-from gatewayd.rtde.negotiation import TIMESTAMP, Event, Negotiation, Session, State, Wishes
+from gatewayd.rtde.messages import (
+    ControllerMessage,
+    DataPackage,
+    ExecutableMessage,
+    TextLevel,
+    TextMessage,
+)
+from gatewayd.rtde.negotiation import TIMESTAMP, Event, Negotiation, Session, Wishes
 from gatewayd.rtde.pace import Pace, Statistics
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.types import DataType
@@ -37,16 +44,22 @@ class ClientHandler(Protocol):
         """The set-up is complete; values follow."""
 
     def values(self, values: tuple[Scalar, ...], now: float) -> None:
-        """A package, flat in the order of `Session.outputs`, received at `now` (monotonic seconds)."""
+        """A package, flat in the order of `Session.outputs`, received at `now` (the loop's time)."""
 
     def inputs_changed(self, session: Session) -> None:
-        """Inputs that were in use have been claimed; recipes of the former session object are void."""
+        """The input recipes have changed: inputs that were in use have been claimed, or registers have joined.
+
+        Those of former session objects can still be sent.
+        """
 
     def session_lost(self, loss: Loss) -> None:
         """A session has ended, or an attempt at one has failed. The client goes on by itself."""
 
     def text(self, message: TextMessage) -> None:
         """The controller has sent a text."""
+
+    def probed(self, delay: float) -> None:
+        """A probe was answered `delay` seconds after it was sent; infinity: it was not, within the handshake's time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +104,17 @@ class Connection(asyncio.Protocol):
         self._codec = ClientProtocol()
         self._negotiation = Negotiation(wishes)
         self._transport: asyncio.Transport | None = None
+        self._complained = False
         self._lost = loop.create_future()
         self._waiters: list[asyncio.Future[None]] = []
         self._deadline: asyncio.TimerHandle | None = None
         self._check: asyncio.TimerHandle | None = None
         self._retry: asyncio.TimerHandle | None = None
         self._retry_delay = _FIRST_CLAIM_RETRY
+        self._probe: asyncio.TimerHandle | None = None
+        self._probed_at = 0.0
+        self._asked_at: float | None = None
+        self._round_trip = 0.0
         self._outputs = Recipe((), ())
         self._clocked = False
         self._period = 0.0
@@ -106,23 +124,47 @@ class Connection(asyncio.Protocol):
         self._measured = 0.0
 
     @property
-    def state(self) -> State:
-        """How far the negotiation has come."""
-        return self._negotiation.state
+    def lists(self) -> ListOutcome:
+        """What the connection has shown of the lists that the controller takes."""
+        negotiation = self._negotiation
+        long = negotiation.awaits_long_list
+        return ListOutcome(
+            negotiation.controller, negotiation.took_long_list, long, long and self._complained
+        )
 
     # what users do
 
-    def send(self, key: str, values: Sequence[Scalar]) -> bool:
-        """Send the flat values of the claimed recipe `key` in one package; False if there is no such recipe now.
+    def send(self, recipe: InputRecipe, values: Sequence[Scalar]) -> bool:
+        """Send the flat values of an accepted recipe in one package; False if it is not one of this session.
 
         Never waits. ValueError if a value does not fit its type.
         """
-        claimed = self.session.inputs.get(key) if self.session is not None else None
-        if claimed is None or self.done.done():
+        if self.session is None or self.done.done() or not self._negotiation.claims.accepted(recipe):
             return False
-        self._write(DataPackage(claimed.id, claimed.recipe.pack(values)))
+        self._write(DataPackage(recipe.id, recipe.recipe.pack(values)))
         self._statistics.writes += 1
         return not self.done.done()
+
+    def join(self, fields: Iterable[str]) -> None:
+        """Have unread registers share a recipe with the others."""
+        if self.session is not None and not self.done.done():
+            self._claim(self._negotiation.join(fields))
+
+    def probe(self) -> bool:
+        """Ask something whose answer queues behind the packages; False if no answer can be expected to it."""
+        if self.session is None or self.done.done() or self._probe is not None:
+            return False
+        question = self._negotiation.probe()
+        if question is None:
+            return False
+        self._probed_at = self._loop.time()
+        self._probe = self._loop.call_later(self._tolerances.handshake, self._probe_unanswered)
+        self._write(question)
+        return not self.done.done()
+
+    def reconnect(self, text: str) -> None:
+        """End the connection for a reason of the user's; what was sent is still delivered."""
+        self._conclude(Loss(LossReason.RECONNECT, f"{self._address}: {text}"))
 
     async def pause(self) -> None:
         """Have the output paused; returns when the controller has answered or the connection is lost."""
@@ -156,22 +198,26 @@ class Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """See asyncio.Protocol."""
-        try:
-            self._receive(data)
-        except Exception as error:  # noqa: BLE001  asyncio would log it and go on; so `run` raises it
-            self._end()
-            if not self.done.done():
-                self.done.set_exception(error)
+        self._guarded(lambda: self._receive(data))
 
     def connection_lost(self, exc: Exception | None) -> None:
         """See asyncio.Protocol."""
         self._lost.set_result(None)
         self._conclude(connection_failure(exc if isinstance(exc, OSError) else None, self._address))
 
+    def _guarded(self, work: Callable[[], None]) -> None:
+        """Do what calls handlers. asyncio would log their exceptions and go on; so `run` raises them."""
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001  see above
+            self._end()
+            if not self.done.done():
+                self.done.set_exception(error)
+
     # messages
 
     def _receive(self, data: bytes) -> None:
-        now = monotonic()
+        now = self._loop.time()
         packages: list[DataPackage] = []
         failure: ProtocolError | None = None
         try:
@@ -179,21 +225,28 @@ class Connection(asyncio.Protocol):
                 if self.done.done():
                     return
                 if type(message) is DataPackage:
-                    packages.append(message)
-                    if self._negotiation.running:
-                        continue
+                    if not self._negotiation.running:
+                        self._take(message)
+                    if self._negotiation.delivering:
+                        packages.append(message)
+                    continue
+                # What came before an answer was sent before it: it is no reading of what the answer brings.
+                failure = self._deliver(packages, now)
+                if failure is not None:
+                    break
                 self._take(message)
         except ProtocolError as error:
             failure = error
-        if packages and self._pace is not None and not self.done.done():
-            failure = self._deliver(packages, now) or failure
+        failure = self._deliver(packages, now) or failure
         if failure is not None:
             self._fail(LossReason.PROTOCOL, f"what the controller sent is not RTDE: {failure}")
 
     def _take(self, message: ControllerMessage) -> None:
         if isinstance(message, TextMessage):
+            self._complained |= self._negotiation.awaits_long_list and message.level <= TextLevel.ERROR
             self._handler.text(message)
             return
+        self._measure_round_trip(message)
         try:
             step = self._negotiation.handle(message)
         except HandshakeError as error:
@@ -201,6 +254,8 @@ class Connection(asyncio.Protocol):
             return
         if step.send is not None:
             self._request(step.send)
+        elif self._negotiation.reading:
+            self._await(self._patience)
         elif not self._negotiation.waiting:
             self._disarm()
         if self.done.done():
@@ -210,17 +265,24 @@ class Connection(asyncio.Protocol):
         elif step.event is not None:
             self._EVENTS[step.event](self)
 
+    def _measure_round_trip(self, message: ControllerMessage) -> None:
+        if self._asked_at is not None and not isinstance(message, DataPackage):
+            self._round_trip = max(self._round_trip, self._loop.time() - self._asked_at)
+            self._asked_at = None
+
     def _deliver(self, packages: list[DataPackage], now: float) -> ProtocolError | None:
+        """Hand on the newest package, if there is any, and count them all."""
         pace = self._pace
-        assert pace is not None
+        if pace is None or not packages or self.done.done():
+            return None
         self._heard = now
         self._patience = max(self._tolerances.data, _PERIODS_OF_PATIENCE * self._period)
-        newest = packages.pop()
+        (*older, newest), packages[:] = packages, ()
         try:
             values = self._outputs.unpack(newest.payload)
         except ProtocolError as error:
             return error
-        for package in packages:
+        for package in older:
             self._statistics.overtaken += 1
             if self._clocked and len(package.payload) >= _TIMESTAMP.size:
                 pace.package(_TIMESTAMP.unpack_from(package.payload)[0], now)
@@ -235,8 +297,8 @@ class Connection(asyncio.Protocol):
         return None
 
     def _started(self) -> None:
-        now = monotonic()
-        session = self.session = self._negotiation.session()
+        now = self._loop.time()
+        session = self.session = self._negotiation.session(self._round_trip)
         self.started_at = self._heard = self._measured = now
         self._statistics.sessions += 1
         self._outputs = session.outputs
@@ -247,21 +309,34 @@ class Connection(asyncio.Protocol):
         self._handler.session_started(session)
 
     def _inputs_changed(self) -> None:
-        self.session = self._negotiation.session()
+        self._heard = self._loop.time()
+        self.session = self._negotiation.session(self._round_trip)
+        self._schedule_retry()
         self._handler.inputs_changed(self.session)
 
     def _pause_answered(self) -> None:
-        self._heard = monotonic()
+        self._heard = self._loop.time()
         for waiter in self._waiters:
             if not waiter.done():
                 waiter.set_result(None)
         self._waiters.clear()
+
+    def _probe_answered(self) -> None:
+        if self._probe is not None:  # else it was given up
+            self._probe.cancel()
+            self._probe = None
+            self._handler.probed(self._loop.time() - self._probed_at)
+
+    def _probe_unanswered(self) -> None:
+        self._probe = None
+        self._guarded(lambda: self._handler.probed(math.inf))
 
     _EVENTS: ClassVar[dict[Event, Callable[[Connection], None]]] = {
         Event.STARTED: _started,
         Event.INPUTS_CHANGED: _inputs_changed,
         Event.PAUSED: _pause_answered,
         Event.RESUMED: _pause_answered,
+        Event.PROBED: _probe_answered,
     }
 
     # sending
@@ -278,9 +353,13 @@ class Connection(asyncio.Protocol):
 
     def _request(self, message: ExecutableMessage) -> None:
         self._write(message)
+        self._asked_at = self._loop.time()
+        self._await(self._tolerances.handshake)
+
+    def _await(self, seconds: float) -> None:
         self._disarm()
         if not self.done.done():
-            self._deadline = self._loop.call_later(self._tolerances.handshake, self._unanswered)
+            self._deadline = self._loop.call_later(seconds, self._unanswered)
 
     async def _ask(self, message: ExecutableMessage | None) -> None:
         if message is None or self.done.done():
@@ -298,17 +377,19 @@ class Connection(asyncio.Protocol):
             self._deadline = None
 
     def _unanswered(self) -> None:
+        if self._negotiation.reading:
+            self._fail(LossReason.SILENT, _silence(self._patience, first=self.session is None))
+            return
         what = self._negotiation.awaited
         self._fail(LossReason.UNANSWERED, f"{what} did not come within {self._tolerances.handshake:g} s")
 
     def _watch(self) -> None:
         self._statistics.turns += 1
-        now = monotonic()
+        now = self._loop.time()
         silence = now - self._heard
         if self._negotiation.running and silence > self._patience:
             first = self._pace is None or self._pace.timestamp is None
-            hint = ": is the robot powered and its safety set-up confirmed?" if first else ""
-            self._fail(LossReason.SILENT, f"no data from the controller for {silence:.1f} s{hint}")
+            self._fail(LossReason.SILENT, _silence(silence, first=first))
             return
         if self._pace is not None and now - self._measured >= _MEASURE_EVERY:
             self._pace.measure(now)
@@ -316,19 +397,21 @@ class Connection(asyncio.Protocol):
         self._check = self._loop.call_later(min(self._tolerances.data / 4, _MEASURE_EVERY / 2), self._watch)
 
     def _schedule_retry(self) -> None:
-        if self._negotiation.claims.retriable and not self.done.done():
+        if self._retry is None and self._negotiation.claims.retriable and not self.done.done():
             delay = min(self._retry_delay, self._tolerances.claim_retry)
             self._retry_delay = 2 * delay
             self._retry = self._loop.call_later(delay, self._retry_claims)
 
     def _retry_claims(self) -> None:
-        request = self._negotiation.retry_claims()
+        self._retry = None
+        self._claim(self._negotiation.retry_claims())
+        self._schedule_retry()
+
+    def _claim(self, request: ExecutableMessage | None) -> None:
         if self._negotiation.claims.exhausted:
             self._give_up_recipes()
-            return
-        if request is not None:
+        elif request is not None:
             self._request(request)
-        self._schedule_retry()
 
     # ends
 
@@ -350,7 +433,12 @@ class Connection(asyncio.Protocol):
     def _end(self) -> None:
         """Stop everything that could still call a handler."""
         self.session = None
-        for handle in (self._deadline, self._check, self._retry):
+        for handle in (self._deadline, self._check, self._retry, self._probe):
             if handle is not None:
                 handle.cancel()
         self._pause_answered()
+
+
+def _silence(seconds: float, *, first: bool) -> str:
+    hint = ": is the robot powered and its safety set-up confirmed?" if first else ""
+    return f"no data from the controller for {seconds:.1f} s{hint}"

@@ -35,6 +35,8 @@ class LossReason(Enum):
     """The controller does not take in what is sent."""
     RECIPES = "recipes"
     """All recipe ids of the connection are used up; a new connection starts again at 1."""
+    RECONNECT = "reconnect"
+    """The user of the client asked for a new connection."""
     FAILED = "failed"
     """Another failure of the connection."""
 

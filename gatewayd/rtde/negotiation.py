@@ -1,21 +1,24 @@
 """The client's part of an RTDE conversation as a table: which message comes next after which answer.
 
-Pure: messages in, messages out. The order is version 2 (else 1), controller version, outputs, inputs, start. Text
-messages are the caller's; data packages are told to the negotiation only while it waits for a start, which
-they prove (a controller may send data before the answer to a start, or instead of it).
+Pure: messages in, messages out. The order is version 2 (else 1), controller version, claims, readings, working recipe,
+start. Where the working recipe reads every input back it is agreed before the claims, as nothing needs to be read
+apart then: its first package after the claims is the reading. Whether a controller takes so long a list of outputs
+only its answer tells; a refusal that blames no field leads to readings in pieces on the same connection. A reading is
+an output recipe for one package: set up, started, paused. Inputs that are claimed later are read in the same way.
+
+Text messages are the caller's; data packages are handed to the negotiation only while it waits for a start, which
+they prove (a controller may send data before the answer to a start, or instead of it), or for the package of a reading.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 from enum import Enum, auto
 from typing import ClassVar, NamedTuple
 
-from gatewayd.rtde.catalogue import OUTPUTS, Series, likely_holders
-from gatewayd.rtde.claims import OLD_LIST_LIMIT, Claims, HandshakeError, InputRecipe, sort_types
+from gatewayd.rtde.catalogue import Series
+from gatewayd.rtde.claims import Claims, HandshakeError, is_long, sort_types
 from gatewayd.rtde.messages import (
-    IN_USE,
     NOT_FOUND,
     ControllerMessage,
     ControllerVersion,
@@ -32,7 +35,17 @@ from gatewayd.rtde.messages import (
     Start,
     StartReply,
 )
+from gatewayd.rtde.reading import Reading
 from gatewayd.rtde.recipe import Recipe
+from gatewayd.rtde.session import (
+    TIMESTAMP,
+    TOO_LONG,
+    Session,
+    Unavailable,
+    Wishes,
+    input_hint,
+    output_hint,
+)
 
 __all__ = [
     "TIMESTAMP",
@@ -46,85 +59,9 @@ __all__ = [
     "Wishes",
 ]
 
-TIMESTAMP = "timestamp"
-"""The output that is always subscribed, first: it tells skipped and late packages, and a restarted controller."""
-TOO_LONG = "TOO_LONG"
-"""Our word for a read-back that was left out because the controller does not take so long a list of names."""
-
 _RATE_V1 = 125
 _RATE_UNKNOWN = {True: 500, False: 125}
 _NEW_HARDWARE = 5
-
-
-@dataclass(frozen=True, slots=True)
-class Wishes:
-    """What a client wants of a controller."""
-
-    outputs: tuple[str, ...] = ()
-    """Fields to subscribe; `timestamp` is put first by itself."""
-    inputs: tuple[str, ...] = ()
-    """Fields to claim."""
-    watchdog: str | None = None
-    """Input field that gets a recipe of its own; need not be in `inputs`."""
-    frequency: float = 0.0
-    """Output packages per second; 0: as many as the controller makes."""
-    read_back: bool = True
-    """Subscribe the wanted `input_*` fields too, after the outputs."""
-    short_outputs: bool = False
-    """Leave the read-backs out all the same: the controller does not take the whole list."""
-    short_inputs: bool = False
-    """Claim the registers by several lists of at most `OLD_LIST_LIMIT` bytes instead of one."""
-    running: bool = True
-    """Start the output; else stay paused."""
-
-    def wanted_inputs(self) -> tuple[str, ...]:
-        """Fields to claim, the watchdog included."""
-        return tuple(dict.fromkeys((*self.inputs, *((self.watchdog,) if self.watchdog else ()))))
-
-    def read_backs(self) -> tuple[str, ...]:
-        """Inputs that the controller also offers as outputs and that are not subscribed anyway."""
-        return tuple(
-            name
-            for name in self.wanted_inputs()
-            if name.startswith("input_") and name in OUTPUTS and name not in self.outputs
-        )
-
-    def subscription(self) -> tuple[str, ...]:
-        """Everything to subscribe, in order, each once."""
-        read_backs = self.read_backs() if self.read_back and not self.short_outputs else ()
-        names = (TIMESTAMP, *self.outputs, *read_backs)
-        return tuple(dict.fromkeys(names))
-
-
-@dataclass(frozen=True, slots=True)
-class Unavailable:
-    """A field that the controller does not give."""
-
-    field: str
-    output: bool
-    """Wanted as output; else as input."""
-    word: str
-    """The controller's word: NOT_FOUND, IN_USE, a type unknown to us; or REFUSED, TOO_LONG."""
-    hint: str
-    """What it means, who may be behind it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Session:
-    """What was agreed with the controller. A new object whenever the inputs change."""
-
-    controller: ControllerVersion
-    series: Series | None
-    """None for a major software version that we do not know."""
-    protocol: int
-    """RTDE protocol version spoken."""
-    period: float
-    """Seconds between packages, as the controller divides its own rate."""
-    outputs: Recipe
-    """Layout of the values; `timestamp` is its first field unless the controller lacks it."""
-    inputs: Mapping[str, InputRecipe]
-    """Claimed inputs by recipe key (`gatewayd.rtde.claims.recipe_key`)."""
-    unavailable: tuple[Unavailable, ...]
 
 
 class State(Enum):
@@ -134,8 +71,12 @@ class State(Enum):
     VERSION_2 = "the answer to protocol version 2"
     VERSION_1 = "the answer to protocol version 1"
     CONTROLLER = "the controller version"
-    OUTPUTS = "the answer to the output recipe"
     INPUTS = "the answer to an input recipe"
+    READING_SETUP = "the answer to the output recipe of a reading"
+    READING_START = "the answer to the start of a reading"
+    READING = "the package of a reading"
+    READING_PAUSE = "the answer to the pause of a reading"
+    OUTPUTS = "the answer to the output recipe"
     STARTING = "the answer to the start"
     RUNNING = "data"
     PAUSING = "the answer to the pause"
@@ -144,12 +85,13 @@ class State(Enum):
 
 
 class Event(Enum):
-    """Something to tell the user of the client."""
+    """Something to report to the user of the client."""
 
     STARTED = auto()
     INPUTS_CHANGED = auto()
     PAUSED = auto()
     RESUMED = auto()
+    PROBED = auto()
 
 
 class Step(NamedTuple):
@@ -161,6 +103,7 @@ class Step(NamedTuple):
 
 _NOTHING = Step()
 _AT_REST = frozenset({State.RUNNING, State.PAUSED})
+_BEFORE_PROBES = frozenset({State.NEW, State.VERSION_2, State.VERSION_1, State.CONTROLLER})
 
 
 class Negotiation:
@@ -169,22 +112,41 @@ class Negotiation:
     def __init__(self, wishes: Wishes) -> None:
         self.state = State.NEW
         """What is awaited."""
-        limit = OLD_LIST_LIMIT if wishes.short_inputs else None
-        self.claims = Claims(wishes.wanted_inputs(), wishes.watchdog, limit)
+        self.claims = Claims(wishes.wanted_inputs(), wishes.watchdog, limited=wishes.limited)
         """The inputs."""
+        self.controller: ControllerVersion | None = None
+        """The controller's software, once it is known."""
+        self.took_long_list = False
+        """Whether the controller has accepted a list longer than every controller takes."""
         self._wishes = wishes
+        self._reading = Reading(wishes)
         self._run = wishes.running
-        self._names = wishes.subscription()
-        self._refused_outputs: dict[str, str] = {}
         self._version = 1
-        self._controller: ControllerVersion | None = None
+        self._asked: tuple[str, ...] = ()
         self._outputs: Recipe | None = None
+        """The working recipe while the controller has it."""
+        self._agreed: Recipe | None = None
+        """The working recipe of the session."""
+        self._reported = False
+        self._joined: frozenset[str] = frozenset()
+        """Unread registers whose content is known all the same: they have been written."""
+        self._probes = 0
         self._period = 1 / _RATE_V1
 
     @property
     def running(self) -> bool:
         """Whether data is due."""
         return self.state is State.RUNNING
+
+    @property
+    def reading(self) -> bool:
+        """Whether a package is due that is a reading."""
+        return self.state is State.READING
+
+    @property
+    def delivering(self) -> bool:
+        """Whether a data package that comes now is one of the working recipe."""
+        return self.state in {State.RUNNING, State.PAUSING}
 
     @property
     def waiting(self) -> bool:
@@ -195,6 +157,11 @@ class Negotiation:
     def awaited(self) -> str:
         """The answer that is due, in words."""
         return (State.INPUTS if self.state in _AT_REST else self.state).value
+
+    @property
+    def awaits_long_list(self) -> bool:
+        """Whether the answer that is due is that to a list which an old controller may refuse for its length."""
+        return is_long(self._asked if self.state is State.OUTPUTS else self.claims.asked)
 
     def begin(self) -> ExecutableMessage:
         """The first message."""
@@ -208,8 +175,7 @@ class Negotiation:
             return action(self, message)
         if isinstance(message, DataPackage):
             return _NOTHING
-        msg = f"the controller sent {type(message).__name__} while {self.state.value} was awaited"
-        raise HandshakeError(msg)
+        raise self._misplaced(message)
 
     def retry_claims(self) -> ExecutableMessage | None:
         """Ask again for inputs that were in use, if any are and no answer is due."""
@@ -217,6 +183,23 @@ class Negotiation:
             return None
         self.claims.retry()
         return self.claims.request()
+
+    def join(self, fields: Iterable[str]) -> ExecutableMessage | None:
+        """Have unread registers share a recipe with the others: at once, or when no answer is due (then None)."""
+        joining = frozenset(fields)
+        self._joined |= joining
+        self.claims.join(joining)
+        return None if self.waiting else self.claims.request()
+
+    def probe(self) -> ExecutableMessage | None:
+        """Ask for an answer that comes behind everything the controller sent before; `Event.PROBED` when it is there.
+
+        None before the session is complete. An answer that is still due to an earlier probe is waited for first.
+        """
+        if not self._reported:
+            return None
+        self._probes += 1
+        return GetControllerVersion()
 
     def pause(self) -> ExecutableMessage | None:
         """Stop the output: at once, or as soon as the negotiation gets there (then None)."""
@@ -234,21 +217,25 @@ class Negotiation:
         self.state = State.RESUMING
         return Start()
 
-    def session(self) -> Session:
+    def session(self, round_trip: float = 0.0) -> Session:
         """What has been agreed. Only after `Event.STARTED`."""
-        assert self._controller is not None
-        assert self._outputs is not None
+        assert self.controller is not None
+        assert self._agreed is not None
+        unread = self._reading.unread(self.claims.types)
         return Session(
-            self._controller,
-            Series.from_major(self._controller.major),
+            self.controller,
+            Series.from_major(self.controller.major),
             self._version,
             self._period,
-            self._outputs,
+            self._agreed,
             self.claims.recipes,
             self._unavailable(),
+            {name: values for name, values in self._reading.held.items() if name not in unread},
+            unread,
+            round_trip,
         )
 
-    # what to do with each answer
+    # the way to the session
 
     def _version_2_answered(self, reply: ProtocolVersionReply) -> Step:
         if reply.accepted:
@@ -262,58 +249,173 @@ class Negotiation:
         return self._go(State.CONTROLLER, GetControllerVersion())
 
     def _controller_answered(self, version: ControllerVersion) -> Step:
-        self._controller = version
-        return self._ask_outputs(version)
+        self.controller = version
+        if self._wishes.read_back and not self._reading.limited:
+            return self._ask_outputs()
+        return self._advance()
 
-    def _ask_outputs(self, version: ControllerVersion) -> Step:
-        if self._version == 1:
-            return self._go(State.OUTPUTS, SetupOutputs(self._names))
-        series = Series.from_major(version.major)
-        rate = series.base_rate if series else _RATE_UNKNOWN[version.major >= _NEW_HARDWARE]
-        frequency = min(max(self._wishes.frequency, 1.0), rate) if self._wishes.frequency else float(rate)
-        self._period = (rate // frequency) / rate
-        return self._go(State.OUTPUTS, SetupOutputs(self._names, frequency))
-
-    def _outputs_answered(self, reply: OutputsSetup) -> Step:
-        assert self._controller is not None
-        types, refused = sort_types(self._names, reply.types)
-        if refused:
-            self._refused_outputs.update(refused)
-            self._names = tuple(name for name in self._names if name not in refused)
-            if not self._names:
-                raise HandshakeError("the controller offers none of the wanted outputs")
-            return self._ask_outputs(self._controller)
-        if reply.recipe == 0:
-            raise HandshakeError("the controller refused the output recipe without naming a field")
-        self._outputs = Recipe(self._names, types)
-        return self._ask_inputs()
-
-    def _ask_inputs(self) -> Step:
-        request = self.claims.request()
+    def _advance(self, event: Event | None = None) -> Step:
+        """The next thing to do while no output runs: claim, read, set up the working recipe, start it."""
+        request = self._claim()
         if request is not None:
-            return self._go(State.INPUTS, request)
+            return self._go(State.INPUTS, request, event)
+        piece = self._reading.piece(self.claims.types)
+        if piece:
+            self._outputs = None
+            return self._set_up(State.READING_SETUP, piece, event)
+        if self._outputs is None:
+            return self._ask_outputs(event)
         self.claims.take_change()
         if self._run:
-            return self._go(State.STARTING, Start())
-        return self._go(State.PAUSED, None, Event.STARTED)
+            return self._go(State.STARTING, Start(), event)
+        return self._go(State.PAUSED, None, self._complete())
+
+    def _claim(self) -> ExecutableMessage | None:
+        """The next request for inputs; registers that turned out not to be readable go apart."""
+        request = self.claims.request()
+        if request is None and not self.claims.busy and self._is_read():
+            self.claims.separate(self._reading.unread(self.claims.types) - self._apart() - self._joined)
+            request = self.claims.request()
+        return request
+
+    def _is_read(self) -> bool:
+        """Whether it is known of every claimed input if it can be read."""
+        return self._outputs is not None and not self._reading.piece(self.claims.types)
+
+    def _apart(self) -> frozenset[str]:
+        """Fields that have a recipe of their own."""
+        return frozenset(key for key, held in self.claims.recipes.items() if held.recipe.names == (key,))
+
+    def _ask_outputs(self, event: Event | None = None) -> Step:
+        names = self._agreed.names if self._agreed is not None else self._reading.working()
+        if not names:
+            raise HandshakeError("the controller offers none of the wanted outputs")
+        return self._set_up(State.OUTPUTS, names, event)
+
+    def _set_up(self, state: State, names: tuple[str, ...], event: Event | None) -> Step:
+        self._asked = names
+        return self._go(state, SetupOutputs(names, self._frequency()), event)
+
+    def _frequency(self) -> float | None:
+        """What to ask for; None in protocol version 1, which cannot choose."""
+        assert self.controller is not None
+        if self._version == 1:
+            return None
+        series = Series.from_major(self.controller.major)
+        rate = series.base_rate if series else _RATE_UNKNOWN[self.controller.major >= _NEW_HARDWARE]
+        frequency = min(max(self._wishes.frequency, 1.0), rate) if self._wishes.frequency else float(rate)
+        self._period = (rate // frequency) / rate
+        return frequency
+
+    def _outputs_answered(self, reply: OutputsSetup) -> Step:
+        names = self._asked
+        if reply.recipe == 0 and NOT_FOUND not in reply.types and is_long(names):
+            return self._list_refused()
+        types, refused = sort_types(names, reply.types)
+        if self._agreed is not None and (refused or tuple(types) != self._agreed.types):
+            raise HandshakeError("the controller answered the same output recipe otherwise than before")
+        if refused:
+            self._reading.refuse(refused)
+            return self._ask_outputs()
+        if reply.recipe == 0:
+            raise HandshakeError("the controller refused the output recipe without naming a field")
+        self.took_long_list |= is_long(names)
+        self._outputs = self._agreed or Recipe(names, types)
+        self._reading.agree(self._outputs)
+        if self._agreed is None:
+            self.claims.separate(name for name in self._reading.refused if name.startswith("input_"))
+        return self._advance()
+
+    def _list_refused(self) -> Step:
+        if self._agreed is not None:
+            raise HandshakeError("the controller refuses an output recipe that it had accepted")
+        self._reading.limited = True
+        self.claims.limit()
+        return self._advance()
 
     def _inputs_answered(self, reply: InputsSetup) -> Step:
-        self.claims.answer(reply)
-        return self._ask_inputs()
-
-    def _more_inputs_answered(self, reply: InputsSetup) -> Step:
-        self.claims.answer(reply)
-        request = self.claims.request()
-        changed = request is None and self.claims.take_change()
-        return Step(request, Event.INPUTS_CHANGED if changed else None)
+        self._take_claim(reply)
+        return self._advance()
 
     def _started(self, message: StartReply | DataPackage) -> Step:
-        if isinstance(message, StartReply) and not message.accepted:
-            raise HandshakeError("the controller refused to start the output")
-        event = Event.STARTED if self.state is State.STARTING else Event.RESUMED
+        if isinstance(message, DataPackage):
+            assert self._outputs is not None
+            if len(message.payload) != self._outputs.size:
+                return _NOTHING
+        elif not message.accepted:
+            return self._start_refused()
+        event = Event.RESUMED if self.state is State.RESUMING else self._complete()
         if not self._run:
             return self._go(State.PAUSING, Pause(), event)
-        return self._go(State.RUNNING, None, event)
+        return self._rest(State.RUNNING, event)
+
+    def _start_refused(self) -> Step:
+        """In version 1 the answer to a list has no place for a refusal: it shows here."""
+        if self._agreed is not None or self._outputs is None or not is_long(self._outputs.names):
+            raise HandshakeError("the controller refused to start the output")
+        self._outputs = None
+        self.took_long_list = False
+        return self._list_refused()
+
+    def _complete(self) -> Event:
+        """The working recipe is set up and, if wanted, started: what that is to the user."""
+        self._agreed = self._outputs
+        event = Event.INPUTS_CHANGED if self._reported else Event.STARTED
+        self._reported = True
+        return event
+
+    # readings
+
+    def _piece_answered(self, reply: OutputsSetup) -> Step:
+        types, refused = sort_types(self._asked, reply.types)
+        if refused:
+            self._reading.refuse(refused)
+            return self._advance()
+        if reply.recipe == 0:
+            raise HandshakeError(
+                "the controller refused the output recipe of a reading without naming a field"
+            )
+        self._reading.expect(Recipe(self._asked, types))
+        return self._go(State.READING_START, Start())
+
+    def _reading_started(self, message: StartReply | DataPackage) -> Step:
+        """A package before the answer proves the start; the reading is the next, which surely is of this piece."""
+        if isinstance(message, StartReply) and not message.accepted:
+            raise HandshakeError("the controller refused to start the output of a reading")
+        return self._go(State.READING, None)
+
+    def _read(self, package: DataPackage) -> Step:
+        if not self._reading.take(package.payload):
+            return _NOTHING
+        return self._go(State.READING_PAUSE, Pause())
+
+    def _reading_paused(self, _: PauseReply) -> Step:
+        return self._advance()
+
+    # while there is a session
+
+    def _more_inputs_answered(self, reply: InputsSetup) -> Step:
+        self._take_claim(reply)
+        return self._settle()
+
+    def _settle(self, event: Event | None = None) -> Step:
+        """Go on with claims; when there are no more, read what is new, or report the change."""
+        if self.claims.busy:
+            return Step(self.claims.request(), event)
+        request = self._claim()
+        if request is not None:
+            return Step(request, event)
+        if not self._reading.piece(self.claims.types):
+            changed = event is None and self.claims.take_change()
+            return Step(None, Event.INPUTS_CHANGED if changed else event)
+        if self.state is State.RUNNING:
+            return self._go(State.READING_PAUSE, Pause(), event)
+        return self._advance(event) if self.state is State.PAUSED else Step(None, event)
+
+    def _rest(self, state: State, event: Event) -> Step:
+        """Nothing is due but what has come up meanwhile."""
+        self.state = state
+        return self._settle(event)
 
     def _started_late(self, message: StartReply) -> Step:
         if not message.accepted:
@@ -323,23 +425,37 @@ class Negotiation:
     def _paused(self, _: PauseReply) -> Step:
         if self._run:
             return self._go(State.RESUMING, Start(), Event.PAUSED)
-        return self._go(State.PAUSED, None, Event.PAUSED)
+        return self._rest(State.PAUSED, Event.PAUSED)
+
+    def _probed(self, version: ControllerVersion) -> Step:
+        if not self._probes:
+            raise self._misplaced(version)
+        self._probes -= 1
+        return _NOTHING if self._probes else Step(None, Event.PROBED)
+
+    def _take_claim(self, reply: InputsSetup) -> None:
+        asked = self.claims.asked
+        self.claims.answer(reply)
+        self.took_long_list |= bool(reply.recipe) and is_long(asked)
 
     def _go(self, state: State, send: ExecutableMessage | None, event: Event | None = None) -> Step:
         self.state = state
         return Step(send, event)
 
+    def _misplaced(self, message: ControllerMessage) -> HandshakeError:
+        return HandshakeError(
+            f"the controller sent {type(message).__name__} while {self.state.value} was awaited"
+        )
+
     def _unavailable(self) -> tuple[Unavailable, ...]:
+        left_out = self._reading.left_out
+        read_backs = set(self._wishes.read_backs())
         outputs = [
-            Unavailable(name, True, word, _output_hint(word)) for name, word in self._refused_outputs.items()
+            Unavailable(name, True, word, output_hint(word, read_back=name in read_backs))
+            for name, word in (*self._reading.refused.items(), *dict.fromkeys(left_out, TOO_LONG).items())
         ]
-        if self._wishes.read_back and self._wishes.short_outputs:
-            outputs += [
-                Unavailable(name, True, TOO_LONG, _output_hint(TOO_LONG))
-                for name in self._wishes.read_backs()
-            ]
         inputs = [
-            Unavailable(name, False, word, _input_hint(name, word))
+            Unavailable(name, False, word, input_hint(name, word))
             for name, word in self.claims.refused.items()
         ]
         return (*outputs, *inputs)
@@ -348,8 +464,15 @@ class Negotiation:
         (State.VERSION_2, ProtocolVersionReply): _version_2_answered,
         (State.VERSION_1, ProtocolVersionReply): _version_1_answered,
         (State.CONTROLLER, ControllerVersion): _controller_answered,
-        (State.OUTPUTS, OutputsSetup): _outputs_answered,
         (State.INPUTS, InputsSetup): _inputs_answered,
+        (State.READING_SETUP, OutputsSetup): _piece_answered,
+        (State.READING_START, StartReply): _reading_started,
+        (State.READING_START, DataPackage): _reading_started,
+        (State.READING, StartReply): _started_late,
+        (State.READING, DataPackage): _read,
+        (State.READING_PAUSE, StartReply): _started_late,
+        (State.READING_PAUSE, PauseReply): _reading_paused,
+        (State.OUTPUTS, OutputsSetup): _outputs_answered,
         (State.STARTING, StartReply): _started,
         (State.STARTING, DataPackage): _started,
         (State.RUNNING, StartReply): _started_late,
@@ -361,21 +484,8 @@ class Negotiation:
         (State.RESUMING, StartReply): _started,
         (State.RESUMING, DataPackage): _started,
         (State.RESUMING, InputsSetup): _more_inputs_answered,
+        **dict.fromkeys(
+            ((state, ControllerVersion) for state in State if state not in _BEFORE_PROBES), _probed
+        ),
     }
     """State and kind of answer -> what to do with it; everything else is out of place."""
-
-
-def _output_hint(word: str) -> str:
-    if word == NOT_FOUND:
-        return "this controller's software does not have the field"
-    if word == TOO_LONG:
-        return "left out because the controller did not take so long a list of outputs"
-    return f"the controller names a type that is not known here: {word}"
-
-
-def _input_hint(name: str, word: str) -> str:
-    if word == IN_USE:
-        return f"probably claimed by {likely_holders(name)}"
-    if word == NOT_FOUND:
-        return "this controller's software does not have the input"
-    return f"the controller answered {word}"

@@ -71,19 +71,20 @@ def _at_least(payload: bytes, size: int) -> None:
 
 
 def _text(data: bytes) -> str:
-    return data.decode("utf-8", "replace")
+    """Text as the controller sent it, whatever it is; bytes that are not UTF-8 stay visible as hexadecimal escapes."""
+    return data.decode("utf-8", "backslashreplace")
 
 
 def _names(data: bytes) -> tuple[str, ...]:
     """Split a comma separated list; ur_rtde sends one comma more at its end."""
-    names = data.decode("ascii", "replace").split(",")
+    names = _text(data).split(",")
     if not names[-1]:
         names.pop()
     return tuple(names)
 
 
 def _joined(names: tuple[str, ...]) -> bytes:
-    return ",".join(names).encode("ascii", "replace")
+    return ",".join(names).encode("utf-8", "backslashreplace")
 
 
 def _decode_text(payload: bytes) -> TextMessage:
@@ -217,8 +218,8 @@ FROM_EXECUTABLE_V1: ExecutableDecoders = {
 
 
 def _encode_text(message: TextMessage) -> bytes:
-    text = message.message.encode("utf-8", "replace")[:_MAX_TEXT]
-    source = message.source.encode("utf-8", "replace")[:_MAX_TEXT]
+    text = message.message.encode("utf-8", "backslashreplace")[:_MAX_TEXT]
+    source = message.source.encode("utf-8", "backslashreplace")[:_MAX_TEXT]
     return bytes((len(text),)) + text + bytes((len(source),)) + source + bytes((message.level,))
 
 
@@ -277,7 +278,7 @@ def encode_controller(message: ControllerMessage, version: int) -> tuple[Package
             return PackageType.GET_URCONTROL_VERSION, _VERSION.pack(major, minor, bugfix, build)
         case TextMessage(text, _, level):
             if version == 1:
-                return PackageType.TEXT_MESSAGE, bytes((level,)) + text.encode("utf-8", "replace")
+                return PackageType.TEXT_MESSAGE, bytes((level,)) + text.encode("utf-8", "backslashreplace")
             return PackageType.TEXT_MESSAGE, _encode_text(message)
         case OutputsSetup(recipe, types):
             return PackageType.SETUP_OUTPUTS, (b"" if version == 1 else _recipe(recipe)) + _joined(types)

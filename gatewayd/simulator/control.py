@@ -2,10 +2,15 @@
 
     get FIELD                    ok VALUE[,VALUE...]
     set FIELD VALUE[,VALUE...]   write as the robot would; a moving field stays there
+    overwrite FIELD VALUE[,...]  the same in every cycle, whatever clients send; `overwrite FIELD off` ends it
     hold FIELD[,FIELD...]        claim inputs for the controller itself
     free FIELD[,FIELD...]        give them up again
     freeze on|off                timestamp stands still, packages go on
+    creep on|off                 as freeze, but the timestamp goes on by 1 ns a cycle
     silence on|off               no data packages
+    pause SECONDS                stand still, as a halted virtual machine: nothing sent, read or counted
+    delay SECONDS                packages and answers leave this late; 0: at once
+    drop-at STEP[:NUMBER]|off    close the next connection that gets there, see --drop-at
     drop-clients                 cut every connection; ok COUNT
     text MESSAGE                 text message (warning) to every client
     restart                      boot again: connections, registers and timestamp from the beginning
@@ -17,9 +22,11 @@ An answer is `ok`, `ok RESULT` or `error REASON`. Bits are `true` and `false`, a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Awaitable, Callable, Mapping
 
 from gatewayd.rtde.catalogue import suggest
+from gatewayd.simulator.faults import DropAt
 from gatewayd.simulator.server import SimulatedController
 from gatewayd.simulator.store import RANGES, Scalar
 
@@ -39,10 +46,15 @@ class Control:
         self._commands: Mapping[str, _Command] = {
             "get": self._get,
             "set": self._set,
+            "overwrite": self._overwrite,
             "hold": self._hold,
             "free": self._free,
             "freeze": self._freeze,
+            "creep": self._creep,
             "silence": self._silence,
+            "pause": self._pause,
+            "delay": self._delay,
+            "drop-at": self._drop_at,
             "drop-clients": self._drop_clients,
             "text": self._text,
             "restart": self._restart,
@@ -71,8 +83,15 @@ class Control:
 
     async def _set(self, rest: str) -> None:
         field, _, text = rest.partition(" ")
+        self._simulator.set(field, *self._values(field, text))
+
+    async def _overwrite(self, rest: str) -> None:
+        field, _, text = rest.partition(" ")
+        self._simulator.overwrite(field, *(() if text.strip() == "off" else self._values(field, text)))
+
+    def _values(self, field: str, text: str) -> list[Scalar]:
         code = self._simulator.controller.store.type(field).code
-        self._simulator.set(field, *(_value(item.strip(), code) for item in text.split(",")))
+        return [_value(item.strip(), code) for item in text.split(",")]
 
     async def _hold(self, rest: str) -> None:
         self._simulator.hold(*_fields(rest))
@@ -85,6 +104,20 @@ class Control:
 
     async def _silence(self, rest: str) -> None:
         self._simulator.faults.silence = _switch(rest)
+
+    async def _creep(self, rest: str) -> None:
+        self._simulator.faults.creep = _switch(rest)
+
+    async def _pause(self, rest: str) -> None:
+        self._simulator.pause(_seconds(rest))
+
+    async def _delay(self, rest: str) -> None:
+        self._simulator.faults.delay = _seconds(rest)
+
+    async def _drop_at(self, rest: str) -> None:
+        faults = self._simulator.faults
+        faults.drop_at = None if rest == "off" else DropAt.parse(rest)
+        faults.drop_times = 1
 
     async def _drop_clients(self, _rest: str) -> str:
         return str(self._simulator.drop_clients())
@@ -115,6 +148,14 @@ def _switch(text: str) -> bool:
         message = f"on or off, not {text!r}"
         raise ValueError(message)
     return text == "on"
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0 <= seconds < math.inf:
+        message = f"{text!r} is not a number of seconds"
+        raise ValueError(message)
+    return seconds
 
 
 def _value(text: str, code: str) -> Scalar:

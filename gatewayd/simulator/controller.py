@@ -34,6 +34,7 @@ INTERNAL = "the controller itself"
 """Owner of the inputs that were claimed with `hold`."""
 
 _RUNNING = 2  # runtime_state
+_CREEP = 1e-9  # seconds a cycle
 _PROGRAM_RUNNING = 0b10  # robot_status_bits
 
 
@@ -68,6 +69,7 @@ class Controller:
         self.store = Store(
             {name: field.type for name, field in {**INPUTS, **OUTPUTS}.items()}, SIGNALS, INITIAL
         )
+        self._overwritten: dict[str, tuple[Scalar, ...]] = {}
         self._rules = tuple(program)
         self._interpreter = self._load()
         if uptime is None:
@@ -84,8 +86,8 @@ class Controller:
         return self.store.moment.step
 
     def output_type(self, name: str) -> DataType | None:
-        """The type of an output, None if this series and version does not have it."""
-        return self._type(OUTPUTS.get(name))
+        """The type of an output, None if this series and version does not have it, or by a fault."""
+        return None if name in self.faults.unreadable else self._type(OUTPUTS.get(name))
 
     def input_type(self, name: str) -> DataType | None:
         """The type of an input, None if this series and version does not have it."""
@@ -106,7 +108,9 @@ class Controller:
     def advance(self, cycles: int = 1) -> None:
         """Run one control cycle, `cycles` after the last: more than 1 where some could not be run in time."""
         self.cycle += cycles
-        if self.faults.freeze:
+        self._overwrite()
+        if self.faults.freeze or self.faults.creep:
+            self._creep()
             return
         running = self._running()
         fraction = self._fraction() if running else 0.0
@@ -116,7 +120,8 @@ class Controller:
             self._interpreter.run(cycles)
 
     def restart(self) -> None:
-        """Boot again: timestamp and registers from the beginning, no claims but internal ones."""
+        """Boot again: timestamp and registers from the beginning, no claims but internal ones, nothing overwritten."""
+        self._overwritten.clear()
         self.store.reset()
         self._interpreter = self._load()
         self._set_step(0, 0.0, 1.0)
@@ -157,6 +162,27 @@ class Controller:
             message = f"{field} follows the controller's cycles; use freeze to stop it"
             raise ValueError(message)
         self.store.pin(field, values)
+
+    def overwrite(self, field: str, values: Sequence[Scalar] | None) -> None:
+        """Write a field as `set` does, and in every cycle again, whatever clients send; None: no more.
+
+        KeyError and ValueError as `set`.
+        """
+        if values is None:
+            self._overwritten.pop(field, None)
+            return
+        self.set(field, values)
+        self._overwritten[field] = self.get(field)
+
+    def _overwrite(self) -> None:
+        for field, values in self._overwritten.items():
+            if self.get(field) != values:
+                self.store.write(field, values)
+
+    def _creep(self) -> None:
+        if self.faults.creep:
+            moment = self.store.moment
+            self.store.moment = moment._replace(time=moment.time + _CREEP)
 
     def _type(self, field: Field | None) -> DataType | None:
         return field.type if field is not None and field.available(self.series, self.version) else None

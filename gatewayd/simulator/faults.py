@@ -1,14 +1,27 @@
 """What can be made to go wrong, and with which probability: switches of the simulated controller.
 
-Everything here is off by default. `freeze` and `silence` may be thrown while the simulator runs.
+Everything here is off by default, and may be thrown while the simulator runs unless it is about the start.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from enum import Enum
 from random import Random
+from typing import NamedTuple
 
-__all__ = ["ADAPTERS", "ADAPTER_FIELDS", "STRICT_LIST_BYTES", "Faults", "Mangler"]
+__all__ = [
+    "ADAPTERS",
+    "ADAPTER_FIELDS",
+    "STRICT_LIST_BYTES",
+    "DropAt",
+    "DroppedError",
+    "Faults",
+    "LongLists",
+    "Mangler",
+    "Step",
+]
 
 STRICT_LIST_BYTES = 2048
 """Longest list of names an old controller takes (guide of 2022, SETUP_OUTPUTS)."""
@@ -37,6 +50,57 @@ ADAPTER_FIELDS: tuple[str, ...] = (
 """The inputs an enabled adapter claims, as users of real controllers report them."""
 
 
+class LongLists(Enum):
+    """What a controller does with a list of names that is longer than `STRICT_LIST_BYTES`."""
+
+    TAKE = "take"
+    REFUSE = "refuse"
+    """Answer with recipe id 0 and the types of all fields."""
+    COMPLAIN = "complain"
+    """Send a text message in place of an answer."""
+    IGNORE = "ignore"
+    """Send nothing at all."""
+    CLOSE = "close"
+    """Close the connection."""
+
+
+class Step(Enum):
+    """A step of a connection: a request, by what it asks for, or the sending of a data package."""
+
+    VERSION = "version"
+    CONTROLLER = "controller"
+    OUTPUTS = "outputs"
+    INPUTS = "inputs"
+    START = "start"
+    PAUSE = "pause"
+    WRITE = "write"
+    """An input package."""
+    DATA = "data"
+    """An output package."""
+
+
+class DropAt(NamedTuple):
+    """The step at which connections are closed, before it is answered or sent."""
+
+    step: Step
+    number: int = 1
+    """Which one of its kind on a connection."""
+
+    @classmethod
+    def parse(cls, text: str) -> DropAt:
+        """Read "outputs" or "outputs:2"; ValueError names what is possible."""
+        word, _, number = text.partition(":")
+        steps = {step.value: step for step in Step}
+        if word not in steps or not (number or "1").isdecimal() or int(number or "1") < 1:
+            message = f"{text!r} is not STEP or STEP:NUMBER with a step out of {', '.join(steps)}"
+            raise ValueError(message)
+        return cls(steps[word], int(number or "1"))
+
+
+class DroppedError(Exception):
+    """The connection is to be closed here."""
+
+
 @dataclass(slots=True)
 class Faults:
     """The switches. Durations in seconds, probabilities from 0 to 1 per data package."""
@@ -51,8 +115,16 @@ class Faults:
     """One of `ADAPTERS`: claims `ADAPTER_FIELDS` for good."""
     hold: tuple[str, ...] = ()
     """Inputs claimed by the controller itself from the start."""
-    strict_lists: bool = False
-    """Ignore lists of names beyond `STRICT_LIST_BYTES` with a text message."""
+    long_lists: LongLists = LongLists.TAKE
+    """What becomes of lists of names beyond `STRICT_LIST_BYTES`."""
+    unreadable: frozenset[str] = frozenset()
+    """Inputs that are NOT_FOUND as outputs: they can be claimed and not be read back."""
+    drop_at: DropAt | None = None
+    """Close connections at this step."""
+    drop_times: float = 1
+    """How many connections to close there from now on; infinity: each."""
+    delay: float = 0.0
+    """How late everything leaves, in order."""
     linger: float = 0.0
     """How long claims outlive their connection."""
     overflow_close: float | None = 1.0
@@ -67,8 +139,18 @@ class Faults:
     """Seed of the three probabilities; each connection draws its own sequence from it."""
     freeze: bool = False
     """Packages go on, the timestamp and everything that follows from it stands still."""
+    creep: bool = False
+    """As `freeze`, but the timestamp goes on by 1 ns a cycle: it changes, and says nothing."""
     silence: bool = False
     """No data packages; everything else is answered."""
+
+    def drops(self, step: Step, number: int) -> bool:
+        """Whether the connection is to be closed at this step, its `number`th of the kind; counts those closed."""
+        if self.drop_at != (step, number) or self.drop_times < 1:
+            return False
+        if self.drop_times < math.inf:
+            self.drop_times -= 1
+        return True
 
     @property
     def mangles(self) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 
+from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.simulator.store import Store
 
 __all__ = ["Effect", "effects"]
@@ -67,21 +68,18 @@ def _analog(store: Store) -> None:
         _take_bits(store, "analog_io_types", 1 << number + shift, volts << shift)
 
 
-_standard = _digital("standard", 0, 8)
-_configurable = _digital("configurable", 8, 8, "actual_configurable_digital_output_bits")
-_tool = _digital("tool", 16, 2)
-
-_EFFECTS: Mapping[str, Effect] = {
+_BY_MASK: Mapping[str, Effect] = {
     "speed_slider_mask": _speed_slider,
-    "speed_slider_fraction": _speed_slider,
-    "standard_digital_output_mask": _standard,
-    "standard_digital_output": _standard,
-    "configurable_digital_output_mask": _configurable,
-    "configurable_digital_output": _configurable,
-    "tool_digital_output_mask": _tool,
-    "tool_digital_output": _tool,
+    "standard_digital_output_mask": _digital("standard", 0, 8),
+    "configurable_digital_output_mask": _digital(
+        "configurable", 8, 8, "actual_configurable_digital_output_bits"
+    ),
+    "tool_digital_output_mask": _digital("tool", 16, 2),
     "standard_analog_output_mask": _analog,
-    "standard_analog_output_type": _analog,
-    "standard_analog_output_0": _analog,
-    "standard_analog_output_1": _analog,
+}
+_EFFECTS: Mapping[str, Effect] = {
+    name: _BY_MASK[needs.mask]
+    for value, needs in COMPANIONS.items()
+    for name in (value, needs.mask, needs.type)
+    if name is not None
 }

@@ -19,13 +19,13 @@ _LONGEST_LINE = 65536
 
 
 async def serve(simulator: SimulatedController, *, control: bool) -> None:
-    """Run until SIGTERM, SIGINT or, with `control`, `quit` or the end of standard input.
+    """Run until SIGTERM, SIGINT, SIGHUP or, with `control`, `quit` or the end of standard input.
 
     Prints `listening on HOST:PORT` once connections are accepted. OSError if the address cannot be had.
     """
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         loop.add_signal_handler(number, stop.set)
     async with simulator:
         reader = asyncio.create_task(_commands(Control(simulator), stop)) if control else None

@@ -17,7 +17,8 @@ from gatewayd.rtde.codec import ProtocolError
 from gatewayd.rtde.messages import TextLevel
 from gatewayd.rtde.types import DEFAULT_PORT
 from gatewayd.simulator.controller import Controller
-from gatewayd.simulator.faults import Faults, Mangler
+from gatewayd.simulator.faults import DroppedError, Faults, Mangler
+from gatewayd.simulator.line import Line
 from gatewayd.simulator.session import Session
 from gatewayd.simulator.store import Scalar
 
@@ -69,6 +70,7 @@ class SimulatedController:
         self._booting: asyncio.TimerHandle | None = None
         self._restarting: asyncio.Task[None] | None = None
         self._next = 0.0
+        self._paused_until = 0.0
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -117,6 +119,22 @@ class SimulatedController:
         self.controller.restart()
         await self._listen()
 
+    def pause(self, seconds: float) -> None:
+        """Stand still for a while, as a halted virtual machine does: nothing is sent, read or counted.
+
+        The timestamp goes on where it stopped, and lags by that much from then on.
+        """
+        loop = asyncio.get_running_loop()
+        self._paused_until = loop.time() + seconds
+        loop.call_at(self._paused_until, self._read_again)
+        for connection in self._connections.values():
+            connection.read(on=False)
+
+    @property
+    def paused(self) -> bool:
+        """Whether it stands still."""
+        return asyncio.get_running_loop().time() < self._paused_until
+
     def drop_clients(self) -> int:
         """Cut every connection; returns how many there were."""
         connections = list(self._connections.values())
@@ -145,6 +163,15 @@ class SimulatedController:
     def free(self, *fields: str) -> None:
         """Give up held inputs; see `Controller.free`."""
         self.controller.free(fields)
+
+    def overwrite(self, field: str, *values: Scalar) -> None:
+        """Write a field in every cycle, whatever clients send; without values no more. See `Controller.overwrite`."""
+        self.controller.overwrite(field, values or None)
+
+    def _read_again(self) -> None:
+        if not self.paused:
+            for connection in self._connections.values():
+                connection.read(on=True)
 
     async def _listen(self) -> None:
         loop = asyncio.get_running_loop()
@@ -187,9 +214,10 @@ class SimulatedController:
         cycles = 1
         if late > (MAKE_UP * period if self._connections else period):
             cycles += int(late / period)
-        self.controller.advance(cycles)
-        for connection in list(self._connections.values()):
-            connection.cycle(now)
+        if not self.paused:
+            self.controller.advance(cycles)
+            for connection in list(self._connections.values()):
+                connection.cycle(now)
         self._next += cycles * period
         pause = _SHORTEST_CYCLE * period if self._connections else _IDLE
         self._schedule(max(self._next, now + pause))
@@ -212,6 +240,7 @@ class _Connection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.Transport", transport)
         self._socket = cast("socket.socket", transport.get_extra_info("socket"))
+        self._line = Line(self._transport, self._server.faults)
         peer = transport.get_extra_info("peername") or ("?", 0)
         self._session = Session(self._server.controller, f"client {self._number} ({peer[0]}:{peer[1]})")
         if not self._server.enter(self._number, self):
@@ -220,7 +249,8 @@ class _Connection(asyncio.Protocol):
         # A small send buffer makes it show soon that a client does not read.
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._transport.write(self._session.greeting())
+        self._write(self._session.greeting())
+        self.read(on=not self._server.paused)
         _log.info("%s connected", self._session)
 
     def data_received(self, data: bytes) -> None:
@@ -232,10 +262,14 @@ class _Connection(asyncio.Protocol):
             self._server.malformed += 1
             self.abort(str(error))
             return
+        except DroppedError as fault:
+            self.abort(str(fault))
+            return
         self._write(replies)
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._server.leave(self._number)
+        self._line.close()
         linger = self._server.faults.linger
         if linger:
             asyncio.get_running_loop().call_later(linger, self._session.close)
@@ -252,9 +286,22 @@ class _Connection(asyncio.Protocol):
         """Send a text message."""
         self._write(self._session.text(message, level))
 
+    def read(self, *, on: bool) -> None:
+        """Take in what the client sends, or leave it in the socket."""
+        if self._transport.is_closing():
+            return
+        if on:
+            self._transport.resume_reading()
+        else:
+            self._transport.pause_reading()
+
     def cycle(self, now: float) -> None:
         """Send the package that is due now, or skip it while the client does not read."""
-        package = self._session.package()
+        try:
+            package = self._session.package()
+        except DroppedError as fault:
+            self.abort(str(fault))
+            return
         if self._transport.is_closing():
             return
         if self._transport.get_write_buffer_size():
@@ -264,7 +311,7 @@ class _Connection(asyncio.Protocol):
         if self._server.faults.mangles:
             package = self._mangler.mangle(package) if package else self._mangler.flush()
         if package:
-            self._transport.write(package)
+            self._line.write(package)
 
     def _blocked(self, now: float) -> None:
         limit = self._server.faults.overflow_close
@@ -277,7 +324,7 @@ class _Connection(asyncio.Protocol):
     def _write(self, data: bytes) -> None:
         if not data or self._transport.is_closing():
             return
-        self._transport.write(self._mangler.flush() + data)
+        self._line.write(self._mangler.flush() + data)
         if self._transport.get_write_buffer_size() > _MOST_UNSENT:
             self._server.overflowed += 1
             self.abort("does not fetch its answers")

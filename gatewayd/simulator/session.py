@@ -7,7 +7,8 @@ recipe replaces the first at once, whatever cannot be understood is answered wit
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from gatewayd.rtde.codec import MAX_PACKAGE, ControllerProtocol, ProtocolError
@@ -36,7 +37,7 @@ from gatewayd.rtde.messages import (
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.controller import Controller
-from gatewayd.simulator.faults import STRICT_LIST_BYTES
+from gatewayd.simulator.faults import STRICT_LIST_BYTES, DroppedError, LongLists, Step
 from gatewayd.simulator.masks import Effect, effects
 from gatewayd.simulator.store import Store, View
 
@@ -49,6 +50,15 @@ SOURCE = "URControl"
 
 _OUTPUT_RECIPE = 1
 _DATA_HEAD = 4
+_STEPS: Mapping[type, Step] = {
+    RequestProtocolVersion: Step.VERSION,
+    GetControllerVersion: Step.CONTROLLER,
+    SetupOutputs: Step.OUTPUTS,
+    SetupInputs: Step.INPUTS,
+    Start: Step.START,
+    Pause: Step.PAUSE,
+    DataPackage: Step.WRITE,
+}
 _log = logging.getLogger(__name__)
 
 
@@ -81,6 +91,7 @@ class Session:
         self._view: View | None = None
         self._period = 1
         self._started = False
+        self._steps: Counter[Step] = Counter()
         self._out: list[bytes] = []
 
     def __str__(self) -> str:
@@ -103,7 +114,7 @@ class Session:
         return self._protocol.send(TextMessage(message, SOURCE, level))
 
     def receive(self, data: bytes) -> bytes:
-        """The answers to `data`, in order. Raises ProtocolError for bytes that are not RTDE.
+        """The answers to `data`, in order. Raises ProtocolError for bytes that are not RTDE, DroppedError for a fault.
 
         What was answered before the offending bytes is lost with the connection, as on a real controller.
         """
@@ -114,12 +125,13 @@ class Session:
         return out
 
     def package(self) -> bytes:
-        """The data package of this cycle; empty if none is due."""
+        """The data package of this cycle; empty if none is due. Raises DroppedError for a fault."""
         controller = self._controller
         if not self._started or self._view is None or controller.faults.silence:
             return b""
         if controller.cycle % self._period:
             return b""
+        self._pass(Step.DATA)
         recipe = _OUTPUT_RECIPE if self._protocol.version > 1 else None
         return self._protocol.send(DataPackage(recipe, self._view.payload()))
 
@@ -127,7 +139,16 @@ class Session:
         """Give up every claim."""
         self._controller.claims.release(self)
 
+    def _pass(self, step: Step) -> None:
+        self._steps[step] += 1
+        if self._controller.faults.drops(step, self._steps[step]):
+            message = f"fault at {step.value}:{self._steps[step]}"
+            raise DroppedError(message)
+
     def _handle(self, message: ExecutableMessage) -> None:
+        step = _STEPS.get(type(message))
+        if step is not None:
+            self._pass(step)
         match message:
             case DataPackage():
                 self._data(message)
@@ -157,11 +178,11 @@ class Session:
         self._answer(TextMessage(message, SOURCE, level))
 
     def _setup_outputs(self, message: SetupOutputs) -> None:
-        if not self._acceptable(message.names):
+        if not self._answers(message.names):
             return
         kinds = [self._controller.output_type(name) for name in message.names]
         types = tuple(kind.word if kind else NOT_FOUND for kind in kinds)
-        valid = bool(types) and NOT_FOUND not in types
+        valid = bool(types) and NOT_FOUND not in types and not self._is_too_long(message.names)
         if valid and not self._fits([kind for kind in kinds if kind]):
             self._complain("the output recipe is larger than a data package")
             valid = False
@@ -176,7 +197,7 @@ class Session:
         if not message.names:
             _log.info("%s: empty input recipe, not confirmed", self)
             return
-        if not self._acceptable(message.names):
+        if not self._answers(message.names):
             return
         kinds = [self._controller.input_type(name) for name in message.names]
         taken = self._controller.claims.taken(self, message.names)
@@ -191,7 +212,7 @@ class Session:
     ) -> int:
         """The id of the new recipe, its fields claimed; 0 and nothing claimed if it cannot be."""
         known = [kind for kind in kinds if kind is not None]
-        if not ERROR_WORDS.isdisjoint(types):
+        if not ERROR_WORDS.isdisjoint(types) or self._is_too_long(names):
             return 0
         if len(self._inputs) >= MOST_INPUT_RECIPES:
             self._complain(f"a connection has {MOST_INPUT_RECIPES} input recipes at most")
@@ -215,12 +236,22 @@ class Session:
         except ProtocolError as error:
             self._complain(f"input recipe {number}: {error.reason}")
 
-    def _acceptable(self, names: tuple[str, ...]) -> bool:
-        size = sum(map(len, names)) + len(names) - 1
-        if not self._controller.faults.strict_lists or size <= STRICT_LIST_BYTES:
+    def _answers(self, names: tuple[str, ...]) -> bool:
+        """Whether a setup request with these names is answered; by id 0 if the list is too long all the same."""
+        if not self._is_too_long(names):
             return True
-        self._complain(f"list of {size} bytes is longer than {STRICT_LIST_BYTES}")
-        return False
+        way, text = (
+            self._controller.faults.long_lists,
+            f"list of {_size(names)} bytes is longer than {STRICT_LIST_BYTES}",
+        )
+        if way is LongLists.CLOSE:
+            raise DroppedError(text)
+        if way is LongLists.COMPLAIN:
+            self._complain(text)
+        return way is LongLists.REFUSE
+
+    def _is_too_long(self, names: tuple[str, ...]) -> bool:
+        return self._controller.faults.long_lists is not LongLists.TAKE and _size(names) > STRICT_LIST_BYTES
 
     def _reply(self, message: OutputsSetup | InputsSetup) -> None:
         """Answer a setup; a list of types too long for a package becomes a complaint."""
@@ -232,3 +263,8 @@ class Session:
     @staticmethod
     def _fits(kinds: Sequence[DataType]) -> bool:
         return Recipe([""] * len(kinds), kinds).size + _DATA_HEAD <= MAX_PACKAGE
+
+
+def _size(names: tuple[str, ...]) -> int:
+    """Bytes of a list of names."""
+    return sum(map(len, names)) + len(names) - 1

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import hmac
 import logging
-import time
 from collections.abc import Awaitable, Callable
 from ipaddress import ip_address
 from typing import cast
@@ -17,6 +16,7 @@ from aiohttp import web
 from aiohttp.typedefs import Middleware
 from aiohttp.web_protocol import RequestHandler
 
+from gatewayd import clock
 from gatewayd.logs import fields
 
 __all__ = ["GREATEST_BODY", "HEADERS", "MOST_CONNECTIONS", "PATIENCE", "Doors", "is_local_name", "middleware"]
@@ -61,27 +61,27 @@ class Doors:
         if len(self._seen) >= MOST_CONNECTIONS:
             return _Full()
         handler = self._server()
-        self._seen[handler] = time.monotonic()
+        self._seen[handler] = clock.now()
         return handler
 
     def finished(self, handler: RequestHandler) -> None:
         """A request of the connection was answered."""
         if handler in self._seen:
-            self._seen[handler] = time.monotonic()
+            self._seen[handler] = clock.now()
 
     async def sweep(self) -> None:
         """Close what wastes a connection, until cancelled."""
         while True:
             await asyncio.sleep(_SWEEP)
             self._forget_closed()
-            now = time.monotonic()
+            now = clock.now()
             for handler in [one for one, seen in self._seen.items() if now - seen > PATIENCE]:
                 transport = handler.transport
                 if transport is not None:
                     transport.abort()
 
     def _forget_closed(self) -> None:
-        now = time.monotonic()
+        now = clock.now()
         # A connection of this very moment may not have its transport yet.
         for handler, seen in list(self._seen.items()):
             if handler.transport is None and now - seen > _SWEEP / 2:

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import asyncio
 import gzip
-import time
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from importlib.resources import files
 
 from aiohttp import web
 
-from gatewayd import __version__
+from gatewayd import __version__, clock
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import Reload
 from gatewayd.control.server import application
@@ -137,7 +136,7 @@ class StatusListener:
         station = self._station(request)
         text = request.query.get("since", "0")
         since = int(text) if text.isascii() and text.isdigit() and len(text) < 16 else 0
-        return _json(view.state(station, self._probes, since, time.monotonic()))
+        return _json(view.state(station, self._probes, since, clock.now()))
 
     def _station(self, request: web.Request) -> Station:
         name = request.match_info["cell"]

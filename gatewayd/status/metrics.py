@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -17,11 +16,13 @@ from prometheus_client import CollectorRegistry, ProcessCollector, generate_late
 from prometheus_client.core import HistogramMetricFamily, Metric
 from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamily
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
+from gatewayd.printable import printable
 from gatewayd.station import Station
 from gatewayd.status.health import readiness
 from gatewayd.status.histogram import Histogram
@@ -110,6 +111,31 @@ METRICS = (
         Kind.COUNTER,
         _CELL,
         "inputs whose read-back differed from what was written",
+    ),
+    MetricInfo(
+        "gatewayd_lag_seconds",
+        Kind.GAUGE,
+        _CELL,
+        "by how much the newest package of the robot is later than the quickest ones were; part of every age",
+    ),
+    MetricInfo(
+        "gatewayd_differing",
+        Kind.GAUGE,
+        _CELL,
+        "inputs for which the robot holds something else than it was given",
+    ),
+    MetricInfo("gatewayd_unadopted", Kind.GAUGE, _CELL, "inputs whose content in the robot is not known"),
+    MetricInfo(
+        "gatewayd_adoption_seconds",
+        Kind.GAUGE,
+        _CELL,
+        "seconds until adopted inputs without an owner fall back; 0: none will",
+    ),
+    MetricInfo(
+        "gatewayd_gaps_total",
+        Kind.COUNTER,
+        _CELL,
+        "times the gateway stood still: stopped, suspended or starved of the CPU",
     ),
     MetricInfo("gatewayd_variables", Kind.GAUGE, ("cell", "quality"), "variables by quality"),
     MetricInfo(
@@ -205,7 +231,7 @@ class Exposition:
 
     def collect(self) -> Iterator[Metric]:
         """Called for each `text`."""
-        now = time.monotonic()
+        now = clock.now()
         daemon, probes = self._probes.daemon, self._probes
         troubles = probes.troubles()
         ready, _ = readiness(daemon.cells, probes.late, troubles)
@@ -255,6 +281,11 @@ def _cell(station: Station, now: float) -> dict[str, list[_Sample]]:
         "gatewayd_robot_sessions_total": [((), health.sessions)],
         "gatewayd_robot_watchdog_fed": [((), _LEVELS[health.watchdog_fed])],
         "gatewayd_read_back_mismatches_total": [((), health.read_back_mismatches)],
+        "gatewayd_lag_seconds": [((), health.lag)],
+        "gatewayd_differing": [((), health.differing)],
+        "gatewayd_unadopted": [((), health.unadopted)],
+        "gatewayd_adoption_seconds": [((), health.adoption)],
+        "gatewayd_gaps_total": [((), health.gaps)],
         "gatewayd_variables": [((one.name.lower(),), image.quality.count(one)) for one in Quality],
         "gatewayd_input_age_seconds": [
             ((), now - max((image.times[i] for i in image.inputs), default=-math.inf))
@@ -308,7 +339,7 @@ def _family(info: MetricInfo, samples: Iterable[_Sample] = ()) -> Metric:
     make = CounterMetricFamily if info.kind is Kind.COUNTER else GaugeMetricFamily
     family = make(info.name, info.meaning, labels=info.labels)
     for labels, value in samples:
-        family.add_metric(labels, value)
+        family.add_metric(list(map(printable, labels)), value)
     return family
 
 

@@ -58,6 +58,12 @@ def robot(cell: Cell, address: str, trouble: str, now: float) -> Node:
     missing = cell.image.available.count(False)
     if not cell.accepts_writes:
         return Node("Robot", Level.WARN, "fresh, its inputs are not adopted yet", facts)
+    if health.differing:
+        words = f"fresh, but it holds something else for {counted(health.differing, 'input')}"
+        return Node("Robot", Level.BAD, words, facts)
+    if health.unadopted:
+        words = f"fresh, but what it holds is not known for {counted(health.unadopted, 'input')}"
+        return Node("Robot", Level.WARN, words, facts)
     if missing:
         return Node("Robot", Level.WARN, f"fresh, but {counted(missing, 'variable')} unavailable", facts)
     return Node("Robot", Level.GOOD, "fresh and writable", facts)
@@ -78,9 +84,16 @@ def gateway(cell: Cell, hanging: Sequence[str], troubles: Sequence[str], now: fl
     facts = f"{good} of {len(cell.image.quality)} values good"
     if hanging:
         return Node("Gateway", Level.BAD, f"hangs: {', '.join(hanging)}", facts)
-    differs = _recent(cell, EventKind.READ_BACK_DIFFERS, now)
+    health, differs = cell.health, _recent(cell, EventKind.READ_BACK_DIFFERS, now)
     if differs:
         return Node("Gateway", Level.WARN, f"read-back differs: {differs}", facts)
+    if health.adoption:
+        words = f"adopted values without an owner fall back in {span(health.adoption)}"
+        return Node("Gateway", Level.WARN, words, facts)
+    out_of_range = cell.image.quality.count(Quality.OUT_OF_RANGE)
+    if out_of_range:
+        words = f"{counted(out_of_range, 'value')} out of the range of a place"
+        return Node("Gateway", Level.WARN, words, facts)
     if forced:
         return Node("Gateway", Level.WARN, f"{counted(forced, 'value')} forced by the local operator", facts)
     if troubles:

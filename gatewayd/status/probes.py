@@ -6,12 +6,12 @@ The hops are seen from listeners of the cell and its robot link, so nothing is m
 from __future__ import annotations
 
 import asyncio
-import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from itertools import islice
 from typing import Protocol
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell, Written
 from gatewayd.core.definition import Direction
 from gatewayd.core.events import Event, EventKind, EventRing
@@ -85,10 +85,10 @@ class CellProbe:
     def _changed(self, direction: Direction) -> None:
         """The last listener of the cell: all images have the package by now."""
         assert self._cell is not None
-        arrived = self._cell.image.output_time
+        arrived = self._cell.freshness.last_arrival
         if direction is Direction.OUTPUT and arrived != self._image_time:
             self._image_time = arrived
-            self.package_to_image.observe(time.monotonic() - arrived)
+            self.package_to_image.observe(clock.now() - arrived)
 
     def _written(self, _writer: int, _changes: Written, now: float) -> None:
         if self._written_at is None:
@@ -96,7 +96,7 @@ class CellProbe:
 
     def _sent(self) -> None:
         if self._written_at is not None:
-            self.write_to_package.observe(time.monotonic() - self._written_at)
+            self.write_to_package.observe(clock.now() - self._written_at)
             self._written_at = None
 
 
@@ -124,11 +124,11 @@ class Probes:
     async def run(self) -> None:
         """Measure until cancelled."""
         while True:
-            self.look(time.monotonic())
+            self.look(clock.now())
             for _ in range(_LOOKS_PER_ROUND):
-                due = time.monotonic() + LAG_PERIOD
+                due = clock.now() + LAG_PERIOD
                 await asyncio.sleep(LAG_PERIOD)
-                self.lag.observe(time.monotonic() - due)
+                self.lag.observe(clock.now() - due)
 
     def look(self, now: float) -> None:
         """Find the cells that are served now and the parts that hang."""

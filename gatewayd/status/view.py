@@ -21,6 +21,7 @@ from gatewayd.daemon import Daemon
 from gatewayd.happening import Happening
 from gatewayd.mapping.plan import Placement
 from gatewayd.modbus.server import ModbusListener
+from gatewayd.printable import json_text
 from gatewayd.station import Station
 from gatewayd.status import picture
 from gatewayd.status.picture import Level, Node
@@ -39,6 +40,9 @@ _IN_RUNS = frozenset(
         EventKind.FALLBACK,
         EventKind.UNAVAILABLE,
         EventKind.AVAILABLE,
+        EventKind.ADOPTION_ENDS,
+        EventKind.READ_BACK_DIFFERS,
+        EventKind.FOLLOWED,
     }
 )
 """Kinds of events that befall many variables in one moment."""
@@ -50,7 +54,7 @@ def as_json(document: object) -> bytes:
         text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     except ValueError:
         text = json.dumps(_finite(document), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text.encode()
+    return json_text(text).encode()
 
 
 def _finite(value: Any) -> Any:
@@ -187,7 +191,7 @@ def _ages(cell: Cell, now: float) -> list[int | None]:
     """Milliseconds since the source told each value; None: never."""
     image = cell.image
     shared = _milliseconds(now - image.output_time)
-    outputs = set(image.outputs)
+    outputs = {index for index in image.outputs if not image.variables[index].valid_running}
     told = (Quality.GOOD, Quality.STALE)
     return [
         shared if index in outputs and quality in told else _milliseconds(image.age(index, now))

@@ -87,7 +87,6 @@ class Watcher:
             consumers,
             lost=lambda node, _now: self.told.append(("lost", node)),
             back=lambda node, _now: self.told.append(("back", node)),
-            booted=lambda node, _now: self.told.append(("booted", node)),
             changed=self._changed,
         )
         self.client = Client(self.service.objects())
@@ -134,7 +133,7 @@ def test_boot_up_of_a_watched_node_ends_its_supervision_until_it_is_heard() -> N
     watcher.hear(1, 0.0)
     watcher.hear(1, 0.1, state=0)
     watcher.service.tick(9.0)
-    assert watcher.told == [("booted", 1)]
+    assert watcher.told == []
     assert watcher.service.state(1) is Watch.WAITING
 
 
@@ -148,84 +147,36 @@ def test_boot_up_of_a_lost_node_is_not_its_return() -> None:
     assert watcher.told == [("lost", 1), ("back", 1)]
 
 
-def test_a_node_that_owes_its_first_heartbeat_has_one_heartbeat_time() -> None:
-    watcher = Watcher(MASTER)
-    assert watcher.service.expect(1, 100.0)
-    assert watcher.service.next_deadline(100.0) == 100.5
-    watcher.service.tick(100.49)
-    assert watcher.told == []
-    watcher.service.tick(100.5)
+def test_another_consumer_goes_on_with_what_is_lost() -> None:
+    former, successor = Watcher(MASTER), Watcher(MASTER)
+    former.hear(1, 0.0)
+    former.service.tick(0.5)
+    successor.service.restart(0.5)
+    successor.service.resume(former.service)
+    assert successor.service.state(1) is Watch.LOST
+
+
+def test_after_a_gap_of_our_own_a_node_has_its_whole_time_again() -> None:
+    watcher = Watcher(MASTER, Consumer(2, 500, None))
+    watcher.hear(1, 0.0)
+    watcher.service.gap(0.1, 9.0)
+    watcher.service.tick(9.49)
+    assert (watcher.told, watcher.service.state(2)) == ([], Watch.WAITING)
+    watcher.service.tick(9.5)
+    watcher.service.gap(10.0, 20.0)
     assert (watcher.told, watcher.service.state(1)) == ([("lost", 1)], Watch.LOST)
-    assert not watcher.service.expect(1, 100.6)
-    watcher.hear(1, 101.0)
-    assert watcher.told == [("lost", 1), ("back", 1)]
-    assert watcher.service.expect(1, 101.1)
-    assert watcher.service.next_deadline(101.1) == 101.5, "a heartbeat alone prolongs it"
 
 
-def test_further_signs_of_life_are_no_heartbeat() -> None:
+def test_a_process_that_stands_still_over_and_over_misses_a_silent_node_all_the_same() -> None:
     watcher = Watcher(MASTER)
-    for now in (0.0, 0.2, 0.4):
-        assert watcher.service.expect(1, now)
-    watcher.service.tick(0.5)
-    assert watcher.told == [("lost", 1)]
-
-
-def test_a_heartbeat_in_time_is_all_that_was_owed() -> None:
-    watcher = Watcher(MASTER)
-    watcher.service.expect(1, 0.0)
-    watcher.hear(1, 0.4)
-    watcher.service.tick(0.89)
-    assert (watcher.told, watcher.service.state(1)) == ([], Watch.ALIVE)
-
-
-def test_a_node_that_boots_owes_its_heartbeat_from_its_next_sign_on() -> None:
-    watcher = Watcher(MASTER)
-    watcher.hear(1, 0.0, state=0)
-    assert watcher.told == [], "it had shown nothing of itself"
-    watcher.service.expect(1, 0.0)
-    watcher.hear(1, 0.4, state=0)
-    assert (watcher.told, watcher.service.next_deadline(0.4)) == ([("booted", 1)], math.inf)
-    watcher.service.expect(1, 1.0)
-    assert watcher.service.next_deadline(1.0) == 1.5
-
-
-def test_a_lost_node_that_boots_is_not_believed_before_it_is_heard() -> None:
-    watcher = Watcher(MASTER)
-    watcher.service.expect(1, 0.0)
-    watcher.service.tick(0.5)
-    watcher.hear(1, 0.6, state=0)
-    assert not watcher.service.expect(1, 0.7)
-    assert watcher.told == [("lost", 1)]
-
-
-def test_a_node_that_is_not_watched_owes_nothing() -> None:
-    watcher = Watcher(MASTER)
-    assert watcher.service.expect(2, 0.0)
-    assert watcher.service.next_deadline(0.0) == math.inf
-
-
-def test_what_is_owed_is_owed_under_a_new_time_and_after_a_restart_no_more() -> None:
-    watcher = Watcher(MASTER)
-    watcher.service.expect(1, 0.0)
-    watcher.client.write(0x1016, 1, 1 << 16 | 200)
-    watcher.service.tick(0.1)
-    assert watcher.service.next_deadline(0.1) == pytest.approx(0.3)
-    watcher.service.restart(0.2)
-    assert watcher.service.next_deadline(0.2) == math.inf
-    watcher.service.tick(9.0)
-    assert watcher.told == []
-
-
-def test_another_consumer_goes_on_with_what_is_owed_and_what_is_lost() -> None:
-    for lost in (False, True):
-        former, next_one = Watcher(MASTER), Watcher(MASTER)
-        former.service.expect(1, 0.0)
-        former.service.tick(0.5 if lost else 0.1)
-        next_one.service.restart(0.5)
-        next_one.service.resume(former.service)
-        assert next_one.service.expect(1, 0.4) is not lost
-        assert next_one.service.next_deadline(0.4) == (math.inf if lost else 0.5)
+    watcher.hear(1, 0.0)
+    now = 0.0
+    while not watcher.told:
+        watcher.service.gap(now, now + 0.1)
+        now += 0.2
+        watcher.service.tick(now)
+        assert now < 2.0
+    assert now > 0.8
 
 
 def test_cct_heartbeat_07_one_node_twice_is_refused() -> None:

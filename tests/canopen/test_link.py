@@ -13,12 +13,14 @@ from uuid import uuid4
 import can
 import pytest
 
+from gatewayd import clock
 from gatewayd.canopen import link as link_module
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.link import LOSS_INTERVAL, CanLink
 from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.plan import CanopenPlan
+from gatewayd.canopen.pythoncan import PythonCanBus
 from gatewayd.canopen.storage import MemoryStore
 from gatewayd.core.cell import Cell
 from gatewayd.core.succession import succeed
@@ -241,3 +243,60 @@ async def test_another_cell_takes_over_unnoticed_by_the_bus(station: Station) ->
 def test_a_node_with_another_heartbeat_is_another_node(station: Station) -> None:
     plan = station.link.node.plan
     assert not station.link.fits(replace(plan, heartbeat=11), station.cell.definition)
+
+
+async def test_what_waited_through_a_gap_is_read_before_anything_else_and_only_that(station: Station) -> None:
+    waited: list[float] = []
+    async with running(station):
+        await until(lambda: station.frames(HEARTBEAT))
+        node = station.link.node
+        receive = node.nmt.receive
+
+        def observed(frame: Frame, now: float) -> None:
+            waited.append(node._peers.waited)
+            receive(frame, now)
+
+        node._handlers[0] = observed
+        now = clock.now()
+        for _ in range(200):
+            station.send(0x000, b"\x80\5")
+        station.link.gap(now - 4.0, now)
+        turn = asyncio.get_running_loop().create_future()
+        asyncio.get_running_loop().call_soon(turn.set_result, None)
+        await turn
+        assert waited == [pytest.approx(4.0)] * 200, "all of them in the turn after the gap"
+        station.send(0x000, b"\x80\5")
+        await until(lambda: len(waited) == 201)
+    assert waited[-1] == 0.0
+
+
+async def test_a_link_that_does_not_run_has_nothing_that_waits(station: Station) -> None:
+    station.link.gap(0.0, 4.0)
+    assert station.link.node._peers.waited == 0.0
+
+
+async def test_a_bus_that_was_stuck_for_seconds_gets_nothing_old(station: Station) -> None:
+    """Real time and a driver without room: SYNC producer, heartbeat, an event-driven TPDO and EMCYs."""
+    sync = replace(station.link.node.plan.sync, producer=True, period=10_000)
+    stuck = Station(str(uuid4()), sync=sync, autostart=True)
+    async with running(stuck):
+        await until(lambda: stuck.frames(HEARTBEAT) and stuck.frames(0x080))
+        bus, now = stuck.link._bus, clock.now()
+        assert isinstance(bus, PythonCanBus)
+        bus._full = True  # what a driver says while nothing goes out
+        stuck.forget()
+        for number in range(1, 100):
+            stuck.cell.image.values[stuck.names["ints_out[0]"]] = number
+            stuck.cell.outputs_written(now)
+            await asyncio.sleep(0.01)
+        count = stuck.link.node.sync.count
+        stuck.link.node.frames_lost(1, clock.now())
+        assert stuck.heard == []
+        assert stuck.link.node.sync.count == count
+        bus._tell_room()
+        await asyncio.sleep(0)
+        first = {can_id: stuck.frames(can_id) for can_id in (0x080, HEARTBEAT, 0x085, 0x285)}
+        assert len(first[0x080]) <= 1
+        assert len(first[HEARTBEAT]) <= 2
+        assert [int.from_bytes(data[:2], "little") for data in first[0x085]] == [0x8110]
+        assert first[0x285] == [b"\x63" + bytes(7)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
@@ -12,9 +13,10 @@ from hypothesis import strategies as st
 
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.frame import Frame, Priority
+from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
-from gatewayd.canopen.node import OVERRUN_TIME, Node, Observer
+from gatewayd.canopen.node import OVERRUN_TIME, Node
+from gatewayd.canopen.observer import Observer
 from gatewayd.canopen.plan import CanopenPlan, Consumer, ObjectPlan, PdoEntry, PdoPlan, SyncPlan
 from gatewayd.canopen.storage import MemoryStore, Saved, Store
 from gatewayd.core.cell import Cell, Change
@@ -22,6 +24,7 @@ from gatewayd.core.definition import CellDefinition, Direction, Lock, Value, Val
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
+from gatewayd.mapping.loader import load
 from tests.canopen.wire import Wire
 
 NODE = 5
@@ -522,6 +525,137 @@ def test_heartbeat_feeds_a_writer_that_sends_only_changes() -> None:
     assert _line_alive(plant)
 
 
+# -- status words in PDOs --------------------------------------------------------------------------------------------
+
+_ROBOT_STATE, _HEARTBEAT_WORD = 7, 4
+"""Sub-indices of 5F00h."""
+
+
+def _status_pdo(transmission: int, *words: tuple[int, int], inhibit: int = 0) -> Plant:
+    """TPDO 3 carries words of the status block behind an output."""
+    cycles = PdoEntry(CYCLES, 0x2401, 1, 32)
+    status = tuple(PdoEntry(None, index, subindex, 16) for index, subindex in words)
+    pdo = PdoPlan(3, Direction.OUTPUT, 0x385, True, transmission, inhibit, 0, (cycles, *status))
+    return Plant(replace(PLAN, pdos=(*PLAN.pdos, pdo)))
+
+
+_STATUS_MAPPING = b"""\
+gatewayd: 1
+cell: sample
+robot: {host: robot}
+canopen:
+  channel: can0
+  bitrate: 500000
+  node: 1
+  pdos:
+    state: {status: [flags, robot_state, quality of ready], event: 500ms}
+writers: {line: {canopen: any}}
+variables:
+  start: {robot: input_bit_register_0, canopen: auto, owner: line}
+  ready: {robot: output_int_register_0, canopen: auto}
+"""
+
+
+def _told_by_tpdo_3(frames: list[Frame]) -> list[tuple[int, ...]]:
+    """The words behind the output."""
+    return [struct.unpack_from("<2H", frame.data, 4) for frame in frames if frame.can_id == 0x385]
+
+
+def test_an_event_driven_tpdo_tells_states_and_qualities_when_the_robot_is_lost() -> None:
+    plant = _status_pdo(255, (0x5F00, _ROBOT_STATE), (0x5F40, CYCLES + 1))
+    plant.operational()
+    plant.show(CYCLES, 5)
+    plant.cell.robot_lost("cable", plant.now)
+    assert _told_by_tpdo_3(plant.take())[-1] == (0, 1)
+    plant.cell.robot_connected(plant.now)
+    plant.cell.adopt({}, plant.now)
+    assert _told_by_tpdo_3(plant.take())[-1] == (1, 1)
+    plant.cell.package_arrived(2.0, plant.now)
+    assert _told_by_tpdo_3(plant.show(CYCLES, 5)) == [(2, 0)]
+    assert _told_by_tpdo_3(plant.run(5.0)) == []
+
+
+def test_an_owner_in_a_tpdo_is_told_when_it_changes() -> None:
+    plant = _status_pdo(254, (0x5F10, PART + 1), (0x5F10, SPEED + 1))
+    plant.operational()
+    assert _told_by_tpdo_3(plant.part(7)) == [(1, 0)]
+    assert _told_by_tpdo_3(plant.heartbeat(0)) == [(0, 0)], "a master that boots has lost its lock"
+    assert plant.write(0x5F00, 26, SPEED + 1, 2) == 0
+    assert _told_by_tpdo_3(plant.run(0.11)) == [(0, 2)], "a lock request changes no value"
+
+
+def test_a_word_that_changes_with_time_is_sent_as_the_inhibit_time_allows() -> None:
+    for inhibit, least, most in ((0, 9, 11), (5000, 1, 3)):
+        plant = _status_pdo(255, (0x5F00, _HEARTBEAT_WORD), (0x5F00, _ROBOT_STATE), inhibit=inhibit)
+        plant.operational()
+        told = []
+        for _ in range(10):
+            plant.cell.health.heartbeat += 1
+            told += _told_by_tpdo_3(plant.run(0.1))
+        assert least <= len(told) <= most
+
+
+def test_status_words_with_sync() -> None:
+    plant = _status_pdo(1, (0x5F00, _ROBOT_STATE), (0x5F40, CYCLES + 1))
+    plant.operational()
+    plant.show(CYCLES, 5)
+    assert _told_by_tpdo_3(plant.hear(0x80)) == [(2, 0)]
+    plant.cell.robot_lost("cable", plant.now)
+    assert _told_by_tpdo_3(plant.hear(0x80)) == [(0, 1)]
+
+
+def test_words_that_a_mapping_puts_into_a_tpdo_are_shown_as_its_mapping_and_sent() -> None:
+    plan = load(_STATUS_MAPPING, "cell").plan
+    assert plan is not None
+    assert plan.canopen is not None
+    wire, cell = Wire(), Cell(plan.cell)
+    node = Node(plan.canopen, cell, wire.send, MemoryStore(), lambda _now: True)
+    node.bus_changed(BusState.ACTIVE, 1.0)
+    node.start(1.0)
+    number = next(pdo.number for pdo in plan.canopen.pdos if any(one.is_status for one in pdo.entries))
+    shown = [node.dictionary.read(0x1A00 + number - 1, slot)[::-1].hex() for slot in (1, 2, 3)]
+    assert sorted(shown) == ["5f000210", "5f000710", "5f400210"]
+    node.receive(Frame(0, bytes([1, 1])), 1.0)
+    values = {"5f000210": 0, "5f000710": 0, "5f400210": 3}
+    expected = struct.pack("<3H", *(values[one] for one in shown))
+    assert expected in [frame.data[-6:] for frame in wire.take()]
+
+
+def test_a_master_maps_status_words_by_sdo_but_no_request() -> None:
+    plant = Plant().power_on()
+    assert plant.write(0x1A02, 1, 0x5F00_0710) == 0
+    assert plant.write(0x1A02, 2, 0x5F40_0310) == 0
+    assert plant.write(0x1A02, 3, 0x5F00_1A10) == -0x0604_0041
+    assert plant.write(0x1A02, 3, 0x5F40_0510) == -0x0602_0000
+    assert plant.write(0x1602, 1, 0x5F00_0710) == -0x0604_0041
+    assert plant.write(0x1A02, 0, 2, 1) == 0
+    assert plant.write(0x1802, 1, 0x4000_0385) == 0
+    plant.hear(0, START)
+    plant.take()
+    plant.cell.robot_lost("cable", plant.now)
+    assert [frame.data for frame in plant.take() if frame.can_id == 0x385][-1] == bytes([0, 0, 3, 0])
+
+
+@pytest.mark.parametrize("behaviour", [0, 1, 2])
+def test_a_lost_robot_is_an_emergency_and_no_communication_error(behaviour: int) -> None:
+    plant = Plant().power_on()
+    plant.node.dictionary.write(0x1029, 1, bytes([behaviour]))
+    plant.hear(0, START)
+    plant.take()
+    plant.cell.robot_lost("cable", plant.now)
+    assert _emergencies(plant.take()) == [0xFF10]
+    assert plant.read(0x1001) == 0x81
+    assert (plant.state, plant.node.counters.communication_errors) == (NmtState.OPERATIONAL, 0)
+    plant.hear(0, RESET_COMMUNICATION)
+    assert _emergencies(plant.run(0.0)) in ([0xFF10], [])
+    assert plant.read(0x1001) == 0x81
+    plant.cell.robot_connected(plant.now)
+    plant.cell.package_arrived(2.0, plant.now)
+    plant.show(CYCLES, 5)
+    assert _emergencies(plant.run(1.1)) == [0]
+    assert plant.read(0x1001) == 0
+
+
 # -- a promised heartbeat --------------------------------------------------------------------------------------------
 
 
@@ -550,24 +684,107 @@ def test_a_writer_that_never_tells_its_heartbeat_is_lost_after_the_time(service:
         assert plant.write(0x5F00, 26, PART + 1, 2) == 0
     assert _emergencies(plant.run(0.49)) == []
     assert plant.cell.ownership.owners == [LINE, None]
-    assert _emergencies(plant.run(0.02)) == [0x8130]
+    assert _emergencies(plant.run(0.02)) == []
     assert not _line_alive(plant)
     assert plant.cell.ownership.owners == [None, None]
     assert plant.cell.image.values[PART] == 0
-    assert plant.node.counters.communication_errors == 1
+    assert plant.node.counters.communication_errors == 0
+    assert _emergencies(plant.part(8)) == [0xFF06]
 
 
-@pytest.mark.parametrize(
-    "behaviour, state",
-    [(0, NmtState.PRE_OPERATIONAL), (1, NmtState.OPERATIONAL), (2, NmtState.STOPPED)],
-)
-def test_a_heartbeat_that_never_came_is_a_communication_error_like_a_lost_one(
-    behaviour: int, state: NmtState
-) -> None:
+@pytest.mark.parametrize("behaviour", [0, 1, 2])
+def test_a_heartbeat_that_never_came_is_no_communication_error(behaviour: int) -> None:
+    """CiA 301 supervises from the first heartbeat on; the mapping's promise is another matter."""
     plant = _promised(behaviour)
     plant.part(7)
     plant.run(0.6)
-    assert (plant.state, _line_alive(plant)) == (state, False)
+    assert (plant.state, _line_alive(plant)) == (NmtState.OPERATIONAL, False)
+
+
+@pytest.mark.parametrize("behaviour, state", [(0, NmtState.PRE_OPERATIONAL), (2, NmtState.STOPPED)])
+def test_a_heartbeat_that_ends_is_a_communication_error_whoever_wrote(
+    behaviour: int, state: NmtState
+) -> None:
+    plant = _promised(behaviour)
+    plant.heartbeat()
+    assert _emergencies(plant.run(0.6)) == [0x8130]
+    assert (plant.state, plant.node.counters.communication_errors) == (state, 1)
+
+
+def test_a_read_begins_nothing() -> None:
+    plant = _promised()
+    plant.read(0x2001, 1)
+    plant.read(0x5F00, 2)
+    plant.write(0x5F00, 27, PART + 1, 2)
+    plant.run(9.0)
+    assert _line_alive(plant)
+    assert plant.write(0x2001, 1, 7) == 0
+
+
+@pytest.mark.parametrize("time", [0, 60_000])
+def test_a_promise_cannot_be_switched_off_from_the_bus(time: int) -> None:
+    """The configuration tool is confirmed, its value is read back and stored; the master dies, and its command ends."""
+    store = MemoryStore()
+    plant = Plant(replace(PLAN, sdo_writer=LINE), store).power_on()
+    value = MASTER << 16 | time if time else 0
+    for _ in range(2):
+        assert plant.write(0x1016, 1, value) == 0
+        plant.run(0.01)
+    assert plant.write(0x1010, 1, b"save") == 0
+    assert plant.read(0x1016, 1) == value
+    told = [text for text in plant.notebook.reports if "1016h" in text]
+    assert len(told) == 2, told
+    assert "line" in told[0]
+    assert "1016h:01" in told[1]
+    for _ in range(2):
+        plant.hear(0, START)
+        plant.heartbeat()
+        plant.part(7)
+        plant.run(0.4)
+        assert plant.cell.image.values[PART] == 7
+        assert _emergencies(plant.run(0.2)) == []
+        assert (plant.cell.image.values[PART], plant.cell.ownership.owners[0]) == (0, None)
+        assert _emergencies(plant.part(8)) == [0xFF06]
+        plant = Plant(replace(PLAN, sdo_writer=LINE), store).power_on()
+        assert plant.read(0x1016, 1) == value
+        assert len(plant.notebook.reports) == 2
+
+
+def test_1016h_may_be_stricter_than_the_promise() -> None:
+    plant = _promised()
+    plant.write(0x1016, 1, MASTER << 16 | 200)
+    plant.part(7)
+    plant.run(0.25)
+    assert _refused_for(plant) is None
+    assert plant.cell.image.values[PART] == 0
+    plant.heartbeat()
+    plant.part(7)
+    assert _emergencies(plant.run(0.25)) == [0x8130]
+    assert plant.cell.image.values[PART] == 0
+    assert plant.notebook.reports == []
+
+
+def test_a_stricter_mapping_counts_at_once_whatever_was_stored() -> None:
+    store = MemoryStore()
+    plant = Plant(PLAN, store).power_on()
+    plant.write(0x1016, 1, MASTER << 16 | 400)
+    plant.write(0x1010, 1, b"save")
+    stricter = replace(PLAN, consumers=(Consumer(MASTER, 100, LINE),))
+    plant = Plant(stricter, store).operational()
+    assert plant.read(0x1016, 1) == MASTER << 16 | 400
+    plant.heartbeat()
+    plant.part(7)
+    plant.run(0.11)
+    assert (plant.cell.image.values[PART], plant.state) == (0, NmtState.OPERATIONAL)
+
+
+def test_writing_1016h_over_and_over_does_not_put_off_the_loss() -> None:
+    plant = _promised()
+    plant.part(7)
+    for number in range(10):
+        plant.write(0x1016, 1, MASTER << 16 | 500 + number)
+        plant.run(0.06)
+    assert plant.cell.image.values[PART] == 0
 
 
 def test_a_watched_node_that_uses_nothing_is_not_missed() -> None:
@@ -631,6 +848,7 @@ def test_a_synchronous_rpdo_of_a_lost_writer_is_refused_and_not_kept() -> None:
 def test_being_started_again_is_no_heartbeat() -> None:
     """A lost heartbeat ends OPERATIONAL; the master that starts the node is not heard by that."""
     plant = _promised(behaviour=0)
+    plant.heartbeat()
     plant.part(7)
     plant.run(0.6)
     plant.hear(0, START)
@@ -648,7 +866,7 @@ def test_after_a_reset_the_heartbeat_is_waited_for_anew(command: bytes) -> None:
     plant.hear(0, START)
     plant.part(8)
     assert plant.cell.image.values[PART] == 8
-    assert _emergencies(plant.run(0.6)) == [0x8130]
+    assert _emergencies(plant.run(0.6)) == []
     assert plant.cell.image.values[PART] == 0
 
 
@@ -706,6 +924,98 @@ def test_the_node_of_a_succeeding_cell_goes_on_with_what_is_owed_and_what_is_los
     plant.heartbeat()
     plant.part(8)
     assert plant.cell.image.values[PART] == 8
+
+
+# -- a gap of our own ------------------------------------------------------------------------------------------------
+
+
+def _stand_still(plant: Plant, seconds: float) -> None:
+    """The process stands still; what follows has waited, until `caught_up`."""
+    since, plant.now = plant.now, plant.now + seconds
+    plant.node.gap(since, plant.now)
+
+
+@pytest.mark.parametrize("heard", [False, True])
+def test_nobody_is_accused_for_our_own_silence(heard: bool) -> None:
+    first, *others = PLAN.pdos
+    plant = _promised(pdos=(replace(first, event=300), *others))
+    plant.heartbeat()
+    plant.part(7)
+    _stand_still(plant, 5.0)
+    if heard:
+        plant.heartbeat()
+        plant.part(7)
+    plant.node.caught_up()
+    assert _emergencies(plant.run(0.25)) == []
+    assert (_line_alive(plant), plant.node.counters.communication_errors) == (True, 0)
+    assert _emergencies(plant.run(0.35)) == [0x8250, 0x8130]
+    assert not _line_alive(plant)
+
+
+def test_a_guarding_master_is_not_accused_and_gets_no_answer_that_it_waits_for_no_more() -> None:
+    plant = Plant(replace(PLAN, heartbeat=0)).operational()
+    plant.write(0x100C, 0, 100, 2)
+    plant.write(0x100D, 0, 3, 1)
+    plant.node.receive(Frame(0x705, b"", remote=True), plant.now)
+    assert plant.take() == [Frame(0x705, b"\5")]
+    _stand_still(plant, 5.0)
+    for _ in range(9):
+        plant.node.receive(Frame(0x705, b"", remote=True), plant.now)
+    plant.node.caught_up()
+    assert plant.run(0.29) == []
+    plant.node.receive(Frame(0x705, b"", remote=True), plant.now)
+    assert plant.take() == [Frame(0x705, b"\x85")], "the toggle bit that it expects"
+    _stand_still(plant, 5.0)
+    plant.node.caught_up()
+    assert _emergencies(plant.run(0.29)) == []
+    assert _emergencies(plant.run(0.02)) == [0x8130]
+
+
+def test_syncs_that_waited_send_nothing_and_count() -> None:
+    second = replace(PLAN.pdos[3], transmission=2)
+    plant = Plant(replace(PLAN, pdos=(*PLAN.pdos[:3], second))).operational()
+    assert [frame.can_id for frame in plant.hear(0x80)] == [0x285]
+    _stand_still(plant, 5.0)
+    assert [frame for _ in range(499) for frame in plant.hear(0x80)] == []
+    plant.node.caught_up()
+    assert [frame.can_id for frame in plant.hear(0x80)] == [0x285]
+    assert plant.node.sync.count == 501
+
+
+def test_a_gap_brings_one_heartbeat_and_one_sync() -> None:
+    sync = SyncPlan(producer=True, period=10_000)
+    plant = Plant(replace(PLAN, heartbeat=100, sync=sync)).operational()
+    _stand_still(plant, 5.0)
+    plant.node.caught_up()
+    plant.node.tick(plant.now)
+    sent = [frame.can_id for frame in plant.take()]
+    assert (sent.count(0x80), sent.count(0x705)) == (1, 1)
+
+
+def test_parameters_of_a_client_that_has_given_up_are_not_set() -> None:
+    plant = Plant().power_on()
+    _stand_still(plant, 0.4)
+    assert plant.write(0x1017, 0, 100, 2) == 0
+    plant.node.caught_up()
+    _stand_still(plant, 3.0)
+    assert plant.write(0x1017, 0, 50, 2) == -0x0800_0022
+    assert plant.read(0x1017) == 100
+    plant.node.caught_up()
+    assert plant.write(0x1017, 0, 50, 2) == 0
+
+
+def test_commands_of_the_master_are_carried_out_however_late() -> None:
+    plant = Plant().operational()
+    _stand_still(plant, 5.0)
+    plant.hear(0, STOP)
+    assert plant.state is NmtState.STOPPED
+
+
+def test_two_gaps_in_a_row_are_one_wait() -> None:
+    plant = Plant().operational()
+    _stand_still(plant, 0.3)
+    _stand_still(plant, 0.3)
+    assert plant.write(0x1017, 0, 50, 2) == -0x0800_0022
 
 
 # -- bus -------------------------------------------------------------------------------------------------------------
@@ -810,7 +1120,9 @@ def test_saved_communication_parameters_and_mappings_survive_a_restart() -> None
     assert first.write(0x1800, 1, 0x4000_0185) == 0
     assert first.write(0x1010, 1, b"save") == 0
     second = Plant(store=store).operational()
-    assert second.notebook.reports == []
+    assert second.notebook.reports == [
+        "stored parameters are used in place of the mapping's: 1017h:00, 1A00h:01"
+    ]
     assert (second.read(0x1017), second.read(0x1A00, 1)) == (250, 0x2402_0120)
     assert second.show(FORCE, 1.5) == [Frame(0x185, CanType.REAL32.pack(1.5))]
 
@@ -977,15 +1289,24 @@ def test_whatever_comes_the_node_stands_and_its_answers_are_bounded(
     assert deadline > plant.now
 
 
-def test_pdos_may_be_replaced_while_they_wait_and_nothing_else() -> None:
-    plant = Plant(replace(PLAN, autostart=True)).power_on()
+def test_how_each_frame_waits_for_the_bus() -> None:
+    sync = SyncPlan(producer=True, period=500_000)
+    plant = Plant(replace(PLAN, autostart=True, sync=sync)).power_on()
     plant.hear(0x80)
     plant.heartbeat()
     plant.read(0x1000)
     plant.run(1.0)
     sent = plant.wire.sent
-    assert {frame.can_id for frame, _ in sent} == {0x705, 0x185, 0x285, 0x585, 0x085}
-    assert {frame.can_id for frame, priority in sent if priority is Priority.PDO} == {0x185, 0x285}
+    found = {(frame.can_id, priority.name) for frame, priority in sent}
+    assert found == {
+        (0x080, "AT_ONCE"),
+        (0x085, "EVENT"),
+        (0x705, "EVENT"),
+        (0x705, "NEWEST"),
+        (0x185, "NEWEST"),
+        (0x285, "NEWEST"),
+        (0x585, "ORDERED"),
+    }
 
 
 def test_sdo_server_tells_its_cob_ids_whatever_the_node_id() -> None:

@@ -6,6 +6,7 @@ from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.heartbeat import HeartbeatConsumer
 from gatewayd.canopen.peers import Peers
 from gatewayd.canopen.plan import Consumer
+from gatewayd.canopen.promise import Promises
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Writer
 from gatewayd.core.events import EventKind
@@ -25,18 +26,29 @@ class Bench:
             PROMISES,
             lost=self._lost,
             back=lambda _node, _now: None,
-            booted=lambda _node, _now: None,
             changed=lambda: None,
         )
-        self.peers = Peers(self.cell, PROMISES, self.watch)
+        self.promises = Promises(PROMISES, also=self.watch.time, broken=self._lost, booted=self._lost)
+        self.peers = Peers(self.cell, self.promises, self.watch)
 
     def _lost(self, node: int, now: float) -> None:
-        for writer in self.peers.of(node):
+        for writer in self.promises.of(node):
             self.peers.lose(writer, "silent", now)
 
     def heartbeat(self, now: float) -> None:
-        self.watch.receive(Frame(0x700 + NODE, b"\5"), now)
-        self.peers.heartbeat(NODE, now)
+        frame = Frame(0x700 + NODE, b"\5")
+        self.watch.receive(frame, now)
+        if self.promises.receive(frame, now):
+            self.peers.heartbeat(NODE, now)
+
+    def rpdo(self, writer: int, now: float) -> bool:
+        """Whether the writer of an RPDO is believed."""
+        self.promises.write(writer, now)
+        return self.peers.connect(writer, "RPDO", now)
+
+    def tick(self, now: float) -> None:
+        self.watch.tick(now)
+        self.promises.tick(now)
 
     @property
     def alive(self) -> list[bool]:
@@ -90,32 +102,52 @@ def test_nobody_is_no_writer(bench: Bench) -> None:
 
 
 def test_a_promise_is_believed_for_one_heartbeat_time_and_then_only_while_it_is_kept(bench: Bench) -> None:
-    assert bench.peers.connect(LINE, "RPDO", 0.0)
-    bench.watch.tick(0.4)
-    assert bench.peers.connect(LINE, "RPDO", 0.4)
-    bench.watch.tick(0.5)
+    assert bench.rpdo(LINE, 0.0)
+    bench.tick(0.4)
+    assert bench.rpdo(LINE, 0.4)
+    bench.tick(0.5)
     assert bench.alive == [False] * 3
     assert not bench.peers.believed(LINE)
-    assert not bench.peers.connect(LINE, "RPDO", 0.6)
+    assert not bench.rpdo(LINE, 0.6)
     bench.peers.heard(LINE, "SDO", 0.7)
     assert (bench.alive, bench.cell.writers.connections) == ([False] * 3, [0] * 3)
     bench.heartbeat(1.0)
     assert bench.peers.believed(LINE)
-    assert bench.peers.connect(LINE, "RPDO", 1.1)
+    assert bench.rpdo(LINE, 1.1)
     assert bench.alive == [True, False, False]
 
 
 def test_a_sign_of_one_writer_is_that_of_its_node(bench: Bench) -> None:
     """Two writers that promise the heartbeat of one node are lost with it together."""
-    assert bench.peers.connect(LINE, "RPDO", 0.0)
+    assert bench.rpdo(LINE, 0.0)
     assert bench.peers.connect(TOOL, "SDO", 0.3)
-    bench.watch.tick(0.5)
+    bench.tick(0.5)
     assert bench.told.count(EventKind.WRITER_LOST) == 2
     assert not bench.peers.connect(TOOL, "SDO", 0.6)
     assert bench.peers.connect(FREE, "SDO", 0.6), "who promised nothing is believed"
 
 
-def test_what_is_no_longer_watched_binds_nobody(bench: Bench) -> None:
-    peers = Peers(bench.cell, (Consumer(11, 500, LINE),), bench.watch)
-    assert peers.connect(LINE, "RPDO", 0.0)
-    assert peers.believed(LINE)
+def test_a_read_makes_a_writer_alive_and_binds_it_to_nothing(bench: Bench) -> None:
+    bench.peers.heard(LINE, "SDO", 0.0)
+    bench.tick(9.0)
+    assert bench.alive == [True, False, False]
+    assert bench.peers.asking(LINE, 9.0).trusted
+    bench.tick(9.5)
+    assert (bench.alive, bench.peers.requester(LINE).trusted) == ([False] * 3, False)
+
+
+def test_what_is_no_longer_watched_is_promised_all_the_same(bench: Bench) -> None:
+    for entry in bench.watch._entries:
+        entry.write(bytes(4))
+    bench.watch.tick(0.0)
+    assert bench.watch.nodes == frozenset()
+    assert bench.rpdo(LINE, 0.0)
+    bench.tick(0.5)
+    assert not bench.rpdo(LINE, 0.6)
+
+
+def test_requests_that_waited_say_so(bench: Bench) -> None:
+    bench.peers.waited = 2.5
+    assert bench.peers.requester(FREE).waited == 2.5
+    bench.peers.waited = 0.0
+    assert bench.peers.requester(FREE) is bench.peers.requester(FREE)

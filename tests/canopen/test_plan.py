@@ -34,3 +34,19 @@ def test_other_numbers_and_policies_are_the_same_node() -> None:
 def test_another_object_is_another_node() -> None:
     more = "  three: {robot: output_int_register_1, canopen: auto}\n"
     assert node(plan(before=more)) != node(plan())
+
+
+def test_the_quality_of_another_variable_is_another_node() -> None:
+    """The object is the same: that of the first variable, whichever it is."""
+    pdos = "canopen: {channel: c, bitrate: 500000, node: 16, pdos: {state: {status: quality of %s}}}"
+    head, lines = HEAD.replace("canopen: {channel: c, bitrate: 500000, node: 16}", pdos), []
+    for first, second in (("one", "two"), ("two", "one")):
+        variables = f"  {first}: {{robot: robot_mode}}\n  {second}: {{robot: safety_mode}}\n"
+        loaded = load((head % first + "variables:\n" + variables).encode(), "a.yaml")
+        assert loaded.plan is not None, loaded.diagnostics
+        lines.append(loaded.plan)
+    places = [
+        [(one.index, one.subindex) for one in plan.canopen.pdos[0].entries] for plan in lines if plan.canopen
+    ]
+    assert places[0] == places[1]
+    assert node(lines[0]) != node(lines[1])

@@ -8,7 +8,7 @@ import pytest
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Pdo
-from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES, StatusObjects
+from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES, StatusObjects, status_word
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.refusal import Reason
@@ -18,6 +18,9 @@ from gatewayd.core.status import FIELDS, LENGTH, RELEASE_ALL, TABLES, StatusBloc
 LINE, HMI = range(2)
 COUNT = 300
 """More variables than an array has entries."""
+
+
+_NOBODY = (partial(Requester, None), partial(Requester, None))
 
 
 def _definition(count: int = COUNT, writers: tuple[str, ...] = ("line", "hmi")) -> CellDefinition:
@@ -56,9 +59,15 @@ class Node:
         self.cell.robot_connected(0.0)
         self.cell.adopt(dict.fromkeys(range(COUNT), 0), 0.0)
         self.heard = True
+        self.asked = 0
+        """Requests of a lock."""
+        self._writer = writer
         self.dictionary = Dictionary(
             StatusObjects(
-                self.cell, lambda: self.now, lambda: Requester(writer, trusted=self.heard)
+                self.cell,
+                lambda: self.now,
+                lambda: Requester(writer, trusted=self.heard),
+                self._asking,
             ).objects()
         )
         self.subindices = {
@@ -67,6 +76,10 @@ class Node:
             for entry in one.entries
             if one.index == HEADER
         }
+
+    def _asking(self) -> Requester:
+        self.asked += 1
+        return Requester(self._writer, trusted=self.heard)
 
     def field(self, name: str) -> int:
         return int.from_bytes(self.dictionary.read(HEADER, self.subindices[name]), "little")
@@ -97,7 +110,8 @@ def test_header_has_every_field_by_its_name() -> None:
     assert {one.type for one in header.entries[1:]} == {CanType.UNSIGNED16, CanType.UNSIGNED32}
     writable = [one.name for one in header.entries if one.access is Access.RW]
     assert writable == ["request", "release"]
-    assert all(one.pdo is Pdo.NONE for one in header.entries)
+    unmapped = [one.name for one in header.entries[1:] if one.pdo is Pdo.NONE]
+    assert unmapped == ["request", "release"]
 
 
 def test_indices_are_fixed_and_apart() -> None:
@@ -112,11 +126,9 @@ def test_indices_are_fixed_and_apart() -> None:
         "quality": 0x5F40,
     }
     largest = Cell(_definition(1024, tuple(f"w{number}" for number in range(32))))
-    indices = [one.index for one in StatusObjects(largest, float, partial(Requester, None)).objects()]
+    indices = [one.index for one in StatusObjects(largest, float, *_NOBODY).objects()]
     assert len(indices) == len(set(indices)) == 3 + 4 * 5
-    assert all(
-        len(one.entries) <= 255 for one in StatusObjects(largest, float, partial(Requester, None)).objects()
-    )
+    assert all(len(one.entries) <= 255 for one in StatusObjects(largest, float, *_NOBODY).objects())
 
 
 def test_every_word_is_that_of_the_block(node: Node) -> None:
@@ -157,7 +169,7 @@ def test_entries_are_named_after_variables_and_writers(node: Node) -> None:
 
 def test_a_cell_without_writers_has_no_table_of_them() -> None:
     bare = Cell(CellDefinition("bare", 1, (), (), (), 0.1))
-    assert [one.index for one in StatusObjects(bare, float, partial(Requester, None)).objects()] == [HEADER]
+    assert [one.index for one in StatusObjects(bare, float, *_NOBODY).objects()] == [HEADER]
 
 
 def test_tables_are_read_only(node: Node) -> None:
@@ -212,3 +224,33 @@ def test_an_sdo_client_that_is_not_heard_moves_no_lock_and_reads_on(node: Node) 
     assert node.put("release", RELEASE_ALL) is AbortCode.DEVICE_STATE
     assert (node.entry("owner", 2), node.entry("owner", 3)) == (LINE + 1, 0)
     assert node.field("refusal_reason") == Reason.HEARTBEAT_LOST
+
+
+def test_a_release_and_a_read_are_no_request(node: Node) -> None:
+    node.put("release", 2)
+    node.put("request", 0)
+    node.field("heartbeat")
+    assert node.asked == 0
+    node.put("request", 2)
+    assert node.asked == 1
+
+
+def test_what_a_tpdo_may_carry_is_where_the_dictionary_has_it(node: Node) -> None:
+    """And holds the same bytes."""
+    block = StatusBlock(node.cell)
+    for one in node.dictionary:
+        for entry in one.entries:
+            word = status_word(one.index, entry.subindex)
+            assert (word is not None) == (entry.pdo is Pdo.TRANSMIT)
+            if word is not None:
+                assert word.type is entry.type
+                assert word.offset is not None
+                words = word.type.bits // 16
+                assert block.read(word.offset, words, node.now)[::-1] == entry.read()
+
+
+@pytest.mark.parametrize(
+    "index, subindex", [(0x5EFF, 1), (0x5F00, 0), (0x5F00, 255), (0x5F03, 1), (0x5F15, 1), (0x5F40, 0)]
+)
+def test_nothing_of_the_status_block_lies_elsewhere(index: int, subindex: int) -> None:
+    assert status_word(index, subindex) is None

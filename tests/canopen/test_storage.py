@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, record, variable
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, Pdo, array, record, variable
 from gatewayd.canopen.nmt import NmtCommand
 from gatewayd.canopen.storage import (
     JsonStore,
@@ -163,6 +163,22 @@ def test_another_node_id_is_not_another_layout() -> None:
     moved = _objects()
     moved[3].entries[1].default = U32.pack(0x189)
     assert layout_of(_objects(), 5) == layout_of(moved, 9) != layout_of(moved, 5)
+
+
+def _with_qualities(*names: str) -> list[Object]:
+    entries = (
+        Entry(number, f"quality {name}", CanType.UNSIGNED16, Access.RO, bytes(2), pdo=Pdo.TRANSMIT)
+        for number, name in enumerate(names, 1)
+    )
+    return [*_objects(), array(0x5F40, "Status quality", entries)]
+
+
+def test_the_order_of_variables_counts_where_a_stored_pdo_tells_their_qualities() -> None:
+    one, other = _with_qualities("start", "speed"), _with_qualities("speed", "start")
+    header, quality = ({(0x1A02, 1): U32.pack(value)} for value in (0x5F00_0710, 0x5F40_0110))
+    assert layout_of(one, 5) == layout_of(other, 5) == layout_of(_objects(), 5)
+    assert layout_of(one, 5, header) == layout_of(other, 5, header)
+    assert layout_of(one, 5, quality) != layout_of(other, 5, quality)
 
 
 def test_an_operational_node_does_not_wait_for_a_disk() -> None:

@@ -141,3 +141,16 @@ def test_hostile_frames_do_no_harm(data: bytes, remote: bool) -> None:
     cycle = Cycle()
     cycle.service.receive(Frame(0x80, data, remote), 0.0)
     assert len(cycle.heard) + len(cycle.wrong) == (0 if remote else 1)
+
+
+def test_a_sync_that_does_not_go_out_is_none() -> None:
+    """It is not counted, nothing is synchronous with it, and its counter value comes with the next one."""
+    cycle = Cycle(SyncPlan(producer=True, period=10_000, counter=3))
+    assert cycle.run(0.015) == [b"\1"]
+    cycle.wire.takes = False
+    cycle.run(5.0)
+    assert (cycle.heard, cycle.service.count) == ([1], 1)
+    assert cycle.service.missed == pytest.approx(499, abs=1)
+    cycle.wire.takes = True
+    assert cycle.run(5.025) == [b"\2", b"\3"]
+    assert cycle.heard == [1, 2, 3]

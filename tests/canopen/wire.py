@@ -19,10 +19,14 @@ class Wire:
         self.frames: list[Frame] = []
         self.sent: list[tuple[Frame, Priority]] = []
         """Everything, whether it was taken or not."""
+        self.takes = True
 
-    def send(self, frame: Frame, priority: Priority) -> None:
+    def send(self, frame: Frame, priority: Priority) -> bool:
+        if not self.takes:
+            return False
         self.frames.append(frame)
         self.sent.append((frame, priority))
+        return True
 
     def take(self) -> list[Frame]:
         frames, self.frames = self.frames, []

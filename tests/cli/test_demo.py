@@ -12,6 +12,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 from gatewayd.demo.scene import HOST
 
 DEMO = [sys.executable, "-m", "gatewayd", "demo"]
@@ -74,3 +76,16 @@ def test_terminal_gets_a_live_table_and_ctrl_c_ends_it() -> None:
     assert "\x1b[?1049h" not in text, "the alternate screen would take the result away"
     assert "packages from the robot" in text
     assert "Traceback" not in text
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_other_signals_end_it_in_order(number: int) -> None:
+    demo = subprocess.Popen([*DEMO, "--port", "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert demo.stdout is not None
+    while " good " not in demo.stdout.readline():
+        assert demo.poll() is None
+    demo.send_signal(number)
+    output, errors = demo.communicate(timeout=PATIENCE)
+    assert demo.returncode in (0, 1), "1: too early for a part to be made on both buses"
+    assert errors == ""
+    assert "packages from the robot" in output

@@ -117,3 +117,45 @@ def test_an_unreadable_file_is_one_line(tmp_path: Path) -> None:
     done = show(tmp_path / "gone.yaml")
     assert (done.exit_code, done.stdout) == (2, "")
     assert done.stderr == f"{tmp_path}/gone.yaml: cannot be read: No such file or directory\n"
+
+
+def test_what_holds_for_the_whole_cell_is_noted() -> None:
+    """Supervision of writers, adoption, and outputs that hang on the program."""
+    content = """\
+gatewayd: 1
+cell: c
+robot: {host: r, valid: running, adopt_for: 3s}
+modbus: {listen: '127.0.0.1:1502'}
+writers: {plc: {modbus: 127.0.0.1, timeout: 1s, timeout_counts: writes, grace: 500ms}}
+variables:
+  go: {robot: input_bit_register_0, modbus: 0.0, owner: plc}
+  ready: {robot: output_bit_register_0, modbus: 9.0}
+"""
+    output = show("-", content=content).output
+    assert (
+        "writer plc: 127.0.0.1, lost after 1s of silence (only writes count), "
+        "keeps what it owns for 0.5s without a connection\n" in output
+    )
+    assert "falls back after 3s without an owner" in output
+    assert "clear, running" in output
+    plain = show("-", content=content.replace("valid: running, adopt_for: 3s", "adopt_for: none")).output
+    assert "without an owner" not in plain
+    assert "running" not in plain
+
+
+def test_status_words_stand_in_the_pdo_table() -> None:
+    content = """\
+gatewayd: 1
+cell: c
+robot: {host: r}
+canopen:
+  channel: can0
+  bitrate: 500000
+  node: 16
+  pdos: {state: {status: [flags, quality of mode], variables: mode}}
+variables: {mode: {robot: robot_mode}}
+"""
+    lines = [" ".join(line.split()) for line in show("-", content=content, COLUMNS="130").output.splitlines()]
+    assert "TPDO 1 (state) 0x190 event (254) 0-15 <- status: flags 5F00h:02 UNSIGNED16" in lines
+    assert "16-31 <- status: quality of mode 5F40h:01 UNSIGNED16" in lines
+    assert "32-63 <- mode 2410h:01 INTEGER32" in lines

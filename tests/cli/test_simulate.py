@@ -39,6 +39,10 @@ def test_a_mistake_in_a_program_file_names_its_place(tmp_path: Path) -> None:
     "options,message",
     [
         (("--hold", "foo"), "no such input: foo"),
+        (("--unreadable", "input_int_register_0,foo"), "no such input: foo"),
+        (("--drop-at", "nowhere"), "'nowhere' is not STEP or STEP:NUMBER"),
+        (("--strict-lists", "maybe"), "'maybe' is not one of"),
+        (("--delay", "-1"), "'-1' is not a number of seconds"),
         (("--version", "4.1"), "software versions begin with 3 (cb3), 5 (e) or 10 (x)"),
         (("--version", "5.12", "--series", "x"), "5.12 is software of series e, not of x"),
         (("--version", "new"), "is not a software version"),

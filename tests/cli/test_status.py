@@ -6,7 +6,11 @@ import json
 
 import pytest
 
-from gatewayd.core.cell import Change
+from gatewayd.cli.status import _STATES
+from gatewayd.cli.watching import _QUALITY_STYLES
+from gatewayd.core.cell import Cell, Change
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
 from tests.cli.conftest import Invoke, Running
 from tests.control.served import CYCLES, LIMIT, SPEED
@@ -43,6 +47,42 @@ def test_what_is_forced_is_degraded(gateway: Running, invoke: Invoke) -> None:
     assert done.exit_code == 1
     assert "forced by the local operator: cycles" in done.output
     assert "11 good, 1 forced" in done.output
+
+
+def test_what_the_robot_holds_and_how_late_it_is(gateway: Running, invoke: Invoke) -> None:
+    def trouble(cell: Cell) -> None:
+        cell.image.quality[LIMIT] = Quality.DIFFERS
+        cell.image.quality[CYCLES] = Quality.OUT_OF_RANGE
+        cell.image.quality[SPEED] = Quality.NOT_RUNNING
+        health = cell.health
+        health.differing, health.unadopted, health.lag, health.adoption, health.gaps = 1, 2, 0.25, 8.0, 3
+
+    gateway.do(trouble)
+    done = invoke("status")
+    assert done.exit_code == 1
+    for words in (
+        "! press: what the robot holds is not known for 2 inputs",
+        "! press: 1 of 12 variables different in the robot: limit",
+        "! press: 1 of 12 variables out of the range of their places: cycles",
+        "2 inputs not known, 1 input different in the robot, 250 ms behind",
+        "adopted values without an owner fall back in 8.0 s",
+        "12: 9 good, 1 differs, 1 out of range, 1 not running",
+        "the gateway stood still 3 times",
+    ):
+        assert words in done.output
+    assert "out of range" in invoke("watch", "--once").output
+
+
+def test_a_stopped_program_alone_is_no_trouble(gateway: Running, invoke: Invoke) -> None:
+    gateway.do(lambda cell: cell.image.quality.__setitem__(CYCLES, Quality.NOT_RUNNING))
+    done = invoke("status")
+    assert done.exit_code == 0
+    assert "11 good, 1 not running" in done.output
+
+
+def test_every_state_of_the_robot_has_words() -> None:
+    assert {source.name.lower() for source in Source} == _STATES.keys()
+    assert {quality.name.lower() for quality in Quality} == _QUALITY_STYLES.keys()
 
 
 @pytest.mark.usefixtures("gateway")

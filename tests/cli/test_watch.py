@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import pty
 import select
+import signal
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -86,6 +88,18 @@ def test_a_picture_keys_and_the_end(terminal: Terminal, gateway: Running) -> Non
     terminal.wait_for("robot not connected")
     terminal.type("q")
     assert terminal.program.wait(10) == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_it_and_leaves_the_terminal_as_it_was(terminal: Terminal, number: int) -> None:
+    before = termios.tcgetattr(terminal.master)
+    terminal.wait_for("q quit")
+    assert termios.tcgetattr(terminal.master) != before
+    terminal.program.send_signal(number)
+    terminal.wait_for("\x1b[?1049l")
+    assert terminal.program.wait(10) == 0
+    assert termios.tcgetattr(terminal.master) == before
+    assert "Traceback" not in terminal.seen
 
 
 def test_typed_keys_are_named() -> None:

@@ -13,11 +13,12 @@ from typing import Any
 
 import pytest
 
+from gatewayd.audit import Audit
 from gatewayd.control import server
 from gatewayd.control.api import Api
 from gatewayd.control.client import Client, ControlError
 from gatewayd.control.endpoint import bind
-from tests.control.served import CYCLES, Served
+from tests.control.served import CYCLES, LIMIT, FixedGateway, Served
 
 
 @dataclass
@@ -47,6 +48,50 @@ async def path(tmp_path: Path, api: Api, asked: list[bool]) -> AsyncIterator[Pat
 @pytest.fixture
 def client(path: Path) -> Client:
     return Client(path)
+
+
+@pytest.mark.parametrize(
+    "path_of_it, body",
+    [
+        ("/v1/variables/limit/force", {"value": 9, "for": 5}),
+        ("/v1/variables/limit/unforce", {}),
+        ("/v1/locks/motion/take", {}),
+        ("/v1/locks/motion/release", {}),
+        ("/v1/reload", {"force": True}),
+    ],
+)
+async def test_what_waited_while_the_gateway_stood_still_is_not_carried_out(  # noqa: PLR0917 - fixtures
+    gateway: FixedGateway,
+    press: Served,
+    audit: Audit,
+    tmp_path: Path,
+    path_of_it: str,
+    body: dict[str, object],
+) -> None:
+    stood_still = 4.8
+    reloaded: list[bool] = []
+
+    async def reload(force: bool) -> Outcome:
+        reloaded.append(force)
+        return Outcome(0)
+
+    press.cell.take_lock(1, 0.0, 1e9, "by anna")
+    press.cell.force(LIMIT, 3.0, 0.0, 1e9, "by anna")
+    owners, events = list(press.cell.ownership.owners), press.cell.events.count
+    found = tmp_path / "late.sock"
+    async with server.serving(bind(found), Api(gateway, audit, stood_still=lambda: stood_still), reload):
+        client = Client(found)
+        with pytest.raises(
+            ControlError, match=r"^the gateway stood still for 4\.8 s; repeat the command$"
+        ) as caught:
+            await asyncio.to_thread(client.post, path_of_it, body)
+        assert (caught.value.status, caught.value.code) == (503, "stood_still")
+        assert (press.cell.ownership.owners, press.cell.events.count, reloaded) == (owners, events, [])
+        assert (await get(client, "/v1/status"))["cells"], "questions are answered"
+        stood_still = 0.5
+        if path_of_it == "/v1/reload":
+            await asyncio.to_thread(client.post, path_of_it, body)
+            assert reloaded == [True]
 
 
 async def get(client: Client, path: str, **query: Any) -> dict[str, Any]:

@@ -757,6 +757,164 @@ def test_outputs_are_good_only_when_their_values_were_copied(cell: Cell) -> None
     assert cell.unreadable == frozenset()
 
 
+def late_by(cell: Cell, lag: float, now: float) -> bool:
+    """A package that comes `lag` seconds late."""
+    shown = cell.package_arrived(now - lag, now, raw=now)
+    if shown:
+        cell.outputs_written(now)
+    return shown
+
+
+def test_a_late_package_is_as_old_as_it_is_late(cell: Cell) -> None:
+    assert late_by(cell, 0.06, 0.1)
+    assert cell.image.age(CYCLES, 0.1) == pytest.approx(0.06, abs=0.001)
+    assert cell.health.lag == pytest.approx(0.06, abs=0.001)
+    cell.tick(0.12)
+    assert quality(cell, CYCLES) is Quality.GOOD
+    cell.tick(0.145)
+    assert cell.freshness.state is Source.LATE
+    assert quality(cell, CYCLES) is Quality.STALE
+
+
+def test_a_package_that_comes_too_late_is_not_shown(cell: Cell) -> None:
+    assert not late_by(cell, 0.2, 0.25)
+    assert cell.freshness.state is Source.LATE
+    assert cell.image.values[CYCLES:] == [0, 2.5, 99, True]
+    assert cell.image.quality[CYCLES:] == [Quality.STALE] * 4
+    assert cell.unreadable == {ALARM}
+    assert [event.detail for event in told(cell, EventKind.STALE)] == ["late"]
+    assert cell.accepts_writes
+
+
+def test_a_lag_at_the_limit_does_not_go_to_and_fro(cell: Cell) -> None:
+    states = []
+    for now, lag in ((0.2, 0.11), (0.21, 0.09), (0.22, 0.11), (0.23, 0.06), (0.24, 0.04), (0.25, 0.09)):
+        late_by(cell, lag, now)
+        states.append(cell.freshness.state)
+    late, fresh = Source.LATE, Source.FRESH
+    assert states == [late, late, late, late, fresh, fresh]
+    assert len(told(cell, EventKind.STALE)) == 1
+
+
+@pytest.mark.parametrize("timestamp", [math.nan, math.inf, -math.inf])
+def test_a_timestamp_that_is_no_number_never_moves_on(cell: Cell, timestamp: float) -> None:
+    for now in (0.05, 0.1, 0.15):
+        assert not cell.package_arrived(timestamp, now)
+        cell.tick(now)
+    assert cell.freshness.state is Source.FROZEN
+    assert late_by(cell, 0.0, 0.2)
+
+
+def pause(cell: Cell, now: float, seconds: float) -> float:
+    """A controller whose clock stood still for 5 s sends again for some time; until when."""
+    for _ in range(round(seconds / 0.01)):
+        now += 0.01
+        assert not late_by(cell, 5.0, now)
+    return now
+
+
+def test_a_controller_that_paused_is_fresh_when_it_answers_quickly(cell: Cell) -> None:
+    now = pause(cell, 5.0, 1.2)
+    assert cell.lag_doubtful(now)
+    assert not cell.lag_doubtful(now + 0.9)
+    assert cell.backlog_probed(0.01, now)
+    assert cell.health.lag == 0.0
+    assert quality(cell, CYCLES) is Quality.STALE
+    assert not cell.backlog_probed(0.0, now)
+    assert late_by(cell, 5.0, now + 0.01)
+    assert not cell.lag_doubtful(now + 9.0)
+
+
+def test_a_backlog_stays_late_however_long_it_lasts(cell: Cell) -> None:
+    now = pause(cell, 5.0, 1.2)
+    for _ in range(20):
+        assert cell.lag_doubtful(now)
+        assert not cell.backlog_probed(4.9, now)
+        now = pause(cell, now, 1.05)
+    assert cell.freshness.state is Source.LATE
+
+
+def test_nothing_is_doubtful_of_what_comes_in_time(cell: Cell) -> None:
+    now = 0.0
+    for _ in range(300):
+        now += 0.01
+        assert late_by(cell, 0.0, now)
+        assert not cell.lag_doubtful(now)
+    assert not cell.backlog_probed(0.0, now)
+
+
+def test_a_new_session_does_not_hide_a_lag(cell: Cell) -> None:
+    late_by(cell, 0.5, 1.0)
+    cell.robot_connected(1.1)
+    assert cell.health.lag == 0.0
+    assert not late_by(cell, 0.5, 1.2)
+    assert cell.freshness.state is Source.LATE
+
+
+def test_after_a_gap_nothing_from_before_is_good_and_the_first_quick_package_is(cell: Cell) -> None:
+    cell.gap(0.0, 5.0)
+    assert cell.freshness.state is Source.SILENT
+    assert quality(cell, CYCLES) is Quality.STALE
+    assert late_by(cell, 0.0, 5.01)
+    assert quality(cell, CYCLES) is Quality.GOOD
+    assert cell.image.age(CYCLES, 5.01) == pytest.approx(0.0, abs=0.003)
+
+
+def test_packages_that_waited_through_a_gap_are_as_old_as_they_are(cell: Cell) -> None:
+    cell.gap(0.0, 5.0)
+    for sent in (0.01, 0.5, 2.0, 4.0, 4.8):
+        assert not cell.package_arrived(sent, 5.0, raw=5.0)
+        assert cell.freshness.state is Source.LATE
+        assert quality(cell, CYCLES) is Quality.STALE
+    assert cell.package_arrived(4.99, 5.0, raw=5.0)
+
+
+def test_outputs_of_a_program_are_good_while_it_runs(press: CellDefinition, connect: Connect) -> None:
+    variables = [replace(one, valid_running=one.direction is Direction.OUTPUT) for one in press.variables]
+    cell = Cell(replace(press, variables=tuple(variables)))
+    connect(cell, 0.0)
+    seen = []
+    for number, state in enumerate((None, 0, 1, 2, 3, 4, 5, 6, 99, 2), 1):
+        now = number / 100
+        assert cell.package_arrived(now, now)
+        cell.program(state)
+        cell.image.values[CYCLES:] = [number, 2.5, 3, True]
+        cell.outputs_written(now)
+        assert cell.health.program == state
+        good = quality(cell, CYCLES) is Quality.GOOD
+        assert (cell.image.values[CYCLES] == number) is good
+        assert (cell.unreadable == {ALARM}) is not good
+        seen.append(good)
+    assert seen == [False, False, False, True, True, True, True, False, False, True]
+    cell.force(CYCLES, 77, 0.2, math.inf)
+    assert cell.package_arrived(0.21, 0.21)
+    cell.program(1)
+    cell.outputs_written(0.21)
+    assert (cell.image.values[CYCLES], quality(cell, CYCLES)) == (77, Quality.FORCED)
+    cell.unforce(CYCLES, 0.22)
+    assert (cell.image.values[CYCLES], quality(cell, CYCLES)) == (0, Quality.NOT_RUNNING)
+    cell.robot_lost("gone", 0.3)
+    assert cell.health.program is None
+
+
+def test_a_value_that_a_place_cannot_show_is_not_good_and_forced_if_forced(
+    press: CellDefinition, connect: Connect
+) -> None:
+    narrow = [
+        replace(one, shown=(0.0, 9.0)) if one.number - 1 in (PART, CYCLES) else one for one in press.variables
+    ]
+    cell = Cell(replace(press, variables=tuple(narrow)))
+    connect(cell, 0.0)
+    assert write(cell, PLC, PART, 10, 1.0) is None
+    assert (cell.image.values[PART], quality(cell, PART)) == (10, Quality.OUT_OF_RANGE)
+    assert cell.force(PART, 11, 1.0, 2.0) is None
+    assert quality(cell, PART) is Quality.FORCED
+    cell.tick(2.0)
+    assert quality(cell, PART) is Quality.OUT_OF_RANGE
+    cell.robot_lost("gone", 3.0)
+    assert quality(cell, PART) is Quality.STALE
+
+
 def test_a_package_after_the_session_tells_nothing(cell: Cell) -> None:
     cell.robot_lost("unplugged", 1.0)
     packages = cell.health.packages
@@ -787,7 +945,7 @@ def test_a_controller_that_is_still_frozen_does_not_pass_for_fresh_by_a_new_sess
     cell.robot_connected(0.4)
     assert not cell.package_arrived(0.0, 0.5)
     assert cell.freshness.state is Source.FROZEN
-    assert cell.package_arrived(0.002, 0.6)
+    assert cell.package_arrived(0.6, 0.6)
 
 
 def test_a_lost_robot_makes_inputs_stale_and_refuses_writes(cell: Cell) -> None:

@@ -183,6 +183,8 @@ class Model:
         self.ever: set[int] = set()
         self.gone: set[int] = set()
         self.due: set[int] = set()
+        self.under_way: set[int] = set()
+        self.entered: set[int] = set()
         self.connections: Counter[int] = Counter()
         self.worked: dict[int, int] = {}
         """By which connection the owner of a lock last worked with it."""
@@ -329,6 +331,7 @@ class Model:
         if self.value[index] != new:
             self.events[EventKind.FALLBACK] += 1
         self.put(index, new, now)
+        self.under_way.add(index)
 
     def fits(self, index: int, value: Value) -> Value | None:
         if index == 4:
@@ -441,6 +444,7 @@ class Model:
                 value = self.fits(change.variable, change.value)
                 assert value is not None
                 self.due.discard(change.variable)
+                self.under_way.discard(change.variable)
                 self.put(change.variable, value, now)
         self.accepted += 1
 
@@ -499,6 +503,9 @@ class Model:
             self.connected = self.adopted = False
             self.source = Source.LOST
             self.good -= set(INPUTS)
+            self.due |= self.under_way
+            self.under_way.clear()
+            self.entered.clear()
             self.dim()
             self.events[EventKind.ROBOT_LOST] += 1
 
@@ -530,9 +537,11 @@ class Model:
         for index, value in held.items():
             self.put(index, value, now)
         self.events[EventKind.INPUTS_ADOPTED] += first
+        new = set(INPUTS) - self.gone - self.entered
+        self.entered |= new
         for index in INPUTS:
             ownerless = self.owner[LOCK_OF[index]] is None and index not in self.gone
-            if index in self.due or (self.clear_on_connect and ownerless and (first or index in held)):
+            if index in self.due or (self.clear_on_connect and ownerless and (index in new or index in held)):
                 self.fall_back(index, now)
 
     def set_gone(self, index: int, *, gone: bool) -> None:
@@ -542,6 +551,10 @@ class Model:
         self.gone ^= {index}
         if gone:
             self.good.discard(index)
+            self.entered.discard(index)
+            if index in self.under_way:
+                self.under_way.discard(index)
+                self.due.add(index)
         if index in OUTPUTS:
             self.ever.discard(index)
             self.show_policy(index)
@@ -716,11 +729,17 @@ class CellMachine(RuleBasedStateMachine):
         self.cell.adopt(held, self.now)
         self.model.adopt(held, self.now)
 
+    @rule(index=st.sampled_from(INPUTS))
+    def fallback_arrives(self, index: int) -> None:
+        """Before it does, the end of the session makes it due again."""
+        self.cell.delivery.delivered(index)
+        self.model.under_way.discard(index)
+
     @precondition(lambda self: self.model.connected)
     @rule(frozen=st.booleans(), number=st.integers(1, 9), flag=st.booleans())
     def package(self, frozen: bool, number: int, flag: bool) -> None:
         self.timestamp += 0 if frozen else 1
-        news = self.cell.package_arrived(self.timestamp, self.now)
+        news = self.cell.package_arrived(self.timestamp, self.now, raw=self.timestamp)
         assert news == self.model.package(self.timestamp, self.now)
         if news:
             values: dict[int, Value] = {8: number, 9: number / 4, 10: -number, 11: flag}
@@ -741,7 +760,7 @@ class CellMachine(RuleBasedStateMachine):
     @rule()
     def late_package(self) -> None:
         self.timestamp += 1
-        assert not self.cell.package_arrived(self.timestamp, self.now)
+        assert not self.cell.package_arrived(self.timestamp, self.now, raw=self.timestamp)
         self.cell.outputs_written(self.now)
 
     @rule(chosen=st.lists(st.integers(0, len(VARIABLES) - 1), min_size=1, max_size=4), gone=st.booleans())
@@ -772,6 +791,11 @@ class CellMachine(RuleBasedStateMachine):
             assert table.connections[lock] == self.model.worked.get(lock, 0)
         for line in (0, 11, 12, 21, 22, 31, 32, 41, 42):
             assert self.cell.holds(line) is (line != 0 and line in self.model.worked.values())
+
+    @invariant()
+    def what_is_due_to_the_robot_is_known(self) -> None:
+        assert self.cell.delivery.owed == self.model.due
+        assert self.cell.delivery.under_way == self.model.under_way
 
     @invariant()
     def stale_never_looks_fresh(self) -> None:

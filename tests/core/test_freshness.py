@@ -112,3 +112,56 @@ def test_reconnecting_to_a_frozen_controller_does_not_make_it_fresh(source: Fres
         assert source.package(timestamp, 20.0) is news
         states.append(source.state)
     assert states == [Source.FROZEN, Source.FRESH]
+
+
+@pytest.mark.parametrize("lag, state", [(0.5, Source.FRESH), (0.51, Source.LATE), (60.0, Source.LATE)])
+def test_a_package_is_late_beyond_the_limit(source: Freshness, lag: float, state: Source) -> None:
+    assert source.package(1.0, 10.0, lag) is (state is Source.FRESH)
+    assert source.state is state
+    assert source.last_progress == 10.0 - lag
+    assert source.last_arrival == 10.0
+
+
+def test_a_late_source_is_fresh_at_half_the_limit(source: Freshness) -> None:
+    source.package(1.0, 10.0, 0.6)
+    assert not source.package(1.1, 10.1, 0.26)
+    assert source.package(1.2, 10.2, 0.25)
+
+
+def test_what_grows_too_old_before_the_next_package_is_late_silent_only_later(source: Freshness) -> None:
+    states = []
+    source.package(1.0, 10.0, 0.4)
+    for now in (10.1, 10.11, 10.5, 10.51):
+        source.tick(now)
+        states.append(source.state)
+    assert states == [Source.FRESH, Source.LATE, Source.LATE, Source.SILENT]
+
+
+@pytest.mark.parametrize("repeated, state", [(False, Source.SILENT), (True, Source.FROZEN)])
+def test_a_small_lag_is_not_what_makes_a_cut_line_stale(
+    source: Freshness, repeated: bool, state: Source
+) -> None:
+    source.package(1.0, 10.0, 0.1)
+    if repeated:
+        source.package(1.0, 10.3, 0.1)
+    source.tick(10.41)
+    assert source.state is state
+
+
+def test_a_frozen_timestamp_is_frozen_though_it_was_late_before(source: Freshness) -> None:
+    states = []
+    source.package(1.0, 10.0, 0.4)
+    for now in (10.11, 10.3, 10.55):
+        source.package(1.0, now, 0.4)
+        source.tick(now)
+        states.append(source.state)
+    assert states == [Source.LATE, Source.LATE, Source.FROZEN]
+
+
+def test_a_source_goes_on_where_its_predecessor_stood(source: Freshness) -> None:
+    source.package(1.0, 10.0, 0.4)
+    heir = Freshness(0.3)
+    heir.succeed(source)
+    assert not heir.package(1.0, 10.05)
+    heir.tick(10.05)
+    assert heir.state is Source.LATE

@@ -231,6 +231,35 @@ def test_an_output_that_is_new_is_good_with_the_next_package(cell: Cell, press: 
     assert [*qualities, *new.image.quality[10:]] == [Quality.NEVER, Quality.GOOD]
 
 
+def test_the_lag_goes_on(cell: Cell, press: CellDefinition) -> None:
+    assert cell.package_arrived(0.04, 0.1, raw=0.1)
+    cell.outputs_written(0.1)
+    new = succeed(cell, press, 0.1).cell
+    assert new.health.lag == pytest.approx(0.06, abs=0.001)
+    assert new.image.age(CYCLES, 0.1) == pytest.approx(0.06, abs=0.001)
+    assert not new.package_arrived(0.05, 0.3, raw=0.3)
+    assert new.freshness.state is Source.LATE
+
+
+def test_what_cannot_be_shown_any_more_is_not_good_at_once(cell: Cell, press: CellDefinition) -> None:
+    new = succeed(cell, changed(press, CYCLES, shown=(0.0, 4.0)), 0.1).cell
+    assert (new.image.values[CYCLES], new.image.quality[CYCLES]) == (5, Quality.OUT_OF_RANGE)
+    again = succeed(new, press, 0.1).cell
+    assert (again.image.values[CYCLES], again.image.quality[CYCLES]) == (5, Quality.GOOD)
+
+
+def test_what_is_now_valid_while_a_program_runs_is_good_only_if_one_does(
+    cell: Cell, press: CellDefinition
+) -> None:
+    new = succeed(cell, changed(press, ALARM, valid_running=True), 0.1).cell
+    assert new.image.quality[ALARM] is Quality.NOT_RUNNING
+    assert new.unreadable == {ALARM}
+    new.program(2)
+    assert new.package_arrived(0.1, 0.1)
+    new.outputs_written(0.1)
+    assert succeed(new, changed(press, ALARM, valid_running=True), 0.1).cell.unreadable == frozenset()
+
+
 def test_forces_and_taken_locks_of_the_operator_go_on(cell: Cell, press: CellDefinition) -> None:
     assert cell.force(FORCE, 33.0, 1.0, until=9.0) is None
     assert cell.force(CYCLES, 1234, 1.0, until=9.0) is None
@@ -267,9 +296,11 @@ def _connect(cell: Cell, _who: int, _which: int, _number: int, now: float) -> No
     cell.adopt(dict.fromkeys(range(6), 0), now)
 
 
-def _package(cell: Cell, who: int, _which: int, _number: int, now: float) -> None:
-    if cell.package_arrived(now if who else 1.0, now):
-        cell.image.values[6:10] = [5, 2.5, 3, True]
+def _package(cell: Cell, who: int, which: int, number: int, now: float) -> None:
+    lag = 0.07 * (which % 3)
+    if cell.package_arrived(now - lag if who else 1.0, now):
+        cell.program(2 * number)
+        cell.image.values[6:10] = [5, which / 2, 3, True]
         cell.outputs_written(now)
 
 
@@ -340,7 +371,13 @@ def test_a_succession_that_changes_nothing_cannot_be_noticed(
     press: CellDefinition, history: list[Step], grace: float
 ) -> None:
     """Two cells with one history, of which one is succeeded now and then, are the same to every observer."""
-    press = replace(press, writers=(replace(press.writers[PLC], grace=grace), *press.writers[1:]))
+    variables = list(press.variables)
+    for index in (LEVEL, ALARM):
+        variables[index] = replace(variables[index], valid_running=True)
+    for index in (SPEED, LEVEL):
+        variables[index] = replace(variables[index], shown=(0.0, 3.0))
+    writers = (replace(press.writers[PLC], grace=grace), *press.writers[1:])
+    press = replace(press, variables=tuple(variables), writers=writers)
     plain, replaced = Cell(press), Cell(press)
     now = 0.0
     for step in history:

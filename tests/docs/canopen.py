@@ -17,6 +17,7 @@ from gatewayd.canopen.identity import REACTIONS
 from gatewayd.canopen.lss import Command
 from gatewayd.canopen.nmt import ALLOWED, NmtState, Service
 from gatewayd.canopen.node import OVERRUN_TIME
+from gatewayd.canopen.robot_errors import QUIET
 from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES
 from gatewayd.canopen.variables import ABORT_OF
 from gatewayd.core.refusal import Reason
@@ -59,7 +60,7 @@ variables:
 
 _MEANINGS: Mapping[int, str | Mapping[int, str]] = {
     0x1000: "0: no device profile",
-    0x1001: "bit 0 any error, bit 4 communication, bit 7 manufacturer's (a refused RPDO)",
+    0x1001: "bit 0 any error, bit 4 communication, bit 7 manufacturer's (a refused RPDO, the robot)",
     0x1002: "the flags of the status block, as 5F00h:02",
     0x1003: {
         0: "how many; write 0 to forget them",
@@ -78,7 +79,8 @@ _MEANINGS: Mapping[int, str | Mapping[int, str]] = {
     0x1012: "where TIME is heard, bit 31: at all; for the log",
     0x1014: "where EMCY is sent; bit 31: not at all",
     0x1015: "least time between two EMCYs in 0.1 ms",
-    0x1016: "a node whose heartbeat is watched: bits 16-22 its node-ID, bits 0-15 milliseconds",
+    0x1016: "a node whose heartbeat is watched: bits 16-22 its node-ID, bits 0-15 milliseconds; "
+    "makes what the mapping promises shorter, never longer",
     0x1017: "milliseconds between two heartbeats; 0: none, and guarding is answered",
     0x1018: {
         1: "0: CiA has assigned none",
@@ -234,7 +236,7 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.STORED_PARAMETERS: "the stored parameters cannot be read; defaults are used",
     ErrorCode.OVERRUN: "received frames were lost for want of room",
     ErrorCode.PASSIVE: "the controller is error-passive",
-    ErrorCode.HEARTBEAT: "the heartbeat of a watched node stayed away (byte 4: its node-ID), or the guarding did",
+    ErrorCode.HEARTBEAT: "the heartbeat of a node of 1016h ended (byte 4: its node-ID), or the guarding did",
     ErrorCode.BUS_OFF_RECOVERED: "the controller was off the bus and is back",
     ErrorCode.PDO_TOO_SHORT: "an RPDO was shorter than its mapping and was dropped (bytes 4-5: its number)",
     ErrorCode.PDO_TOO_LONG: "an RPDO was longer than its mapping; its first bytes were used",
@@ -246,6 +248,13 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.WRITE_CLAIMED_ELSEWHERE: "an RPDO was dropped: the controller gave a register to another client",
     ErrorCode.WRITE_NEVER: "an RPDO was dropped: this writer may never write a variable of it",
     ErrorCode.WRITE_HEARTBEAT_LOST: "an RPDO was dropped: the heartbeat that its writer promised stays away",
+    ErrorCode.WRITE_PARTIAL_TAKEOVER: "an RPDO was dropped: it would take over a part of a `whole` group",
+    ErrorCode.ROBOT_LOST: "the robot is not connected",
+    ErrorCode.ROBOT_STALE: "it is connected, and its values are stale (byte 4: `robot_state`)",
+    ErrorCode.ROBOT_DIFFERS: "the robot holds something else than it was given (bytes 4-5: how many inputs)",
+    ErrorCode.ROBOT_UNAVAILABLE: "the controller does not have, or gave to another client, what is mapped "
+    "(bytes 4-5: how many variables)",
+    ErrorCode.WRITE_WAITED: "an RPDO was dropped: it waited too long while the gateway stood still",
 }
 
 
@@ -260,7 +269,8 @@ def emergencies() -> str:
 
 def happenings() -> str:
     """What befalls the node, and what follows."""
-    return _docstring_table("node.py").replace("`OVERRUN_TIME`", f"{OVERRUN_TIME:g} s")
+    text = _docstring_table("node.py").replace("`OVERRUN_TIME`", f"{OVERRUN_TIME:g} s")
+    return text.replace("`QUIET`", f"{QUIET:g} s")
 
 
 def received_pdos() -> str:
@@ -409,7 +419,8 @@ def pdo_kinds() -> str:
         ("output (from the robot)", "`ro`", "TPDO"),
         ("input (towards the robot), some CANopen writer", "`rww`", "RPDO"),
         ("input without a CANopen writer", "`ro`", "none"),
-        ("status block", "`ro`, request and release `rw`", "none"),
+        ("status block", "`ro`", "TPDO"),
+        ("its words request and release", "`rw`", "none"),
     ]
     return table(("what", "access", "may be mapped into"), rows)
 

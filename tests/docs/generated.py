@@ -24,6 +24,7 @@ from gatewayd.control import documented
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
+from gatewayd.core.program import STATES
 from gatewayd.core.refusal import PRECEDENCE, Reason
 from gatewayd.core.status import BASE, FIELDS, TABLES
 from gatewayd.eventlog import LEVELS
@@ -106,6 +107,8 @@ def _types(schema: Mapping[str, Any]) -> Iterator[str]:
     if "anyOf" in schema:
         for choice in schema["anyOf"]:
             yield from _types(choice)
+    elif len(schema.get("enum", ())) > _MANY_WORDS:
+        yield "text"
     elif "enum" in schema or "const" in schema:
         yield from (f"`{word}`" for word in schema.get("enum", [schema.get("const")]))
     elif _DURATION.search(schema.get("pattern", "")):
@@ -118,6 +121,8 @@ def _types(schema: Mapping[str, Any]) -> Iterator[str]:
         yield _TYPES[schema.get("type", "object")] + _range(schema)
 
 
+_MANY_WORDS = 16
+"""Choices that a cell of a table can hold; the meaning says where more are listed."""
 _TYPES = {
     "array": "list",
     "boolean": "`true`, `false`",
@@ -223,6 +228,9 @@ _QUALITIES = {
     Quality.UNAVAILABLE: "the controller does not have the field, or gave the register to another client",
     Quality.NEVER: "nothing has been told yet",
     Quality.FORCED: "the local operator put the value there for commissioning",
+    Quality.DIFFERS: "the robot holds something else than it was given",
+    Quality.OUT_OF_RANGE: "one of its places cannot show the value: there it is saturated, or 0 for what is no number",
+    Quality.NOT_RUNNING: "it is valid only while the robot program runs, and it does not; outputs show `on_stale`",
 }
 _SOURCES = {
     Source.LOST: "no connection to the controller",
@@ -230,6 +238,7 @@ _SOURCES = {
     Source.FRESH: "packages come and tell something new",
     Source.SILENT: "connected, but no package for longer than `stale_after`",
     Source.FROZEN: "packages come, but the controller's own time stands still",
+    Source.LATE: "packages come, but what they report is older than `stale_after`",
 }
 
 
@@ -243,6 +252,13 @@ def sources() -> str:
     """The states of the robot by number."""
     rows = [(source.value, f"`{source.name.lower()}`", _SOURCES[source]) for source in Source]
     return table(("number", "robot_state", "meaning"), rows)
+
+
+def programs() -> str:
+    """The states of the robot program, and which of them count as running."""
+    rows = [("0", "not known, or the controller does not report it", "no")]
+    rows += [(str(state + 1), name, "yes" if runs else "no") for state, (name, runs) in STATES.items()]
+    return table(("number", "program", "runs"), [*rows, ("more", "unknown to this version", "no")])
 
 
 def refusals() -> str:
@@ -445,6 +461,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "status-tables": status_tables,
     "qualities": qualities,
     "robot-states": sources,
+    "programs": programs,
     "refusals": refusals,
     "exceptions": exceptions,
     "events": events,

@@ -36,6 +36,7 @@ class Master:
         self._states: list[int] = []
         self._last = 0.0
         self._beat: Any = None
+        self._watched: list[tuple[float, Any]] = []
         self.connect()
 
     # -- commands ------------------------------------------------------------------------------------------------
@@ -115,6 +116,26 @@ class Master:
         for pdo in chosen:
             pdo.start(period)
         return len(chosen)
+
+    def stop_repeating(self) -> None:
+        """End every `repeat`."""
+        for pdo in self._node.rpdo.values():
+            pdo.stop()
+
+    def watch(self, key: str) -> None:
+        """Keep from now on when which value of a mapped object came."""
+
+        def keep(pdo: Any) -> None:
+            self._watched += [(time.monotonic(), one.raw) for one in pdo.map if self._key(one) == key]
+
+        for pdo in self._node.tpdo.values():
+            if any(self._key(one) == key for one in pdo.map):
+                pdo.add_callback(keep)
+
+    def watched(self) -> list[tuple[float, Any]]:
+        """Monotonic time and value of all that came since the last call."""
+        found, self._watched = self._watched, []
+        return found
 
     def read(self, index: int, subindex: int) -> Any:
         """Upload: the value; or the abort code as text."""

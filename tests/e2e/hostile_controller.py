@@ -44,7 +44,7 @@ class HostileController:
 
     async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         chance = self._chance
-        proper = chance.choice((0, 1, 2, 3, 4, 5, 5, 5, 5))
+        proper = chance.choice((0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 12, 12))
         """Requests that are answered as they should be."""
         while True:
             size, kind = _HEAD.unpack(await reader.readexactly(_HEAD.size))
@@ -60,6 +60,8 @@ class HostileController:
                     return
                 continue
             proper -= 1
+            if kind == ord("O") and chance.random() < 0.3:
+                answer = answer[:3] + bytes(1) + answer[4:]  # the list is too long: read in pieces
             writer.write(answer)
             if kind == ord("S"):
                 await self._stream(writer, payload)
@@ -90,7 +92,11 @@ class HostileController:
 
     def _wrong(self, answer: bytes) -> bytes:
         chance = self._chance
-        kind = chance.randrange(8)
+        kind = chance.randrange(10)
+        if kind == 8:
+            return answer[:3] + bytes(1) + answer[4:]  # refused, and no field to blame
+        if kind == 9:
+            return self._package() + answer
         if kind == 0:
             return chance.randbytes(chance.choice((1, 2, 3, 50, 5000)))
         if kind == 1:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import signal
 import subprocess
 import sys
 import time
@@ -185,3 +187,30 @@ def test_events_are_followed_as_they_come(cell: Cell) -> None:
         simulator.kill()
         assert "robot lost" in json.loads(following.stdout.readline())["event"]
         following.terminate()
+
+
+def test_a_command_that_waited_while_the_gateway_stood_still_is_not_carried_out(cell: Cell) -> None:
+    """The crew gave up after seconds; the gateway goes on, and what they asked for then is no longer meant."""
+    simulator, daemon, plc, socket = cell
+    assert plc.write_integers(0, 11) == 0
+    daemon.signal(signal.SIGSTOP)
+    command = [sys.executable, "-m", "gatewayd", "force", "number", "42", "--socket", str(socket)]
+    waiting = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    wait_for(lambda: _waits_in(socket), "the command to be sent")
+    begin = time.monotonic()
+    wait_for(lambda: time.monotonic() - begin > 0.7, "time to pass")
+    daemon.signal(signal.SIGCONT)
+    _output, errors = waiting.communicate(timeout=30)
+    assert waiting.returncode == 1, errors
+    assert re.search(r"the gateway stood still for \d+\.\d s; repeat the command", errors), errors
+    assert not daemon.lines("value forced")
+    wait_for(
+        lambda: gatewayd(socket, "force", "number", "42").returncode == 0, "the repeated command to count"
+    )
+    wait_for(lambda: simulator.integer("input_int_register_0") == 42, "the robot to have the forced value")
+
+
+def _waits_in(path: Path) -> bool:
+    """Whether somebody waits to be accepted there, with what was sent: as the kernel lists it (state 02)."""
+    lines = Path("/proc/net/unix").read_text("ascii").splitlines()
+    return any(line.split()[5] == "02" and line.endswith(str(path)) for line in lines)

@@ -26,8 +26,10 @@ variables:
 """
 COMMAND, SETPOINT, CLEARED, HELD, VALUED, EXCEPTED, LAMP, FRAGILE = range(1, 9)
 GOOD, STALE, UNAVAILABLE, NEVER = range(4)
-LOST, WAITING, FRESH, SILENT, FROZEN = range(5)
+LOST, WAITING, FRESH, SILENT, FROZEN, LATE = range(6)
 """Values of the status block."""
+ROBOT_AGE, PACKAGES, LAG = 11, 15, 45
+"""Offsets of the lower words of its numbers."""
 
 
 def start(plant: Plant, text: str = CELL, **options: str) -> tuple[Simulator, Daemon, Plc]:
@@ -74,6 +76,8 @@ def test_robot_killed_and_restarted_with_other_values(plant: Plant) -> None:
         "demo",
         "--program",
         "output_int_register_1 = count input_int_register_0",
+        "--uptime",
+        "5",  # as a restarted controller: its clock has gone back
         port=simulator.port,
     )
     # Before the gateway is back, the robot's own program (or another tool) has put other values there.
@@ -126,6 +130,31 @@ def test_a_robot_that_cannot_be_reached_is_one_line(plant: Plant, host: str) -> 
     assert "Traceback" not in daemon.text()
 
 
+def test_delay_in_small_steps_and_a_clock_that_creeps_are_late(plant: Plant) -> None:
+    """Each package has a new timestamp and comes in time after the last one; only the lag says how old it is."""
+    simulator, daemon, plc = start(plant)
+    assert plc.write_integers(0, 7) == 0
+    wait_for(lambda: plc.integers(20, 4) == [7] * 4, "the echo")
+    for step in range(1, 21):
+        simulator.do(f"delay {step * 0.05}")
+        began = plc.status(PACKAGES)
+        wait_for(lambda began=began: plc.status(PACKAGES) - began & 0xFFFF > 5, "packages")  # type: ignore[misc]
+    wait_for(lambda: plc.robot_state == LATE, "late values to count as such")
+    assert_fallbacks(plc)
+    assert plc.status(LAG) >= 400
+    assert plc.status(ROBOT_AGE) >= 400
+
+    simulator.do("delay 0")
+    wait_for(lambda: plc.robot_state == FRESH, "quick packages")
+    wait_for(lambda: plc.integers(20, 4) == [7] * 4, "good values")
+    assert plc.status(LAG) < 400
+
+    simulator.do("creep on")
+    wait_for(lambda: plc.robot_state == LATE, "a clock that creeps to count as late")
+    assert_fallbacks(plc)
+    assert len([line for line in daemon.lines("robot values stale") if "detail=late" in line]) == 2
+
+
 def test_frozen_timestamp_is_stale_though_packages_come(plant: Plant) -> None:
     simulator, daemon, plc = start(plant, stale_after="300ms")
     assert plc.write_integers(0, 7) == 0
@@ -139,9 +168,11 @@ def test_frozen_timestamp_is_stale_though_packages_come(plant: Plant) -> None:
     simulator.do("freeze off")
     took = wait_for(lambda: plc.robot_state == FRESH, "the robot to go on")
     wait_for(lambda: plc.integers(20, 4) == [7] * 4, "its values")
-    assert qualities(plc) == [GOOD] * 8
+    # One new session tells that nothing has queued up behind the clock meanwhile.
+    daemon.wait_for_line("robot lost", "its clock stood still")
+    wait_for(lambda: plc.writable and qualities(plc) == [GOOD] * 8, "the new session")
     assert len(daemon.lines("robot values stale", "frozen")) == 1
-    assert not daemon.lines("robot lost")
+    assert len(daemon.lines("robot lost")) == 1
 
 
 def test_silence_is_stale_and_then_a_loss(plant: Plant) -> None:

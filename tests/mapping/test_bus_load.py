@@ -208,3 +208,23 @@ def test_packages_per_second_at_most(robot: dict[str, object], packages: float) 
 
 def test_bit_rates_are_those_of_cia_301() -> None:
     assert [rate // 1000 for rate in BIT_RATES] == [10, 20, 50, 125, 250, 500, 800, 1000]
+
+
+def test_status_words_are_counted() -> None:
+    """A PDO of four words is as long as one of eight bytes of variables."""
+    text = """\
+gatewayd: 1
+cell: c
+robot: {host: r, series: e, frequency: 10}
+canopen:
+  channel: can0
+  bitrate: 500000
+  node: 16
+  heartbeat: none
+  pdos: {state: {status: [flags, robot_state, lag]}}
+variables: {a: {robot: robot_mode}}
+"""
+    cell = load_file(text.encode(), "c.yaml").cell
+    assert cell.canopen is not None
+    (share,) = bus_shares([station_of(cell, cell.canopen)])
+    assert (share.what, share.bits, share.rate) == ("node 16: TPDO 1 (state)", frame_bits(8), 10)

@@ -171,3 +171,53 @@ def test_no_file_can_make_it_work_for_long() -> None:
     found = node(f"  pdos:\n{pdos}", "  d: {robot: output_bit_register_0..127}\n")
     assert time.perf_counter() - started < 10
     assert 2000 < len(found.misnamed) < 4000
+
+
+STATUS = """\
+  ready: {robot: output_bit_register_0}
+  recipe: {robot: output_int_register_0..2, canopen: object}
+  far: {robot: output_int_register_9}
+"""
+
+
+def test_status_words_come_before_the_variables() -> None:
+    """In the order of the list; a family has one word for each member, and need not be on CANopen itself."""
+    found = pdo(
+        node("  pdos: {state: {status: [flags, quality of far, uptime], variables: ready}}\n", STATUS),
+        "state",
+    )
+    assert [(offset, word.name) for offset, word in found.status_offsets] == [
+        (0, "flags"),
+        (16, "quality of far"),
+        (32, "uptime"),
+    ]
+    assert [offset for offset, _ in found.offsets] == [64]
+    assert (found.bits, found.label) == (65, "TPDO 1 (state)")
+
+
+def test_a_pdo_of_status_words_alone_is_a_tpdo() -> None:
+    found = node("  pdos: {state: {status: quality of recipe}}\n", STATUS)
+    assert found.is_complete
+    (one,) = found.pdos
+    assert (one.direction, one.entries) == (Direction.OUTPUT, ())
+    assert [(word.index, word.subindex, word.quality_of) for word in one.status] == [
+        (0x5F40, 2, 1),
+        (0x5F40, 3, 2),
+        (0x5F40, 4, 3),
+    ]
+
+
+def test_the_quality_of_nothing_is_kept_for_the_rules() -> None:
+    found = node("  pdos: {state: {status: [flags, 'quality of recipe[7]', quality of nothing]}}\n", STATUS)
+    assert [(one.pdo, one.text, one.problem) for one in found.misnamed] == [
+        ("state", "recipe[7]", MemberProblem.UNKNOWN),
+        ("state", "nothing", MemberProblem.UNKNOWN),
+    ]
+    assert not found.is_complete
+
+
+def test_status_words_make_a_pdo_one_that_is_sent() -> None:
+    """Whatever variables stand beside them."""
+    found = node("  pdos: {p: {status: flags, variables: go}}\n", "  go: {robot: input_bit_register_0}\n")
+    assert pdo(found, "p").direction is Direction.OUTPUT
+    assert not found.is_complete

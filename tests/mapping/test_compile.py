@@ -357,3 +357,78 @@ def test_cell_with_errors_is_not_compiled() -> None:
     document, _ = read_document(parse(b"gatewayd: 1\ncell: c\nvariables: {}", "f"))
     with pytest.raises(ValueError, match="f has errors"):
         compile_plan(expand(document))
+
+
+def keyed(*pairs: tuple[str, str]) -> Plan:
+    """`GOOD` with some keys more."""
+    text = GOOD
+    for old, new in pairs:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return compiled(text)
+
+
+@pytest.mark.parametrize(
+    "written, seconds",
+    [("", 10.0), ("adopt_for: 3s", 3.0), ("adopt_for: 10s", 10.0), ("adopt_for: none", None)],
+)
+def test_adopted_inputs_wait_for_an_owner(written: str, seconds: float | None) -> None:
+    """The default counts for nothing in the fingerprint, written or not; every other value does."""
+    plan = keyed(("  series: e\n", f"  series: e\n  {written}\n"))
+    assert plan.cell.adopt_for == seconds
+    assert (plan.cell.fingerprint == FINGERPRINT) is (seconds == 10.0)
+
+
+def test_writers_keep_what_they_promise() -> None:
+    plan = keyed(
+        ("192.168.1.21], timeout: 3s}", "192.168.1.21], timeout: 3s, timeout_counts: writes, grace: 500ms}"),
+        ("plc: {modbus: 192.168.1.20}", "plc: {canopen: sdo, node: 1, heartbeat: 1s, grace: none}"),
+        ("writers:\n", "canopen: {channel: can0, bitrate: 500000, node: 16}\nwriters:\n"),
+    )
+    assert plan.cell.writers == (
+        Writer("hmi", timeout=3.0, grace=0.5, counts_writes=True),
+        Writer("plc", heartbeat=1.0),
+    )
+
+
+def test_a_group_may_be_whole() -> None:
+    plan = keyed(("lease: 2s}\nvariables", "lease: 2s, whole: true}\nvariables"))
+    assert [lock.name for lock in plan.cell.locks if lock.whole] == ["motion"]
+
+
+def test_outputs_that_hang_on_the_program() -> None:
+    """One variable, or all output registers; what says whether the program runs is then asked for."""
+    one = keyed(("input: 0, order: CDAB}], ", "input: 0, order: CDAB}], valid: running, "))
+    assert [variable.name for variable in one.cell.variables if variable.valid_running] == ["mode"]
+    cell = keyed(("  series: e\n", "  series: e\n  valid: running\n"))
+    assert [v.name for v in cell.cell.variables if v.valid_running] == ["lamps[0]", "lamps[1]"]
+    for plan in (one, cell):
+        assert plan.robot.outputs == ("robot_mode", "output_bit_registers0_to_31", "runtime_state")
+        assert plan.cell.fingerprint != FINGERPRINT
+
+
+def test_what_follows_from_places_is_no_meaning_of_its_own() -> None:
+    """A later gatewayd may judge differently what a place can show."""
+    plan = compiled()
+    assert plan.cell.variables[1].shown == pytest.approx((-3276.85, 3276.75))
+    assert plan.cell.fingerprint == FINGERPRINT
+
+
+def test_status_words_are_entries_of_a_tpdo() -> None:
+    """Objects without a variable of their own; a quality names the variable that it is of."""
+    section = (
+        "canopen: {channel: can0, bitrate: 500000, node: 16, "
+        "pdos: {state: {status: [lag, quality of clock], variables: lamps}}}\nwriters:\n"
+    )
+    plan = keyed(("writers:\n", section))
+    assert plan.canopen is not None
+    (pdo,) = plan.canopen.pdos
+    assert pdo.direction is Direction.OUTPUT
+    assert pdo.entries == (
+        PdoEntry(None, 0x5F00, 30, 32),
+        PdoEntry(None, 0x5F40, 4, 16, quality_of=3),
+        PdoEntry(6, 0x2400, 1, 1),
+        PdoEntry(7, 0x2400, 2, 1),
+    )
+    assert [entry.is_status for entry in pdo.entries] == [True, True, False, False]
+    assert not PdoEntry(None, 0x0005, 0, 8).is_status

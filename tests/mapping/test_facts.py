@@ -61,7 +61,9 @@ def test_variables_are_told_as_the_file_spells_them() -> None:
 
 
 OTHERWISE: dict[type, Any] = {str: "other", bool: None, int: 77, float: 0.123456789, tuple: ()}
-KNOWN = {"source", "fingerprint", "number", "name", "lock", "low", "high", "members", "kind", "cell"}
+KNOWN = {
+    "source", "fingerprint", "number", "name", "lock", "low", "high", "members", "kind", "cell", "shown", "shows_nan",
+}  # fmt: skip
 """Fields that a difference is told by elsewhere (numbers, names), or that follow from others."""
 
 
@@ -85,7 +87,9 @@ CASES = [
     *(("modbus", field.name) for field in dataclasses.fields(cast("Any", plan().modbus))),
     *(("variables", field.name) for field in dataclasses.fields(plan().cell.variables[0])),
     *(("locks", field.name) for field in dataclasses.fields(plan().cell.locks[0])),
+    *(("writers", field.name) for field in dataclasses.fields(plan().cell.writers[0])),
     ("cell", "stale_after"),
+    ("cell", "adopt_for"),
     ("cell", "clear_on_connect"),
 ]
 
@@ -172,3 +176,35 @@ def test_a_canopen_section_is_told_by_names() -> None:
         "pdos": "variable=path index=1; variable=none index=2",
     }
     assert facts.variables(new)["bit"]["canopen"] == "2001h sub 3 UNSIGNED8"
+
+
+def test_keys_of_supervision_and_takeover_are_told() -> None:
+    text = TEXT.replace("timeout: 100ms}", "timeout: 100ms, timeout_counts: writes, grace: 2s}")
+    text = text.replace("{owner: [plc, hmi], lease: 2s}", "{owner: [plc, hmi], lease: 2s, whole: true}")
+    text = text.replace("  host: 127.0.0.1\n", "  host: 127.0.0.1\n  adopt_for: none\n")
+    loaded = load(text.replace("on_stale: exception", "valid: running").encode(), "cell.yaml")
+    assert loaded.plan is not None, loaded.diagnostics
+    assert facts.writers(loaded.plan)["plc"] == {
+        "modbus": "127.0.0.2, 127.0.1.0/24",
+        "timeout": "0.1 s",
+        "timeout_counts": "writes",
+        "grace": "2 s",
+    }
+    assert facts.groups(loaded.plan)["motion"]["takeover"] == "whole"
+    assert facts.variables(loaded.plan)["pose"]["valid"] == "running"
+    robot = facts.links(loaded.plan)["robot"]
+    assert robot["adopt_for"] == "none"
+    assert "runtime_state" in robot["subscribed"].split()
+    assert facts.links(plan())["robot"]["adopt_for"] == "10 s"
+
+
+def test_status_words_in_a_pdo_are_told_by_name() -> None:
+    text = TEXT.replace(
+        "writers:",
+        "canopen: {channel: can0, bitrate: 500000, node: 16, pdos: {p: {status: [flags, quality of door]}}}\nwriters:",
+    )
+    loaded = load(text.encode(), "cell.yaml")
+    assert loaded.plan is not None, loaded.diagnostics
+    pdos = facts.links(loaded.plan)["canopen"]["pdos"]
+    assert "index=24384 subindex=6 bits=16 quality_of=door" in pdos
+    assert pdos.count("quality_of") == 1

@@ -37,6 +37,22 @@ def test_all_of_them_can_run_in_one_process() -> None:
     assert [finding.message for one in found for finding in one.diagnostics] == []
 
 
+FINGERPRINTS = {
+    "canopen-only.yaml": 0xA75E1CB5,
+    "full-image.yaml": 0xD1CF3B6F,
+    "small-cell.yaml": 0x8261FCB6,
+    "two-buses.yaml": 0x317A2AE8,
+    "two-plcs.yaml": 0x9A171BB0,
+}
+"""What a PLC compares with the status block. A new key of the language must not change them; a change of what a file
+says does, and belongs into the changelog."""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_keeps_its_fingerprint(name: str) -> None:
+    assert f"{plan(name).cell.fingerprint:08X}" == f"{FINGERPRINTS[name]:08X}"
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_listens_on_loopback_and_says_how_to_change_it(name: str) -> None:
     text = (MAPPINGS / name).read_text()

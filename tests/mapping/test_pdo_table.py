@@ -105,3 +105,32 @@ def test_the_register_table_names_object_and_pdo(cell: ExpandedCell) -> None:
 )
 def test_transmission_types_in_words(number: int, words: str) -> None:
     assert transmission_words(number) == words
+
+
+def test_status_words_are_rows_and_parts_of_the_document() -> None:
+    text = """\
+gatewayd: 1
+cell: c
+robot: {host: r}
+canopen:
+  channel: can0
+  bitrate: 500000
+  node: 16
+  pdos: {forces: {status: [flags, quality of force], variables: force}}
+variables: {force: {robot: output_double_register_0, canopen: {type: REAL32}}}
+"""
+    cell = load(text.encode(), "c.yaml").cell
+    (row,) = pdo_rows(cell)
+    assert [(run.names, run.bit, run.bits, run.objects, run.type) for run in row.runs] == [
+        ("status: flags", 0, 16, "5F00h:02", "UNSIGNED16"),
+        ("status: quality of force", 16, 16, "5F40h:01", "UNSIGNED16"),
+        ("force", 32, 32, "2430h:01", "REAL32"),
+    ]
+    document = as_document(cell)
+    assert document is not None
+    (pdo,) = document["pdos"]
+    assert pdo["status"] == [
+        {"name": "flags", "bit": 0, "bits": 16, "object": "5F00h:02", "type": "UNSIGNED16"},
+        {"name": "quality of force", "bit": 16, "bits": 16, "object": "5F40h:01", "type": "UNSIGNED16"},
+    ]
+    assert [one["name"] for one in pdo["variables"]] == ["force"]

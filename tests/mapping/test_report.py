@@ -96,6 +96,6 @@ def test_github_annotations_are_escaped() -> None:
             "::error file=a.yaml,line=4,col=9,title=GW201 register-overlap::"
             "`y` lies on `x`%0Aa.yaml:3:7: `x` is here%0Ahint: move it to 12"
         ),
-        "::warning file=b%2C1%3A2.yaml,line=1,col=1,title=GW217 open-listener::100%25 open%0D%0Asecond line",
+        "::warning file=b%2C1%3A2.yaml,line=1,col=1,title=GW217 open-listener::100%25 open\\r\\nsecond line",
         "::error file=c,title=unreadable::gone",
     ]

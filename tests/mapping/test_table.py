@@ -18,6 +18,7 @@ from gatewayd.mapping.table import (
     by_line,
     formula,
     limits,
+    lost,
     policy,
     rows,
 )
@@ -43,9 +44,7 @@ variables:
 
 @pytest.fixture(scope="module")
 def loaded() -> Loaded:
-    found = load(TEXT.encode(), "cell.yaml")
-    assert found.diagnostics == ()
-    return found
+    return load(TEXT.encode(), "cell.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -132,3 +131,19 @@ def test_a_variable_without_a_place_has_a_row() -> None:
     )
     last = rows(load(text.encode(), "cell.yaml").cell)[-1]
     assert (last.robot, last.area, last.address, last.notation, last.words) == ("robot_mode", "", None, "", 0)
+
+
+def test_new_keys_have_columns_and_words() -> None:
+    """A whole group, and outputs that hang on the robot program."""
+    text = TEXT.replace("{host: 192.168.1.10}", "{host: 192.168.1.10, valid: running}")
+    text = text.replace("lease: 2s}", "lease: 2s, whole: true}") + (
+        "  answer: {robot: output_int_register_0, modbus: 110, on_stale: hold}\n"
+    )
+    table = {row.name: row for row in rows(load(text.encode(), "cell.yaml").cell)}
+    assert (table["call"].whole, table["start"].whole) == (True, False)
+    assert policy(table["call"]) == "plc > hmi, 2s (motion, whole)"
+    assert (lost(table["answer"]), lost(table["tcp[0]"]), lost(table["call"])) == (
+        "hold, running",
+        "exception",
+        "hold",
+    )

@@ -203,6 +203,48 @@ async def test_a_connection_without_requests_is_closed(
     await listener.close()
 
 
+async def test_a_connection_that_holds_a_lock_is_not_closed_for_idleness(
+    live_cell: Cell, plan_of: PlanOf, events: list[PeerEvent]
+) -> None:
+    """That would be a hidden release; what silence of a writer means is said by its `timeout`."""
+    listener = ModbusListener("127.0.0.1", 0, observe=events.append)
+    listener.serve([(plan_of(idle_timeout=0.1), live_cell)])
+    await listener.start()
+    owner, other = await dial(listener, "127.0.0.2"), await dial(listener)
+    owner[1].write(bytes.fromhex("0001 0000 0006 01 06 000a 0005"))
+    await owner[0].readexactly(12)
+    assert await other[0].read() == b""
+    await asyncio.sleep(0.2)
+    assert live_cell.ownership.held_by(0)
+    assert listener.connections == 1
+    owner[1].write(bytes.fromhex("0001 0000 0006 01 06 ea89 ffff"))
+    await owner[0].readexactly(12)
+    assert await owner[0].read() == b"", "released, it is like any other"
+    for _reader, writer in (owner, other):
+        writer.close()
+    await listener.close()
+
+
+async def test_an_owner_that_does_not_read_its_answers_is_dropped_with_its_locks(
+    live_cell: Cell, plan_of: PlanOf, monkeypatch: pytest.MonkeyPatch, events: list[PeerEvent]
+) -> None:
+    monkeypatch.setattr(server, "STALLED_AFTER", 0.1)
+    monkeypatch.setattr(server, "_SWEEP", 0.02)
+    listener = ModbusListener("127.0.0.1", 0, observe=events.append)
+    listener.serve([(plan_of(), live_cell)])
+    await listener.start()
+    peer = socket.create_connection(("127.0.0.1", listener.port), 5, ("127.0.0.2", 0))
+    peer.setblocking(False)
+    requests = bytes.fromhex("0001 0000 0006 01 06 000a 0005" + "0001 0000 0006 01 03 00c8 0060" * 100_000)
+    sending = asyncio.create_task(asyncio.get_running_loop().sock_sendall(peer, requests))
+    await until(lambda: bool(live_cell.ownership.held_by(0)))
+    await until(lambda: not live_cell.ownership.held_by(0))
+    assert events[-1].reason == "did not read its answers for 0.1 s"
+    sending.cancel()
+    peer.close()
+    await listener.close()
+
+
 async def test_a_peer_that_does_not_read_is_not_read_from_and_then_dropped(
     live_cell: Cell, plan_of: PlanOf, monkeypatch: pytest.MonkeyPatch, events: list[PeerEvent]
 ) -> None:
@@ -330,6 +372,8 @@ async def test_a_new_plan_for_the_same_cell_loses_no_owner(
     assert live_cell.ownership.held_by(0)
     assert live_cell.writers.connections[0] == 1
     assert len(live_cell.listeners) == 1
+    (connection,) = listener._connections
+    assert connection.accesses[1].requester.connection == connection.number
 
 
 async def test_a_defect_costs_one_connection(

@@ -5,9 +5,8 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable
+from functools import partial
 
 import pytest
 
@@ -19,25 +18,14 @@ from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
-from gatewayd.mapping.loader import load
-from gatewayd.robot import inputs as inputs_module
-from gatewayd.robot.link import RobotLink
+from gatewayd.robot import readback as readback_module
 from gatewayd.rtde.catalogue import SoftwareVersion
-from gatewayd.simulator.controller import Controller
-from gatewayd.simulator.program import DEMO, parse
 from gatewayd.simulator.server import SimulatedController
+from tests.robot.rig import HMI, PLC, Defect, Rig, Rigged, plan_for
+from tests.robot.rig import rigged as joined
 
 Until = Callable[..., Awaitable[None]]
-PLC, HMI = 0, 1
 
-HEAD = """\
-gatewayd: 1
-cell: link
-robot: {{host: 127.0.0.1, port: {port}, stale_after: 5s{options}}}
-writers: {{plc: {{modbus: 127.0.0.2}}, hmi: {{modbus: 127.0.0.3}}}}
-modbus: {{listen: '127.0.0.1:1502'}}
-variables:
-"""
 REGISTERS = """\
   bit:    {robot: input_bit_register_3,    modbus: 0.3}
   number: {robot: input_int_register_0,    modbus: 1}
@@ -48,58 +36,10 @@ REGISTERS = """\
 BIT, NUMBER, REAL, ECHO, LAMP = range(5)
 
 
-class Defect(Exception):
-    pass
-
-
-@dataclass
-class Rig:
-    robot: SimulatedController
-    cell: Cell
-    link: RobotLink
-
-    def write(self, *changes: tuple[int, bool | int | float], writer: int = PLC) -> None:
-        """Apply a write request that must be accepted."""
-        refusal = self.cell.write(Requester(writer), [Change(*one) for one in changes], time.monotonic())
-        assert refusal is None, refusal
-
-    def get(self, field: str) -> object:
-        return self.robot.get(field)
-
-    def events(self, kind: EventKind) -> list[str]:
-        return [event.detail for event in self.cell.events if event.kind is kind]
-
-
-Rigged = Callable[..., AbstractAsyncContextManager[Rig]]
-
-
 @pytest.fixture
 def rigged() -> Rigged:
-    """A controller that echoes its registers, a cell for the variables given, and their link, running."""
-
-    @asynccontextmanager
-    async def run(
-        variables: str = REGISTERS,
-        options: str = "",
-        prepare: Callable[[SimulatedController], None] | None = None,
-        version: SoftwareVersion | None = None,
-    ) -> AsyncIterator[Rig]:
-        async with SimulatedController(Controller(version=version, program=parse(DEMO))) as robot:
-            if prepare is not None:
-                prepare(robot)
-            loaded = load((HEAD.format(port=robot.port, options=options) + variables).encode(), "link.yaml")
-            assert loaded.plan is not None, loaded.diagnostics
-            cell = Cell(loaded.plan.cell)
-            link = RobotLink(loaded.plan.robot, cell)
-            task = asyncio.create_task(link.run())
-            try:
-                yield Rig(robot, cell, link)
-            finally:
-                task.cancel()
-                with suppress(asyncio.CancelledError, Defect):
-                    await task
-
-    return run
+    """A rig; of the registers above unless told otherwise."""
+    return partial(joined, REGISTERS)
 
 
 async def test_what_the_controller_holds_is_adopted_and_not_overwritten(rigged: Rigged, until: Until) -> None:
@@ -201,7 +141,7 @@ async def test_a_value_that_does_not_arrive_is_told_once(
     rigged: Rigged, until: Until, monkeypatch: pytest.MonkeyPatch, cyclic: bool
 ) -> None:
     """Also while the PLC writes another variable, or the same value, again and again."""
-    monkeypatch.setattr(inputs_module, "VERIFY_AFTER", 0.1)
+    monkeypatch.setattr(readback_module, "VERIFY_AFTER", 0.1)
     async with rigged() as rig:
         await until(lambda: rig.cell.accepts_writes)
         rig.write((NUMBER, 7), (REAL, 1.0))
@@ -238,9 +178,9 @@ IO = """\
 
 
 async def test_an_input_that_the_controller_does_not_tell_is_not_good_before_it_is_written(
-    rigged: Rigged, until: Until
+    until: Until,
 ) -> None:
-    async with rigged(IO) as rig:
+    async with joined(IO) as rig:
         await until(lambda: rig.cell.accepts_writes)
         assert rig.cell.image.quality == [Quality.NEVER, Quality.NEVER, Quality.GOOD]
         rig.write((0, 0.5), (1, 1))
@@ -248,9 +188,9 @@ async def test_an_input_that_the_controller_does_not_tell_is_not_good_before_it_
         await until(lambda: rig.get("target_speed_fraction") == 0.5)
 
 
-async def test_a_new_session_sends_nothing_that_nobody_wrote_in_it(rigged: Rigged, until: Until) -> None:
+async def test_a_new_session_sends_nothing_that_nobody_wrote_in_it(until: Until) -> None:
     """What cannot be read back would else be sent as it was before the loss, over what was set meanwhile."""
-    async with rigged(IO) as rig:
+    async with joined(IO) as rig:
         await until(lambda: rig.cell.accepts_writes)
         rig.write((0, 0.5), (1, 1))
         await until(lambda: rig.get("target_speed_fraction") == 0.5)
@@ -297,9 +237,9 @@ OLD = """\
 """
 
 
-async def test_what_an_old_controller_lacks_costs_only_itself(rigged: Rigged, until: Until) -> None:
+async def test_what_an_old_controller_lacks_costs_only_itself(until: Until) -> None:
     """Registers from 24 on came with 5.3; the reason is the controller's word."""
-    async with rigged(OLD, version=SoftwareVersion(5, 1, 0)) as rig:
+    async with joined(OLD, version=SoftwareVersion(5, 1, 0)) as rig:
         await until(lambda: rig.cell.accepts_writes)
         assert rig.cell.image.quality == [
             Quality.GOOD,
@@ -320,7 +260,7 @@ async def test_what_an_old_controller_lacks_costs_only_itself(rigged: Rigged, un
 async def test_checking_can_be_switched_off(
     rigged: Rigged, until: Until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(inputs_module, "VERIFY_AFTER", 0.0)
+    monkeypatch.setattr(readback_module, "VERIFY_AFTER", 0.0)
     async with rigged(options=", verify: false") as rig:
         await until(lambda: rig.cell.accepts_writes)
         _make_stubborn(rig.robot)
@@ -389,12 +329,11 @@ async def test_the_watchdog_is_fed_for_living_writers_only(rigged: Rigged, until
 
 def rebound(rig: Rig, variables: str, options: str = "") -> Cell | None:
     """The cell that went on with these variables, by the same link; None if that takes another session."""
-    loaded = load((HEAD.format(port=rig.robot.port, options=options) + variables).encode(), "link.yaml")
-    assert loaded.plan is not None, loaded.diagnostics
+    plan = plan_for(rig.robot.port, variables, options)
     now = time.monotonic()
-    new = succeed(rig.cell, loaded.plan.cell, now).cell
+    new = succeed(rig.cell, plan.cell, now).cell
     rig.link.flush(now)
-    if not rig.link.rebind(loaded.plan.robot, new, now):
+    if not rig.link.rebind(plan.robot, new, now):
         return None
     rig.cell = new
     return new
@@ -451,3 +390,163 @@ async def test_a_link_without_a_session_goes_on_too(rigged: Rigged, until: Until
         await until(lambda: rig.cell.accepts_writes)
         rig.write((NUMBER, 9))
         await until(lambda: rig.get("input_int_register_0") == 9)
+
+
+# -- what may be sent, and when --------------------------------------------------------------------------------------
+
+
+async def test_writes_go_on_while_new_registers_wait_for_a_clock_that_stands_still(
+    rigged: Rigged, until: Until
+) -> None:
+    """And so do releases; the new register is unavailable until it was read."""
+
+    def prepare(robot: SimulatedController) -> None:
+        robot.hold("input_double_register_0")
+        robot.set("input_double_register_0", 4.5)
+
+    async with rigged(prepare=prepare) as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.cell.writer_connected(Requester(PLC), time.monotonic())
+        rig.robot.faults.freeze = True
+        rig.robot.free("input_double_register_0")
+        await until(lambda: not rig.link.settled)
+        rig.write((NUMBER, 7), (BIT, True))
+        await until(lambda: rig.get("input_int_register_0") == 7)
+        refusal = rig.cell.write(Requester(PLC), [Change(REAL, 1.0)], time.monotonic())
+        assert refusal is not None
+        assert refusal.reason is Reason.CLAIMED_ELSEWHERE
+        rig.cell.writer_disconnected(Requester(PLC), time.monotonic(), "gone")
+        await until(lambda: rig.get("input_int_register_0") == 0)
+        assert not rig.link.settled, "the clock still stands"
+        rig.write((NUMBER, 9))
+        rig.cell.stop(time.monotonic(), "the gateway stops")
+        await rig.link.close()
+        await until(lambda: rig.get("input_int_register_0") == 0)
+        assert rig.get("input_double_register_0") == 4.5
+
+
+async def test_a_reload_in_that_moment_swallows_nothing(rigged: Rigged, until: Until) -> None:
+    async with rigged(prepare=lambda robot: robot.hold("input_double_register_0")) as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.robot.faults.freeze = True
+        rig.robot.free("input_double_register_0")
+        await until(lambda: not rig.link.settled)
+        for number in range(20):
+            rig.write((NUMBER, number))
+        assert rebound(rig, REGISTERS.replace("lamp:", "light:")) is not None
+        assert not rig.cell.is_available(REAL), "it was not read yet"
+        await until(lambda: rig.get("input_int_register_0") == 19)
+        rig.robot.faults.freeze = False
+        await until(lambda: rig.cell.is_available(REAL) and rig.link.settled)
+        rig.write((REAL, 3.5))
+        await until(lambda: rig.get("input_double_register_0") == 3.5)
+
+
+async def test_a_fallback_is_due_until_it_reads_back(rigged: Rigged, until: Until) -> None:
+    """The connection is cut in the moment of the release: the next session gives it."""
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.cell.writer_connected(Requester(PLC), time.monotonic())
+        rig.write((NUMBER, 7))
+        await until(lambda: rig.get("input_int_register_0") == 7)
+        sessions = rig.cell.health.sessions
+        rig.robot.drop_clients()
+        rig.cell.writer_disconnected(Requester(PLC), time.monotonic(), "gone")
+        assert rig.cell.delivery.under_way
+        await until(lambda: rig.cell.health.sessions > sessions and rig.cell.accepts_writes)
+        await until(lambda: rig.get("input_int_register_0") == 0)
+        await until(lambda: not rig.cell.delivery.under_way)
+        assert not rig.cell.delivery.owed
+
+
+UNREADABLE = ("input_bit_registers0_to_31", "input_int_register_0")
+SHARED = """\
+  first:  {robot: input_bit_register_1, modbus: 0.1}
+  second: {robot: input_bit_register_2, modbus: 0.2, on_release: true}
+  third:  {robot: input_bit_register_3, modbus: 0.3, on_release: hold}
+  number: {robot: input_int_register_0, modbus: 1}
+  other:  {robot: input_int_register_1, modbus: 3}
+"""
+
+
+async def test_what_cannot_be_read_is_named_and_not_sent_before_it_is_written(until: Until) -> None:
+    def prepare(robot: SimulatedController) -> None:
+        robot.faults.unreadable = frozenset(UNREADABLE)
+        robot.set("input_bit_registers0_to_31", 0b1010)
+        robot.set("input_int_register_0", 77)
+        robot.set("input_int_register_1", 88)
+
+    async with joined(SHARED, prepare=prepare) as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        assert rig.events(EventKind.INPUTS_ADOPTED) == ["1 variables; not readable: first, second and 2 more"]
+        assert rig.cell.health.unadopted == 4
+        assert rig.cell.image.quality == [Quality.NEVER] * 4 + [Quality.GOOD]
+        rig.write((4, 89))
+        await until(lambda: rig.get("input_int_register_1") == 89)
+        assert (rig.get(UNREADABLE[0]), rig.get(UNREADABLE[1])) == (0b1010, 77)
+        rig.write((0, True))
+        await until(lambda: rig.get(UNREADABLE[0]) == 0b0110)
+        assert rig.get(UNREADABLE[1]) == 77
+        fallbacks = [event for event in rig.cell.events if event.kind is EventKind.FALLBACK]
+        assert [(one.variable, one.new) for one in fallbacks] == [(1, True), (2, False)]
+        assert rig.cell.health.unadopted == 1
+        rig.write((3, 5))
+        await until(lambda: rig.get(UNREADABLE[1]) == 5)
+        assert rig.cell.image.quality == [Quality.GOOD] * 5
+        await until(
+            lambda: rig.link._client.session is not None and len(rig.link._client.session.inputs) == 1
+        )
+        await until(lambda: rig.link.settled)
+        rig.write((0, False), (3, 6), (4, 90))
+        await until(lambda: rig.get("input_int_register_1") == 90)
+        assert (rig.get(UNREADABLE[0]), rig.get(UNREADABLE[1])) == (0b0100, 6)
+
+
+async def test_without_verification_nothing_is_read_back_on_the_wire(rigged: Rigged, until: Until) -> None:
+    async with rigged(
+        options=", verify: false", prepare=lambda robot: robot.set("input_int_register_0", 5)
+    ) as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        assert rig.cell.image.values[NUMBER] == 5, "read once, before the working recipe"
+        session = rig.link._client.session
+        assert session is not None
+        assert not [name for name in session.outputs.names if name.startswith("input_")]
+
+
+# -- what the robot holds --------------------------------------------------------------------------------------------
+
+
+async def test_what_was_given_and_is_not_held_differs_and_is_sent_again(
+    rigged: Rigged, until: Until, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The PLC wrote 7, the robot holds 99: not good, until it holds 7."""
+    monkeypatch.setattr(readback_module, "VERIFY_AFTER", 0.1)
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.write((NUMBER, 7))
+        await until(lambda: rig.get("input_int_register_0") == 7)
+        await until(lambda: rig.link._inputs._recipes[0].is_settled)
+        rig.robot.set("input_int_register_0", 99)
+        await until(lambda: rig.cell.image.quality[NUMBER] is Quality.DIFFERS)
+        assert rig.cell.health.differing == 1
+        assert rig.cell.image.values[NUMBER] == 7
+        assert rig.events(EventKind.READ_BACK_DIFFERS) == [
+            "input_int_register_0: sent 7, the controller holds 99"
+        ]
+        await until(lambda: rig.get("input_int_register_0") == 7)
+        await until(lambda: rig.cell.image.quality[NUMBER] is Quality.GOOD)
+        assert (rig.cell.health.differing, rig.cell.health.read_back_mismatches) == (0, 1)
+
+
+async def test_what_was_only_adopted_follows_the_robot(rigged: Rigged, until: Until) -> None:
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        rig.robot.set("input_int_register_0", 99)
+        rig.robot.set("input_bit_registers0_to_31", 0x80)
+        await until(lambda: rig.cell.image.values[NUMBER] == 99)
+        assert rig.cell.image.quality[NUMBER] is Quality.GOOD
+        assert rig.events(EventKind.FOLLOWED) == [""]
+        rig.write((BIT, True))
+        await until(lambda: rig.get("input_bit_registers0_to_31") == 0x88)
+        assert rig.get("input_int_register_0") == 99
+        assert rig.cell.health.read_back_mismatches == 0

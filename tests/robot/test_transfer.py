@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.core.definition import Direction, Value, ValueKind, Variable
-from gatewayd.robot.transfer import InputTransfer, OutputTransfer, read_back
+from gatewayd.robot.transfer import InputTransfer, OutputTransfer
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
 
@@ -140,8 +140,12 @@ def test_adopted_and_gathered_are_the_same() -> None:
     assert transfer.gather([adopted[index] for index in range(len(variables))]) == tuple(transfer.base)
 
 
-def test_read_back_is_what_the_package_has() -> None:
-    assert read_back(FLAT, LAYOUT.slots, ["pose", "speed_slider_mask", "int_1"]) == {
-        "pose": (10.0, 11.0, 12.0, 13.0, 14.0, 15.0),
-        "int_1": (8,),
-    }
+def test_parts_are_what_variables_are_in_their_fields_and_the_rest_is_free() -> None:
+    bits = tuple(Variable(n + 1, f"bit{n}", Direction.INPUT, ValueKind.BOOL, "word", bit=n) for n in (0, 3))
+    element = Variable(3, "y", Direction.INPUT, ValueKind.FLOAT, "pose", element=1)
+    transfer = InputTransfer((*bits, element), LAYOUT.names, LAYOUT.slots)
+    assert [part.of([0b1000]) for part in transfer.parts["word"]] == [False, True]
+    assert transfer.free("word", [0b11001]) == [0b10000]
+    pose = [10.0, 11.0, 12.0, 13.0, 14.0, 15.0]
+    assert [part.of(pose) for part in transfer.parts["pose"]] == [11.0]
+    assert transfer.free("pose", pose) == [10.0, 0, 12.0, 13.0, 14.0, 15.0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -38,9 +38,14 @@ class Script:
     """Requests that are not answered."""
     accept_start: bool = True
     data_before_start_reply: bool = False
+    package_before_inputs_reply: bool = False
     sends_data: bool = True
     time_zero: float = 100.0
+    claimable: set[str] = field(default_factory=set)
+    """Inputs that can be claimed although they are missing."""
     name_limit: int = 65535
+    complains: bool = False
+    """Say so where a list is longer than that."""
     stop_reading: bool = False
     spoil: Callable[[bytes], bytes] | None = None
     """Applied to every package sent."""
@@ -98,7 +103,7 @@ class Peer:
             self.text()
 
     def setup_outputs(self, names: tuple[str, ...], frequency: float | None) -> None:
-        if len(",".join(names)) > self.script.name_limit:
+        if self.is_too_long(names):
             return
         words = tuple(
             "NOT_FOUND" if name in self.script.missing or name not in OUTPUTS else OUTPUTS[name].type.word
@@ -111,7 +116,7 @@ class Peer:
         self.say(messages.OutputsSetup(int(good), words))
 
     def setup_inputs(self, names: tuple[str, ...]) -> None:
-        if len(",".join(names)) > self.script.name_limit:
+        if self.is_too_long(names):
             return
         words = tuple(self.input_word(name) for name in names)
         good = not messages.ERROR_WORDS.intersection(words)
@@ -119,10 +124,18 @@ class Peer:
         if good:
             number = len(self.recipes) + 1
             self.recipes[number] = Recipe(names, [DataType.from_word(word) for word in words])
+        if self.script.package_before_inputs_reply:
+            self.package()
         self.say(messages.InputsSetup(number, words))
 
+    def is_too_long(self, names: tuple[str, ...]) -> bool:
+        too_long = len(",".join(names)) > self.script.name_limit
+        if too_long and self.script.complains:
+            self.say(messages.TextMessage("the list is too long", "URControl", messages.TextLevel.ERROR))
+        return too_long
+
     def input_word(self, name: str) -> str:
-        if name in self.script.missing or name not in INPUTS:
+        if name in self.script.missing - self.script.claimable or name not in INPUTS:
             return "NOT_FOUND"
         return "IN_USE" if name in self.script.in_use else INPUTS[name].type.word
 
@@ -148,8 +161,9 @@ class Peer:
         values: list[Scalar] = []
         for name, kind in zip(self.outputs.names, self.outputs.types, strict=True):
             value = self.written.get(name, self.step if kind is DataType.INT32 else 0)
-            values += [value] * kind.count
-        values[0] = self.script.time_zero + self.step * self.period
+            values += [self.script.time_zero + self.step * self.period if name == "timestamp" else value] * (
+                kind.count
+            )
         self.say(messages.DataPackage(1, self.outputs.pack(values)))
 
     async def stream(self) -> None:
@@ -208,24 +222,40 @@ class Notebook:
         self.changes: list[client.Session] = []
         self.losses: list[client.Loss] = []
         self.texts: list[messages.TextMessage] = []
+        self.delays: list[float] = []
         self.packages: list[tuple[Scalar, ...]] = []
+        self.calls: list[str] = []
+        """Names of the calls about sessions, packages and inputs, in their order."""
         self.client: client.RtdeClient | None = None
 
     def session_started(self, session: client.Session) -> None:
         self.sessions.append(session)
+        self.calls.append("session_started")
 
     def values(self, values: tuple[Scalar, ...], now: float) -> None:
         assert now > 0
         self.packages.append(values)
+        self.calls.append("values")
 
     def inputs_changed(self, session: client.Session) -> None:
         self.changes.append(session)
+        self.calls.append("inputs_changed")
 
     def session_lost(self, loss: client.Loss) -> None:
         self.losses.append(loss)
+        self.calls.append("session_lost")
 
     def text(self, message: messages.TextMessage) -> None:
         self.texts.append(message)
+
+    def probed(self, delay: float) -> None:
+        self.delays.append(delay)
+
+
+def send(one: client.RtdeClient, key: str, values: Sequence[Scalar]) -> bool:
+    """Send by the newest recipe of that key, if there is one."""
+    recipe = one.session.inputs.get(key) if one.session is not None else None
+    return recipe is not None and one.send(recipe, values)
 
 
 async def _until(condition: Callable[[], object], seconds: float = 5.0) -> None:

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from gatewayd.rtde.catalogue import INPUTS
 from gatewayd.rtde.claims import (
+    OLD_LIST_LIMIT,
     REFUSED,
     REGISTERS_KEY,
     WATCHDOG_KEY,
@@ -23,7 +24,10 @@ REGISTERS = tuple(f"input_int_register_{number}" for number in range(6))
 class Controller:
     """Answers input setups: what is taken is taken."""
 
-    def __init__(self, taken: set[str] | None = None, missing: set[str] | None = None) -> None:
+    def __init__(
+        self, taken: set[str] | None = None, missing: set[str] | None = None, limit: int = 65535
+    ) -> None:
+        self.limit = limit
         self.taken = taken or set()
         self.missing = missing or set()
         self.ids = 0
@@ -38,7 +42,7 @@ class Controller:
         while (request := claims.request()) is not None:
             self.asked.append(request.names)
             types = tuple(map(self.word, request.names))
-            good = not {NOT_FOUND, IN_USE} & set(types)
+            good = not {NOT_FOUND, IN_USE} & set(types) and len(",".join(request.names)) <= self.limit
             self.ids += good
             claims.answer(InputsSetup(self.ids if good else 0, types))
 
@@ -177,14 +181,85 @@ def test_after_255_recipes_the_connection_is_used_up() -> None:
     assert claims.exhausted
 
 
-def test_a_list_limit_splits_only_what_is_too_long() -> None:
-    claims = Claims((*REGISTERS, "speed_slider_mask"), list_limit=3 * len(REGISTERS[0]) + 2)
+MANY = tuple(name for name in INPUTS if name.startswith("input_"))
+
+
+@pytest.mark.parametrize("limited", [False, True], ids=["refused", "known before"])
+def test_a_list_that_is_too_long_is_split(limited: bool) -> None:
+    """A refusal that names no field is one of the list where it is long; a short one is asked for as it is."""
+    claims = Claims((*MANY, "speed_slider_mask"), limited=limited)
+    controller = Controller(limit=OLD_LIST_LIMIT)
+    controller.converse(claims)
+    assert all(len(",".join(names)) <= OLD_LIST_LIMIT for names in controller.asked[not limited :])
+    assert list(held(claims)) == [REGISTERS_KEY, "registers 2", "speed_slider"]
+    assert held(claims)[REGISTERS_KEY] + held(claims)["registers 2"] == MANY
+    assert not claims.refused
+
+
+def test_a_separated_register_leaves_no_recipe_that_carries_it() -> None:
+    claims = Claims(REGISTERS)
+    controller = Controller({REGISTERS[4]})
+    controller.converse(claims)
+    claims.separate([REGISTERS[1], REGISTERS[4]])
+    assert claims.recipes == {}
+    controller.converse(claims)
+    rest = (REGISTERS[0], *REGISTERS[2:4], REGISTERS[5])
+    assert held(claims) == {REGISTERS_KEY: rest, REGISTERS[1]: (REGISTERS[1],)}
+    assert claims.refused == {REGISTERS[4]: IN_USE}
+    controller.taken.clear()
+    claims.retry()
+    controller.converse(claims)
+    assert held(claims)[REGISTERS[4]] == (REGISTERS[4],)
+
+
+def test_recipes_of_before_stay_valid_and_those_of_others_never_are() -> None:
+    claims, other = Claims(REGISTERS), Claims(REGISTERS)
+    controller = Controller()
+    controller.converse(claims)
+    Controller().converse(other)
+    former = claims.recipes[REGISTERS_KEY]
+    claims.separate(REGISTERS[:1])
+    controller.converse(claims)
+    assert claims.accepted(former)
+    assert all(map(claims.accepted, claims.recipes.values()))
+    assert not claims.accepted(other.recipes[REGISTERS_KEY])
+
+
+def test_joined_registers_keep_their_order_within_the_list_limit() -> None:
+    claims = Claims(MANY, limited=True)
+    claims.separate(MANY[:3])
+    controller = Controller(limit=OLD_LIST_LIMIT)
+    controller.converse(claims)
+    claims.join(MANY[:3])
+    controller.converse(claims)
+    assert all(len(",".join(names)) <= OLD_LIST_LIMIT for names in controller.asked)
+    assert sorted(name for names in held(claims).values() for name in names) == sorted(MANY)
+    assert all(names == tuple(sorted(names, key=MANY.index)) for names in held(claims).values())
+    assert not set(MANY[:3]) & held(claims).keys()
+
+
+def test_a_refused_join_leaves_the_register_its_own_recipe() -> None:
+    claims = Claims(REGISTERS)
+    claims.separate(REGISTERS[:1])
+    controller = Controller()
+    controller.converse(claims)
+    before = held(claims)
+    claims.join(REGISTERS[:1])
+    assert claims.request()
+    claims.answer(InputsSetup(0, ("INT32",) * 6))
+    controller.converse(claims)
+    assert held(claims) == before
+    assert not claims.refused
+
+
+def test_joins_leave_ids_for_inputs_that_become_free() -> None:
+    claims = Claims(REGISTERS)
+    claims.separate(REGISTERS[:1])
     Controller().converse(claims)
-    assert held(claims) == {
-        REGISTERS_KEY: REGISTERS[:3],
-        f"{REGISTERS_KEY} 2": REGISTERS[3:],
-        "speed_slider": ("speed_slider_mask",),
-    }
+    claims._used = 191
+    claims.join(REGISTERS[:1])
+    assert claims.request() is None
+    assert not claims.exhausted
 
 
 @pytest.mark.parametrize("words", [(), ("INT32",), ("INT32",) * 3])

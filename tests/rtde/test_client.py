@@ -9,6 +9,7 @@ import pytest
 from gatewayd.rtde import messages
 from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.client import LossReason
+from tests.rtde.conftest import send
 
 if TYPE_CHECKING:
     from tests.rtde.conftest import Connected, Controller
@@ -41,7 +42,7 @@ async def test_a_version_1_controller_is_spoken_to_in_version_1(
         await until(lambda: len(seen.packages) > 2)
         assert seen.sessions[0].protocol == 1
         assert {text.source for text in seen.texts} == {""}
-        assert client.send("registers", range(24))
+        assert send(client, "registers", range(24))
         await until(lambda: controller.peer.written.get("input_int_register_23") == 23)
         assert not seen.losses
 
@@ -76,7 +77,7 @@ async def test_inputs_in_use_are_claimed_as_they_are_freed_on_the_same_connectio
         await until(lambda: seen.packages)
         session = seen.sessions[0]
         assert {one.field for one in session.unavailable} == {REGISTERS[3], REGISTERS[7]}
-        assert client.send("registers", [5] * 22)
+        assert send(client, "registers", [5] * 22)
         await until(lambda: len(controller.peer.written) == 22)
         controller.script.in_use = {REGISTERS[7]}
         await until(lambda: len(seen.changes) == 1)
@@ -87,7 +88,7 @@ async def test_inputs_in_use_are_claimed_as_they_are_freed_on_the_same_connectio
         await until(lambda: len(seen.changes) == 2)
         assert client.session is seen.changes[1]
         assert client.session.unavailable == ()
-        assert client.send("registers", range(24))
+        assert send(client, "registers", range(24))
         await until(lambda: controller.peer.written.get(REGISTERS[7]) == 7)
         assert (len(controller.peers), len(seen.sessions)) == (1, 1)
 
@@ -99,9 +100,9 @@ async def test_values_written_together_go_out_in_one_package(
     async with connected(inputs=inputs, watchdog="input_int_register_24") as (client, seen):
         await until(lambda: seen.packages)
         assert set(seen.sessions[0].inputs) == {"registers", "speed_slider", "watchdog"}
-        assert client.send("registers", [*range(24), *(number / 2 for number in range(24))])
-        assert client.send("speed_slider", (1, 0.5))
-        assert client.send("watchdog", (1,))
+        assert send(client, "registers", [*range(24), *(number / 2 for number in range(24))])
+        assert send(client, "speed_slider", (1, 0.5))
+        assert send(client, "watchdog", (1,))
         await until(lambda: "input_int_register_24" in controller.peer.written)
         packages = [one for one in controller.peer.received if isinstance(one, messages.DataPackage)]
         assert [one.recipe for one in packages] == [1, 2, 3]
@@ -113,17 +114,17 @@ async def test_what_is_written_is_read_back_in_the_packages(connected: Connected
     async with connected(inputs=REGISTERS) as (client, seen):
         await until(lambda: seen.packages)
         slot = seen.sessions[0].outputs.slots[REGISTERS[5]]
-        client.send("registers", range(100, 124))
+        send(client, "registers", range(100, 124))
         await until(lambda: seen.packages[-1][slot] == (105,))
 
 
 async def test_what_cannot_be_sent_is_not(connected: Connected, until: Until) -> None:
     async with connected(inputs=REGISTERS[:1], backoff=0.2) as (client, seen):
-        assert not client.send("registers", (1,))
+        assert not send(client, "registers", (1,))
         await until(lambda: seen.packages)
-        assert not client.send("speed_slider", (1, 1.0))
+        assert not send(client, "speed_slider", (1, 1.0))
         with pytest.raises(ValueError, match="input_int_register_0 is INT32"):
-            client.send("registers", (1 << 31,))
+            send(client, "registers", (1 << 31,))
 
 
 async def test_a_restarted_controller_gets_the_full_set_up_again(
@@ -205,32 +206,105 @@ async def test_without_a_session_pause_and_resume_return_at_once(
         await client.resume()
 
 
-async def test_a_list_too_long_for_an_old_controller_is_tried_without_read_backs(
+OUTPUTS = tuple(f"output_{kind}_register_{number}" for kind in ("int", "double") for number in range(24))
+BITS = tuple(f"input_bit_register_{number}" for number in range(64, 128))
+
+
+async def test_a_controller_that_stays_silent_to_a_long_list_is_read_in_pieces(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    """Silence is no statement: the list is tried twice. What every register holds is known before it can be sent."""
+    controller.script.name_limit = 2048
+    async with connected(outputs=OUTPUTS, inputs=REGISTERS + DOUBLES, handshake_timeout=0.1) as (_, seen):
+        await until(lambda: seen.packages)
+        assert [loss.reason for loss in seen.losses] == [LossReason.UNANSWERED] * 2
+        session = seen.sessions[0]
+        assert session.outputs.names[: 1 + len(OUTPUTS)] == ("timestamp", *OUTPUTS)
+        read_back = set(session.outputs.names) & set(REGISTERS + DOUBLES)
+        assert session.held.keys() == set(REGISTERS + DOUBLES) - read_back
+        assert session.unread == frozenset()
+
+
+async def test_a_complaint_instead_of_an_answer_is_a_statement(
     controller: Controller, connected: Connected, until: Until
 ) -> None:
     controller.script.name_limit = 2048
-    outputs = tuple(f"output_{kind}_register_{number}" for kind in ("int", "double") for number in range(24))
-    async with connected(outputs=outputs, inputs=REGISTERS + DOUBLES, handshake_timeout=0.1) as (_, seen):
+    controller.script.complains = True
+    settings = {"outputs": OUTPUTS, "inputs": REGISTERS + DOUBLES, "handshake_timeout": 0.1}
+    async with connected(**settings) as (client, seen):
         await until(lambda: seen.packages)
-        assert [loss.reason for loss in seen.losses] == [LossReason.UNANSWERED]
-        assert seen.sessions[0].outputs.names == ("timestamp", *outputs)
-        assert {one.word for one in seen.sessions[0].unavailable} == {"TOO_LONG"}
-        assert "registers" in seen.sessions[0].inputs
+        assert len(seen.losses) == 1
+        client.reconnect("once more")
+        await until(lambda: len(seen.sessions) == 2)
+        assert [loss.reason for loss in seen.losses] == [LossReason.UNANSWERED, LossReason.RECONNECT]
 
 
 async def test_more_inputs_than_an_old_controller_takes_at_once_are_claimed_by_parts(
     controller: Controller, connected: Connected, until: Until
 ) -> None:
     controller.script.name_limit = 2048
-    bits = tuple(f"input_bit_register_{number}" for number in range(64, 128))
-    inputs = (*REGISTERS, *DOUBLES, *bits)
+    inputs = (*REGISTERS, *DOUBLES, *BITS)
     async with connected(inputs=inputs, handshake_timeout=0.1, read_back=False) as (client, seen):
         await until(lambda: seen.packages)
         claimed = seen.sessions[0].inputs
         assert list(claimed) == ["registers", "registers 2"]
         assert claimed["registers"].recipe.names + claimed["registers 2"].recipe.names == inputs
-        assert client.send("registers 2", [True] * claimed["registers 2"].recipe.count)
-        await until(lambda: controller.peer.written.get(bits[63]) is True)
+        assert seen.sessions[0].held.keys() == set(inputs)
+        assert send(client, "registers 2", [True] * claimed["registers 2"].recipe.count)
+        await until(lambda: controller.peer.written.get(BITS[63]) is True)
+
+
+async def test_recipes_of_a_former_connection_are_refused(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    """Those of a former session object of the same connection are not."""
+    controller.script.in_use = {REGISTERS[1]}
+    async with connected(inputs=REGISTERS[:2], claim_retry=0.02) as (client, seen):
+        await until(lambda: seen.packages)
+        first = seen.sessions[0].inputs["registers"]
+        controller.script.in_use = set()
+        await until(lambda: seen.changes)
+        assert client.send(first, (5,))
+        await until(lambda: controller.peer.written.get(REGISTERS[0]) == 5)
+        client.reconnect("a test")
+        assert not client.send(first, (6,))
+        await until(lambda: len(seen.sessions) == 2)
+        assert not client.send(first, (6,))
+        assert not client.send(seen.changes[0].inputs["registers"], (6, 6))
+        assert client.send(seen.sessions[1].inputs["registers"], (7, 8))
+        await until(lambda: controller.peer.written.get(REGISTERS[1]) == 8)
+
+
+async def test_a_register_that_cannot_be_read_joins_the_others_once_it_is_sent(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.missing = {REGISTERS[1]}
+    controller.script.claimable = {REGISTERS[1]}
+    async with connected(inputs=REGISTERS[:3]) as (client, seen):
+        await until(lambda: seen.packages)
+        assert seen.sessions[0].unread == {REGISTERS[1]}
+        assert set(seen.sessions[0].inputs) == {"registers", REGISTERS[1]}
+        assert send(client, REGISTERS[1], (1,))
+        client.join(REGISTERS[1])
+        await until(lambda: seen.changes)
+        assert seen.changes[0].inputs["registers"].recipe.names == REGISTERS[:3]
+        assert client.send(seen.sessions[0].inputs["registers"], (1, 3))
+
+
+async def test_a_reconnect_is_reported_once_and_what_was_sent_arrives(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected(inputs=REGISTERS) as (client, seen):
+        client.reconnect("nothing to end yet")
+        await until(lambda: seen.packages)
+        send(client, "registers", range(24))
+        client.reconnect("the clock stays behind")
+        client.reconnect("again")
+        await until(lambda: len(seen.sessions) == 2)
+        assert [loss.reason for loss in seen.losses] == [LossReason.RECONNECT]
+        assert seen.losses[0].text.endswith("the clock stays behind")
+        assert seen.losses[0].started
+        assert controller.peers[0].written[REGISTERS[23]] == 23
 
 
 async def test_statistics_tell_the_measured_frequency(connected: Connected, until: Until) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import socket
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ import pytest
 
 from gatewayd.rtde import messages
 from gatewayd.rtde.client import ClientSettings, LossReason, RtdeClient
+from tests.rtde.conftest import send
 
 if TYPE_CHECKING:
     from tests.rtde.conftest import Connected, Controller
@@ -123,7 +125,7 @@ async def test_the_first_package_may_take_longer(
 ) -> None:
     """A controller whose safety set-up is not confirmed accepts the start and sends nothing."""
     controller.script.sends_data = False
-    async with connected(data_timeout=0.05, first_data_timeout=0.4) as (_, seen):
+    async with connected(data_timeout=0.05, first_data_timeout=1.0) as (_, seen):
         await until(lambda: seen.sessions)
         await asyncio.sleep(0.2)
         assert not seen.losses
@@ -184,7 +186,7 @@ async def test_a_controller_that_does_not_read_is_given_up_and_no_write_waits(
         await until(lambda: seen.packages)
         controller.script.stop_reading = True
         sent = 0
-        while client.send("registers", [0.0] * 24):
+        while send(client, "registers", [0.0] * 24):
             sent += 1
             assert sent < 200_000
         await until(lambda: seen.losses)
@@ -210,7 +212,7 @@ async def test_what_was_sent_before_the_end_arrives(
 ) -> None:
     async with connected(inputs=DOUBLES) as (client, seen):
         await until(lambda: seen.packages)
-        client.send("registers", [1.5] * 24)
+        send(client, "registers", [1.5] * 24)
     await until(lambda: controller.peer.written.get(DOUBLES[23]) == 1.5)
 
 
@@ -248,3 +250,68 @@ async def test_pausing_ends_with_the_connection(
         await client.pause()
         await until(lambda: seen.losses)
         assert seen.losses[0].reason is LossReason.UNANSWERED
+
+
+async def test_a_probe_tells_how_long_the_answer_took(connected: Connected, until: Until) -> None:
+    async with connected() as (client, seen):
+        assert not client.probe()
+        await until(lambda: seen.packages)
+        assert client.probe()
+        assert not client.probe()
+        await until(lambda: seen.delays)
+        assert 0 < seen.delays[0] < 1
+        assert client.probe()
+        await until(lambda: len(seen.delays) == 2)
+        assert not seen.losses
+
+
+async def test_a_probe_without_an_answer_is_no_loss(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected(handshake_timeout=0.05) as (client, seen):
+        await until(lambda: seen.packages)
+        controller.script.mute = {messages.GetControllerVersion}
+        assert client.probe()
+        await until(lambda: seen.delays)
+        assert seen.delays == [math.inf]
+        controller.script.mute.clear()
+        controller.peer.say(controller.script.version)
+        assert client.probe()
+        await until(lambda: len(seen.delays) == 2)
+        assert seen.delays[1] < 1
+        assert len(seen.sessions) == 1
+
+
+async def test_a_package_from_before_a_claim_is_no_reading_of_it(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    """In one segment with the answer to the claim, the package before it is delivered before the change is reported."""
+    controller.script.in_use = {"input_int_register_0"}
+    controller.script.sends_data = False
+    async with connected(inputs=("input_int_register_0",), claim_retry=0.02) as (_, seen):
+        await until(lambda: seen.sessions)
+        controller.script.package_before_inputs_reply = True
+        controller.script.in_use = set()
+        await until(lambda: seen.changes)
+        assert seen.calls[-1] == "inputs_changed"
+        assert "values" in seen.calls
+
+
+async def test_the_round_trip_of_the_set_up_is_measured(connected: Connected, until: Until) -> None:
+    async with connected() as (_, seen):
+        await until(lambda: seen.sessions)
+        assert 0 < seen.sessions[0].round_trip < 1
+
+
+async def test_a_reading_waits_for_its_package_as_long_as_for_first_data(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    """A controller whose safety set-up is not confirmed accepts starts and sends nothing."""
+    controller.script.sends_data = False
+    settings = {"inputs": ("input_int_register_0",), "read_back": False, "handshake_timeout": 0.05}
+    async with connected(first_data_timeout=0.3, **settings) as (_, seen):
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.SILENT
+        assert "safety set-up confirmed" in seen.losses[0].text
+        controller.script.sends_data = True
+        await until(lambda: seen.packages)

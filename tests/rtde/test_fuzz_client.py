@@ -10,6 +10,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from gatewayd.rtde.client import LossReason
+from tests.rtde.conftest import send
 
 if TYPE_CHECKING:
     from tests.rtde.conftest import Connected, Controller
@@ -52,7 +53,7 @@ async def test_no_answer_of_a_controller_harms_the_client(
         while len(seen.losses) < CONNECTIONS:
             registers = client.session.inputs.get("registers") if client.session is not None else None
             if registers is not None:
-                assert client.send("registers", [0] * registers.recipe.count)
+                assert send(client, "registers", [0] * registers.recipe.count)
             await asyncio.sleep(0.001)
         reasons = {loss.reason for loss in seen.losses}
         assert {LossReason.PROTOCOL, LossReason.HANDSHAKE, LossReason.UNANSWERED} <= reasons

@@ -1,17 +1,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.claims import HandshakeError
-from gatewayd.rtde.negotiation import TOO_LONG, Event, Negotiation, State, Step, Wishes
+from gatewayd.rtde.negotiation import Event, Negotiation, State, Step, Wishes
+from tests.rtde.pure_controller import PureController
 
 E_SERIES = m.ControllerVersion(5, 12, 0, 1101)
 CB3 = m.ControllerVersion(3, 15, 8, 1)
-DATA = m.DataPackage(1, b"")
+DATA = m.DataPackage(1, bytes(16))
 WISHES = Wishes(("output_int_register_0",), ("input_int_register_0",))
 TO_OUTPUTS = (m.ProtocolVersionReply(True), E_SERIES)
 TO_INPUTS = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE", "INT32", "INT32")))
@@ -110,14 +114,17 @@ def test_inputs_in_use_are_told_with_their_likely_holder() -> None:
     )
     replies = (
         *TO_OUTPUTS,
-        m.OutputsSetup(1, ("DOUBLE",)),
         m.InputsSetup(0, ("INT32", "IN_USE")),
         m.InputsSetup(1, ("INT32",)),
         m.InputsSetup(0, ("NOT_FOUND",)),
+        m.OutputsSetup(0, ("NOT_FOUND",)),
+        m.OutputsSetup(1, ("DOUBLE",)),
+        m.InputsSetup(2, ("INT32",)),
         m.StartReply(True),
     )
     negotiation, _ = talk(wishes, replies)
-    in_use, missing = negotiation.session().unavailable
+    unreadable, in_use, missing = negotiation.session().unavailable
+    assert (unreadable.field, unreadable.output) == ("input_int_register_0", True)
     assert (in_use.field, in_use.output, in_use.word) == ("input_int_register_1", False, "IN_USE")
     assert "PROFINET" in in_use.hint
     assert (missing.field, missing.word) == ("tool_digital_output", "NOT_FOUND")
@@ -216,35 +223,11 @@ def test_a_session_can_begin_paused() -> None:
 
 
 def test_inputs_can_be_claimed_while_paused() -> None:
-    wishes = Wishes(inputs=("input_int_register_0",), read_back=False, running=False)
-    replies = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",)), m.InputsSetup(0, ("IN_USE",)))
+    wishes = Wishes(inputs=("input_int_register_0",), running=False)
+    replies = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE", "INT32")), m.InputsSetup(0, ("IN_USE",)))
     negotiation, _ = talk(wishes, replies)
     assert negotiation.retry_claims()
     assert negotiation.handle(m.InputsSetup(1, ("INT32",))).event is Event.INPUTS_CHANGED
-
-
-def test_subscription_has_the_timestamp_first_and_everything_once() -> None:
-    wishes = Wishes(
-        ("robot_mode", "timestamp", "input_int_register_1"),
-        ("input_int_register_1", "input_int_register_2", "speed_slider_mask"),
-        watchdog="input_int_register_3",
-    )
-    assert wishes.subscription() == (
-        "timestamp",
-        "robot_mode",
-        "input_int_register_1",
-        "input_int_register_2",
-        "input_int_register_3",
-    )
-
-
-def test_a_shortened_subscription_leaves_out_read_backs_and_says_so() -> None:
-    wishes = Wishes(inputs=("input_int_register_0",), short_outputs=True)
-    replies = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",)), m.InputsSetup(1, ("INT32",)), m.StartReply(True))
-    negotiation, steps = talk(wishes, replies)
-    assert steps[2].send == m.SetupOutputs(("timestamp",), 500.0)
-    (left_out,) = negotiation.session().unavailable
-    assert (left_out.field, left_out.output, left_out.word) == ("input_int_register_0", True, TOO_LONG)
 
 
 def test_what_is_awaited_is_put_in_words() -> None:
@@ -253,3 +236,43 @@ def test_what_is_awaited_is_put_in_words() -> None:
     negotiation, _ = talk(WISHES, (*TO_INPUTS, m.InputsSetup(0, ("IN_USE",)), m.StartReply(True)))
     negotiation.retry_claims()
     assert negotiation.awaited == "the answer to an input recipe"
+
+
+WORDS = st.sampled_from(("DOUBLE", "INT32", "NOT_FOUND", "IN_USE", "STRING", ""))
+ANYTHING = st.one_of(
+    st.builds(m.ProtocolVersionReply, st.booleans()),
+    st.sampled_from((E_SERIES, CB3)),
+    st.builds(m.OutputsSetup, st.none() | st.integers(0, 2), st.lists(WORDS, max_size=5).map(tuple)),
+    st.builds(m.InputsSetup, st.integers(0, 255), st.lists(WORDS, max_size=4).map(tuple)),
+    st.builds(m.StartReply, st.booleans()),
+    st.builds(m.PauseReply, st.booleans()),
+    st.builds(m.DataPackage, st.none() | st.integers(0, 2), st.binary(max_size=20)),
+)
+
+
+@settings(max_examples=500, deadline=None)
+@given(data=st.data())
+def test_whatever_a_controller_answers_ends_the_talk_in_order_or_goes_on(data: st.DataObject) -> None:
+    """Right answers up to some point, then anything: nothing but a HandshakeError is raised, nothing is asked twice."""
+    draw = data.draw
+    inputs = tuple(
+        f"input_{kind}_register_{n}" for kind in ("int", "double") for n in range(draw(st.integers(0, 48)))
+    )
+    controller = PureController(
+        limit=draw(st.sampled_from((100, 2048, 65535))), in_use=set(inputs[:2]), unreadable=set(inputs[1:3])
+    )
+    negotiation = Negotiation(Wishes(("output_int_register_0",), inputs, read_back=draw(st.booleans())))
+    request: m.ExecutableMessage | None = negotiation.begin()
+    with suppress(HandshakeError):
+        for _ in range(draw(st.integers(0, 40))):
+            if request is not None:
+                controller.ask(request)
+            if draw(st.integers(0, 9)) == 0 or not controller.out:
+                controller.out.appendleft(draw(ANYTHING))
+            request = negotiation.handle(controller.out.popleft()).send
+            if request is None and draw(st.booleans()):
+                request = draw(
+                    st.sampled_from((negotiation.retry_claims, negotiation.pause, negotiation.resume))
+                )()
+            if negotiation.state is State.RUNNING:
+                assert negotiation.session().inputs.keys() == negotiation.claims.recipes.keys()

@@ -62,11 +62,16 @@ def test_only_one_trailing_comma_is_ignored() -> None:
     assert decode(b"") == messages.SetupInputs(())
 
 
-def test_other_characters_than_ascii_do_no_harm() -> None:
+def test_nothing_that_a_controller_says_is_lost() -> None:
+    """Bytes that are no text are shown as such; two answers that differ never read the same for it."""
     decode = payloads.FROM_CONTROLLER[PackageType.TEXT_MESSAGE]
-    assert decode(b"\x03\xff\xfe!\x01\xe4\x02") == messages.TextMessage("\ufffd\ufffd!", "\ufffd", 2)
+    assert decode(b"\x03\xff\xfe!\x01\xe4\x02") == messages.TextMessage("\\xff\\xfe!", "\\xe4", 2)
+    assert decode(b"\x04\xe2\x82\xac\x1b\x00\x02") == messages.TextMessage("\u20ac\x1b", "", 2)
     names = payloads.FROM_EXECUTABLE[PackageType.SETUP_INPUTS](b"caf\xc3\xa9")
-    assert names == messages.SetupInputs(("caf\ufffd\ufffd",))
+    assert names == messages.SetupInputs(("caf\u00e9",))
+    assert payloads.encode_executable(names, 2)[1] == b"caf\xc3\xa9"
+    types = payloads.FROM_CONTROLLER[PackageType.SETUP_INPUTS](b"\x00IN\xffT,\x1b[2J")
+    assert types == messages.InputsSetup(0, ("IN\\xffT", "\x1b[2J"))
 
 
 def test_texts_are_cut_to_their_length_byte() -> None:

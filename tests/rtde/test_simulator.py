@@ -13,6 +13,7 @@ from gatewayd.rtde.client import LossReason
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import Faults
 from gatewayd.simulator.server import SimulatedController
+from tests.rtde.conftest import send
 
 if TYPE_CHECKING:
     from tests.rtde.conftest import Connected
@@ -48,7 +49,7 @@ async def test_the_full_image_is_written_and_read_back(
             assert session.unavailable == ()
             assert session.series is series
             values = [1 << 31, 7, *range(-12, 12), *(number / 4 for number in range(24))]
-            assert client.send("registers", values)
+            assert send(client, "registers", values)
             slots = [session.outputs.slots[name] for name in image("input")]
             read_back = slice(slots[0].start, slots[-1].stop)
             await until(lambda: seen.packages[-1][read_back] == tuple(values))
@@ -96,15 +97,6 @@ async def test_the_boot_restart_is_waited_out(connected: Connected, until: Until
     ):
         await until(lambda: len(seen.sessions) == 2 and seen.packages)
         assert seen.losses[0].reason in {LossReason.CLOSED, LossReason.RESTARTED}
-
-
-async def test_an_old_controller_gets_a_short_list(connected: Connected, until: Until) -> None:
-    async with SimulatedController(Controller(faults=Faults(strict_lists=True))) as simulated:
-        settings = {"outputs": image("output"), "inputs": image("input"), "handshake_timeout": 0.2}
-        async with connected(port=simulated.port, **settings) as (_, seen):
-            await until(lambda: seen.packages)
-            assert {one.word for one in seen.sessions[0].unavailable} == {"TOO_LONG"}
-            assert len(seen.sessions[0].inputs["registers"].recipe.names) == 50
 
 
 async def test_what_one_client_leaves_another_gets(connected: Connected, until: Until) -> None:

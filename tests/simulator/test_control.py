@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.simulator.control import Control
+from gatewayd.simulator.faults import DropAt, Step
 from gatewayd.simulator.server import SimulatedController
 
 
@@ -25,6 +26,13 @@ def control(simulator: SimulatedController) -> Control:
         ("  drop-clients  ", "ok 0"),
         ("text hello there", "ok"),
         ("freeze on", "ok"),
+        ("creep on", "ok"),
+        ("delay 0.5", "ok"),
+        ("delay -1", "error '-1' is not a number of seconds"),
+        ("pause nan", "error 'nan' is not a number of seconds"),
+        ("drop-at outputs:2", "ok"),
+        ("drop-at off", "ok"),
+        ("overwrite timestamp 1", "error timestamp follows the controller's cycles; use freeze to stop it"),
         ("silence off", "ok"),
         ("freeze maybe", "error on or off, not 'maybe'"),
         ("set timestamp 1", "error timestamp follows the controller's cycles; use freeze to stop it"),
@@ -68,9 +76,34 @@ async def test_switches(control: Control, simulator: SimulatedController) -> Non
     assert (simulator.faults.freeze, simulator.faults.silence) == (True, False)
 
 
+async def test_faults_of_lines_and_connections(control: Control, simulator: SimulatedController) -> None:
+    for line in ("delay 0.25", "drop-at inputs:3", "creep on"):
+        assert await control.execute(line) == "ok"
+    faults = simulator.faults
+    assert (faults.delay, faults.drop_at, faults.creep) == (0.25, DropAt(Step.INPUTS, 3), True)
+    answer = await control.execute("drop-at nowhere")
+    assert answer.startswith(
+        "error 'nowhere' is not STEP or STEP:NUMBER with a step out of version, controller"
+    )
+
+
+async def test_what_is_overwritten_stays_until_it_is_switched_off(
+    control: Control, simulator: SimulatedController
+) -> None:
+    controller = simulator.controller
+    assert await control.execute("overwrite input_int_register_0 99") == "ok"
+    controller.store.write("input_int_register_0", (5,))
+    controller.advance()
+    assert controller.get("input_int_register_0") == (99,)
+    assert await control.execute("overwrite input_int_register_0 off") == "ok"
+    controller.store.write("input_int_register_0", (5,))
+    controller.advance()
+    assert controller.get("input_int_register_0") == (5,)
+
+
 async def test_an_unknown_command_names_the_known_ones(control: Control) -> None:
     answer = await control.execute("jump")
-    assert answer.startswith("error unknown command 'jump'; there are: get, set, hold, free")
+    assert answer.startswith("error unknown command 'jump'; there are: get, set, overwrite, hold")
 
 
 async def test_quit(control: Control) -> None:

@@ -62,6 +62,20 @@ def test_fields_come_with_their_version() -> None:
     assert new.output_type("nothing") is None
 
 
+def test_creep_moves_the_timestamp_by_nothing_to_speak_of() -> None:
+    controller = Controller(program=parse("output_int_register_0 = count every 10ms"))
+    controller.faults.creep = True
+    stamps = []
+    for _ in range(50):
+        controller.advance()
+        stamps.append(float(controller.get("timestamp")[0]))
+    assert all(0 < after - before < 2e-9 for before, after in pairwise(stamps))
+    assert controller.get("output_int_register_0") == (0,)
+    controller.faults.creep = False
+    controller.advance()
+    assert float(controller.get("timestamp")[0]) - stamps[-1] == pytest.approx(0.002, abs=1e-6)
+
+
 def test_freeze_stops_the_timestamp_and_the_program_but_not_the_cycles() -> None:
     controller = Controller(program=parse("output_int_register_0 = count every 2ms"))
     controller.advance()

@@ -1,9 +1,13 @@
-"""Mangled streams: reproducible, and never out of order."""
+"""Mangled streams: reproducible, and never out of order. Connections closed at a named step."""
 
 from __future__ import annotations
 
+import math
+
+import pytest
+
 from gatewayd.rtde.catalogue import INPUTS
-from gatewayd.simulator.faults import ADAPTER_FIELDS, Faults, Mangler
+from gatewayd.simulator.faults import ADAPTER_FIELDS, DropAt, Faults, Mangler, Step
 
 PACKAGES = [bytes([n]) * 8 for n in range(200)]
 
@@ -49,3 +53,29 @@ def test_a_seed_repeats_and_connections_differ() -> None:
 def test_an_adapter_claims_inputs_that_exist() -> None:
     assert set(ADAPTER_FIELDS) <= set(INPUTS)
     assert len(ADAPTER_FIELDS) == 12 + 2 + 24 + 24
+
+
+@pytest.mark.parametrize(
+    "text, parsed",
+    [
+        ("outputs", DropAt(Step.OUTPUTS)),
+        ("inputs:2", DropAt(Step.INPUTS, 2)),
+        ("data:10", DropAt(Step.DATA, 10)),
+    ],
+)
+def test_a_step_to_drop_at(text: str, parsed: DropAt) -> None:
+    assert DropAt.parse(text) == parsed
+
+
+@pytest.mark.parametrize("text", ["", "output", "outputs:0", "outputs:x", "outputs:-1"])
+def test_no_step_to_drop_at(text: str) -> None:
+    with pytest.raises(ValueError, match="is not STEP or STEP:NUMBER"):
+        DropAt.parse(text)
+
+
+@pytest.mark.parametrize("times", [0, 1, 2, math.inf])
+def test_a_drop_comes_as_often_as_it_should(times: float) -> None:
+    faults = Faults(drop_at=DropAt(Step.START, 2), drop_times=times)
+    assert not faults.drops(Step.START, 1)
+    assert not faults.drops(Step.PAUSE, 2)
+    assert [faults.drops(Step.START, 2) for _ in range(3)] == [times >= n for n in (1, 2, 3)]

@@ -28,7 +28,7 @@ async def test_it_serves_clients_and_takes_commands(
         await one.ended()
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_ends_it_cleanly(process: Callable[..., Process], number: signal.Signals) -> None:
     simulator = process()
     simulator.popen.send_signal(number)
@@ -63,3 +63,14 @@ def test_a_line_without_end_is_refused() -> None:
     assert ended.returncode == 0
     assert ended.stdout.splitlines()[1].startswith("error ")
     assert ended.stdout.splitlines()[-1] == "ok 0"
+
+
+def test_faults_of_lists_and_connections_can_be_declared(process: Callable[..., Process]) -> None:
+    """`--strict-lists` without a way means what it meant before there were several."""
+    simulator = process(
+        "--strict-lists",
+        *("--drop-at", "outputs:2", "--drop-times", "0"),
+        *("--unreadable", "input_int_register_0", "--delay", "0.01", "--creep"),
+    )
+    assert simulator.do("clients") == "ok 0"
+    assert simulator.stop() == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import socket
 import struct
 from itertools import pairwise
@@ -16,10 +17,11 @@ from gatewayd.rtde.messages import (
     ProtocolVersionReply,
     RequestProtocolVersion,
     SetupInputs,
+    Start,
     TextMessage,
 )
 from gatewayd.simulator.controller import Controller
-from gatewayd.simulator.faults import Faults
+from gatewayd.simulator.faults import DropAt, Faults, Step
 from gatewayd.simulator.program import DEMO, parse
 from gatewayd.simulator.server import SimulatedController
 
@@ -225,3 +227,50 @@ async def test_stop_and_start_keep_port_and_values(
 async def test_a_port_in_use_is_an_error(simulator: SimulatedController) -> None:
     with pytest.raises(OSError, match="address already in use"):
         await SimulatedController(port=simulator.port).start()
+
+
+async def test_a_pause_stops_everything_and_leaves_the_clock_behind(
+    simulator: SimulatedController, client: type[Client]
+) -> None:
+    """Nothing is sent, nobody is answered; the timestamp goes on by one step, as if no time had passed."""
+    loop = asyncio.get_running_loop()
+    async with client(simulator.port) as one, client(simulator.port) as other:
+        await one.stream("timestamp")
+        await other.negotiate()
+        await one.package()
+        simulator.pause(0.4)
+        start = loop.time()
+        assert simulator.paused
+        other.send(RequestProtocolVersion(2))
+        async with client(simulator.port) as late:
+            await late.negotiate()
+            assert loop.time() - start > 0.35
+        await other.receive(ProtocolVersionReply)
+        stamps = [float((await one.package())[0]) for _ in range(100)]
+        assert max(after - before for before, after in pairwise(stamps)) < 0.2
+        assert stamps[-1] - stamps[0] < loop.time() - start - 0.3
+
+
+async def test_a_dropped_connection_gives_its_claims_back(client: type[Client]) -> None:
+    async with served(Faults(drop_at=DropAt(Step.START), drop_times=math.inf)) as simulator:
+        for _ in range(2):
+            async with client(simulator.port) as one:
+                await one.negotiate()
+                assert (await one.inputs(INT(0))).recipe == 1
+                await one.outputs("timestamp")
+                one.send(Start())
+                await one.ended()
+
+
+async def test_what_is_overwritten_shows_in_the_read_back(
+    simulator: SimulatedController, client: type[Client]
+) -> None:
+    async with client(simulator.port) as one:
+        await one.stream(INT(0))
+        await one.inputs(INT(0))
+        simulator.overwrite(INT(0), 99)
+        one.send(DataPackage(1, struct.pack(">i", 5)))
+        await one.until(lambda values: values == (99,))
+        simulator.overwrite(INT(0))
+        one.send(DataPackage(1, struct.pack(">i", 6)))
+        await one.until(lambda values: values == (6,))

@@ -30,7 +30,7 @@ from gatewayd.rtde.messages import (
     TextMessage,
 )
 from gatewayd.simulator.controller import Controller
-from gatewayd.simulator.faults import Faults
+from gatewayd.simulator.faults import DropAt, DroppedError, Faults, LongLists, Step
 from gatewayd.simulator.session import Session
 
 INT = "input_int_register_{}".format
@@ -195,9 +195,56 @@ def test_masks_are_honoured(peer: Peer) -> None:
     assert peer.controller.get("actual_digital_output_bits") == (4,)
 
 
-def test_strict_lists_are_ignored_beyond_2048_bytes() -> None:
-    peer = Peer(Controller(faults=Faults(strict_lists=True)))
-    names = tuple(name for name in INPUTS if "int_register" in name or "double_register" in name)
+MANY = tuple(name for name in INPUTS if "int_register" in name or "double_register" in name)
+MANY_TYPES = ("INT32",) * 48 + ("DOUBLE",) * 48
+
+
+def test_a_list_beyond_2048_bytes_is_answered_with_id_0() -> None:
+    peer = Peer(Controller(faults=Faults(long_lists=LongLists.REFUSE)))
+    assert peer.ask(SetupInputs(MANY)) == [InputsSetup(0, MANY_TYPES)]
+    assert peer.controller.claims.held(peer.session) == ()
+    assert peer.ask(SetupOutputs(MANY, 0.0)) == [OutputsSetup(0, MANY_TYPES)]
+    assert peer.ask(Start()) == [StartReply(accepted=False)]
+    assert peer.ask(SetupInputs(MANY[:80]))[0] == InputsSetup(1, MANY_TYPES[:80])
+
+
+def test_a_list_beyond_2048_bytes_is_not_answered() -> None:
+    peer = Peer(Controller(faults=Faults(long_lists=LongLists.IGNORE)))
+    assert peer.ask(SetupInputs(MANY)) == []
+    assert peer.ask(SetupOutputs(MANY, 0.0)) == []
+
+
+def test_a_list_beyond_2048_bytes_ends_the_connection() -> None:
+    peer = Peer(Controller(faults=Faults(long_lists=LongLists.CLOSE)))
+    with pytest.raises(DroppedError, match="longer than 2048"):
+        peer.ask(SetupOutputs(MANY, 0.0))
+
+
+def test_a_connection_is_dropped_at_the_step_that_was_named() -> None:
+    peer = Peer(Controller(faults=Faults(drop_at=DropAt(Step.OUTPUTS, 2))))
+    assert peer.ask(SetupOutputs(("timestamp",), 0.0), Start())
+    with pytest.raises(DroppedError, match="fault at outputs:2"):
+        peer.ask(SetupOutputs(("timestamp",), 0.0))
+    assert peer.ask(SetupOutputs(("timestamp",), 0.0))
+
+
+def test_a_connection_is_dropped_in_place_of_a_package() -> None:
+    peer = Peer(Controller(faults=Faults(drop_at=DropAt(Step.DATA, 2))))
+    peer.ask(SetupOutputs(("timestamp",), 0.0), Start())
+    assert len(peer.cycle()) == 1
+    with pytest.raises(DroppedError, match="fault at data:2"):
+        peer.cycle()
+
+
+def test_what_is_unreadable_can_be_claimed() -> None:
+    peer = Peer(Controller(faults=Faults(unreadable=frozenset(MANY[:1]))))
+    assert peer.ask(SetupInputs(MANY[:1])) == [InputsSetup(1, ("INT32",))]
+    assert peer.ask(SetupOutputs(MANY[:2], 0.0)) == [OutputsSetup(0, ("NOT_FOUND", "INT32"))]
+
+
+def test_a_list_beyond_2048_bytes_is_complained_of() -> None:
+    peer = Peer(Controller(faults=Faults(long_lists=LongLists.COMPLAIN)))
+    names = MANY
     assert text(peer.ask(SetupInputs(names))) == "list of 2235 bytes is longer than 2048"
     assert peer.ask(SetupInputs(names[:80]))[0] == InputsSetup(1, ("INT32",) * 48 + ("DOUBLE",) * 32)
 

@@ -4,13 +4,31 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from tests.e2e.plant import HEAD
 from tests.e2e.plc import HMI, LINE, PLC
 from tests.e2e.processes import HOST
-from tests.soak.client import SHARED
+from tests.soak.client import SHARED, SHARED_FIELD
 
-__all__ = ["ECHOES", "FIRST", "HELD", "MASTER", "NAME", "NODE", "SECOND", "VARIANTS", "command", "mapping"]
+__all__ = [
+    "ECHOES",
+    "FIELDS",
+    "FIELDS_OF",
+    "FIRST",
+    "HELD",
+    "MASTER",
+    "MASTER_FIELDS",
+    "MOMENT",
+    "NAME",
+    "NODE",
+    "SECOND",
+    "STALE_AFTER",
+    "VARIANTS",
+    "command",
+    "journal",
+    "mapping",
+]
 
 NAME = "cell"
 FIRST, SECOND, MASTER = "first", "second", "master"
@@ -19,6 +37,18 @@ ECHOES = 4
 """Variables that tell what a writer wrote, as it came back from the robot."""
 HELD = "input_int_register_3"
 """Field that a robot program may hold for itself."""
+FIRST_FIELD, SECOND_FIELD = "input_int_register_0", "input_int_register_1"
+MASTER_FIELDS = "input_int_register_4", "input_int_register_5"
+FIELDS_OF = {
+    FIRST: (FIRST_FIELD, SHARED_FIELD),
+    SECOND: (SECOND_FIELD, SHARED_FIELD),
+    MASTER: MASTER_FIELDS,
+}
+"""Whose fields are whose."""
+FIELDS = tuple(dict.fromkeys([*(field for fields in FIELDS_OF.values() for field in fields), HELD]))
+MOMENT = 20
+"""Register of the controller's clock; -1 while it is not good."""
+STALE_AFTER = 0.3
 
 NODE = 16
 _CELL = f"""\
@@ -33,16 +63,17 @@ writers:
   {SECOND}: {{{{modbus: {HMI}, timeout: 1s}}}}
   {MASTER}: {{{{canopen: any, node: 1, heartbeat: 500ms}}}}
 variables:
-  first_in:    {{{{robot: input_int_register_0, modbus: 0, owner: {FIRST}}}}}
-  second_in:   {{{{robot: input_int_register_1, modbus: 2, owner: {SECOND}, lease: 500ms}}}}
-  shared:      {{{{robot: input_int_register_2, modbus: {SHARED}, owner: [{FIRST}, {SECOND}], lease: 300ms}}}}
+  first_in:    {{{{robot: {FIRST_FIELD}, modbus: 0, owner: {FIRST}}}}}
+  second_in:   {{{{robot: {SECOND_FIELD}, modbus: 2, owner: {SECOND}, lease: 500ms}}}}
+  shared:      {{{{robot: {SHARED_FIELD}, modbus: {SHARED}, owner: [{FIRST}, {SECOND}], lease: 300ms}}}}
   held:        {{{{robot: {HELD}, modbus: 12}}}}
-  master_in:   {{{{robot: input_int_register_4, canopen: auto, owner: {MASTER}}}}}
-  heard_in:    {{{{robot: input_int_register_5, canopen: auto, owner: {MASTER}}}}}
+  master_in:   {{{{robot: {MASTER_FIELDS[0]}, canopen: auto, owner: {MASTER}}}}}
+  heard_in:    {{{{robot: {MASTER_FIELDS[1]}, canopen: auto, owner: {MASTER}}}}}
   first_echo:  {{{{robot: output_int_register_0, modbus: 100}}}}
   second_echo: {{{{robot: output_int_register_1, modbus: 102}}}}
   master_echo: {{{{robot: output_int_register_4, canopen: auto}}}}
   heard_echo:  {{{{robot: output_int_register_5, canopen: auto}}}}
+  moment:      {{{{robot: timestamp, modbus: {{{{holding: {MOMENT}, type: float64}}}}, on_stale: -1}}}}
   doubles:     {{{{robot: 'output_double_register_0..23', modbus: 200}}}}
 """
 VARIANTS = {
@@ -60,7 +91,7 @@ def mapping(variant: str, robot: int, modbus: int, can: int) -> str:
         host=HOST,
         robot=robot,
         frequency="0",
-        stale_after="300ms",
+        stale_after=f"{STALE_AFTER * 1000:g}ms",
         robot_options="",
         modbus=modbus,
         unit=1,
@@ -69,13 +100,19 @@ def mapping(variant: str, robot: int, modbus: int, can: int) -> str:
     return head + _CELL.format(can=can) + VARIANTS[variant]
 
 
-def command(name: str, modbus: int, can: int, status: int) -> Sequence[str]:
+def journal(directory: Path, name: str) -> Path:
+    """Where the client of this name notes what it writes."""
+    return directory / f"{name}.journal"
+
+
+def command(name: str, directory: Path, modbus: int, can: int, status: int) -> Sequence[str]:
     """How the client of this name is started: one of the writers, `poller` or `browser`."""
+    noted = journal(directory, name)
     module, *arguments = {
-        FIRST: ("client", HOST, PLC, modbus, 0, 100, 0.05),
-        SECOND: ("client", HOST, HMI, modbus, 2, 102, 0.08),
-        MASTER: ("master", f"socket://{HOST}:{can}", NODE, 0.05),
-        "poller": ("client", HOST, LINE, modbus, -1, 0, 1.0),
+        FIRST: ("client", HOST, PLC, modbus, 0, 100, 0.05, FIRST_FIELD, noted),
+        SECOND: ("client", HOST, HMI, modbus, 2, 102, 0.08, SECOND_FIELD, noted),
+        MASTER: ("master", f"socket://{HOST}:{can}", NODE, 0.05, *MASTER_FIELDS, noted),
+        "poller": ("client", HOST, LINE, modbus, -1, 0, 1.0, "", noted),
         "browser": ("browser", HOST, status, NAME, 0.5),
     }[name]
     return [sys.executable, "-m", f"tests.soak.{module}", *map(str, arguments)]

@@ -1,9 +1,9 @@
 """A PLC of the soak run, as a process: writes and reads without end, and comes back by itself whatever happens.
 
-    python -m tests.soak.client HOST SOURCE PORT REGISTER ECHO PAUSE
+    python -m tests.soak.client HOST SOURCE PORT REGISTER ECHO PAUSE FIELD JOURNAL
 
-Each PAUSE seconds it writes a counter to REGISTER and the shared register, and reads ECHO. With REGISTER -1 it only
-reads the status block: a slow poller.
+Each PAUSE seconds it writes a counter to REGISTER, which is FIELD of the robot, and the shared register, and reads
+ECHO. With REGISTER -1 it only reads the status block: a slow poller. What it wrote stands in the file JOURNAL.
 """
 
 from __future__ import annotations
@@ -13,27 +13,30 @@ import time
 from contextlib import suppress
 
 from tests.e2e.plc import Plc
+from tests.soak.journal import Journal
 
-__all__ = ["SHARED"]
+__all__ = ["SHARED", "SHARED_FIELD"]
 
 SHARED = 8
 """Register that both PLCs write: whose lock is free takes it, the other is refused."""
+SHARED_FIELD = "input_int_register_2"
 _RETRY = 0.1
 _GREATEST = 30_000
 _STATUS = 60000
 
 
-def _cycle(plc: Plc, register: int, echo: int, number: int) -> None:
+def _cycle(plc: Plc, places: dict[int, str], echo: int, number: int, journal: Journal) -> None:
     plc.read(_STATUS, 64)
-    if register >= 0:
-        plc.write_integers(register, number)
-        plc.write_integers(SHARED, number)
+    for register, field in places.items():
+        journal.note(field, number)
+        journal.note(field, number, plc.write_integers(register, number))
         plc.reading_code(echo, 2)
 
 
 def _main(host: str, source: str, *figures: str) -> None:
     port, register, echo = map(int, figures[:3])
-    pause = float(figures[3])
+    pause, field, journal = float(figures[3]), figures[4], Journal(figures[5])
+    places = {register: field, SHARED: SHARED_FIELD} if register >= 0 else {}
     number = 0
     while True:
         # AssertionError: an exception code that reads should not give; the run sees it by the echo that stands still.
@@ -42,7 +45,7 @@ def _main(host: str, source: str, *figures: str) -> None:
             try:
                 while True:
                     number = number % _GREATEST + 1
-                    _cycle(plc, register, echo, number)
+                    _cycle(plc, places, echo, number, journal)
                     time.sleep(pause)
             finally:
                 plc.close()

@@ -1,9 +1,10 @@
 """The CANopen master of the soak run, as a process: starts the node, writes and reads without end, and comes back.
 
-    python -m tests.soak.master CHANNEL NODE PAUSE
+    python -m tests.soak.master CHANNEL NODE PAUSE FIELD FIELD JOURNAL
 
 Each PAUSE seconds it tells its heartbeat. While the node's own heartbeat says OPERATIONAL it sends an RPDO as well: a
 counter, and what the node's TPDO told of that counter last. So the second number moves only if both ways are open.
+What it sent, by the FIELD of the robot, stands in the file JOURNAL.
 """
 
 from __future__ import annotations
@@ -11,9 +12,12 @@ from __future__ import annotations
 import struct
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 
 import can
+
+from tests.soak.journal import Journal
 
 __all__ = ["HEARTBEAT", "NMT", "OPERATIONAL", "RPDO", "TPDO"]
 
@@ -57,15 +61,17 @@ def _send(bus: can.BusABC, identifier: int, data: bytes) -> None:
     bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
 
-def _cycle(bus: can.BusABC, node: _Node, counter: int) -> None:
+def _cycle(bus: can.BusABC, node: _Node, counter: int, fields: Sequence[str], journal: Journal) -> None:
     _send(bus, HEARTBEAT + _MASTER, bytes([OPERATIONAL]))
     if node.state == OPERATIONAL:
+        for field, value in zip(fields, (counter, node.told), strict=True):
+            journal.note(field, value)
         _send(bus, RPDO + node.number, _PAIR.pack(counter, node.told))
     elif node.state is not None:
         _send(bus, NMT, bytes([_START, node.number]))
 
 
-def _serve(bus: can.BusABC, number: int, pause: float) -> None:
+def _serve(bus: can.BusABC, number: int, pause: float, fields: Sequence[str], journal: Journal) -> None:
     node = _Node(number)
     counter, due = 0, time.monotonic()
     while True:
@@ -76,17 +82,18 @@ def _serve(bus: can.BusABC, number: int, pause: float) -> None:
         if time.monotonic() >= due:
             due = time.monotonic() + pause
             counter = counter % _GREATEST + 1
-            _cycle(bus, node, counter)
+            _cycle(bus, node, counter, fields, journal)
 
 
-def _main(channel: str, number: str, pause: str) -> None:
+def _main(channel: str, number: str, pause: str, *others: str) -> None:
+    fields, journal = others[:2], Journal(others[2])
     while True:
         # ValueError, IndexError: nonsense on the line, as a broken adapter says it.
         with (
             suppress(OSError, ValueError, IndexError, can.CanError),
             can.Bus(channel, interface="slcan", bitrate=1_000_000, sleep_after_open=0) as bus,
         ):
-            _serve(bus, int(number), float(pause))
+            _serve(bus, int(number), float(pause), fields, journal)
         time.sleep(_RETRY)
 
 

@@ -10,14 +10,17 @@ from pathlib import Path
 
 from gatewayd.control.client import Client
 from tests.e2e.processes import HOST, Daemon, Process, Simulator, free_port, wait_for
+from tests.e2e.witness import Witness
 from tests.soak.browser import COMPLAINT
-from tests.soak.cell import FIRST, MASTER, SECOND, command, mapping
+from tests.soak.cell import FIELDS, FIELDS_OF, command, journal, mapping
+from tests.soak.journal import entries
 from tests.soak.look import Look
+from tests.soak.truth import Record, misheld, unheard
 
 __all__ = ["PATIENCE", "WRITERS", "Rig"]
 
 PATIENCE = 15.0
-WRITERS = (FIRST, SECOND, MASTER)
+WRITERS = tuple(FIELDS_OF)
 _CLIENTS = (*WRITERS, "poller", "browser")
 
 
@@ -34,9 +37,12 @@ class Rig:
         self.audit = directory / "audit.jsonl"
         self.control = Client(directory / "control.sock", patience=2.0)
         self.look = Look(self.control, self.status)
+        self.record = Record()
+        self.witness = Witness(HOST, self._robot, FIELDS)
         try:
             self.write_mapping("plain")
             self.simulator = self.start_simulator()
+            self.witness.start()
             self.bus = self.start_bus()
             self.daemon = self._start_daemon()
             for name in _CLIENTS:
@@ -71,7 +77,9 @@ class Rig:
         self._end(self.bus)
 
     def start_client(self, name: str) -> None:
-        self.clients[name] = Process(command(name, self.modbus, self.can, self.status), self._log(name))
+        self.clients[name] = Process(
+            command(name, self.directory, self.modbus, self.can, self.status), self._log(name)
+        )
         self._everything.append(self.clients[name])
 
     def end_client(self, name: str) -> None:
@@ -91,7 +99,24 @@ class Rig:
         ended = [f"{name} has ended" for name, client in self.clients.items() if not client.running]
         return self.clients["browser"].lines(COMPLAINT) + ended
 
+    def lies(self) -> list[str]:
+        """What the robot held and should not have, or should have held and did not; the witness stops."""
+        self.witness.stop()
+        found: list[str] = []
+        noted = [entry for name in WRITERS for entry in entries(journal(self.directory, name))]
+        for field in FIELDS:
+            changes = self.witness.changes[field]
+            of_field = sorted(entry for entry in noted if entry.field == field)
+            found += misheld(field, changes, of_field, self.record)
+        for name in WRITERS:
+            for field in FIELDS_OF[name]:
+                mine = [one for one in entries(journal(self.directory, name)) if one.field == field]
+                found += unheard(field, self.witness.changes[field], mine, self.witness.watching)
+        return found
+
     def close(self) -> None:
+        if self.witness.is_alive():
+            self.witness.stop()
         for process in self._everything:
             with suppress(ProcessLookupError):
                 process.signal(signal.SIGCONT)

@@ -10,7 +10,7 @@ from random import Random
 from gatewayd.control.client import ControlError, NoDaemon
 from tests.e2e.processes import wait_for
 from tests.soak.cell import ECHOES
-from tests.soak.faults import FAULTS, bound
+from tests.soak.faults import FAULTS, ROUND, bound
 from tests.soak.look import descriptors, threads, torn
 from tests.soak.rig import PATIENCE, WRITERS, Rig
 from tests.soak.verdict import Measured, Sample
@@ -25,10 +25,10 @@ _SETTLED = 10.0
 
 
 def kinds(seed: int) -> Iterator[tuple[str, Random]]:
-    """Every kind once in random order, again and again, each with the chance that it draws from."""
+    """Round after round in random order, each kind with the chance that it draws from."""
     chance = Random(seed)
     while True:
-        for kind in chance.sample(sorted(FAULTS), len(FAULTS)):
+        for kind in chance.sample(ROUND, len(ROUND)):
             # Its own, so that what one fault draws, which may depend on timing, moves no other.
             yield kind, Random(chance.getrandbits(64))
 
@@ -111,6 +111,7 @@ def _close(rig: Rig, measured: Measured) -> None:
         time.sleep(0.1)
     measured.descriptors_at_end = descriptors(process)
     measured.failures += rig.complaints()
+    measured.lies = rig.lies()
     measured.failures += [f"the audit has a torn line: {line[:200]}" for line in torn(rig.audit)]
     for name in WRITERS:
         rig.end_client(name)

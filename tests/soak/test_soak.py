@@ -8,9 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.soak.faults import FAULTS
+from tests.e2e.witness import Change
+from tests.soak.faults import FAULTS, ROUND
+from tests.soak.journal import SENT, Entry, Journal, entries
 from tests.soak.look import torn
 from tests.soak.run import kinds, soak
+from tests.soak.truth import Period, Record, misheld, unheard
 from tests.soak.verdict import MEMORY_BOUND, THREADS_BOUND, Measured, Sample
 
 SECONDS = float(os.environ.get("GATEWAYD_SOAK_SECONDS", "20"))
@@ -26,13 +29,13 @@ def test_every_fault_is_recovered_and_nothing_is_left_behind(tmp_path: Path) -> 
 
 
 def test_a_seed_makes_the_same_faults_and_every_kind_comes_in_turn() -> None:
-    count = 3 * len(FAULTS)
+    count = 3 * len(ROUND)
 
     def drawn(seed: int) -> list[tuple[str, float]]:
         return [(kind, chance.random()) for kind, chance in itertools.islice(kinds(seed), count)]
 
     assert drawn(1) == drawn(1) != drawn(2)
-    assert [kind for kind, _ in sorted(drawn(1))] == sorted([*FAULTS] * 3)
+    assert [kind for kind, _ in sorted(drawn(1))] == sorted(ROUND * 3)
 
 
 def test_a_line_of_the_audit_that_was_cut_short_is_seen(tmp_path: Path) -> None:
@@ -40,6 +43,80 @@ def test_a_line_of_the_audit_that_was_cut_short_is_seen(tmp_path: Path) -> None:
     audit = tmp_path / "audit.jsonl"
     audit.write_text('{"what": 1}\n{"wh{"what": 2}\n{"what": 3}\n{"wh', "utf-8")
     assert torn(audit) == ['{"wh{"what": 2}']
+
+
+A, B = "input_int_register_0", "input_int_register_1"
+
+
+def test_a_journal_is_read_as_it_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "plc.journal"
+    assert list(entries(path)) == []
+    journal = Journal(str(path))
+    journal.note(A, 7)
+    journal.note(A, 7, 6)
+    sent, answered = entries(path)
+    assert (sent.field, sent.value, sent.outcome) == (A, 7, SENT)
+    assert (answered.outcome, answered.time >= sent.time) == (6, True)
+
+
+def sent(time: float, value: float) -> Entry:
+    return Entry(time, A, value, SENT)
+
+
+@pytest.mark.parametrize(
+    "change, record, found",
+    [
+        (Change(10.1, 7, 0.0), Record(), []),
+        (Change(99.0, 0, 0.0), Record(), []),
+        (Change(10.1, 8, 0.0), Record(), ["nobody wrote"]),
+        (Change(9.9, 7, 0.0), Record(), ["nobody wrote"]),
+        (Change(13.0, 7, 0.0), Record(), ["3.0 s after"]),
+        (Change(13.0, 7, 2.5), Record(), []),
+        (Change(13.0, 7, 0.0), Record(pauses=[Period(10.0, 12.9, [A])]), []),
+        (Change(13.0, 7, 0.0), Record(pauses=[Period(10.0, 12.9, [B])]), ["3.0 s after"]),
+        (Change(13.0, 8, 0.0), Record([Period(12.0, 14.0, [A], 8)]), []),
+        (Change(13.0, 9, 0.0), Record([Period(12.0, 14.0, [A], 8)]), ["nobody wrote"]),
+        (Change(13.0, 9, 0.0), Record([Period(12.0, 14.0, [A])]), []),
+        (Change(14.5, 9, 0.0), Record([Period(12.0, 14.0, [A])]), ["nobody wrote"]),
+    ],
+    ids=str,
+)
+def test_what_the_robot_held_must_have_been_written_lately(
+    change: Change, record: Record, found: list[str]
+) -> None:
+    """Or be declared, or be the operator's, or have come when nobody looked."""
+    told = list(misheld(A, [change], [sent(10.0, 7), Entry(10.0, A, 7, 0)], record))
+    assert len(told) == len(found)
+    assert all(part in line for part, line in zip(found, told, strict=True))
+
+
+@pytest.mark.parametrize(
+    "changes, outcome, watched, count",
+    [
+        ([Change(10.05, 7, 0.0)], 0, True, 0),
+        ([Change(9.0, 7, 0.0)], 0, True, 0),
+        ([Change(9.0, 6, 0.0)], 0, True, 1),
+        ([], 0, True, 1),
+        ([], 0, False, 0),
+        ([], 6, True, 0),
+        ([Change(10.02, 8, 0.0)], 0, True, 0),
+        ([Change(10.2, 8, 0.0)], 0, True, 1),
+    ],
+)
+def test_what_was_acknowledged_must_have_been_there(
+    changes: list[Change], outcome: int, watched: bool, count: int
+) -> None:
+    """Unless nobody looked, or the next value took its place at once."""
+    written = [sent(10.0, 7), Entry(10.01, A, 7, outcome)]
+    assert len(list(unheard(A, changes, written, lambda _since, _until: watched))) == count
+
+
+def test_lies_are_told_but_not_all_of_them() -> None:
+    measured = good()
+    measured.lies = [f"lie {number}" for number in range(30)]
+    told = measured.verdict()
+    assert told[0] == "lie 0"
+    assert told[-1] == "and 10 more of what the robot held"
 
 
 def good(kilobytes: int = 0) -> Measured:

@@ -14,6 +14,8 @@ MEMORY_BOUND = 8 * 1024
 """Kilobytes by which memory may grow from the second quarter of the run to the last."""
 THREADS_BOUND = 4
 """Threads that may be more at the end than at the beginning: the event loop's pool grows when it is needed."""
+_SHOWN = 20
+"""Lines about what the robot held; where there are more, they say the same."""
 
 _DEFINITION = """\
 Recovery: from the end of the fault until the daemon calls itself healthy, PLCs and master are alive, what they write
@@ -43,6 +45,8 @@ class Measured:
     samples: list[Sample] = field(default_factory=list)
     leaked: list[str] = field(default_factory=list)
     """Locks without a living owner, and forces that stayed."""
+    lies: list[str] = field(default_factory=list)
+    """What the robot held and should not have, and what was acknowledged and never there."""
     descriptors_at_end: int = 0
     """With everything of the run's own gone but what was there at the first sample."""
 
@@ -69,6 +73,9 @@ class Measured:
 
     def _faulty(self) -> Iterator[str]:
         yield from self.failures
+        yield from self.lies[:_SHOWN]
+        if self.lies[_SHOWN:]:
+            yield f"and {len(self.lies) - _SHOWN} more of what the robot held"
         if not self.samples:
             yield "nothing was measured"
             return

@@ -111,6 +111,7 @@ def test_every_metric_of_the_cells_is_looked_at_or_named_here() -> None:
         "gatewayd_robot_packages_total",  # package_rate says it
         "gatewayd_robot_watchdog_fed",  # only with a watchdog in the mapping
         "gatewayd_input_age_seconds",
+        "gatewayd_adoption_seconds",  # for seconds after a start; the status page says it
         "gatewayd_locks",
         "gatewayd_writes_refused_total",  # refusals_total has the reasons
     }

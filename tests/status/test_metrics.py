@@ -122,3 +122,19 @@ def test_troubles_are_counted(daemon: Daemon) -> None:
     """The listener of a daemon that does not run does not listen."""
     assert one(read(Probes(daemon)), "gatewayd_troubles") == 1
     assert one(read(Probes(daemon, lambda: ["1 mapping file not served"])), "gatewayd_troubles") == 2
+
+
+def test_what_the_robot_holds_how_late_it_is_and_gaps(probes: Probes, cell: Cell) -> None:
+    health = cell.health
+    health.lag, health.differing, health.unadopted, health.adoption, health.gaps = 0.25, 1, 2, 8.0, 3
+    text = Exposition(probes, "1").text().decode()
+    for line in (
+        'gatewayd_lag_seconds{cell="press"} 0.25',
+        'gatewayd_differing{cell="press"} 1.0',
+        'gatewayd_unadopted{cell="press"} 2.0',
+        'gatewayd_adoption_seconds{cell="press"} 8.0',
+        'gatewayd_gaps_total{cell="press"} 3.0',
+        'gatewayd_robot_state{cell="press",state="late"} 0.0',
+        'gatewayd_variables{cell="press",quality="not_running"} 0.0',
+    ):
+        assert line in text.splitlines()

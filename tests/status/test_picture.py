@@ -8,6 +8,7 @@ import pytest
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import Event, EventKind
+from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
 from gatewayd.status.picture import RECENT, Level, bus, can_bus, gateway, robot, writers
 from tests.status.press import CYCLES, HMI, LINE, PLC, SPARE
@@ -91,3 +92,21 @@ def test_writers_by_their_last_deeds(cell: Cell, now: float) -> None:
     lost = writers(cell, now + 5)[PLC]
     assert (lost.level, lost.words, lost.facts) == (Level.BAD, "lost, last heard 5 s ago", "holds no lock")
     assert writers(cell, now)[LINE].facts == "holds no lock"
+
+
+def test_what_the_robot_holds_colours_it(cell: Cell, now: float) -> None:
+    cell.set_availability([SPARE], True, "", now)
+    cell.health.unadopted = 2
+    node = robot(cell, ADDRESS, "", now)
+    assert (node.level, node.words) == (Level.WARN, "fresh, but what it holds is not known for 2 inputs")
+    cell.health.differing = 1
+    node = robot(cell, ADDRESS, "", now)
+    assert (node.level, node.words) == (Level.BAD, "fresh, but it holds something else for 1 input")
+
+
+def test_what_falls_back_soon_and_what_cannot_be_shown_colour_the_gateway(cell: Cell, now: float) -> None:
+    cell.image.quality[CYCLES] = Quality.OUT_OF_RANGE
+    node = gateway(cell, (), (), now)
+    assert (node.level, node.words) == (Level.WARN, "1 value out of the range of a place")
+    cell.health.adoption = 8.0
+    assert gateway(cell, (), (), now).words == "adopted values without an owner fall back in 8 s"

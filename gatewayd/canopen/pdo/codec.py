@@ -39,8 +39,16 @@ class Mapped:
     """One entry of a mapping."""
 
     variable: int | None
-    """Index of the variable; None for a dummy entry (no BOOLEAN), which is skipped on reception, 0 on transmission."""
+    """Index of the variable; None for a word of the status block, and for a dummy entry (no BOOLEAN), which is skipped
+    on reception, 0 on transmission."""
     type: CanType
+    offset: int | None = None
+    """Where the status block has it."""
+
+    @property
+    def is_dummy(self) -> bool:
+        """Whether it holds nothing."""
+        return self.variable is None and self.offset is None
 
 
 def fit(value: Value, can_type: CanType) -> Value:
@@ -85,12 +93,14 @@ def is_aligned(types: Iterable[CanType]) -> bool:
 
 
 Gather = Callable[[Sequence[Value]], Sequence[Value]]
+ReadWord = Callable[[int, int], int]
+"""Reads so many words of the status block from that offset on, as one number."""
 
 
 class Layout:
     """A compiled mapping of at most 64 bits, aligned as `is_aligned` says."""
 
-    __slots__ = ("_content", "_pack", "_parts", "_runs", "_unpack", "gather", "mapping", "size", "variables")
+    __slots__ = ("_pack", "_parts", "_runs", "_unpack", "content", "gather", "mapping", "size", "variables")
 
     def __init__(self, mapping: Sequence[Mapped], variables: Sequence[Variable]) -> None:
         types = [one.type for one in mapping]
@@ -102,23 +112,46 @@ class Layout:
         self.size = (bits + 7) // 8
         """Bytes."""
         self.variables = tuple(one.variable for one in mapping if one.variable is not None)
-        """Variables in the order of the mapping, without dummies."""
+        """Variables in the order of the mapping, without dummies and status words."""
+        self.content = tuple(one for one in mapping if not one.is_dummy)
+        """What a PDO holds, in the order of the mapping."""
         self.gather: Gather = _gatherer(self.variables)
-        """Copies the content out of an image's values: what `pack` takes, and comparable with `==`."""
+        """Copies the content out of an image's values: what `pack` takes, and comparable with `==`. For a mapping with
+        status words `gatherer` makes it."""
         runs = list(_runs(self.mapping))
         compiled = struct.Struct("<" + "".join(run.format for run in runs))
         self._pack = compiled.pack
         self._unpack = compiled.unpack
-        self._content = tuple(one.type for one in mapping if one.variable is not None)
         self._runs = tuple(_slices(runs)) if any(run.bits for run in runs) else None
         self._parts = tuple(part for run in runs for part in run.parts(variables))
+
+    @property
+    def has_status(self) -> bool:
+        """Whether it carries words of the status block."""
+        return len(self.content) > len(self.variables)
+
+    def gatherer(self, read: ReadWord) -> Gather:
+        """What copies the content together where some of it is in the status block."""
+        if not self.has_status:
+            return self.gather
+        places = [(one.variable, one.offset or 0, one.type.bits // 16) for one in self.content]
+
+        def gather(values: Sequence[Value]) -> tuple[Value, ...]:
+            return tuple(
+                values[variable] if variable is not None else read(offset, words)
+                for variable, offset, words in places
+            )
+
+        return gather
 
     def pack(self, content: Sequence[Value]) -> bytes:
         """The PDO's bytes for what `gather` returned."""
         try:
             return self._packed(content)
         except (struct.error, OverflowError, ValueError, TypeError):
-            return self._packed([fit(value, one) for value, one in zip(content, self._content, strict=True)])
+            return self._packed(
+                [fit(value, one.type) for value, one in zip(content, self.content, strict=True)]
+            )
 
     def changes(self, data: bytes) -> list[Change] | Refusal:
         """What `size` bytes mean for the cell. Every bit is meant: who maps it into an RPDO sends it on purpose.
@@ -167,7 +200,7 @@ class _Run:
         if self.bits:
             return f"{self.size}s"
         one = self.mapped[0]
-        return one.type.char if one.variable is not None else f"{one.type.bits // 8}x"
+        return one.type.char if not one.is_dummy else f"{one.type.bits // 8}x"
 
     @property
     def size(self) -> int:
@@ -177,7 +210,7 @@ class _Run:
     @property
     def values(self) -> int:
         """How many values of the content it takes."""
-        return sum(one.variable is not None for one in self.mapped)
+        return sum(not one.is_dummy for one in self.mapped)
 
     def parts(self, variables: Sequence[Variable]) -> Iterator[_Part]:
         """What takes its value when a PDO is received."""

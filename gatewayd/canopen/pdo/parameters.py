@@ -31,6 +31,7 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, Pdo, record
 from gatewayd.canopen.pdo.codec import GREATEST_BITS, Layout, Mapped, is_aligned
 from gatewayd.canopen.plan import CanopenPlan, PdoEntry, PdoPlan
+from gatewayd.canopen.status_objects import status_word
 from gatewayd.core.definition import Direction, Variable
 
 __all__ = ["LEAST_NUMBER", "Configuration", "PdoParameters", "PdoTable"]
@@ -279,7 +280,7 @@ class PdoParameters:
             entry = self._around.find(index, subindex)
         except Abort as abort:
             raise Abort(AbortCode.NO_OBJECT) from abort
-        mapped = self._around.objects.get((index, subindex))
+        mapped = self._around.objects.get((index, subindex)) or status_word(index, subindex)
         if mapped is None or entry.pdo is not self._kind.pdo:
             raise Abort(AbortCode.NOT_MAPPABLE)
         return mapped
@@ -304,7 +305,10 @@ class PdoParameters:
 
     def _known(self, value: int) -> Mapped:
         index, subindex = value >> 16, value >> 8 & 0xFF
-        return self._dummy(index, subindex) or self._around.objects[index, subindex]
+        known = self._dummy(index, subindex) or self._around.objects.get((index, subindex))
+        mapped = known or status_word(index, subindex)
+        assert mapped is not None
+        return mapped
 
     def _default_cob_id(self, node: int) -> tuple[bytes, bool]:
         plan, flags = self._plan, self._kind.flags

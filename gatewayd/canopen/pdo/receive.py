@@ -19,9 +19,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from enum import Enum
 from typing import Final
 
+from gatewayd.canopen.gap import spared
 from gatewayd.canopen.pdo.parameters import Configuration
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.refusal import Reason, Refusal
@@ -70,7 +72,18 @@ Tell = Callable[[Fault, int, float], None]
 class ReceivePdo:
     """One valid RPDO and what is known of the last reception."""
 
-    __slots__ = ("changes", "configuration", "data", "due", "faults", "latched", "received", "size")
+    __slots__ = (
+        "changes",
+        "configuration",
+        "data",
+        "due",
+        "faults",
+        "latched",
+        "received",
+        "size",
+        "spared",
+        "waited",
+    )
 
     def __init__(self, configuration: Configuration) -> None:
         self.configuration = configuration
@@ -81,8 +94,12 @@ class ReceivePdo:
         """Frames, faulty ones included."""
         self.latched: bytes | None = None
         """What waits for SYNC."""
+        self.waited = 0.0
+        """Seconds for which that may have waited while the process stood still."""
         self.due = math.inf
         """When the deadline passes; infinity before the first frame and after a time-out."""
+        self.spared = False
+        """The process stood still since the last frame."""
         self.data: bytes | None = None
         """What `changes` was made of. Masters repeat themselves, so that it is worth keeping."""
         self.changes: list[Change] | Refusal = []
@@ -188,12 +205,22 @@ class ReceiveEngine:
         for pdo in self._synchronous:
             if pdo.latched is not None:
                 data, pdo.latched = pdo.latched, None
-                self._write(pdo, data, now, requester)
+                self._write(pdo, data, now, replace(requester, waited=pdo.waited))
 
     def forget(self) -> None:
         """The writer is lost: what it left for the next SYNC is nobody's any more."""
         for pdo in self._synchronous:
             pdo.latched = None
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still: what is kept for SYNC has waited, and deadlines count anew."""
+        self._now = now
+        for pdo in self._pdos.values():
+            pdo.waited += now - since
+            if pdo.due < math.inf:
+                pdo.due = spared(pdo.due, pdo.configuration.event, since, now, again=pdo.spared)
+                pdo.spared = True
+        self._deadline = None
 
     def tick(self, now: float) -> None:
         """Notice deadlines that have passed. Cheap before `next_deadline`."""
@@ -226,6 +253,7 @@ class ReceiveEngine:
                 else (Fault.SHORT, Fault.TIMEOUT)
             )
             self._clear(pdo, good, now)
+        pdo.spared = False
         event = pdo.configuration.event
         if event:
             pdo.due = now + event
@@ -235,6 +263,7 @@ class ReceiveEngine:
         data = data[: pdo.size]
         if pdo.configuration.is_synchronous and requester.trusted:
             pdo.latched = data
+            pdo.waited = requester.waited
         else:
             self._write(pdo, data, now, requester)
 

@@ -9,24 +9,31 @@ What a happening means for a TPDO follows from its schedule by the table `MOVES`
   that equals the SYNC start value counts as the first.
 
 The content differs if its bytes do, and for a real with a deadband only if it moved by at least that much since it was
-sent. Each frame holds one moment of the image. A TPDO with a variable that may not be read now (`Cell.unreadable`)
-stops, and starts again with it.
+sent. Each frame holds one moment of the image, and of the status block where it carries words of it; those are looked
+at whenever the cell changes, and every `STATUS_LOOK` seconds. A TPDO with a variable that may not be read now
+(`Cell.unreadable`) stops, and starts again with it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
 from operator import attrgetter
 from typing import Final
 
 from gatewayd.canopen.frame import Frame, Priority, Send
+from gatewayd.canopen.pdo.codec import ReadWord
 from gatewayd.canopen.pdo.parameters import Configuration
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Value, Variable
+from gatewayd.core.status import StatusBlock
 
-__all__ = ["MOVES", "Happening", "Move", "Schedule", "TransmitEngine", "TransmitPdo"]
+__all__ = ["MOVES", "STATUS_LOOK", "Happening", "Move", "Schedule", "TransmitEngine", "TransmitPdo"]
+
+
+STATUS_LOOK: Final = 0.1
+"""Seconds between two looks at status words that change with time, as the heartbeat of the core does."""
 
 
 class Schedule(Enum):
@@ -92,6 +99,7 @@ class TransmitPdo:
         "forced",
         "gather",
         "guarded",
+        "has_status",
         "is_stopped",
         "moves",
         "pack",
@@ -99,14 +107,17 @@ class TransmitPdo:
         "waits",
     )
 
-    def __init__(self, configuration: Configuration, variables: Sequence[Variable]) -> None:
+    def __init__(self, configuration: Configuration, variables: Sequence[Variable], read: ReadWord) -> None:
         layout = configuration.layout
         schedule = Schedule.of(configuration.transmission)
-        deadbands = tuple(variables[index].deadband for index in layout.variables)
+        deadbands = tuple(
+            variables[one.variable].deadband if one.variable is not None else 0.0 for one in layout.content
+        )
         self.configuration = configuration
         self.can_id = configuration.can_id
         self.moves = {happening: move for (one, happening), move in MOVES.items() if one is schedule}
-        self.gather = layout.gather
+        self.gather = layout.gatherer(read)
+        self.has_status = layout.has_status
         self.pack = layout.pack
         self.guarded = frozenset(layout.variables)
         self.deadbands = deadbands if any(deadbands) else None
@@ -138,6 +149,14 @@ class TransmitPdo:
         """Let nothing wait, and the event timer stand still."""
         self.waits = self.forced = False
         self.due = math.inf
+
+    def count(self) -> bool:
+        """Count a SYNC. Returns whether it is one to send with."""
+        self.countdown = (self.countdown or 1) - 1
+        if self.countdown:
+            return False
+        self.countdown = self.configuration.transmission
+        return True
 
     def news(self, content: Sequence[Value]) -> bytes | None:
         """The bytes to send; None if nothing differs enough from what was sent last."""
@@ -173,9 +192,15 @@ class TransmitEngine:
         self.is_operational = False
         self._cell = cell
         self._values = cell.image.values
+        self._block = StatusBlock(cell)
+        self._now = 0.0
+        """The last time that was told, for words of the status block."""
+        self._look_due = math.inf
         self._send = send
         self._pdos: dict[int, TransmitPdo] = {}
         self._event_driven: list[TransmitPdo] = []
+        self._with_status: list[TransmitPdo] = []
+        """Those of them that carry words of the status block."""
         self._synchronous: list[TransmitPdo] = []
         self._fresh: list[TransmitPdo] = []
         self._unreadable = frozenset[int]()
@@ -197,7 +222,7 @@ class TransmitEngine:
         """A TPDO is now like this; None: it does not exist. The inhibit time that runs for it goes on."""
         former = self._pdos.pop(number, None)
         if configuration is not None:
-            pdo = TransmitPdo(configuration, self._cell.definition.variables)
+            pdo = TransmitPdo(configuration, self._cell.definition.variables, self._read_word)
             if former is not None:
                 pdo.earliest = 0.0 if configuration.is_synchronous else former.earliest
                 pdo.sent = former.sent
@@ -206,11 +231,14 @@ class TransmitEngine:
         pdos = self.pdos
         self._event_driven = [pdo for pdo in pdos if not pdo.configuration.is_synchronous]
         self._synchronous = [pdo for pdo in pdos if pdo.configuration.is_synchronous]
+        self._with_status = [pdo for pdo in self._event_driven if pdo.has_status]
+        self._look_due = self._now if self._with_status else math.inf
         self._fresh = [pdo for pdo in self._fresh if pdo in pdos]
         self._deadline = None
 
     def nmt(self, operational: bool, now: float) -> None:
         """OPERATIONAL was entered or left."""
+        self._now = now
         if operational == self.is_operational:
             return
         self.is_operational = operational
@@ -225,37 +253,62 @@ class TransmitEngine:
 
     def image_changed(self, now: float) -> None:
         """Output values or qualities have changed."""
-        if not self.is_operational:
-            return
-        self._look(now)
-        values = self._values
-        for pdo in self._event_driven:
-            if pdo.gather(values) != pdo.content and not pdo.waits and not pdo.is_stopped:
-                self._happened(pdo, Happening.CHANGE, now)
+        self._compare(self._event_driven, now)
 
-    def on_sync(self, counter: int | None, now: float) -> None:
-        """A SYNC was received, with this counter if it has one."""
+    def status_changed(self, now: float) -> None:
+        """Something else of the cell has changed: words of the status block may have."""
+        self._compare(self._with_status, now)
+
+    def on_sync(self, counter: int | None, now: float, *, late: bool = False) -> None:
+        """A SYNC was received, with this counter if it has one.
+
+        `late`: it waited while the process stood still. It is counted, but what it asked for is over.
+        """
+        self._now = now
         if not self.is_operational:
             return
         self._look(now)
         for pdo in self._synchronous:
             if pdo.is_stopped or not _counts(pdo, counter):
                 continue
-            self._happened(pdo, Happening.SYNC, now)
+            if not late:
+                self._happened(pdo, Happening.SYNC, now)
+            elif pdo.moves.get(Happening.SYNC) is Move.COUNT:
+                pdo.count()
 
     def tick(self, now: float) -> None:
         """Send what time makes due. Cheap before `next_deadline`."""
+        self._now = now
         if not self.is_operational:
             return
         self._look(now)
         if now < self.next_deadline():
             return
+        if now >= self._look_due:
+            self._look_due = now + STATUS_LOOK
+            self._compare(self._with_status, now)
         for pdo in self._event_driven:
             if pdo.waits and now >= pdo.earliest:
                 self._happened(pdo, Happening.INHIBIT_OVER, now)
             if now >= pdo.due:
                 self._timer(pdo, now)
         self._deadline = None
+
+    def renew(self, can_id: int, now: float) -> Frame | None:
+        """In place of a frame that has waited too long for the bus: what it would hold now; None if it is nothing.
+
+        A synchronous PDO holds the moment of its SYNC, which is over.
+        """
+        self._now = now
+        pdo = next((pdo for pdo in self._pdos.values() if pdo.can_id == can_id), None)
+        if pdo is None or not self.is_operational or pdo.is_stopped:
+            return None
+        if pdo.configuration.is_synchronous:
+            pdo.forced = True
+            return None
+        pdo.content = pdo.gather(self._values)
+        pdo.data = pdo.pack(pdo.content)
+        return Frame(can_id, pdo.data)
 
     def next_deadline(self, now: float = 0.0) -> float:
         """When `tick` is wanted, not before `now`; infinity if never. It may turn out then that nothing is due yet."""
@@ -270,7 +323,20 @@ class TransmitEngine:
             return math.inf
         if self._fresh:
             return 0.0
-        return min(map(_deadline_of, self._event_driven), default=math.inf)
+        return min(self._look_due, min(map(_deadline_of, self._event_driven), default=math.inf))
+
+    def _compare(self, pdos: Iterable[TransmitPdo], now: float) -> None:
+        self._now = now
+        if not self.is_operational:
+            return
+        self._look(now)
+        values = self._values
+        for pdo in pdos:
+            if pdo.gather(values) != pdo.content and not pdo.waits and not pdo.is_stopped:
+                self._happened(pdo, Happening.CHANGE, now)
+
+    def _read_word(self, offset: int, words: int) -> int:
+        return int.from_bytes(self._block.read(offset, words, self._now), "big")
 
     def _look(self, now: float) -> None:
         """Notice what happened beside the image: PDOs configured anew, variables that may be read or not."""
@@ -340,9 +406,7 @@ class TransmitEngine:
         pdo.countdown = None
 
     def _count(self, pdo: TransmitPdo, now: float) -> None:
-        pdo.countdown = (pdo.countdown or 1) - 1
-        if pdo.countdown == 0:
-            pdo.countdown = pdo.configuration.transmission
+        if pdo.count():
             content = pdo.gather(self._values)
             self._emit(pdo, content, pdo.pack(content), now)
 
@@ -358,7 +422,7 @@ class TransmitEngine:
             if configuration.event:
                 pdo.due = now + configuration.event
                 self._expect(pdo.due)
-        self._send(Frame(pdo.can_id, data), Priority.PDO)
+        self._send(Frame(pdo.can_id, data), Priority.NEWEST)
 
     def _expect(self, deadline: float) -> None:
         if self._deadline is not None and deadline < self._deadline:

@@ -54,7 +54,8 @@ _INTRODUCTION = """\
 
 Every finding names the rule that it breaks. Ids and names are stable. An error keeps the gateway from starting; a
 warning does not, unless `--strict` asks for it. `gatewayd check --explain GW214` prints a rule without this page.
-Each rule links to its reason; beside it lie `bad.yaml`, which breaks this rule alone, and `good.yaml`, which passes.
+Each rule links to its reason; beside it lie `bad.yaml`, which breaks this rule, and `good.yaml`, which does not.
+Neither has an error of another rule; a warning it may have.
 
 `--format json` writes one document with `version`, `files`, `errors`, `warnings`, `unreadable` and `findings`. A
 finding has `rule`, `slug`, `family`, `severity`, `file`, `line`, `column` (both from 1), `message`, `hint` (or null)

@@ -13,7 +13,7 @@ from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.rtde import LEAST_RATE
 from gatewayd.mapping.rules.wording import number, seconds
 
-__all__: list[str] = []
+__all__ = ["silent_motion"]
 
 _MOTION_FIELDS = ("speed_slider_fraction",)
 _MOTION_WORDS = frozenset(
@@ -118,7 +118,7 @@ holding is meant.
 )
 def held_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`hold` at motion commands without supervision."""
-    for variable, silent in _unsupervised_motion(cell):
+    for variable, silent in silent_motion(cell):
         if variable.spec.on_release.kind is FallbackKind.HOLD:
             message = (
                 f"`{variable.part.name}` is held when its owner is lost, and `{silent}` is not supervised"
@@ -140,7 +140,7 @@ command stays set. Give the writer a `timeout`, or the variable a `lease`.
 )
 def unsupervised_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Motion commands without supervision whose fallback would stop the motion."""
-    for variable, silent in _unsupervised_motion(cell):
+    for variable, silent in silent_motion(cell):
         if variable.spec.on_release.kind is not FallbackKind.HOLD:
             writer = cell.document.writers[silent]
             message = f"`{variable.part.name}` looks like a motion command, and `{silent}` is not supervised"
@@ -149,8 +149,8 @@ def unsupervised_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.position, message, hint=hint, related=related)
 
 
-def _unsupervised_motion(cell: ExpandedCell) -> Iterator[tuple[ConcreteVariable, str]]:
-    """Motion commands and the first owner that could be lost unnoticed."""
+def silent_motion(cell: ExpandedCell) -> Iterator[tuple[ConcreteVariable, str]]:
+    """Motion commands that no lease bounds, and the first owner that could be lost unnoticed."""
     for variable in _lines(cell):
         if variable.lock is None or not _is_motion(variable):
             continue
@@ -168,11 +168,11 @@ def _is_motion(variable: ConcreteVariable) -> bool:
 @cell_rule(
     "GW605",
     "policy-of-other-side",
-    "on_stale at an input, or on_release at an output",
+    "on_stale or valid at an input, or on_release at an output",
     """
-`on_stale` is what the fieldbus sees of an output when the robot stops telling; `on_release` is what the
-robot is given of an input when the owner is lost. At the other side they never act, and the policy that
-does act is the default.
+`on_stale` is what the fieldbus sees of an output when the robot stops telling, and `valid` when an output is good at
+all; `on_release` is what the robot is given of an input when the owner is lost. At the other side they never act, and
+the policy that does act is the default.
 """,
 )
 def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -186,6 +186,10 @@ def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
                 f"`{key}` never acts on it"
             )
             yield rule.at(variable.part.key_at(key), message, hint=f"write `{other}`, or remove `{key}`")
+        if is_input and "valid" in variable.spec.model_fields_set:
+            message = f"`{variable.part.name}` is an input ({variable.target}); `valid` never acts on it"
+            hint = "remove `valid`: it says when an output is good"
+            yield rule.at(variable.part.key_at("valid"), message, hint=hint)
 
 
 @cell_rule(

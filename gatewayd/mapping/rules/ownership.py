@@ -13,7 +13,7 @@ from gatewayd.mapping.plan import Network
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.wording import did_you_mean, seconds
 
-__all__: list[str] = []
+__all__ = ["endless_locks"]
 
 _LEAST_LEASE = 0.1
 _RESERVED = (ANY, "free", "gateway", "operator", "robot", "undeclared")
@@ -374,38 +374,19 @@ lease, or the writer a timeout.
 )
 def endless_lock(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Shared locks without a lease whose owners are not all supervised."""
+    for lock, silent in endless_locks(cell):
+        message = f"`{lock.name}` has no lease, and its owner `{silent}` no timeout"
+        related = (Related(cell.document.writers[silent].key, f"`{silent}` is here"),)
+        hint = f"add `lease: 5s` here, or `timeout: 1s` to `{silent}`"
+        yield rule.at(_lease_place(cell, lock), message, hint=hint, related=related)
+
+
+def endless_locks(cell: ExpandedCell) -> Iterator[tuple[ConcreteLock, str]]:
+    """Shared locks without a lease, one of each line, and the first owner that could keep them unnoticed."""
     for lock in _distinct(cell.locks):
         silent = [name for name in lock.owners if not cell.document.writers[name].spec.is_supervised]
         if len(lock.owners) > 1 and lock.lease is None and silent:
-            writer = cell.document.writers[silent[0]]
-            message = f"`{lock.name}` has no lease, and its owner `{silent[0]}` no timeout"
-            related = (Related(writer.key, f"`{silent[0]}` is here"),)
-            hint = f"add `lease: 5s` here, or `timeout: 1s` to `{silent[0]}`"
-            yield rule.at(_lease_place(cell, lock), message, hint=hint, related=related)
-
-
-@cell_rule(
-    "GW515",
-    "unsupervised-watchdog",
-    "a watchdog that requires a writer without a timeout",
-    """
-The watchdog is fed while the required writers are alive. A writer without `timeout` counts as alive as
-long as its connection is open, even if its program stands still, so the robot program would not stop.
-""",
-    Severity.WARNING,
-)
-def unsupervised_watchdog(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Required writers without `timeout`."""
-    robot = cell.document.robot
-    if robot is None or robot.spec.watchdog is None:
-        return
-    for index, name in enumerate(robot.spec.watchdog.requires or ()):
-        writer = cell.document.writers.get(name)
-        if writer is not None and not writer.spec.is_supervised:
-            message = f"the watchdog requires `{name}`, which has no timeout"
-            related = (Related(writer.key, f"`{name}` is here"),)
-            hint = f"add `timeout: 1s` to `{name}`"
-            yield rule.at(robot.at("watchdog", "requires", index), message, hint=hint, related=related)
+            yield lock, silent[0]
 
 
 @cell_rule(

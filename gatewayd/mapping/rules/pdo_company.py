@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction, FallbackKind
 from gatewayd.mapping.can_expand import ConcretePdo
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
@@ -21,7 +20,8 @@ __all__: list[str] = []
     """
 With `on_stale: exception` a PDO is no longer sent once the value is stale: the master sees its own time-out. All
 that is in the PDO stops with it, so the policy of its neighbours (`clear`, or a value) never reaches the master,
-which keeps their last values. Put the variable into a PDO of its own, or give the whole PDO one policy.
+which keeps their last values. The same goes for words of the status block, which would have said why. Put the
+variable into a PDO of its own, or give the whole PDO one policy.
 """,
     Severity.WARNING,
 )
@@ -32,15 +32,20 @@ def silenced_neighbour(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         variables = [cell.variables[entry.variable] for entry in pdo.entries]
         silent = [one for one in variables if one.spec.on_stale.kind is FallbackKind.EXCEPTION]
         others = [one for one in variables if one.spec.on_stale.kind is not FallbackKind.EXCEPTION]
-        if not silent or not others:
+        if not silent or not (others or pdo.status):
             continue
         place = silent[0].at("on_stale")
         if place in reported:
             continue
         reported.add(place)
-        message = f"{pdo.label} stops when `{silent[0].name}` is stale, and `{others[0].name}` is in it too"
-        related = (Related(others[0].position, f"`{others[0].name}` has another policy"),)
-        hint = f"put `{silent[0].part.name}` into a PDO of its own, or write `on_stale: exception` at both"
+        other = others[0].name if others else pdo.status[0].name
+        message = f"{pdo.label} stops when `{silent[0].name}` is stale, and `{other}` is in it too"
+        hint = f"put `{silent[0].part.name}` into a PDO of its own"
+        if others:
+            related = (Related(others[0].position, f"`{other}` has another policy"),)
+            hint += ", or write `on_stale: exception` at both"
+        else:
+            related = (Related(pdo.position, f"`{other}` is in this PDO"),)
         yield rule.at(place, message, hint=hint, related=related)
 
 
@@ -49,17 +54,18 @@ def silenced_neighbour(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "contended-pdo",
     "variables in one PDO that may be held by different owners",
     """
-A PDO is taken whole or refused whole. While another owner holds one of its variables, nothing of it arrives, and
-the others stand still too. Put them into a `group`, so that they are owned together, or into PDOs of their own.
-(Bits are judged one by one: a bit that the PDO does not change stops nothing.)
+A PDO is taken whole or refused whole, and all that is mapped in it is meant, bits too. Each one takes every variable
+that is free, whether the master changed it or not; and while another owner holds one of them, nothing of the PDO
+arrives and the others stand still too. Put them into a `group`, so that they are owned together, or into PDOs of
+their own, or give them one fixed owner.
 """,
     Severity.WARNING,
 )
 def contended_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """RPDOs with numbers of several locks, one of which somebody else may own."""
+    """RPDOs with variables of several locks, one of which somebody else may own."""
     reported: set[Position] = set()
     for pdo in _pdos(cell, Direction.INPUT):
-        locked = list(_numbers(cell, pdo))
+        locked = list(_locked(cell, pdo))
         if len({lock.members for _, lock in locked}) < 2:
             continue
         shared = next((one for one, lock in locked if _is_contended(cell, lock)), None)
@@ -69,14 +75,14 @@ def contended_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         other = next(one for one, _ in locked if one.lock != shared.lock)
         message = f"{pdo.label} carries `{shared.name}`, which another owner may hold, and `{other.name}`"
         related = (Related(other.position, f"`{other.name}` is refused with it"),)
-        hint = "write `group: NAME` at both, or make a PDO for each"
+        hint = "write `group: NAME` at both, make a PDO for each, or give both one owner"
         yield rule.at(shared.position, message, hint=hint, related=related)
 
 
-def _numbers(cell: ExpandedCell, pdo: ConcretePdo) -> Iterator[tuple[ConcreteVariable, ConcreteLock]]:
+def _locked(cell: ExpandedCell, pdo: ConcretePdo) -> Iterator[tuple[ConcreteVariable, ConcreteLock]]:
     for entry in pdo.entries:
         variable = cell.variables[entry.variable]
-        if entry.plan.type is not CanType.BOOLEAN and variable.lock is not None:
+        if variable.lock is not None:
             yield variable, cell.locks[variable.lock]
 
 

@@ -1,4 +1,4 @@
-"""Rules GW402 to GW406, GW409 to GW412, GW416 to GW419, GW430 and GW431: PDOs and their COB-IDs."""
+"""Rules GW402 to GW406, GW409, GW416 to GW419 and GW431: PDOs and their COB-IDs."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from gatewayd.canopen.cob_ids import Function, is_restricted
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.bus_load import FIRST_EVENT_TYPE, pdo_bits
-from gatewayd.mapping.can_expand import CanopenCell, ConcretePdo, MemberProblem, Misnamed
-from gatewayd.mapping.can_model import AUTO, NO_PDO
+from gatewayd.mapping.can_expand import CanopenCell, ConcretePdo
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expand import ExpandedCell
 from gatewayd.mapping.pdo_layout import PDO_BITS, PDO_NUMBERS
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import cob, did_you_mean, number, seconds
+from gatewayd.mapping.rules.wording import cob, number, seconds
 
 __all__ = ["cob_id_place"]
 
@@ -40,8 +39,7 @@ def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """PDOs of the file beyond eight bytes."""
     for pdo in _pdos(cell):
         if pdo.bits > PDO_BITS:
-            over = next(entry for offset, entry in pdo.offsets if offset + entry.plan.type.bits > PDO_BITS)
-            name = cell.variables[over.variable].name
+            name = next(name for name, end in _contents(cell, pdo) if end > PDO_BITS)
             message = (
                 f"the PDO `{pdo.name}` has {pdo.bits} bits, a PDO carries {PDO_BITS}; `{name}` does not fit"
             )
@@ -76,8 +74,8 @@ def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "mixed-pdo",
     "a PDO with variables of both directions",
     """
-A PDO is sent by one node. What flows towards the robot comes in an RPDO, what comes from the robot leaves in
-a TPDO: two PDOs.
+A PDO is sent by one node. What flows towards the robot comes in an RPDO, what comes from the robot and the words
+of the status block leave in a TPDO: two PDOs.
 """,
 )
 def mixed_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -85,7 +83,8 @@ def mixed_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for pdo in _pdos(cell):
         other = next((entry for entry in pdo.entries if entry.direction is not pdo.direction), None)
         if other is not None:
-            first, name = (cell.variables[entry.variable].name for entry in (pdo.entries[0], other))
+            name = cell.variables[other.variable].name
+            first = pdo.status[0].name if pdo.status else cell.variables[pdo.entries[0].variable].name
             message = (
                 f"the PDO `{pdo.name}` carries `{first}` {_WORDS[pdo.direction]} "
                 f"and `{name}` {_WORDS[other.direction]}"
@@ -238,111 +237,6 @@ def _spans(cob_ids: list[int]) -> str:
             spans.append([cob_id, cob_id])
     texts = [cob(first) if first == last else f"{cob(first)}..{cob(last)}" for first, last in spans]
     return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
-
-
-@cell_rule(
-    "GW410",
-    "unknown-pdo",
-    "a PDO that is not declared",
-    """
-`canopen: {pdo: NAME}` puts a variable into a PDO of the section `canopen: pdos:`. `auto` leaves the PDO to the
-automatic layout; `none` (or `canopen: object`) keeps the variable out of PDOs.
-""",
-)
-def unknown_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Names of PDOs at variables."""
-    if cell.canopen is None:
-        return
-    known = cell.canopen.part.spec.pdos
-    for part in cell.document.variables.values():
-        place = part.spec.canopen
-        if place is not None and place.pdo not in known and place.pdo not in (AUTO, NO_PDO):
-            hint = did_you_mean(
-                place.pdo, known, f"add `{place.pdo}` to `pdos` of the section `canopen`, or write auto"
-            )
-            message = f"the PDO `{place.pdo}` of `{part.name}` is not declared"
-            yield rule.at(part.at("canopen", "pdo"), message, hint=hint)
-
-
-@cell_rule(
-    "GW411",
-    "variable-in-two-pdos",
-    "a variable in two PDOs, or twice in one",
-    """
-A variable lies in one PDO: an input that came in two of them would jump between their values, and an output
-would only cost the bus twice. Also found here: a PDO that names a variable whose own line says
-`canopen: object`, which keeps it out of PDOs.
-""",
-)
-def variable_in_two_pdos(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Variables that are wanted once more."""
-    for wrong in _once(cell, MemberProblem.TAKEN, MemberProblem.OBJECT_ONLY):
-        assert wrong.variable is not None
-        variable = cell.variables[wrong.variable]
-        place = wrong.position or variable.part.at("canopen", "pdo")
-        if wrong.problem is MemberProblem.OBJECT_ONLY:
-            message = f"the PDO `{wrong.pdo}` names `{variable.name}`, whose line says `canopen: object`"
-            related = (Related(variable.part.at("canopen"), "the line is here"),)
-            yield rule.at(
-                place, message, hint="write `canopen: auto` there, or remove it here", related=related
-            )
-            continue
-        message = f"`{variable.name}` is in the PDO `{wrong.other}` already"
-        yield rule.at(place, message, hint=f"remove it from `{wrong.pdo}` or from `{wrong.other}`")
-
-
-@cell_rule(
-    "GW412",
-    "empty-pdo",
-    "a PDO that carries nothing",
-    """
-The PDO names no variable, and no variable names it. It would take a COB-ID and send nothing.
-""",
-)
-def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """PDOs of the file without variables."""
-    if cell.canopen is None or len(cell.document.declared("variables")) > len(cell.document.variables):
-        return
-    broken = {wrong.pdo for wrong in cell.canopen.misnamed}
-    unresolved = {missing.part.name for missing in cell.unresolved}
-    for name in cell.canopen.empty:
-        if name in broken or unresolved & {
-            member.name for member in cell.canopen.part.spec.pdos[name].variables
-        }:
-            continue
-        message = f"no variable is in the PDO `{name}`"
-        hint = "name its `variables`, or remove it"
-        yield rule.at(cell.canopen.part.key_at("pdos", name), message, hint=hint)
-
-
-@cell_rule(
-    "GW430",
-    "unknown-pdo-variable",
-    "a PDO that names a variable that does not exist",
-    """
-`variables` of a PDO names variables of this file: a single one (`start`), a whole family (`recipe`), one of a
-family (`recipe[3]`) or some of it (`recipe[0..7]`; inside a list in brackets it needs quotes).
-""",
-)
-def unknown_pdo_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Members without a line, and members that a family does not have."""
-    declared = cell.document.declared("variables")
-    unresolved = {missing.part.name for missing in cell.unresolved}
-    for wrong in _once(cell, MemberProblem.UNKNOWN):
-        name = wrong.text.partition("[")[0]
-        if name in unresolved or (name in declared and name not in cell.document.variables):
-            continue
-        count = sum(variable.part.name == name for variable in cell.variables)
-        if count:
-            message = f"the PDO `{wrong.pdo}` names `{wrong.text}`, and `{name}` "
-            single = count == 1 and all(one.member is None for one in cell.variables if one.part.name == name)
-            message += "is a single variable" if single else f"has {count} members"
-            hint = f"write `{name}`" if single else f"write `{name}[0..{count - 1}]` or less"
-        else:
-            message = f"the PDO `{wrong.pdo}` names `{wrong.text}`, which is no variable of this file"
-            hint = did_you_mean(name, declared, "add the variable, or remove the name")
-        assert wrong.position is not None
-        yield rule.at(wrong.position, message, hint=hint)
 
 
 @cell_rule(
@@ -502,10 +396,9 @@ def _pdos(cell: ExpandedCell) -> Iterator[ConcretePdo]:
         yield from (pdo for pdo in cell.canopen.pdos if pdo.name)
 
 
-def _once(cell: ExpandedCell, *problems: MemberProblem) -> Iterator[Misnamed]:
-    """The first of each name in each PDO."""
-    seen: set[tuple[str, str]] = set()
-    for wrong in cell.canopen.misnamed if cell.canopen is not None else ():
-        if wrong.problem in problems and (wrong.pdo, wrong.text) not in seen:
-            seen.add((wrong.pdo, wrong.text))
-            yield wrong
+def _contents(cell: ExpandedCell, pdo: ConcretePdo) -> Iterator[tuple[str, int]]:
+    """The name of everything in a PDO, and the bit after it."""
+    for offset, word in pdo.status_offsets:
+        yield word.name, offset + word.type.bits
+    for offset, entry in pdo.offsets:
+        yield cell.variables[entry.variable].name, offset + entry.plan.type.bits

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from math import floor, isclose
 
@@ -23,14 +23,6 @@ LEAST_RATE = 0.1
 
 _SHORT_LISTS = 2048
 _LONG_LISTS_SINCE = SoftwareVersion(5, 17)
-_MASKS = {
-    "speed_slider_fraction": "speed_slider_mask",
-    "standard_digital_output": "standard_digital_output_mask",
-    "configurable_digital_output": "configurable_digital_output_mask",
-    "tool_digital_output": "tool_digital_output_mask",
-    "standard_analog_output_0": "standard_analog_output_mask",
-    "standard_analog_output_1": "standard_analog_output_mask",
-}
 _UPPER_INPUTS = frozenset(
     f"{family.prefix}{register}"
     for family in REGISTERS
@@ -314,9 +306,11 @@ def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "long-recipe",
     "more field names than an old controller takes in one request",
     """
-Controllers before software 5.17 take at most 2048 bytes of field names in the request that sets up the
-outputs. All outputs travel in one recipe, and with `verify: true` the read-back of every input with them.
-Leave fields out, or set `verify: false`.
+Controllers before software 5.17 take at most 2048 bytes of field names in one request, and everything that is read
+all the time travels in one recipe: the outputs first, then with `verify: true` the read-backs of as many inputs as
+have room. An input without room is read in pieces when connecting, and what is written is not compared with it
+afterwards (which is what `verify: false` does with all of them). An output without room has no value. Leave fields
+out.
 """,
     Severity.WARNING,
 )
@@ -329,19 +323,27 @@ def long_recipe(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     )
     if robot is None or not limited:
         return
-    names = dict.fromkeys(
-        variable.field.name
-        for variable in cell.variables
-        if variable.direction is Direction.OUTPUT or (robot.spec.verify and variable.field.name in OUTPUTS)
-    )
-    length = len(",".join(("timestamp", *names)))
-    if length > _SHORT_LISTS:
-        message = (
-            f"the names of the {len(names)} output fields take {length} bytes, "
-            f"this controller takes {_SHORT_LISTS}"
-        )
-        hint = "leave fields out, or set `verify: false` to do without the read-back of inputs"
-        yield rule.at(cell.document.key_at("variables"), message, hint=hint)
+    outputs = _names(variable for variable in cell.variables if variable.direction is Direction.OUTPUT)
+    read_back = _names(variable for variable in cell.variables if variable.field.name in OUTPUTS)
+    names = list(dict.fromkeys((*outputs, *read_back))) if robot.spec.verify else outputs
+    if _length(names) <= _SHORT_LISTS:
+        return
+    message = f"the names of {len(names)} fields take {_length(names)} bytes, this controller takes {_SHORT_LISTS}: "
+    if _length(outputs) > _SHORT_LISTS:
+        message += "outputs that have no room have no value"
+        hint = "leave fields out"
+    else:
+        message += "inputs that have no room are not compared with what was written"
+        hint = "write `verify: false` if no input needs to be, or leave fields out"
+    yield rule.at(cell.document.key_at("variables"), message, hint=hint)
+
+
+def _names(variables: Iterable[ConcreteVariable]) -> list[str]:
+    return list(dict.fromkeys(variable.field.name for variable in variables))
+
+
+def _length(names: Sequence[str]) -> int:
+    return len(",".join(("timestamp", *names)))
 
 
 @cell_rule(
@@ -368,34 +370,6 @@ def upper_range(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     if watchdog is not None and watchdog[0] in _UPPER_INPUTS:
         message = f"the watchdog feeds {watchdog[0]}, which URCaps and ur_rtde may claim"
         yield rule.at(watchdog[1], message, hint=hint)
-
-
-@cell_rule(
-    "GW310",
-    "missing-mask",
-    "a speed slider or robot output without the mask that makes it act",
-    """
-The robot takes `speed_slider_fraction`, digital and analog outputs over only where the mask says so, and
-masks start at 0. Without the mask the value is written and nothing happens. Map the mask as a variable
-too.
-""",
-)
-def missing_mask(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Masked inputs whose mask is not mapped."""
-    mapped = {variable.field.name for variable in cell.variables}
-    # The mask may be meant by a line that could not be read; that line has its own finding.
-    broken = {item.name for item in cell.unresolved}
-    if len(cell.document.declared("variables")) != len(cell.document.variables):
-        return
-    seen: set[tuple[str, str]] = set()
-    for variable in cell.variables:
-        mask = _MASKS.get(variable.field.name)
-        key = variable.part.name, variable.field.name
-        if mask is None or mask in mapped or mask in broken or key in seen:
-            continue
-        seen.add(key)
-        message = f"`{variable.name}` ({variable.target}) has no effect without `{mask}`"
-        yield rule.at(variable.at("robot"), message, hint=f"map `{mask}` as a variable too")
 
 
 @cell_rule(

@@ -10,14 +10,18 @@ from gatewayd.mapping.rules import (
     bounds,
     can_bus,
     canopen,
+    companions,
     conversion,
     failsafe,
     listener,
     ownership,
     pdo_company,
+    pdo_members,
     pdos,
     places,
     rtde,
+    sharing,
+    supervision,
 )
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
@@ -28,12 +32,16 @@ FAMILY_MODULES = (
     places,
     listener,
     rtde,
+    companions,
     canopen,
     pdos,
+    pdo_members,
     pdo_company,
     can_bus,
     ownership,
+    sharing,
     failsafe,
+    supervision,
     conversion,
 )
 """The modules whose rules are applied."""

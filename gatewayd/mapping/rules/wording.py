@@ -13,6 +13,7 @@ __all__ = [
     "cob",
     "did_you_mean",
     "first_of_each_line",
+    "names_and_more",
     "number",
     "one_and_more",
     "seconds",
@@ -60,6 +61,12 @@ def one_and_more(names: Sequence[str]) -> str:
     """The first name in backticks and how many follow."""
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     return f"`{names[0]}`{more}"
+
+
+def names_and_more(names: Sequence[str]) -> str:
+    """The first two names in backticks and how many follow: "`a`, `b` and 3 more"."""
+    shown = " and ".join(f"`{name}`" for name in names[:2])
+    return shown if len(names) <= 2 else f"{shown.replace(' and ', ', ')} and {len(names) - 2} more"
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:

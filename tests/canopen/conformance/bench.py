@@ -144,8 +144,9 @@ class WireDevice(Device):
     def power_off(self) -> None:
         self._sent.clear()
 
-    def _send(self, frame: Frame, _priority: Priority) -> None:
+    def _send(self, frame: Frame, _priority: Priority) -> bool:
         self._sent.append((self._now, frame))
+        return True
 
     def send(self, frame: Frame) -> None:
         self._node.receive(frame, self._now)

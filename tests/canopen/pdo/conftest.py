@@ -92,9 +92,10 @@ class Bench:
     def __post_init__(self) -> None:
         self.by_name = {variable.name: index for index, variable in enumerate(self.variables)}
 
-    def send(self, frame: Frame, priority: Priority) -> None:
-        assert priority is Priority.PDO
+    def send(self, frame: Frame, priority: Priority) -> bool:
+        assert priority is Priority.NEWEST
         self.sent.append(frame)
+        return True
 
     def take(self) -> list[str]:
         """What was sent since the last call, as `185:01020304`."""

@@ -276,7 +276,7 @@ def test_pdo_stops_while_its_variable_may_not_be_read(guarded: Bench) -> None:
     assert sender.engine.next_deadline() == math.inf
     assert (sender.engine.stopped, [pdo.is_stopped for pdo in sender.engine.pdos]) == (1, [True, False])
     guarded.cell.robot_connected(T + 4)
-    guarded.cell.package_arrived(2.0, T + 4)
+    guarded.cell.package_arrived(1005.0, T + 4)
     assert sender.show(4, out_int_0=1) == [], "the package was not copied yet"
     guarded.cell.outputs_written(T + 4)
     assert sender.show(4) == int_frame(1), "it starts again with what there is"
@@ -290,7 +290,7 @@ def test_synchronous_pdo_stops_and_resumes_too(guarded: Bench, transmission: int
     guarded.cell.robot_lost("cut", T)
     assert sender.sync() == []
     guarded.cell.robot_connected(T)
-    guarded.cell.package_arrived(2.0, T)
+    guarded.cell.package_arrived(1001.0, T)
     guarded.cell.outputs_written(T)
     assert sender.sync() == int_frame(0)
 

@@ -12,8 +12,11 @@ from random import Random
 from tests.soak.faults import can, daemon, http, modbus, operator, robot
 from tests.soak.rig import Rig
 
-__all__ = ["BOUND", "FAULTS", "Fault", "bound"]
+__all__ = ["BOUND", "FAULTS", "ROUND", "Fault", "bound"]
 
+STILL = "gateway stands still"
+_OFTEN = {STILL: 3}
+"""How often in a round, where not once."""
 Fault = Callable[[Rig, Random], None]
 BOUND = 5.0
 """Seconds after a fault in which all must be well."""
@@ -44,7 +47,7 @@ FAULTS: dict[str, Fault] = {
     "CAN flood": can.flood,
     "browser never reads": http.never_reads,
     "browsers half-open": http.half_requests,
-    "daemon suspended": daemon.suspend_daemon,
+    STILL: daemon.stand_still,
     "reload": daemon.reload,
     "broken reload": daemon.broken_reload,
     "audit unwritable": daemon.unwritable_audit,
@@ -53,3 +56,5 @@ FAULTS: dict[str, Fault] = {
     "operator takes a lock": operator.take_lock,
 }
 """Kind -> what does it."""
+ROUND = [kind for kind in sorted(FAULTS) for _ in range(_OFTEN.get(kind, 1))]
+"""What is brought before any kind comes again."""

@@ -3,25 +3,50 @@
 from __future__ import annotations
 
 import signal
+import threading
 import time
 from pathlib import Path
 from random import Random
 
 from gatewayd.auditfile import GREATEST_SIZE, KEPT
-from tests.e2e.processes import wait_for
-from tests.soak.cell import VARIANTS
+from tests.e2e.plc import STRANGER, Plc
+from tests.e2e.processes import HOST, wait_for
+from tests.soak.cell import MOMENT, STALE_AFTER, VARIANTS
 from tests.soak.faults.common import suspend
 from tests.soak.rig import PATIENCE, Rig
 
-__all__ = ["broken_reload", "full_audit", "reload", "suspend_daemon", "unwritable_audit"]
+__all__ = ["broken_reload", "full_audit", "reload", "stand_still", "unwritable_audit"]
 
+_STILL = (0.2, 1.0), (1.0, 9.5)
+"""Seconds; short and long gaps come equally often. A client of the rig waits 10 s for an answer."""
+_TOLERANCE = 0.3
+_ACCUSATIONS = "writer lost", "robot lost"
 _TROUBLE, _END = "cannot write the audit file", "the audit file can be written again"
 _UNWRITABLE = ("/dev/full", ".", "/nowhere/audit.jsonl")
 """A full disk, a directory, a directory that is gone."""
 
 
-def suspend_daemon(rig: Rig, _chance: Random) -> None:
-    suspend(rig.daemon, lambda: time.sleep(1))
+def stand_still(rig: Rig, chance: Random) -> None:
+    """Time is judged before what waited: nothing old is served as good, and nobody living is accused."""
+    accused = [len(rig.daemon.lines(words)) for words in _ACCUSATIONS]
+    reader = Plc(rig.modbus, STRANGER, host=HOST)
+    served: list[float] = []
+    asking = threading.Thread(target=lambda: served.extend(reader.doubles(MOMENT)), daemon=True)
+
+    def meanwhile() -> None:
+        asking.start()
+        time.sleep(chance.uniform(*chance.choice(_STILL)))
+
+    suspend(rig.daemon, meanwhile)
+    continued = rig.witness.timestamp(time.monotonic())
+    asking.join(PATIENCE)
+    reader.close()
+    assert served, "no answer to a read that waited"
+    old = continued - served[0]
+    assert served[0] == -1 or old < STALE_AFTER + _TOLERANCE, f"a value {old:.1f} s old was served as good"
+    wait_for(lambda: not rig.look.ills(), "all to be well", PATIENCE)
+    for words, before in zip(_ACCUSATIONS, accused, strict=True):
+        assert len(rig.daemon.lines(words)) == before, rig.daemon.lines(words)[-1]
 
 
 def reload(rig: Rig, chance: Random) -> None:

@@ -10,9 +10,10 @@ from random import Random
 
 from tests.e2e.plc import STRANGER
 from tests.e2e.processes import HOST, wait_for
-from tests.soak.cell import FIRST, SECOND
+from tests.soak.cell import FIELDS_OF, FIRST, SECOND
 from tests.soak.faults.common import kill_writer, suspend
 from tests.soak.rig import PATIENCE, Rig
+from tests.soak.truth import Period
 
 __all__ = ["burst", "garbage", "half_open_plc", "half_request", "kill_plc", "never_reads"]
 
@@ -27,9 +28,11 @@ def kill_plc(rig: Rig, chance: Random) -> None:
 def half_open_plc(rig: Rig, chance: Random) -> None:
     """It hangs; its connection stands. Its locks are free before it comes back."""
     name = chance.choice((FIRST, SECOND))
+    begin = time.monotonic()
     suspend(
         rig.clients[name], lambda: wait_for(lambda: not rig.look.locks_of(name), f"{name}'s locks", PATIENCE)
     )
+    rig.record.pauses.append(Period(begin, time.monotonic(), FIELDS_OF[name]))
 
 
 def garbage(rig: Rig, chance: Random) -> None:

@@ -6,12 +6,18 @@ import time
 from random import Random
 
 from tests.e2e.processes import wait_for
+from tests.soak.cell import FIELDS_OF, FIRST, MASTER_FIELDS
+from tests.soak.faults.common import unjudged
 from tests.soak.rig import PATIENCE, Rig
 
 __all__ = ["force", "take_lock"]
 
 _FORCED = ("first_in", "master_in", "second_echo", "heard_echo", "doubles[3]")
 _TAKEN = ("first_in", "second_in", "shared", "master_in", "heard_in")
+_FIELDS = {"first_in": FIELDS_OF[FIRST][:1], "master_in": MASTER_FIELDS[:1]}
+"""Of what is forced, what is an input of the robot."""
+_VALUE = 40_000
+"""No writer writes it of itself."""
 _LONGEST = 3600
 """Seconds of what the operator ends himself."""
 
@@ -22,14 +28,15 @@ def force(rig: Rig, chance: Random) -> None:
     path = f"/v1/variables/{name.replace('[', '%5B').replace(']', '%5D')}"
     seconds = chance.uniform(0.2, 1.5)
     by_time, robot_cut = chance.random() < 0.5, chance.random() < 0.3
-    rig.control.post(f"{path}/force", {"value": 40_000, "for": seconds if by_time else _LONGEST})
-    assert name in rig.look.forced(), f"{name} is not forced"
-    if robot_cut:
-        rig.simulator.do("drop-clients")
-    time.sleep(seconds)
-    if not by_time:
-        rig.control.post(f"{path}/unforce")
-    wait_for(lambda: not rig.look.forced(), f"the end of the force of {name}", PATIENCE)
+    with unjudged(rig, _FIELDS.get(name, ()), _VALUE):
+        rig.control.post(f"{path}/force", {"value": _VALUE, "for": seconds if by_time else _LONGEST})
+        assert name in rig.look.forced(), f"{name} is not forced"
+        if robot_cut:
+            rig.simulator.do("drop-clients")
+        time.sleep(seconds)
+        if not by_time:
+            rig.control.post(f"{path}/unforce")
+        wait_for(lambda: not rig.look.forced(), f"the end of the force of {name}", PATIENCE)
 
 
 def take_lock(rig: Rig, chance: Random) -> None:

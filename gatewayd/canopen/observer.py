@@ -1,0 +1,45 @@
+"""What a node counts, and whom it tells of what is not for the bus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from gatewayd.canopen.nmt import NmtState
+
+__all__ = ["NodeCounters", "Observer"]
+
+
+class Observer:
+    """Whom a node tells what is not for the bus; does nothing by itself."""
+
+    def cob_ids_changed(self) -> None:
+        """`Node.cob_ids` or `Node.remote_ids` is another one now."""
+
+    def nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
+        """The NMT state is another one now."""
+
+    def report(self, text: str) -> None:
+        """Something for the log."""
+
+    def time_told(self, moment: datetime, now: float) -> None:
+        """The network's wall clock (TIME)."""
+
+    def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
+        """An LSS master demands it: be silent for `delay` seconds, switch, be silent for as long again."""
+
+
+@dataclass(slots=True)
+class NodeCounters:
+    """Since the node was made."""
+
+    received: int = 0
+    """Frames that were handed to the node."""
+    ignored: int = 0
+    """Frames with a COB-ID that means nothing in the present NMT state."""
+    outside_window: int = 0
+    """Synchronous RPDOs that came after the synchronous window (1007h)."""
+    communication_errors: int = 0
+    """Losses of heartbeat, guarding or bus."""
+    overruns: int = 0
+    """Received frames that were lost."""

@@ -1,0 +1,121 @@
+"""What a client wants of a controller, and what was agreed with it. Records; the way there is in the negotiation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from gatewayd.rtde.catalogue import OUTPUTS, Series, likely_holders
+from gatewayd.rtde.claims import InputRecipe
+from gatewayd.rtde.messages import IN_USE, NOT_FOUND, ControllerVersion
+from gatewayd.rtde.recipe import Recipe, Scalar
+
+__all__ = ["TIMESTAMP", "TOO_LONG", "Session", "Unavailable", "Wishes", "input_hint", "output_hint"]
+
+TIMESTAMP = "timestamp"
+"""The output that is always subscribed, first: it shows skipped and late packages, and a restarted controller."""
+TOO_LONG = "TOO_LONG"
+"""Our word for an output that was left out because the controller does not take so long a list of names."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """What a client wants of a controller."""
+
+    outputs: tuple[str, ...] = ()
+    """Fields to subscribe; `timestamp` is put first by itself."""
+    inputs: tuple[str, ...] = ()
+    """Fields to claim."""
+    watchdog: str | None = None
+    """Input field that gets a recipe of its own; need not be in `inputs`."""
+    frequency: float = 0.0
+    """Output packages per second; 0: as many as the controller makes."""
+    read_back: bool = True
+    """Subscribe the wanted `input_*` fields too, after the outputs, to go on reading them."""
+    limited: bool = False
+    """Send no list of names of more than `OLD_LIST_LIMIT` bytes: the controller does not take it."""
+    running: bool = True
+    """Start the output; else stay paused."""
+
+    def wanted_inputs(self) -> tuple[str, ...]:
+        """Fields to claim, the watchdog included."""
+        return tuple(dict.fromkeys((*self.inputs, *((self.watchdog,) if self.watchdog else ()))))
+
+    def wanted_outputs(self) -> tuple[str, ...]:
+        """Fields to subscribe whatever becomes of the inputs."""
+        return tuple(dict.fromkeys((TIMESTAMP, *self.outputs)))
+
+    def read_backs(self) -> tuple[str, ...]:
+        """Inputs that the controller also offers as outputs and that are not subscribed anyway."""
+        return tuple(
+            name
+            for name in self.wanted_inputs()
+            if name.startswith("input_") and name in OUTPUTS and name not in self.outputs
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Unavailable:
+    """A field that the controller does not give."""
+
+    field: str
+    output: bool
+    """Wanted as output, or to read an input back; else as input."""
+    word: str
+    """The controller's word: NOT_FOUND, IN_USE, a type unknown to us; or REFUSED, TOO_LONG."""
+    hint: str
+    """What it means, who may be behind it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """What was agreed with the controller. A new object whenever the inputs change.
+
+    Every claimed field is in exactly one recipe of `inputs`. What it held when it was claimed is in `held`; else it is
+    in `unread`; else the working recipe reads it back, and the first package after the session was reported shows it.
+    """
+
+    controller: ControllerVersion
+    series: Series | None
+    """None for a major software version that we do not know."""
+    protocol: int
+    """RTDE protocol version spoken."""
+    period: float
+    """Seconds between packages, as the controller divides its own rate."""
+    outputs: Recipe
+    """Layout of the values, the same for the whole session; `timestamp` is first unless the controller lacks it."""
+    inputs: Mapping[str, InputRecipe]
+    """Claimed inputs by recipe key (`gatewayd.rtde.claims.recipe_key`; an unread register has its own name)."""
+    unavailable: tuple[Unavailable, ...]
+    held: Mapping[str, tuple[Scalar, ...]] = field(default_factory=dict)
+    """What inputs held that were read apart from the working recipe, right after they had been claimed, by field.
+
+    For an input that an earlier session object had already it is as old as the claim.
+    """
+    unread: frozenset[str] = frozenset()
+    """Claimed inputs of which the controller does not say what they hold.
+
+    A register among them has a recipe of its own, until `RtdeClient.join` was called for it.
+    """
+    round_trip: float = 0.0
+    """Greatest time from a request to its answer so far, in seconds."""
+
+
+def output_hint(word: str, *, read_back: bool) -> str:
+    """What the word for an output, or for the reading of an input, means."""
+    if word == NOT_FOUND:
+        return "this controller's software does not have the field"
+    if word != TOO_LONG:
+        return f"the controller names a type that is not known here: {word}"
+    if read_back:
+        return "not verified: the controller does not take a list of outputs that has it too"
+    return "left out because the controller does not take so long a list of outputs: map fewer of them"
+
+
+def input_hint(name: str, word: str) -> str:
+    """What the word for an input means."""
+    if word == IN_USE:
+        return f"probably claimed by {likely_holders(name)}"
+    if word == NOT_FOUND:
+        return "this controller's software does not have the input"
+    return f"the controller answered {word}"

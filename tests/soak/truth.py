@@ -1,0 +1,103 @@
+"""What the robot got in a soak run, and whether it should have: pure, so that it can be tested without running an hour.
+
+The robot's inputs may hold what a writer wrote lately, what the mapping declares for the time without an owner, and
+what the operator forced; and what was acknowledged was there.
+"""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from tests.e2e.witness import Change
+from tests.soak.journal import SENT, Entry
+
+__all__ = ["FALLBACK", "LATELY", "Period", "Record", "misheld", "unheard"]
+
+FALLBACK = 0
+"""What every input of the cell declares for `on_release`."""
+LATELY = 2.0
+"""Seconds from when a writer was about to write until the robot has it: the longest limit of a writer, which is how
+long a write may wait, and as much for a busy machine."""
+_REACHED = 1.0
+"""Seconds in which what was acknowledged is seen in the robot."""
+_CYCLES = 0.03
+"""Seconds in which a value may be overtaken by the next one without having been seen."""
+_AROUND = 0.2
+"""Seconds before an acknowledgement in which the connection to the robot must have stood."""
+
+
+@dataclass(frozen=True, slots=True)
+class Period:
+    """From when to when something could have been written that no journal has."""
+
+    begin: float
+    end: float
+    fields: Sequence[str]
+    value: float | None = None
+    """None: any value."""
+
+
+@dataclass(slots=True)
+class Record:
+    """What faults did to the robot's inputs, and to those who write them."""
+
+    periods: list[Period] = field(default_factory=list)
+    pauses: list[Period] = field(default_factory=list)
+    """In which a writer stood still: what it was about to write it wrote afterwards."""
+
+
+def misheld(name: str, changes: Sequence[Change], entries: Sequence[Entry], record: Record) -> Iterator[str]:
+    """What the robot's field held and should not have."""
+    sent: dict[float, list[float]] = {}
+    for entry in entries:
+        if entry.outcome == SENT:
+            sent.setdefault(entry.value, []).append(entry.time)
+    pauses = [one for one in record.pauses if name in one.fields]
+    for change in changes:
+        if change.value == FALLBACK or _granted(name, change, record):
+            continue
+        moments = sent.get(change.value, [])
+        place = bisect.bisect_right(moments, change.time)
+        if not place:
+            yield f"{name} held {change.value}, which nobody wrote"
+            continue
+        took = change.time - moments[place - 1]
+        excused = sum(
+            max(0.0, min(one.end, change.time) - max(one.begin, moments[place - 1])) for one in pauses
+        )
+        if took - change.blind - excused > LATELY:
+            yield f"{name} got {change.value} {took:.1f} s after it was written"
+
+
+def _granted(name: str, change: Change, record: Record) -> bool:
+    return any(
+        name in one.fields
+        and one.value in {None, change.value}
+        and one.begin <= change.time
+        and change.time - change.blind <= one.end
+        for one in record.periods
+    )
+
+
+def unheard(
+    name: str,
+    changes: Sequence[Change],
+    entries: Sequence[Entry],
+    watching: Callable[[float, float], bool],
+) -> Iterator[str]:
+    """What was acknowledged and never seen in the robot's field, though it was watched and nothing took its place."""
+    times = [change.time for change in changes]
+    begun = 0.0
+    for entry in entries:
+        if entry.outcome == SENT:
+            begun = entry.time
+        elif entry.outcome == 0 and watching(entry.time - _AROUND, entry.time + _REACHED):
+            first = bisect.bisect_left(times, begun)
+            held = changes[first - 1].value if first else None
+            last = bisect.bisect_right(times, entry.time + _REACHED)
+            seen = changes[first:last]
+            overtaken = any(change.time < entry.time + _CYCLES for change in seen)
+            if held != entry.value and not overtaken and all(one.value != entry.value for one in seen):
+                yield f"{name} never held {entry.value}, acknowledged at {entry.time:.3f}"
