@@ -1011,6 +1011,60 @@ def test_commands_of_the_master_are_carried_out_however_late() -> None:
     assert plant.state is NmtState.STOPPED
 
 
+@pytest.mark.parametrize("seconds, value, owner", [(0.3, 8, LINE), (5.0, 0, None)])
+def test_an_rpdo_that_waited_longer_than_its_writer_may_be_silent_is_dropped_and_its_locks_released(
+    seconds: float, value: int, owner: int | None
+) -> None:
+    plant = Plant(replace(PLAN, consumers=())).operational()
+    plant.part(7)
+    _stand_still(plant, seconds)
+    told = _emergencies(plant.part(8))
+    assert (plant.cell.image.values[PART], plant.cell.ownership.owners[0]) == (value, owner)
+    assert told == ([] if owner == LINE else [0xFF08])
+    plant.node.caught_up()
+    assert _emergencies(plant.part(9)) == ([] if owner == LINE else [0])
+    assert plant.cell.image.values[PART] == 9
+
+
+@pytest.mark.parametrize("sync_waits", [False, True])
+@pytest.mark.parametrize("before", [False, True])
+def test_a_synchronous_rpdo_that_waited_is_not_written_with_a_later_sync(
+    before: bool, sync_waits: bool
+) -> None:
+    """Whether it came before the gap or in it, and whether SYNC did."""
+    plant = Plant(replace(PLAN, consumers=())).operational()
+    speed = CanType.REAL32.pack(2.5)
+    if before:
+        plant.hear(0x305, speed)
+        _stand_still(plant, 5.0)
+    else:
+        _stand_still(plant, 5.0)
+        plant.hear(0x305, speed)
+    if sync_waits:
+        told = plant.hear(0x80)
+        plant.node.caught_up()
+    else:
+        plant.node.caught_up()
+        told = plant.hear(0x80)
+    assert plant.cell.image.values[SPEED] == 0.0
+    assert _emergencies(told) == [0xFF08]
+    plant.hear(0x305, speed)
+    plant.hear(0x80)
+    assert plant.cell.image.values[SPEED] == 2.5
+
+
+def test_writes_and_lock_requests_by_sdo_that_waited_are_aborted_and_releases_are_not() -> None:
+    plant = Plant().power_on()
+    assert plant.write(0x2001, 1, 7) == 0
+    _stand_still(plant, 5.0)
+    assert plant.write(0x2001, 1, 8) == -0x0800_0022
+    assert _refused_for(plant) is Reason.WAITED
+    assert plant.write(0x5F00, 26, SPEED + 1, 2) == -0x0800_0022
+    assert plant.cell.image.values[PART] == 7
+    assert plant.write(0x5F00, 27, PART + 1, 2) == 0
+    assert plant.cell.ownership.owners == [None, None]
+
+
 def test_two_gaps_in_a_row_are_one_wait() -> None:
     plant = Plant().operational()
     _stand_still(plant, 0.3)

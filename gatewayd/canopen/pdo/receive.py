@@ -9,6 +9,8 @@ with the next SYNC, if its writer still lives. Both only in OPERATIONAL.
 | longer than the mapping | its first bytes are used | 8220h |
 | none for the event time, after a first one | | 8250h |
 | the cell refuses the write | dropped | FF01h-FF08h by reason |
+| it waited too long while the gateway stood still | dropped, and the locks that it would have renewed are released \
+| FF08h |
 
 Each fault is told once per PDO. It is cleared by the opposite: a frame of the right length, any usable frame, a write
 that succeeds; and when the PDO is no longer received (configured anew, OPERATIONAL left). While the writer's heartbeat
@@ -283,6 +285,8 @@ class ReceiveEngine:
             refusal = self._cell.write(requester, changes, now)
         if refusal is not None:
             self.refused += 1
+            if refusal.reason is Reason.WAITED:
+                self._cell.drop_waited(requester, pdo.configuration.layout.variables, now)
             self._raise(pdo, _FAULTS[refusal.reason], now)
         elif pdo.faults:
             self._clear(pdo, [fault for fault in pdo.faults if fault.is_refusal], now)
