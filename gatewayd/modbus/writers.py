@@ -44,12 +44,8 @@ def succeeded(writers: Writers, successors: Mapping[Cell, Cell]) -> Writers:
 
 
 def hold_anything(accesses: Accesses) -> bool:
-    """Whether any of the writers holds a lock."""
-    return any(
-        cell.ownership.held_by(requester.writer)
-        for cell, requester in writers_of(accesses)
-        if requester.writer is not None
-    )
+    """Whether any lock follows the connection."""
+    return any(cell.holds(requester.connection) for cell, requester in writers_of(accesses))
 
 
 def _name(cell: Cell, requester: Requester) -> str:
