@@ -112,6 +112,47 @@ def test_a_suspended_machine_ages_everything(monkeypatch: pytest.MonkeyPatch) ->
     assert clock.raw() - time.monotonic() - raw == pytest.approx(90.0, abs=0.1)
 
 
+_WAITING = """
+    import asyncio, sys
+    from gatewayd import clock
+
+    async def main():
+        loop = asyncio.get_running_loop()
+        loop.add_reader(0, lambda: print(sys.stdin.readline().strip()))
+        print("runs", flush=True)
+        loop.call_later(0.3, print, "timer")
+        loop.call_later(0.4, loop.stop)
+
+    loop = clock.new_event_loop()
+    loop.run_until_complete(main())
+    loop.run_forever()
+"""
+
+
+def test_what_waits_is_read_before_timers_that_are_due() -> None:
+    """A stopped process gets EINTR from epoll_wait, with which Python would run the timers first."""
+    child = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(_WAITING)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    assert child.stdout is not None
+    assert child.stdin is not None
+    assert child.stdout.readline() == "runs\n"
+    child.send_signal(signal.SIGSTOP)
+    os.waitid(os.P_PID, child.pid, os.WSTOPPED)
+    child.stdin.write("waited\n")
+    child.stdin.flush()
+    stopped = time.monotonic()
+    while time.monotonic() - stopped < 0.5:
+        time.sleep(0.05)
+    child.send_signal(signal.SIGCONT)
+    said, _ = child.communicate()
+    assert said.split() == ["waited", "timer"]
+
+
 _CHILD = """
     import asyncio, sys
     from gatewayd import clock
