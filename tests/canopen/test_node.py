@@ -22,7 +22,7 @@ from gatewayd.canopen.storage import MemoryStore, Saved, Store
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, Value, ValueKind, Variable, Writer
 from gatewayd.core.refusal import Reason
-from gatewayd.core.requester import Requester
+from gatewayd.core.requester import Requester, new_connection
 from gatewayd.core.succession import succeed
 from gatewayd.mapping.loader import load
 from tests.canopen.wire import Wire
@@ -890,19 +890,32 @@ def test_a_master_that_restarts_before_its_first_heartbeat_is_lost_as_a_writer()
 
 
 def test_the_modbus_side_of_a_writer_is_not_bound_by_its_heartbeat() -> None:
-    """Its lock stays with the connection that is left, and moves for nothing that comes by CANopen."""
+    """What it took by Modbus stays with that connection, and moves for nothing that comes by CANopen."""
     plant = _promised()
-    plant.cell.writer_connected(Requester(LINE), plant.now, "Modbus")
-    plant.part(7)
+    modbus = Requester(LINE, connection=new_connection())
+    plant.cell.writer_connected(modbus, plant.now, "Modbus")
+    plant.part(6)
+    assert plant.cell.write(modbus, [Change(PART, 7)], plant.now) is None
     plant.run(0.6)
     assert (_line_alive(plant), plant.cell.writers.connections) == (True, [1, 0])
     assert plant.cell.ownership.owners == [LINE, None]
     assert _emergencies(plant.part(8)) == [0xFF06]
     assert plant.write(0x5F00, 27, PART + 1, 2) == -0x0800_0022
     assert plant.cell.image.values[PART] == 7
-    assert plant.cell.write(Requester(LINE), [Change(PART, 9)], plant.now) is None
-    plant.cell.writer_disconnected(Requester(LINE), plant.now, "hung up")
+    assert plant.cell.write(modbus, [Change(PART, 9)], plant.now) is None
+    plant.cell.writer_disconnected(modbus, plant.now, "hung up")
     assert plant.cell.ownership.owners == [None, None]
+
+
+def test_what_a_writer_took_by_canopen_ends_with_its_heartbeat() -> None:
+    """A connection by Modbus keeps the writer alive, but is not the one that works with the lock."""
+    plant = _promised()
+    plant.cell.writer_connected(Requester(LINE, connection=new_connection()), plant.now, "Modbus")
+    plant.part(7)
+    plant.run(0.6)
+    assert _line_alive(plant)
+    assert plant.cell.ownership.owners == [None, None]
+    assert plant.cell.image.values[PART] == 0
 
 
 @pytest.mark.parametrize("lost", [False, True])

@@ -82,6 +82,8 @@ class Requests(RuleBasedStateMachine):
         accepted = {}
         for index, value in written.items():
             may = writer in OWNERS[index] and self.owners.get(index, writer) == writer
+            if index in implied and self.owners.get(index) != writer and len(OWNERS[index]) > 1:
+                may = False  # nobody takes by a whole word what another one may own too
             if not may and index in implied and value == self.values[index]:
                 continue
             if not may or (index in NUMBERS and value > 999):
