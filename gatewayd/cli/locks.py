@@ -76,7 +76,10 @@ Examples:
 def take(
     context: click.Context, name: str, seconds: float | None, socket: Path | None, cell: str | None
 ) -> None:
-    """Take lock NAME (of a variable or group) from whoever holds it, until it is released. Values stay as they are."""
+    """Take lock NAME (of a variable or group) from whoever holds it, until it is released.
+
+    What a writer held falls back to its on_release; what nobody held stays as it is.
+    """
     where = socket or context.obj["socket"], cell or context.obj["cell"]
     lock = readable(_post(where, name, "take", {} if seconds is None else {"for": seconds}))
     until = "until you release it" if seconds is None else f"for {seconds:g} s"
