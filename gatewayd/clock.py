@@ -5,9 +5,13 @@
 - `raw`: CLOCK_MONOTONIC_RAW, for comparisons with another machine's clock: no time service adjusts its speed. It
   goes on in suspension too, as the other machine's does; packages from before would not look late otherwise.
 
+- `judged_now`: the same as `now`, at the beginning of a callback: whether the process stood still is judged first.
+
 asyncio serves sockets before timers. After the process stood still (stopped, suspended, starved of the CPU) what
 waited in the sockets would therefore be served before anything notices that time has passed. The selector is what
-runs first in every turn, so it is here that a gap is noticed, and its listeners hear of it before any socket or timer.
+runs first in every turn, so it is here that most gaps are noticed, and their listeners hear of it before any socket or
+timer. A process that was stopped in the middle of a turn still has callbacks of that turn before it: those that serve
+sockets, or judge somebody for silence, begin with `judged_now`.
 
 A machine whose clocks all stand still with it (some virtual machines when paused) shows no gap.
 """
@@ -20,7 +24,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["GAP", "ClockedLoop", "Gap", "new_event_loop", "now", "on_gap", "raw"]
+__all__ = ["GAP", "ClockedLoop", "Gap", "judged_now", "new_event_loop", "now", "on_gap", "raw"]
 
 GAP = 0.05
 """Seconds beyond what the loop wanted to sleep after which the process counts as having stood still."""
@@ -79,25 +83,57 @@ class Gap:
 GapListener = Callable[[Gap], None]
 
 
+class _Watch:
+    """When the loop was last seen at work, and who is told when it was not. Only the loop's thread may look."""
+
+    __slots__ = ("listeners", "seen")
+
+    def __init__(self) -> None:
+        self.listeners: list[GapListener] = []
+        self.seen = now()
+
+    def look(self) -> float:
+        """The time; if too much has passed since the last look, with the loop awake, the listeners are called first."""
+        since, self.seen = self.seen, now()
+        if self.seen - since > GAP:
+            self.stood_still(since)
+        return self.seen
+
+    def stood_still(self, since: float) -> None:
+        gap = Gap(since, self.seen)
+        for listener in self.listeners:
+            listener(gap)
+        self.seen = now()  # what the listeners did took its time too
+
+
+_watch: _Watch | None = None
+"""That of the process's loop; None where the loop is another one."""
+
+
+def judged_now() -> float:
+    """`now`, for callbacks that serve what may have waited; listeners of a gap are called before it returns.
+
+    To be called first in a callback, before anything is changed: the listeners change cells and links.
+    """
+    return now() if _watch is None else _watch.look()
+
+
 class _Selector(selectors.DefaultSelector):
     """Looks at the time when a turn of the loop begins, before what the turn will serve is known."""
 
-    def __init__(self) -> None:
+    def __init__(self, watch: _Watch) -> None:
         super().__init__()
-        self.gap_listeners: list[GapListener] = []
-        self._turn_began = now()
+        self._watch = watch
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         """See selectors.BaseSelector; the listeners of a gap are called first."""
-        asleep_at = now()
+        watch = self._watch
+        asleep_at = watch.look()
         found: list[tuple[selectors.SelectorKey, int]] = super().select(timeout)
         _suspension.look()
-        began, self._turn_began = self._turn_began, now()
-        overslept = self._turn_began - asleep_at - (timeout or 0.0) if timeout is not None else 0.0
-        if asleep_at - began > GAP or overslept > GAP:
-            gap = Gap(began, self._turn_began)
-            for listener in self.gap_listeners:
-                listener(gap)
+        watch.seen = now()
+        if timeout is not None and watch.seen - asleep_at - timeout > GAP:
+            watch.stood_still(asleep_at)
             # A process that was stopped in epoll_wait gets EINTR from it when it goes on, and Python, whose time-out
             # has passed meanwhile, returns nothing although something waits. Timers would come first then, and take
             # those for silent whose bytes are there.
@@ -106,16 +142,26 @@ class _Selector(selectors.DefaultSelector):
 
 
 class ClockedLoop(asyncio.SelectorEventLoop):
-    """An event loop on `now`, whose `gap_listeners` are called first in the turn after a gap. They must not raise."""
+    """An event loop on `now`, whose `gap_listeners` are called before anything else after a gap. They must not raise.
+
+    There is one in a process.
+    """
 
     def __init__(self) -> None:
-        selector = _Selector()
-        self.gap_listeners = selector.gap_listeners
-        super().__init__(selector)
+        global _watch  # noqa: PLW0603 - the clock of the process, as its loop is
+        watch = _watch = _Watch()
+        self.gap_listeners = watch.listeners
+        super().__init__(_Selector(watch))
 
     def time(self) -> float:
         """See asyncio; `now`, so that deadlines pass while the machine is suspended."""
         return now()
+
+    def close(self) -> None:
+        """See asyncio; nobody judges the time any more."""
+        global _watch  # noqa: PLW0603 - as above
+        _watch = None
+        super().close()
 
 
 def new_event_loop() -> ClockedLoop:

@@ -217,7 +217,7 @@ class Daemon:
         while True:
             adoption = station.cell.adoption
             adoption.reachable = adoption.reachable or self._is_reachable(station)
-            station.cell.tick(clock.now())
+            station.cell.tick(clock.judged_now())
             await asyncio.sleep(TICK)
 
     def _is_reachable(self, station: Station) -> bool:

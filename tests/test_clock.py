@@ -68,6 +68,28 @@ def test_a_gap_is_judged_before_the_socket_that_waited() -> None:
     assert order == ["gap", "waited"]
 
 
+def test_a_gap_in_the_middle_of_a_turn_is_judged_by_the_next_callback_of_it() -> None:
+    order: list[str] = []
+
+    async def main() -> None:
+        loop = asyncio.get_running_loop()
+        ended = asyncio.Event()
+        clock.on_gap(lambda _gap: order.append("gap"))
+
+        def serve() -> None:
+            clock.judged_now()
+            order.append("served")
+            ended.set()
+
+        loop.call_soon(time.sleep, 2 * clock.GAP)
+        loop.call_soon(serve)
+        await ended.wait()
+
+    _run(main())
+    assert order == ["gap", "served"]
+    assert clock.judged_now() == pytest.approx(clock.now(), abs=0.1), "without a loop it judges nothing"
+
+
 def test_sleep_that_was_asked_for_is_no_gap() -> None:
     gaps: list[clock.Gap] = []
 

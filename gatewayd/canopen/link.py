@@ -302,7 +302,7 @@ class CanLink(Observer):
         self._timer = asyncio.get_running_loop().call_at(due, self._tick)
 
     def _tick(self) -> None:
-        now = clock.now()
+        now = clock.judged_now()
         self._timer, self._due = None, math.inf
         self.node.tick(now)
         self._schedule(now)

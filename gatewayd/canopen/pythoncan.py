@@ -145,6 +145,7 @@ class PythonCanBus(SupervisedBus):
 
     def _readable(self) -> None:
         """The descriptor has something."""
+        clock.judged_now()
         if self._bus is not None and not self._read(self._bus) and self._reading is None:
             # What the interface has read already, no descriptor announces.
             assert self._loop is not None
@@ -157,6 +158,7 @@ class PythonCanBus(SupervisedBus):
     def _look_for_frames(self) -> None:
         """There is no descriptor: ask, the more often the more comes."""
         assert self._loop is not None
+        clock.judged_now()
         before = self.counters.received
         if self._bus is None:
             return

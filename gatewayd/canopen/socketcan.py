@@ -167,7 +167,7 @@ class SocketCanBus(SupervisedBus):
         self._read(clock.now(), CATCH_UP_FRAMES)
 
     def _readable(self) -> None:
-        self._read(clock.now(), DRAIN)
+        self._read(clock.judged_now(), DRAIN)
 
     def _read(self, now: float, most: int) -> None:
         """Hand over at most so many frames that wait."""

@@ -48,7 +48,7 @@ class ReadPoller:
 
     def _turn(self) -> None:
         readers = self._readers
-        now = clock.now()
+        now = clock.judged_now()
         end = now + _LONGEST_TURN
         # A client that waits for nothing has its next request under way by now: a look is cheaper than a sleep.
         while now < end and (events := self._epoll.poll(0, _MOST_EVENTS)):
@@ -56,4 +56,4 @@ class ReadPoller:
                 reader = readers.get(descriptor)
                 if reader is not None:
                     reader(now)
-            now = clock.now()
+            now = clock.judged_now()

@@ -165,6 +165,7 @@ class RobotLink:
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`. The packages that waited tell their own time."""
+        self._client.gap()
 
     def flush(self, now: float) -> None:
         """Send what is still due at once."""
@@ -245,6 +246,7 @@ class RobotLink:
 
     def values(self, flat: Sequence[Value], now: float) -> None:
         """A package."""
+        clock.judged_now()
         cell = self._cell
         self._measure()
         if cell.freshness.state is not Source.FRESH:

@@ -126,6 +126,11 @@ class RtdeClient:
         """
         return self._connection is not None and self._connection.probe()
 
+    def gap(self) -> None:
+        """The process stood still until now: for that time nobody is taken for silent."""
+        if self._connection is not None:
+            self._connection.gap()
+
     def reconnect(self, text: str) -> None:
         """End the connection once, for the reason that `text` gives, and set up a new one."""
         if self._connection is not None:

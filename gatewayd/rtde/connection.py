@@ -383,6 +383,10 @@ class Connection(asyncio.Protocol):
         what = self._negotiation.awaited
         self._fail(LossReason.UNANSWERED, f"{what} did not come within {self._tolerances.handshake:g} s")
 
+    def gap(self) -> None:
+        """The process stood still until now: what the controller sent meanwhile is still to be read."""
+        self._heard = self._loop.time()
+
     def _watch(self) -> None:
         self._statistics.turns += 1
         now = self._loop.time()

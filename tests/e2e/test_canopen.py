@@ -29,8 +29,10 @@ writers:
 FULL = (
     HEAD
     + """\
+groups:
+  bits: {{lease: none}}  # one group: else whole registers would take no bit that the master may own too
 variables:
-  bits_in:     {{robot: input_bit_register_0..63,     modbus: 0.0,    canopen: auto, lease: none}}
+  bits_in:     {{robot: input_bit_register_0..63,     modbus: 0.0,    canopen: auto, group: bits}}
   ints_in:     {{robot: input_int_register_0..23,     modbus: 100,    canopen: auto, lease: none}}
   reals_in:    {{robot: input_double_register_0..23,  modbus: 200,    canopen: auto, lease: none}}
   bits_out:    {{robot: output_bit_register_0..63,    modbus: 1000.0, canopen: auto}}

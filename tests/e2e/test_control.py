@@ -93,12 +93,13 @@ def test_a_forced_output_is_seen_by_the_plc_through_every_package_and_then_no_mo
     assert plc.read(QUALITY + ECHO, 2) == [0, 0]
 
 
-def test_a_taken_lock_survives_the_plc_and_is_given_back(cell: Cell) -> None:
+def test_a_taken_lock_starts_from_its_fallback_and_is_given_back(cell: Cell) -> None:
+    """Nobody inherits the command of a PLC that the lock was taken from."""
     simulator, _daemon, plc, socket = cell
     assert plc.write_integers(0, 11) == 0
     assert gatewayd(socket, "locks", "take", "number").returncode == 0
     assert plc.write_integers(0, 12) == BUSY
-    assert simulator.integer("input_int_register_0") == 11
+    wait_for(lambda: simulator.integer("input_int_register_0") == 5, "the fallback in the robot")
     assert gatewayd(socket, "locks", "release", "number").returncode == 0
     assert plc.write_integers(0, 13) == 0
 

@@ -81,7 +81,7 @@ def write_all(plc: Plc, simulator: Simulator) -> None:
 def test_reloads_at_full_speed_are_noticed_by_nobody(plant: Plant) -> None:
     """Two readers and a writer without a pause, the robot at 500 Hz, and one reload after another beneath them."""
     cell = f"""\
-writers: {{plc: {{modbus: {PLC}}}, hmi: {{modbus: {HMI}}}}}
+writers: {{plc: {{modbus: {PLC}, grace: 1min}}, hmi: {{modbus: {HMI}}}}}
 variables:
   ints:    {{robot: input_int_register_0..{INTEGERS - 1}, modbus: 0, owner: plc}}
   doubles: {{robot: input_double_register_0..{DOUBLES - 1}, modbus: {2 * INTEGERS}, owner: plc}}

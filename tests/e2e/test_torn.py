@@ -19,7 +19,7 @@ INPUTS, OUTPUTS = 0, 500
 DOUBLE_INPUTS = INPUTS + 2 * INTEGERS
 
 CELL = f"""\
-writers: {{plc: {{modbus: {PLC}}}}}
+writers: {{plc: {{modbus: {PLC}, grace: 1min}}}}
 variables:
   ints:    {{robot: input_int_register_0..{INTEGERS - 1},     modbus: {INPUTS}}}
   doubles: {{robot: input_double_register_0..{DOUBLES - 1},   modbus: {DOUBLE_INPUTS}}}
