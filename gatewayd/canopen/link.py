@@ -255,7 +255,7 @@ class CanLink(Observer):
         self._other_bit_rate = actual
 
     def _offer(self, frame: Frame) -> bool:
-        """Hand a frame to the bus. One that the process was stopped with is old: it waits, and is made anew by `gap`."""
+        """Hand a frame to the bus. One that the process was stopped with is old: it waits, and `gap` makes it anew."""
         bus = self._bus
         return bus is not None and not clock.has_stood_still() and bus.send(frame)
 
