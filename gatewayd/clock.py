@@ -24,17 +24,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = [
-    "GAP",
-    "ClockedLoop",
-    "Gap",
-    "has_stood_still",
-    "judged_now",
-    "new_event_loop",
-    "now",
-    "on_gap",
-    "raw",
-]
+__all__ = ["GAP", "ClockedLoop", "Gap", "judged_now", "new_event_loop", "now", "on_gap", "raw"]
 
 GAP = 0.05
 """Seconds beyond what the loop wanted to sleep after which the process counts as having stood still."""
@@ -126,14 +116,6 @@ def judged_now() -> float:
     To be called first in a callback, before anything is changed: the listeners change cells and links.
     """
     return now() if _watch is None else _watch.look()
-
-
-def has_stood_still() -> bool:
-    """Whether the process has just stood still, in the middle of a callback, and nobody has heard of it yet.
-
-    To be asked before something is sent that is true only now. False on another kind of loop.
-    """
-    return _watch is not None and now() - _watch.seen > GAP
 
 
 class _Selector(selectors.DefaultSelector):

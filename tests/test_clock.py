@@ -77,9 +77,7 @@ def test_a_gap_in_the_middle_of_a_turn_is_judged_by_the_next_callback_of_it() ->
         clock.on_gap(lambda _gap: order.append("gap"))
 
         def serve() -> None:
-            assert clock.has_stood_still()
             clock.judged_now()
-            assert not clock.has_stood_still()
             order.append("served")
             ended.set()
 

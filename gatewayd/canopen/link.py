@@ -255,24 +255,19 @@ class CanLink(Observer):
         self._other_bit_rate = actual
 
     def _offer(self, frame: Frame) -> bool:
-        """Hand a frame to the bus. One that the process was stopped with is old: it waits, and `gap` makes it anew."""
-        bus = self._bus
-        return bus is not None and not clock.has_stood_still() and bus.send(frame)
+        return self._bus is not None and self._bus.send(frame)
 
     def _catch_up(self) -> None:
         if self._bus is not None:
             self._bus.catch_up()
         self.node.caught_up()
-        self._transmitter.flush()
         if self._runs:
             self._schedule(clock.now())
 
     def _offer_at_once(self, frame: Frame) -> bool:
         """A frame that may not be late: not where older ones still wait in the kernel."""
         bus = self._bus
-        if bus is None or clock.has_stood_still():
-            return False
-        return not bus.lags(self.node.bit_rate) and bus.send(frame)
+        return bus is not None and not bus.lags(self.node.bit_rate) and bus.send(frame)
 
     def _renew(self, can_id: int) -> Frame | None:
         return self.node.renew(can_id, clock.now())
