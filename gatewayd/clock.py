@@ -6,6 +6,7 @@
   goes on in suspension too, as the other machine's does; packages from before would not look late otherwise.
 
 - `judged_now`: the same as `now`, at the beginning of a callback: whether the process stood still is judged first.
+- `overdue`: whether it stood still since, so that what the callback is about to hand out is old.
 
 asyncio serves sockets before timers. After the process stood still (stopped, suspended, starved of the CPU) what
 waited in the sockets would therefore be served before anything notices that time has passed. The selector is what
@@ -24,7 +25,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["GAP", "ClockedLoop", "Gap", "judged_now", "new_event_loop", "now", "on_gap", "raw"]
+__all__ = ["GAP", "ClockedLoop", "Gap", "judged_now", "new_event_loop", "now", "on_gap", "overdue", "raw"]
 
 GAP = 0.05
 """Seconds beyond what the loop wanted to sleep after which the process counts as having stood still."""
@@ -116,6 +117,14 @@ def judged_now() -> float:
     To be called first in a callback, before anything is changed: the listeners change cells and links.
     """
     return now() if _watch is None else _watch.look()
+
+
+def overdue() -> bool:
+    """Whether the process stands still since the time was judged last, as far as its loop can know.
+
+    For the end of a callback, where nothing can be judged any more: what it hands out was made before the gap.
+    """
+    return _watch is not None and now() - _watch.seen > GAP
 
 
 class _Selector(selectors.DefaultSelector):

@@ -90,6 +90,21 @@ def test_a_gap_in_the_middle_of_a_turn_is_judged_by_the_next_callback_of_it() ->
     assert clock.judged_now() == pytest.approx(clock.now(), abs=0.1), "without a loop it judges nothing"
 
 
+def test_a_callback_can_see_that_what_it_hands_out_was_made_before_a_gap() -> None:
+    found: list[bool] = []
+
+    async def main() -> None:
+        found.append(clock.overdue())
+        time.sleep(2 * clock.GAP)  # noqa: ASYNC251 - the process stands still
+        found.append(clock.overdue())
+        clock.judged_now()
+        found.append(clock.overdue())
+
+    _run(main())
+    assert found == [False, True, False]
+    assert not clock.overdue(), "without a loop it judges nothing"
+
+
 def test_sleep_that_was_asked_for_is_no_gap() -> None:
     gaps: list[clock.Gap] = []
 

@@ -50,7 +50,13 @@ class CanLink(Observer):
         self._plan = plan
         self._cell = cell
         self._bus: Bus | None = None
-        self._transmitter = Transmitter(self._offer, self._renew, now=clock.now, punctual=self._offer_at_once)
+        self._transmitter = Transmitter(
+            self._offer,
+            self._renew,
+            now=clock.now,
+            punctual=self._offer_at_once,
+            overdue=clock.overdue,
+        )
         self._timer: asyncio.TimerHandle | None = None
         self._due = math.inf
         self._runs = False
@@ -261,6 +267,7 @@ class CanLink(Observer):
         if self._bus is not None:
             self._bus.catch_up()
         self.node.caught_up()
+        self._transmitter.flush()
         if self._runs:
             self._schedule(clock.now())
 

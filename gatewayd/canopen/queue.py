@@ -154,6 +154,8 @@ class Transmitter:
     `offer` is the bus's `send`: False if it takes nothing now; `punctual` the same for a frame that may not be late.
     `send` is a `gatewayd.canopen.frame.Send`.
     Closed, it drops what it is given: what was meant for a bus that was away must not be sent when it is back.
+    While `overdue` says that the process stood still since the frames were made, cyclic ones wait to be made anew
+    (`renew`, then `flush`).
     """
 
     def __init__(
@@ -163,6 +165,7 @@ class Transmitter:
         *,
         now: Callable[[], float],
         punctual: Callable[[Frame], bool] | None = None,
+        overdue: Callable[[], bool] = lambda: False,
         queue: TransmitQueue | None = None,
     ) -> None:
         self.queue = TransmitQueue() if queue is None else queue
@@ -170,6 +173,7 @@ class Transmitter:
         """Frames that were dropped because the bus was away, or because they may not wait."""
         self._offer = offer
         self._punctual = offer if punctual is None else punctual
+        self._overdue = overdue
         self._renew = renew
         self._now = now
         self._moved = 0.0
@@ -188,10 +192,11 @@ class Transmitter:
     def send(self, frame: Frame, priority: Priority) -> bool:
         """Hand a frame on; never waits, never fails. False if it was dropped."""
         if priority is Priority.AT_ONCE:
-            taken = self._open and self._punctual(frame)
+            taken = self._open and not self._overdue() and self._punctual(frame)
             self.discarded += not taken
             return taken
-        if self._open and not self.queue and self._offer(frame):
+        old = priority is Priority.NEWEST and self._overdue()
+        if self._open and not self.queue and not old and self._offer(frame):
             return True
         # Asked again: a bus that fails at the frame it is offered closes us, and will never tell of room for that one.
         if not self._open:

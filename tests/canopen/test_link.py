@@ -270,6 +270,33 @@ async def test_what_waited_through_a_gap_is_read_before_anything_else_and_only_t
     assert waited[-1] == 0.0
 
 
+def test_a_pdo_that_a_gap_kept_from_being_sent_tells_what_is_so_after_it(station: Station) -> None:
+    """Stopped between a package of the robot and the PDO that it leads to."""
+
+    async def main() -> None:
+        cell, number = station.cell, station.names["ints_out[0]"]
+
+        def stood_still(gap: clock.Gap) -> None:
+            cell.image.values[number] = 3  # as the core does with what has become stale
+            cell.outputs_written(gap.until)
+            station.link.gap(gap.since, gap.until)
+
+        async with running(station):
+            await until(lambda: station.frames(HEARTBEAT))
+            station.send(0x000, b"\1\5")
+            await until(lambda: len(station.frames(0x285)) > 0)
+            clock.on_gap(stood_still)
+            clock.judged_now()
+            cell.image.values[number] = 2
+            time.sleep(2 * clock.GAP)  # noqa: ASYNC251 - the process stands still
+            cell.outputs_written(clock.now())
+            await until(lambda: b"\x03" + bytes(7) in station.frames(0x285))
+        assert b"\x02" + bytes(7) not in station.frames(0x285)
+
+    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+        runner.run(main())
+
+
 async def test_a_link_that_does_not_run_has_nothing_that_waits(station: Station) -> None:
     station.link.gap(0.0, 4.0)
     assert station.link.node._peers.waited == 0.0

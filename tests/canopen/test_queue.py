@@ -178,7 +178,10 @@ class Wire:
         self.frames: list[Frame] = []
         self.present: dict[int, Frame] = {}
         """What would be sent now."""
-        self.transmitter = Transmitter(self.offer, self.present.get, now=lambda: self.now)
+        self.overdue = False
+        self.transmitter = Transmitter(
+            self.offer, self.present.get, now=lambda: self.now, overdue=lambda: self.overdue
+        )
         self.transmitter.open()
 
     def offer(self, frame: Frame) -> bool:
@@ -282,6 +285,18 @@ def test_what_waits_is_made_anew_when_the_process_stood_still(wire: Wire) -> Non
     wire.send(Frame(0x581, b"answer"), Priority.ORDERED)
     wire.transmitter.renew()
     assert wire.recover() == [Frame(0x581, b"answer")]
+
+
+def test_what_was_made_before_the_process_stood_still_is_made_anew_too(wire: Wire) -> None:
+    """It stood still between the value of a PDO and the PDO."""
+    wire.room, wire.overdue = 999, True
+    assert wire.send(Frame(0x181, b"old"), Priority.NEWEST)
+    assert not wire.send(Frame(0x80), Priority.AT_ONCE)
+    assert wire.send(EMERGENCY, Priority.EVENT)
+    wire.overdue = False
+    wire.present[0x181] = Frame(0x181, b"now")
+    wire.transmitter.renew()
+    assert wire.recover() == [EMERGENCY, Frame(0x181, b"now")]
 
 
 def test_a_frame_that_the_bus_failed_at_does_not_stop_those_after_it() -> None:
