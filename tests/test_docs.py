@@ -49,6 +49,17 @@ def test_commands_exist(page: Path) -> None:
     assert set(made) <= targets
 
 
+def test_every_promise_is_held_by_tests_that_exist() -> None:
+    """Each row of the tables names its tests; a test that moves takes its row along."""
+    page = (ROOT / "docs/explanation/promises.md").read_text()
+    rows = [line for line in page.splitlines() if line.startswith("| ") and not line.startswith("| promise")]
+    assert len(rows) > 20
+    for row in rows:
+        held_by = re.findall(r"`(tests/[\w/]+\.py)`", row.rsplit(" | ", 1)[1])
+        assert held_by, row
+        assert [name for name in held_by if not (ROOT / name).exists()] == []
+
+
 def test_readme_has_exactly_two_commands() -> None:
     """One runs the main job, one passes the tests; nothing else is needed."""
     (block,) = FENCE.findall((ROOT / "README.md").read_text().split("## Two commands")[1].split("\n## ")[0])
