@@ -61,6 +61,12 @@ class NodeGuarding:
         self._asked = -math.inf
         self._is_lost = False
 
+    def resume(self, former: NodeGuarding) -> None:
+        """Go on as another one: a master that was asking is watched, one that was missed is missed still."""
+        self._toggle, self._asked = former._toggle, former._asked
+        self._is_lost, self._spared = former._is_lost, former._spared
+        self._supervise()
+
     def receive(self, frame: Frame, now: float, *, late: bool = False) -> None:
         """A frame with this node's error control COB-ID; only remote frames mean anything.
 

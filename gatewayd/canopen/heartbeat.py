@@ -62,6 +62,10 @@ class HeartbeatProducer:
         """The boot-up was sent, which counts as the first heartbeat."""
         self._due = now + self._period.number / 1000 if self.enabled else math.inf
 
+    def resume(self, former: HeartbeatProducer) -> None:
+        """Go on as another one: the next heartbeat comes when its next would have."""
+        self._due = former._due
+
     def tick(self, now: float) -> None:
         """Send what is due. Heartbeats that were missed are not made up for."""
         if now < self._due:

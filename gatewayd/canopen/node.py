@@ -235,8 +235,8 @@ class Node:
     def resume(self, former: Node, now: float) -> None:
         """Instead of `start`: take the place of a node of the same plan, over the cell that succeeded its own.
 
-        For the bus nothing happens: no boot-up, the same NMT state, parameters, errors and watched nodes. TPDOs are
-        sent anew, a synchronous RPDO that waited is dropped, and the deadlines of RPDOs run from their next frame.
+        For the bus nothing happens: no boot-up, the same NMT state, parameters, errors, watched nodes and deadlines.
+        TPDOs are sent anew.
         """
         self._now = now
         self._started = True
@@ -252,12 +252,15 @@ class Node:
         self.consumer.restart(now)
         self.consumer.resume(former.consumer)
         self.promises.resume(former.promises)
-        self.guarding.restart(now)
-        self.sync.restart(now)
+        self.guarding.resume(former.guarding)
         self.emergency.resume(former.emergency)
         self._peers.resume(former._peers)
         self._route()
         self.nmt.resume(former.nmt.state, now)
+        # Entering the state has begun these anew.
+        self.sync.resume(former.sync)
+        self.producer.resume(former.producer)
+        self.receive_pdos.resume(former.receive_pdos)
 
     def lose_writers(self, reason: str, now: float) -> None:
         """Nobody on this bus is a writer any more."""

@@ -106,6 +106,10 @@ class Sync:
         self._last = -math.inf
         self._due = now + self._period.number / 1e6 if self.produces else math.inf
 
+    def resume(self, former: Sync) -> None:
+        """Go on as another one: in its cycle, with its counter."""
+        self._counter, self._last, self._due = former._counter, former._last, former._due
+
     def stopped(self) -> None:
         """The node has been stopped: the counter begins with 1 when it goes on."""
         self._counter = 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -918,15 +919,20 @@ def test_what_a_writer_took_by_canopen_ends_with_its_heartbeat() -> None:
     assert plant.cell.image.values[PART] == 0
 
 
+def _reload(plant: Plant) -> None:
+    """The cell goes on with another definition, and the node with it."""
+    former = plant.node
+    plant.cell = succeed(plant.cell, _CELL, plant.now).cell
+    plant.node = Node(former.plan, plant.cell, plant.wire.send, MemoryStore(), lambda _now: True)
+    plant.node.resume(former, plant.now)
+
+
 @pytest.mark.parametrize("lost", [False, True])
 def test_the_node_of_a_succeeding_cell_goes_on_with_what_is_owed_and_what_is_lost(lost: bool) -> None:
     plant = _promised()
     plant.part(7)
     plant.run(0.6 if lost else 0.3)
-    former = plant.node
-    plant.cell = succeed(plant.cell, _CELL, plant.now).cell
-    plant.node = Node(former.plan, plant.cell, plant.wire.send, MemoryStore(), lambda _now: True)
-    plant.node.resume(former, plant.now)
+    _reload(plant)
     plant.take()
     plant.part(8)
     assert plant.cell.image.values[PART] == (0 if lost else 8)
@@ -937,6 +943,73 @@ def test_the_node_of_a_succeeding_cell_goes_on_with_what_is_owed_and_what_is_los
     plant.heartbeat()
     plant.part(8)
     assert plant.cell.image.values[PART] == 8
+
+
+@pytest.mark.parametrize("missed", [False, True])
+def test_the_deadline_of_an_rpdo_goes_on_through_a_reload(missed: bool) -> None:
+    """Else the last command of a master that dies just before a reload would stay for ever."""
+    first, *others = PLAN.pdos
+    plan = replace(PLAN, pdos=(replace(first, event=300), *others), consumers=())
+    plant = Plant(plan).operational()
+    plant.part(7)
+    plant.run(0.4 if missed else 0.2)
+    _reload(plant)
+    assert _emergencies(plant.run(0.2)) == ([] if missed else [0x8250])
+    assert (_line_alive(plant), plant.cell.image.values[PART]) == (False, 0)
+    assert _emergencies(plant.part(8)) == [0]
+
+
+def test_what_was_wrong_with_an_rpdo_before_a_reload_is_over_with_a_good_one() -> None:
+    plant = Plant().operational()
+    assert _emergencies(plant.hear(0x205, b"\7")) == [0x8210]
+    _reload(plant)
+    assert _emergencies(plant.part(8)) == [0]
+
+
+def test_a_synchronous_rpdo_waits_through_a_reload() -> None:
+    first, *others = PLAN.pdos
+    plant = Plant(replace(PLAN, pdos=(replace(first, transmission=1), *others))).operational()
+    plant.part(7)
+    _reload(plant)
+    plant.hear(0x80)
+    assert plant.cell.image.values[PART] == 7
+
+
+@pytest.mark.parametrize("missed", [False, True])
+def test_a_guarding_master_is_watched_through_a_reload(missed: bool) -> None:
+    plant = Plant(replace(PLAN, heartbeat=0)).operational()
+    plant.node.dictionary.write(0x1029, 1, bytes([1]))
+    plant.write(0x100C, 0, 100, 2)
+    plant.write(0x100D, 0, 3, 1)
+    plant.node.receive(Frame(0x705, b"", remote=True), plant.now)
+    assert plant.take() == [Frame(0x705, b"\5")]
+    plant.run(0.4 if missed else 0.2)
+    _reload(plant)
+    assert _emergencies(plant.run(0.2)) == ([] if missed else [0x8130])
+    plant.node.receive(Frame(0x705, b"", remote=True), plant.now)
+    frames = plant.take()
+    assert Frame(0x705, b"\x85") in frames, "the toggle bit goes on"
+    assert _emergencies(frames) == [0]
+
+
+def test_heartbeat_and_sync_keep_their_time_through_a_reload() -> None:
+    sync = replace(PLAN.sync, producer=True, period=100_000, counter=10)
+    plan = replace(PLAN, sync=sync, heartbeat=150)
+    plant = Plant(plan).operational()
+    begin, moments = plant.now, []
+    for turn in range(200):
+        plant.now = begin + turn * 0.01
+        if turn % 7 == 0:
+            _reload(plant)
+            plant.take()
+        plant.node.tick(plant.now)
+        moments += [(frame, turn) for frame in plant.take() if frame.can_id in (0x80, 0x705)]
+    syncs = [frame.data[0] for frame, _turn in moments if frame.can_id == 0x80]
+    assert syncs == [number % 10 + 1 for number in range(len(syncs))]
+    for can_id, period in ((0x80, 0.1), (0x705, PLAN.heartbeat / 1000)):
+        turns = [turn for frame, turn in moments if frame.can_id == can_id]
+        assert len(turns) >= 2 / period - 2
+        assert max(after - before for before, after in pairwise(turns)) <= 100 * period + 1
 
 
 # -- a gap of our own ------------------------------------------------------------------------------------------------

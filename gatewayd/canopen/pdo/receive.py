@@ -185,6 +185,17 @@ class ReceiveEngine:
             self._clear(pdo, tuple(pdo.faults), now)
         self._deadline = math.inf
 
+    def resume(self, former: ReceiveEngine) -> None:
+        """Go on as another one with the same RPDOs: their deadlines run, what was wrong still is."""
+        for number, pdo in self._pdos.items():
+            before = former._pdos.get(number)
+            if before is not None:
+                pdo.faults = before.faults
+                pdo.received = before.received
+                pdo.latched, pdo.waited = before.latched, before.waited
+                pdo.due, pdo.spared = before.due, before.spared
+        self._deadline = None
+
     def receive(self, can_id: int, data: bytes, now: float) -> bool:
         """A data frame. Returns whether an RPDO has this identifier."""
         pdos = self._by_can_id.get(can_id)
