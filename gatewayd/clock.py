@@ -29,6 +29,8 @@ __all__ = ["GAP", "ClockedLoop", "Gap", "judged_now", "new_event_loop", "now", "
 
 GAP = 0.05
 """Seconds beyond what the loop wanted to sleep after which the process counts as having stood still."""
+_MOST_GAPS = 3
+"""Gaps in a row, each while the one before it was judged: more of them are listeners that take that long."""
 _NOTICEABLE = 0.01
 """Seconds between two readings of two clocks that are no suspension."""
 
@@ -101,10 +103,14 @@ class _Watch:
         return self.seen
 
     def stood_still(self, since: float) -> None:
-        gap = Gap(since, self.seen)
-        for listener in self.listeners:
-            listener(gap)
-        self.seen = now()  # what the listeners did took its time too
+        """Call the listeners; again if the process was stopped while they were called."""
+        for _ in range(_MOST_GAPS):
+            gap = Gap(since, self.seen)
+            for listener in self.listeners:
+                listener(gap)
+            since, self.seen = self.seen, now()
+            if self.seen - since <= GAP:
+                break
 
 
 _watch: _Watch | None = None

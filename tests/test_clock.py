@@ -90,6 +90,43 @@ def test_a_gap_in_the_middle_of_a_turn_is_judged_by_the_next_callback_of_it() ->
     assert clock.judged_now() == pytest.approx(clock.now(), abs=0.1), "without a loop it judges nothing"
 
 
+def test_a_gap_while_another_one_is_judged_is_judged_as_well() -> None:
+    gaps: list[clock.Gap] = []
+
+    async def main() -> None:
+        def stopped_again(gap: clock.Gap) -> None:
+            if not gaps:
+                time.sleep(3 * clock.GAP)
+            gaps.append(gap)
+
+        clock.on_gap(stopped_again)
+        time.sleep(2 * clock.GAP)  # noqa: ASYNC251 - the process stands still
+        clock.judged_now()
+
+    _run(main())
+    first, second = gaps
+    assert first.length >= 2 * clock.GAP
+    assert second.length >= 3 * clock.GAP
+    assert second.since == first.until
+
+
+def test_listeners_that_are_slow_are_not_called_for_ever() -> None:
+    calls: list[clock.Gap] = []
+
+    async def main() -> None:
+        def slow(gap: clock.Gap) -> None:
+            calls.append(gap)
+            time.sleep(2 * clock.GAP)
+
+        clock.on_gap(slow)
+        time.sleep(2 * clock.GAP)  # noqa: ASYNC251 - the process stands still
+        clock.judged_now()
+        assert not clock.overdue()
+
+    _run(main())
+    assert 1 < len(calls) < 10
+
+
 def test_a_callback_can_see_that_what_it_hands_out_was_made_before_a_gap() -> None:
     found: list[bool] = []
 
