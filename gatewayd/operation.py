@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
@@ -27,19 +28,27 @@ log = logging.getLogger("gatewayd.operation")
 
 
 class Standstill:
-    """Remembers the last gap of the loop, and says how long it was while it counts as of just now."""
+    """Remembers the last gap of the loop, and says how long it was while it counts as of just now.
+
+    A gap that comes before the loop was awake for JUST_NOW prolongs the one before it: what waited then waits still.
+    """
 
     def __init__(self) -> None:
-        self._gap: clock.Gap | None = None
+        self._since = self._until = -math.inf
+        self._awake = 0.0
+        """Seconds between the gaps that are one."""
 
     def gap(self, gap: clock.Gap) -> None:
         """The process stood still. For `gatewayd.clock.on_gap`."""
-        self._gap = gap
+        self._awake += gap.since - self._until
+        if self._awake > JUST_NOW:
+            self._since, self._awake = gap.since, 0.0
+        self._until = gap.until
 
     def seconds(self) -> float:
         """For how long the process stood still until just now; 0.0: it did not."""
-        gap = self._gap
-        return gap.length if gap is not None and clock.now() - gap.until <= JUST_NOW else 0.0
+        awake = self._awake + clock.now() - self._until
+        return self._until - self._since if awake <= JUST_NOW else 0.0
 
 
 class Operated(Gateway, Protocol):

@@ -97,3 +97,17 @@ def test_a_standstill_counts_for_a_moment(monkeypatch: pytest.MonkeyPatch) -> No
     assert standstill.seconds() == pytest.approx(4.8)
     monkeypatch.setattr(clock, "now", lambda: now + JUST_NOW + 0.01)
     assert standstill.seconds() == 0.0
+
+
+def test_gaps_between_which_little_could_be_served_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    standstill, now = Standstill(), clock.now()
+    monkeypatch.setattr(clock, "now", lambda: now)
+    standstill.gap(clock.Gap(now - 5.0, now - 0.2))
+    standstill.gap(clock.Gap(now - 0.17, now - 0.1))
+    standstill.gap(clock.Gap(now - 0.06, now))
+    assert standstill.seconds() == pytest.approx(5.0)
+    monkeypatch.setattr(clock, "now", lambda: now + 0.05)
+    assert standstill.seconds() == 0.0, "awake for 0.12 s"
+    standstill.gap(clock.Gap(now + 0.04, now + 0.1))
+    monkeypatch.setattr(clock, "now", lambda: now + 0.1)
+    assert standstill.seconds() == pytest.approx(0.06)
