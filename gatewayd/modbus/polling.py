@@ -26,11 +26,11 @@ class ReadPoller:
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._epoll = select.epoll()
-        self._readers: dict[int, Callable[[float], None]] = {}
+        self._readers: dict[int, Callable[[], None]] = {}
         self._loop.add_reader(self._epoll.fileno(), self._turn)
 
-    def add(self, descriptor: int, reader: Callable[[float], None]) -> None:
-        """Call `reader` with the time whenever the socket has something to read, its end included."""
+    def add(self, descriptor: int, reader: Callable[[], None]) -> None:
+        """Call `reader` whenever the socket has something to read, its end included."""
         self._readers[descriptor] = reader
         self._epoll.register(descriptor, select.EPOLLIN)
 
@@ -55,5 +55,5 @@ class ReadPoller:
             for descriptor, _events in events:
                 reader = readers.get(descriptor)
                 if reader is not None:
-                    reader(now)
+                    reader()
             now = clock.judged_now()

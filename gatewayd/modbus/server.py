@@ -129,7 +129,7 @@ class _Connection(ServerRequestHandler):
             self.wire.resume_reading()
             self.wire.pause_reading()
 
-    def readable(self, now: float) -> None:
+    def readable(self) -> None:
         """The socket has something to read: the hot path."""
         session = self.session
         try:
@@ -142,6 +142,8 @@ class _Connection(ServerRequestHandler):
         if not count:
             self.drop("closed by the peer")
             return
+        # Only now: until the bytes were read they may have waited, and others of this turn were served before.
+        now = clock.judged_now()
         try:
             answers = self.receive(count, now)
         except Exception:  # noqa: BLE001 - a defect of ours costs this connection, not the others

@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
+from gatewayd import clock
 from gatewayd.core.requester import Requester
 from gatewayd.modbus.frames import FrameBuffer, FramingError, encode, split
 from gatewayd.modbus.functions import ExceptionCode, Unit, exception, execute
@@ -93,6 +94,10 @@ class Session:
         try:
             while (frame := split(self.buffer.data, start, end)) is not None:
                 start = frame.end
+                if clock.overdue():
+                    # Stopped between two requests: those that follow have waited since they were read.
+                    read_at, now = now, clock.judged_now()
+                    waited = max(waited, now - read_at)
                 answers.append(
                     encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now, waited))
                 )

@@ -17,8 +17,9 @@ from contextlib import ExitStack
 
 import pytest
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell, Change
-from gatewayd.core.definition import CellDefinition
+from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.mapping.plan import ModbusPlan
@@ -322,3 +323,38 @@ async def test_the_time_of_the_gap_is_no_silence_of_the_peer(
     assert [event.kind for event in events] == [PeerEventKind.CONNECTED] * 2
     sending.cancel()
     await listener.close()
+
+
+@pytest.mark.parametrize("together", [True, False], ids=["one connection", "two connections"])
+def test_stopped_between_two_requests_of_one_turn_the_second_has_waited(
+    judge: Judge, plan_of: PlanOf, peers: ExitStack, together: bool
+) -> None:
+    def stopped(_direction: Direction) -> None:
+        if len(judge.waits) == 1:
+            time.sleep(LIMIT + 0.1)
+
+    async def main() -> list[str]:
+        listener = ModbusListener("127.0.0.1", 0)
+        listener.serve([(plan_of(), judge)])
+        await listener.start()
+        clock.on_gap(lambda gap: listener.gap(gap.since, gap.until))
+        first = Peer(peers, listener)
+        second = first if together else Peer(peers, listener)
+        for peer in (first, second):
+            await peer.ask(READ)
+            peer.socket.setblocking(True)
+        judge.listeners.append(stopped)
+        if together:
+            first.send(WRITE, WRITE)
+        else:
+            first.send(WRITE)
+            second.send(WRITE)
+        answers = [await first.answer(), await second.answer()]
+        await listener.close()
+        return answers
+
+    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+        answers = runner.run(main())
+    assert sorted(answers) == sorted([WRITE.replace(" 000a 0005", " 00 0a 00 05"), BUSY[WRITE]])
+    in_time, late = judge.waits
+    assert in_time < LIMIT < late
