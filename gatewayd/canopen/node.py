@@ -225,8 +225,7 @@ class Node:
 
     def start(self, now: float) -> None:
         """Power-on: once, before anything else but `bus_changed`."""
-        self._now = now
-        self._started = True
+        self._now, self._started = now, True
         self.parameters.report_differences()
         self._reset(NmtCommand.RESET_NODE, now)
         if self.bus.carries:
@@ -238,8 +237,7 @@ class Node:
         For the bus nothing happens: no boot-up, the same NMT state, parameters, errors, watched nodes and deadlines.
         TPDOs are sent anew.
         """
-        self._now = now
-        self._started = True
+        self._now, self._started = now, True
         self.bus, self.counters = former.bus, former.counters
         self._fell, self._was_off = former._fell, former._was_off
         self.promises.resume(former.promises)  # what was reported, before the reset compares again
@@ -257,8 +255,7 @@ class Node:
         self._peers.resume(former._peers)
         self._route()
         self.nmt.resume(former.nmt.state, now)
-        # Entering the state has begun these anew.
-        self.sync.resume(former.sync)
+        self.sync.resume(former.sync)  # from here on what entering the state has begun anew
         self.producer.resume(former.producer)
         self.receive_pdos.resume(former.receive_pdos)
 
