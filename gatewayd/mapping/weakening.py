@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from gatewayd.core.definition import CellDefinition, Direction, Variable, Writer
+from gatewayd.core.definition import CellDefinition, Direction, Lock, Variable, Writer
 
 __all__ = ["weakened"]
 
@@ -20,6 +20,9 @@ def weakened(old: CellDefinition, new: CellDefinition) -> Iterator[str]:
     for writer in old.writers:
         if writer.name in writers:
             yield from _supervision(writer, writers[writer.name])
+    if _endless(new.adopt_for) > _endless(old.adopt_for):
+        yield f"adopted values would be kept longer: adopt_for {_seconds(old.adopt_for)} -> {_seconds(new.adopt_for)}"
+    yield from _locks(old, new)
     variables = {variable.name: variable for variable in new.variables}
     for variable in old.variables:
         successor = variables.get(variable.name)
@@ -41,6 +44,20 @@ def _supervision(old: Writer, new: Writer) -> Iterator[str]:
         yield f"`{old.name}` would keep its locks without a connection: grace {old.grace:g} s -> {new.grace:g} s"
 
 
+def _locks(old: CellDefinition, new: CellDefinition) -> Iterator[str]:
+    locks = {lock.name: lock for lock in new.locks}
+    for lock in old.locks:
+        after = locks.get(lock.name)
+        # Who else may own it is a reason for another lease.
+        if after is None or _names(lock, old) != _names(after, new):
+            continue
+        if _endless(after.lease) > _endless(lock.lease):
+            before = _seconds(lock.lease)
+            yield f"`{lock.name}` would be kept longer for a silent owner: lease {before} -> {_seconds(after.lease)}"
+        if lock.whole and not after.whole:
+            yield f"`{lock.name}` could be taken over in part"
+
+
 def _limits(old: Variable, new: Variable) -> Iterator[str]:
     if old.limits is None:
         return
@@ -60,7 +77,11 @@ def _owners(old: Variable, new: Variable, before: CellDefinition, after: CellDef
 def _may_own(variable: Variable, definition: CellDefinition) -> list[str]:
     if variable.lock is None:
         return []
-    return [definition.writers[owner].name for owner in definition.locks[variable.lock].owners]
+    return _names(definition.locks[variable.lock], definition)
+
+
+def _names(lock: Lock, definition: CellDefinition) -> list[str]:
+    return [definition.writers[owner].name for owner in lock.owners]
 
 
 def _endless(seconds: float | None) -> float:

@@ -183,7 +183,7 @@ def test_nothing_is_objected_to_what_touches_nobody() -> None:
 @pytest.mark.parametrize("replacement, owned, said", [
     (("[0, 150]", "[0, 100]"), "force", "`force` is owned now and would change: limits 0..150 clamped -> 0..100"),
     ((OLD[OLD.index("  start:"):OLD.index("  part:")], ""), "start", "`start` is owned now and would be removed"),
-    (("owner: [plc, hmi], lease: 2s}", "owner: [plc, hmi], lease: 3s}"), "speed", "`speed` of the group `motion`"),
+    (("owner: [plc, hmi], lease: 2s}", "owner: [plc, hmi], lease: 1s}"), "speed", "`speed` of the group `motion`"),
     (("127.0.0.1:1502", "127.0.0.1:1503"), "start", "modbus would move while `start` is owned: listen 127"),
     (("host: 127.0.0.1", "host: 127.0.0.9"), "start", "robot would move while `start` is owned: host"),
     (("plc: {modbus: 127.0.0.2", "plc: {modbus: 127.0.0.5"), "part", "writer `plc` would change while `part` is"),
