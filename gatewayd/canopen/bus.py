@@ -111,8 +111,11 @@ class Bus(Protocol):
     def lags(self, bit_rate: int | None) -> bool:
         """Whether a frame that is sent now would be late, because older ones still wait for the bus."""
 
-    def catch_up(self) -> None:
-        """Hand over all received frames that wait, instead of leaving the loop its turns in between."""
+    def catch_up(self) -> bool:
+        """Hand over all received frames that wait, instead of leaving the loop its turns in between.
+
+        False: they were so many that it has to be called again.
+        """
 
     def set_filters(self, can_ids: Iterable[int], remote_ids: Iterable[int] = ()) -> None:
         """Receive data frames of `can_ids` and remote frames of `remote_ids`, and nothing else."""

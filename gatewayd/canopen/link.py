@@ -58,6 +58,7 @@ class CanLink(Observer):
             overdue=clock.overdue,
         )
         self._timer: asyncio.TimerHandle | None = None
+        self._catching: asyncio.Handle | None = None
         self._due = math.inf
         self._runs = False
         self._started = False
@@ -127,10 +128,10 @@ class CanLink(Observer):
         self.node.gap(since, now)
         self._beat = (self._beat[0], now)
         self._transmitter.renew()
-        if self._runs:
-            asyncio.get_running_loop().call_soon(self._catch_up)
-        else:
+        if not self._runs:
             self.node.caught_up()
+        elif self._catching is None:
+            self._catching = asyncio.get_running_loop().call_soon(self._catch_up)
 
     # -- called by the driver ------------------------------------------------------------------------------------
 
@@ -264,9 +265,12 @@ class CanLink(Observer):
         return self._bus is not None and self._bus.send(frame)
 
     def _catch_up(self) -> None:
-        if self._bus is not None:
-            self._bus.catch_up()
-        self.node.caught_up()
+        """Read what waited; as long as there is more, what comes has waited too."""
+        self._catching = None
+        if self._bus is None or self._bus.catch_up():
+            self.node.caught_up()
+        elif self._runs:
+            self._catching = asyncio.get_running_loop().call_soon(self._catch_up)
         self._transmitter.flush()
         if self._runs:
             self._schedule(clock.now())
@@ -290,7 +294,10 @@ class CanLink(Observer):
         self._close_bus("the link ends")
         if self._timer is not None:
             self._timer.cancel()
-        self._timer, self._due = None, math.inf
+        if self._catching is not None:
+            self._catching.cancel()
+            self.node.caught_up()
+        self._timer, self._catching, self._due = None, None, math.inf
         self._switching.clear()
 
     def _on_image(self, direction: Direction) -> None:

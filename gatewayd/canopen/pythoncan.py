@@ -137,11 +137,13 @@ class PythonCanBus(SupervisedBus):
 
     # Receiving
 
-    def catch_up(self) -> None:
+    def catch_up(self) -> bool:
         """See Bus; for at most `CATCH_UP` seconds."""
         end = clock.now() + CATCH_UP
-        while self._bus is not None and not self._read(self._bus) and clock.now() < end:
-            pass
+        while self._bus is not None and not self._read(self._bus):
+            if clock.now() >= end:
+                return False
+        return True
 
     def _readable(self) -> None:
         """The descriptor has something."""

@@ -162,9 +162,10 @@ class SocketCanBus(SupervisedBus):
 
     # Receiving
 
-    def catch_up(self) -> None:
+    def catch_up(self) -> bool:
         """See Bus."""
         self._read(clock.now(), CATCH_UP_FRAMES)
+        return True
 
     def _readable(self) -> None:
         self._read(clock.judged_now(), DRAIN)

@@ -15,6 +15,7 @@ import pytest
 
 from gatewayd import clock
 from gatewayd.canopen import link as link_module
+from gatewayd.canopen import pythoncan
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.link import LOSS_INTERVAL, CanLink
@@ -268,6 +269,25 @@ async def test_what_waited_through_a_gap_is_read_before_anything_else_and_only_t
         station.send(0x000, b"\x80\5")
         await until(lambda: len(waited) == 201)
     assert waited[-1] == 0.0
+
+
+async def test_more_than_is_read_in_one_go_has_waited_all_the_same(
+    station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pythoncan, "CATCH_UP", 0.0)
+    waited: list[float] = []
+    async with running(station):
+        await until(lambda: station.frames(HEARTBEAT))
+        node = station.link.node
+        node._handlers[0] = lambda _frame, _now: waited.append(node._peers.waited)
+        for _ in range(1000):
+            station.send(0x000, b"\x80\5")
+        now = clock.now()
+        station.link.gap(now - 4.0, now)
+        station.link.gap(now, now + 0.1)
+        await until(lambda: len(waited) == 1000)
+        assert min(waited) >= 4.0
+        await until(lambda: node._peers.waited == 0.0)
 
 
 def test_a_pdo_that_a_gap_kept_from_being_sent_tells_what_is_so_after_it(station: Station) -> None:
