@@ -1,4 +1,4 @@
-"""What nobody meant or knows does not pass for a command or a good value: groups, shared registers, places, programs."""
+"""What nobody meant or knows passes for no command and no good value: groups, shared registers, places, programs."""
 
 from __future__ import annotations
 
