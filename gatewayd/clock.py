@@ -87,7 +87,7 @@ GapListener = Callable[[Gap], None]
 
 
 class _Watch:
-    """When the loop was last seen at work, and who is told when it was not. Only the loop's thread may look."""
+    """When the loop was last seen at work, and who is notified when it was not. Only the loop's thread may look."""
 
     __slots__ = ("listeners", "seen")
 

@@ -116,6 +116,7 @@ LAYERS: dict[str, set[str]] = {
     "systemd": {"printable"},
     "turning": {"clock"},
     "demo": {
+        "clock",
         "core",
         "daemon",
         "demo",
@@ -245,6 +246,13 @@ PURE = (
     "status.picture",
 )
 """What has no socket, no event loop and no clock."""
+OTHER_CLOCK = {
+    "cli.watch": "paints a terminal; times of the gateway come as ages",
+    "clock": "is made of it",
+    "compilation": "waits for a child, which is suspended as well",
+    "service": "the service manager compares it with its own CLOCK_MONOTONIC",
+}
+"""Module -> why it may ask `time.monotonic`."""
 
 IMPURE_IMPORTS = {"asyncio", "select", "selectors", "signal", "socket", "subprocess", "threading", "time"}
 
@@ -359,6 +367,14 @@ def test_library_types_stay_in_their_adapter(module: str) -> None:
 def test_pure_modules_have_no_socket_no_loop_and_no_clock(module: str) -> None:
     if within(module, PURE):
         assert not IMPURE_IMPORTS & {name.partition(".")[0] for name in imports(module)}
+
+
+@every_module
+def test_whoever_meets_times_of_a_cell_asks_the_one_clock(module: str) -> None:
+    """CLOCK_MONOTONIC stands still while the machine is suspended, and the times of a cell go on."""
+    asked = [node for node in ast.walk(tree(module)) if isinstance(node, ast.Attribute | ast.Name)]
+    names = {ast.unparse(node) for node in asked}
+    assert ("time.monotonic" in names) == (module in OTHER_CLOCK)
 
 
 @every_module

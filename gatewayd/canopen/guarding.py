@@ -86,7 +86,7 @@ class NodeGuarding:
             self._back(now)
 
     def gap(self, since: float, now: float) -> None:
-        """We stood still and heard nobody: a master that was asking has its time again."""
+        """The process stood still and received nothing: a master that was asking has its time again."""
         if self._due < math.inf:
             self._asked = spared(self._asked, 0.0, since, now, again=self._spared)
             self._spared = True

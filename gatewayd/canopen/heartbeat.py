@@ -127,7 +127,7 @@ class _Watched:
     state: Watch = Watch.WAITING
     due: float = math.inf
     spared: bool = False
-    """We stood still since it was heard."""
+    """The process stood still since its last heartbeat."""
 
 
 class HeartbeatConsumer:
@@ -188,7 +188,7 @@ class HeartbeatConsumer:
         return watched.timeout if watched is not None else math.inf
 
     def gap(self, since: float, now: float) -> None:
-        """We stood still and heard nobody: who was alive has its time again."""
+        """The process stood still and received nothing: each living node has its time again."""
         for watched in self._watched.values():
             if watched.state is Watch.ALIVE:
                 watched.due = spared(watched.due, watched.timeout, since, now, again=watched.spared)

@@ -2,7 +2,7 @@
 
 It stands apart from the supervision by CiA 301 (`gatewayd.canopen.heartbeat`), which begins with the first heartbeat
 and leads to EMCY 8130h and 1029h. What a writer promised begins to bind it with its first write or lock request, and
-its breach costs the writer its locks, and what it asks for is refused until it is heard. A read begins nothing.
+its breach costs the writer its locks, and its requests are refused until its heartbeat is back. A read begins nothing.
 
 1016h can be written from the bus. It can make the time shorter, but neither longer nor endless.
 """
@@ -51,7 +51,7 @@ PROMISE: dict[tuple[Promise, Sign], Promise] = {
     (Promise.BROKEN, Sign.HEARTBEAT): Promise.KEPT,
 }
 """A pair that is not listed leaves the state. Writes after the first one prolong nothing: else a writer that comes and
-goes would never be missed. A node that was missed is heard by its heartbeat alone, not by booting."""
+goes would never be missed. A node that was missed comes back by its heartbeat alone, not by booting."""
 
 _BOUND = (Promise.OWED, Promise.KEPT)
 
@@ -155,7 +155,7 @@ class Promises:
                 present.state, present.since, present.spared = found.state, found.since, found.spared
 
     def weakened(self, names: Sequence[str]) -> list[str]:
-        """What is to be reported of 1016h after a change: where it is weaker than the mapping. Each is told once.
+        """What is to be reported of 1016h after a change: where it is weaker than the mapping. Each is reported once.
 
         `names`: those of the writers.
         """
@@ -177,7 +177,7 @@ class Promises:
         )
 
     def gap(self, since: float, now: float) -> None:
-        """We stood still and heard nobody: who is bound has its time again."""
+        """The process stood still and received nothing: each bound node has its time again."""
         for found in self._nodes.values():
             if found.state in _BOUND:
                 found.since = spared(found.since, 0.0, since, now, again=found.spared)

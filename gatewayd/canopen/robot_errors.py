@@ -8,9 +8,9 @@
 | FF13h | the controller does not have, or gave to another client, what is mapped | how many variables |
 
 None of them is a communication error: 1029h has nothing to do with it. An error that has gone is over when it has not
-come back for `QUIET` seconds, or for the inhibit time of EMCY (1015h) if that is longer: what comes and goes is told
-once. Between connecting and the first package nothing is known that is new, and a robot that was never there is missed
-after `FIRST_CONNECTION` seconds.
+come back for `QUIET` seconds, or for the inhibit time of EMCY (1015h) if that is longer: what comes and goes is
+reported once. Between connecting and the first package nothing is known that is new, and a robot that was never there
+is missed after `FIRST_CONNECTION` seconds.
 """
 
 from __future__ import annotations

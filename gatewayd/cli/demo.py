@@ -9,12 +9,13 @@ import os
 import shlex
 import signal
 import sys
-import time
 from pathlib import Path
 from shutil import which
 from typing import TYPE_CHECKING
 
 import click
+
+from gatewayd import clock
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -77,7 +78,8 @@ def command(seconds: float | None, port: int | None) -> int:
         reason = error.strerror or str(error)
         click.echo(f"gatewayd: cannot listen on port {port}: {reason}; --port 0 takes a free one", err=True)
         return FAILED
-    return asyncio.run(_play(console, chosen, told, seconds or None, live=live))
+    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+        return runner.run(_play(console, chosen, told, seconds or None, live=live))
 
 
 def _port(wanted: int | None) -> tuple[int, str]:
@@ -143,7 +145,7 @@ async def _live(console: Console, scene: Scene, stop: asyncio.Event, seconds: fl
     before = None
     with Live(console=console, auto_refresh=False, vertical_overflow="crop") as picture:
         while not stop.is_set():
-            shot = snapshot(scene, time.monotonic())
+            shot = snapshot(scene, clock.now())
             picture.update(screen(shot, before, pokes, *console.size), refresh=True)
             before = shot
             if await _wait(scene, stop, FRAME, seconds):
@@ -159,13 +161,13 @@ async def _lines(scene: Scene, stop: asyncio.Event, seconds: float | None) -> No
     for meaning, text in [*pokes, without_mbpoll]:
         click.echo(f"{meaning}: {text}")
     while not await _wait(scene, stop, BLOCK, seconds):
-        click.echo(plain(snapshot(scene, time.monotonic())))
-    click.echo(plain(snapshot(scene, time.monotonic())))
+        click.echo(plain(snapshot(scene, clock.now())))
+    click.echo(plain(snapshot(scene, clock.now())))
 
 
 async def _wait(scene: Scene, stop: asyncio.Event, pause: float, seconds: float | None) -> bool:
     """Wait for `pause`; returns whether the end has come."""
-    left = scene.started + seconds - time.monotonic() if seconds is not None else math.inf
+    left = scene.started + seconds - clock.now() if seconds is not None else math.inf
     try:
         async with asyncio.timeout(max(0.0, min(pause, left))):
             await stop.wait()

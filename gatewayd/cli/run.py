@@ -6,7 +6,6 @@ import logging
 import math
 import os
 import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -289,6 +288,7 @@ class _Obedience:
         self._logged: dict[int, float] = {}
 
     def __call__(self, number: int, effect: Effect) -> None:
+        from gatewayd import clock
         from gatewayd.logs import fields
         from gatewayd.signals import Effect, name_of
 
@@ -297,6 +297,6 @@ class _Obedience:
             self._stop.set()
         elif effect is Effect.RELOAD:
             self._reload()
-        elif time.monotonic() - self._logged.get(number, -math.inf) >= self.QUIET:
-            self._logged[number] = time.monotonic()
+        elif clock.now() - self._logged.get(number, -math.inf) >= self.QUIET:
+            self._logged[number] = clock.now()
             logging.getLogger("gatewayd.run").warning("signal ignored", extra=fields(signal=name_of(number)))

@@ -39,8 +39,7 @@ Examples:
 
 \b
 Exit codes:
-  0  healthy: robots fresh, writable and as they were told, no variable unavailable or out of range, nothing forced
-     or held by hand, no writer lost
+  0  healthy: all is available, fresh, writable, as given and in range; nothing forced or held, no writer lost
   1  degraded: what is wrong is printed
   2  wrong usage, or no gateway could be reached
 """,

@@ -160,12 +160,12 @@ class _Routes:
             headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"}
         )
         await response.prepare(request)
-        told = clock.now()
+        sent_at = clock.now()
         # A follower that is gone, or that leaves too much unread, is told nothing more.
         with suppress(ConnectionError, TimeoutError):
             while True:
-                if found or clock.now() - told >= ALIVE_PERIOD:
-                    told = clock.now()
+                if found or clock.now() - sent_at >= ALIVE_PERIOD:
+                    sent_at = clock.now()
                     async with asyncio.timeout(_WRITE_TIME):
                         await response.write("".join(map(_line, found)).encode() or b"\n")
                 await asyncio.sleep(_FOLLOW_PERIOD)

@@ -62,7 +62,7 @@ class Admission:
     def judge(self, requester: Requester, changes: Sequence[Change], *, adopted: bool) -> Verdict:
         """The verdict on all changes together; `adopted`: the robot is there and its inputs were taken over.
 
-        If several changes stand in the way, `PRECEDENCE` says which refusal is told. A peer that no writer
+        If several changes stand in the way, `PRECEDENCE` says which refusal is reported. A peer that no writer
         is declared for may write nothing. Of a writer that is not trusted, or that asked too long ago, nothing is
         applied, not even what would change nothing.
         """

@@ -1,4 +1,4 @@
-"""Whether the robot is heard in time: a state machine over packages, silence, lag and a timestamp that stands still."""
+"""Whether the robot reports in time: a state machine over packages, silence, lag and a timestamp that stands still."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The process image: for every variable its value, the time its source told it, and its quality.
+"""The process image: for every variable its value, the time when its source had it, and its quality.
 
 Two declarations of a variable are compiled here, so that a package costs nothing more where they are not used: what
 every place of it can show (`shown`, `shows_nan`), and that it means something only while the program runs.

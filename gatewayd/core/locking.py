@@ -140,7 +140,7 @@ class Locking:
             self._lost(writer, now, f"no {what} for {declared.timeout:g} s")
 
     def gap(self, since: float, now: float) -> None:
-        """The gateway stood still: what could not be heard in this time counts against nobody."""
+        """The gateway stood still: what could not be received in this time counts against nobody."""
         orphans, owners = self._ownership.orphans, self._ownership.owners
         for lock, end in orphans.items():
             owner = owners[lock]

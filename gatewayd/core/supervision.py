@@ -113,7 +113,7 @@ class WriterTable:
         ]
 
     def gap(self, since: float, now: float) -> None:
-        """Nobody could be heard from `since` to `now`: that time is no silence of any writer.
+        """Nothing could be received from `since` to `now`: that time is no silence of any writer.
 
         After a gap in which what a writer sent has become too old to count, its supervision begins anew. Not after a
         shorter one: else many short gaps would keep a dead writer alive.

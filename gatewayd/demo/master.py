@@ -10,12 +10,13 @@ from __future__ import annotations
 import asyncio
 import math
 import struct
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import can
+
+from gatewayd import clock
 
 __all__ = [
     "CHECKS",
@@ -189,12 +190,12 @@ class Master:
     async def run(self) -> None:
         """Drive the node until cancelled."""
         self._bus = can.Bus(interface="virtual", channel=self._channel)
-        now = time.monotonic()
+        now = clock.now()
         self._jobs = [(self._sync, now), (self._beat, now), (self._feed, now)]
         try:
             while True:
                 self._receive(self._bus)
-                now = time.monotonic()
+                now = clock.now()
                 self._jobs = [(job, job(now) if now >= due else due) for job, due in self._jobs]
                 await asyncio.sleep(_LOOK)
         finally:
@@ -204,7 +205,7 @@ class Master:
         while (message := bus.recv(0)) is not None:
             handler = self._handlers.get(message.arbitration_id)
             if handler is not None:
-                handler(bytes(message.data), time.monotonic())
+                handler(bytes(message.data), clock.now())
 
     def _send(self, can_id: int, data: bytes = b"") -> None:
         assert self._bus is not None

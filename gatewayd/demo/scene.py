@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
-import time
 from collections import deque
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
@@ -14,6 +13,7 @@ from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from gatewayd import clock
 from gatewayd.core.cell import Cell
 from gatewayd.daemon import Daemon
 from gatewayd.demo.master import Master
@@ -56,7 +56,7 @@ class Scene:
         assert loaded.plan.canopen is not None
         self.rows: tuple[Row, ...] = rows(loaded.cell)
         self.port = port or free_port(HOST)
-        self.started = time.monotonic()
+        self.started = clock.now()
         self.problems: deque[str] = deque(maxlen=_PROBLEMS)
         """Errors that the parties have logged, which no demonstration should have."""
         self.robot = SimulatedController(Controller(program=parse(ROBOT_PROGRAM, "robot program")), host=HOST)

@@ -217,7 +217,7 @@ def _fallback(fallback: Fallback) -> str:
 
 
 def _text(plan: Plan, name: str, value: Any) -> str:
-    """Any value of a link's plan; `variable`, `quality_of` and `...writer` are indices and told by name."""
+    """Any value of a link's plan; `variable`, `quality_of` and `...writer` are indices and shown by name."""
     if value is None:
         return "" if name == "quality_of" else "none"
     if name in ("variable", "quality_of"):

@@ -61,7 +61,7 @@ def _domain_unknown(
     chosen = any(one.field == needs.type and one.bit in (None, needs.bit) for one in variables)
     if chosen or DOMAINS in session.outputs.names:
         return None
-    return f"whether it is current or voltage is neither mapped ({needs.type}) nor told by the controller ({DOMAINS})"
+    return f"whether it is current or voltage is neither mapped ({needs.type}) nor sent by the controller ({DOMAINS})"
 
 
 def _carries(answered: DataType, variable: Variable) -> bool:

@@ -240,7 +240,7 @@ class RobotLink:
     def inputs_changed(self, session: Session) -> None:
         """Registers that were in use elsewhere are ours now, or others share a recipe.
 
-        New ones can be written once the next package has told what they hold. The former recipes serve until then.
+        New ones can be written once the next package has shown what they hold. The former recipes serve until then.
         """
         self._session = session
 

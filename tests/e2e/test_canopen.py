@@ -243,6 +243,8 @@ def test_everything_that_can_be_lost_is_lost_and_comes_back(plant: Plant) -> Non
     simulator.kill()
     wait_for(lambda: master.output(CLEARED) == 0 and master.output(VALUED) == 7.25, "the policies on TPDOs")
     assert master.output(HELD) == 8
+    assert master.emergency(0xFF10)[1] == 0x81, "the robot is lost; 1029h has no part in it"
+    assert plc.status(NMT_STATE) == OPERATIONAL
     assert master.ask("read", 0x2420, 2) == DEVICE_STATE
     assert master.ask("write", 0x2010, 1, 9) == DEVICE_STATE
     master.ask("inputs", {COMMAND: 9})

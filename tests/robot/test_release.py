@@ -105,6 +105,15 @@ async def lease_ends(rig: Rig, _until: Until) -> None:
     rig.cell.tick(time.monotonic() + 3600)
 
 
+async def writer_releases(rig: Rig, _until: Until) -> None:
+    rig.cell.release_all(Requester(PLC), time.monotonic())
+
+
+async def another_takes_over(rig: Rig, _until: Until) -> None:
+    for index in rig.cell.image.inputs:
+        assert rig.cell.request(Requester(HMI), index, time.monotonic()) is None
+
+
 async def operator_frees(rig: Rig, _until: Until) -> None:
     for lock in range(len(rig.cell.definition.locks)):
         rig.cell.free_lock(lock, time.monotonic())
@@ -170,6 +179,8 @@ async def owner_lost_while_the_robot_is(rig: Rig, until: Until) -> None:
 CAUSES = [
     connection_lost,
     lease_ends,
+    writer_releases,
+    another_takes_over,
     operator_frees,
     force_ends,
     gateway_stops,
@@ -226,7 +237,8 @@ async def drive(rig: Rig, family: Family, until: Until) -> None:
 @pytest.mark.parametrize("cause", CAUSES)
 async def test_a_release_reaches_the_actuator(family: Family, cause: Cause, until: Until) -> None:
     def leased(definition: CellDefinition) -> CellDefinition:
-        return replace(definition, locks=tuple(replace(lock, lease=600.0) for lock in definition.locks))
+        locks = [replace(lock, lease=600.0, owners=(HMI, PLC), takeover=True) for lock in definition.locks]
+        return replace(definition, locks=tuple(locks))
 
     async with rigged(family.variables, prepare=prepared(family), definition=leased) as rig:
         await drive(rig, family, until)

@@ -118,7 +118,7 @@ class ReceiveEngine:
     """All RPDOs of a node.
 
     They write as `requester()`, asked anew for each frame. Each frame of the right length is a sign of life of a
-    trusted writer, whether its write is refused or not. `raised` and `cleared` are told of each fault of each PDO; a
+    trusted writer, whether its write is refused or not. `raised` and `cleared` are called for each fault of each PDO; a
     fault of one PDO may have been cleared while `standing` still has it for another.
     """
 

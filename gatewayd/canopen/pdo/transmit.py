@@ -194,7 +194,7 @@ class TransmitEngine:
         self._values = cell.image.values
         self._block = StatusBlock(cell)
         self._now = 0.0
-        """The last time that was told, for words of the status block."""
+        """The time of the last call, at which words of the status block are read."""
         self._look_due = math.inf
         self._send = send
         self._pdos: dict[int, TransmitPdo] = {}

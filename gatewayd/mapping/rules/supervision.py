@@ -57,7 +57,7 @@ closed for idleness. Give the writer a `timeout` of some times the period in whi
     Severity.WARNING,
 )
 def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Writers without supervision, unless another rule has told already what that leads to."""
+    """Writers without supervision, unless another rule has reported already what that leads to."""
     reported = {name for _, name in silent_motion(cell)}
     reported |= {name for _, name in endless_locks(cell)}
     reported |= {name for _, name in _unsupervised_requirements(cell)}
