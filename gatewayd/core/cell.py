@@ -77,17 +77,16 @@ class Cell:
             self.ownership,
             self.writers,
             self.events.append,
-            self._fall_back,
+            self._fallbacks.apply,
             lambda: self._notify(Direction.INPUT),
         )
         self._refusals = RefusalLog(self.events.append)
-        self._adopted = False
         self._next_heartbeat: float | None = None
 
     @property
     def accepts_writes(self) -> bool:
         """Whether the robot is connected and its inputs were adopted."""
-        return self._adopted
+        return self.delivery.ready
 
     @property
     def unreadable(self) -> frozenset[int]:
@@ -102,7 +101,7 @@ class Cell:
         Members of a lock that is taken over and that the request does not write take their release fallback.
         """
         self._release_expired(now)
-        verdict = self._admission.judge(requester, changes, adopted=self._adopted)
+        verdict = self._admission.judge(requester, changes, adopted=self.delivery.ready)
         refusal = verdict.refusal
         if refusal is None or refusal.reason is not Reason.WAITED:
             self.writer_seen(requester, now, wrote=True)
@@ -239,7 +238,9 @@ class Cell:
         declared = self.definition.variables[variable]
         is_input = declared.direction is Direction.INPUT
         if is_input:
-            verdict = self._admission.judge(LOCAL_OPERATOR, [Change(variable, value)], adopted=self._adopted)
+            verdict = self._admission.judge(
+                LOCAL_OPERATOR, [Change(variable, value)], adopted=self.delivery.ready
+            )
             allowed, refusal = dict(verdict.values).get(variable), verdict.refusal
         else:
             allowed, refusal = within(declared, value), None
@@ -293,7 +294,6 @@ class Cell:
             return
         was_fresh = self.freshness.state is Source.FRESH
         self.freshness.lost()
-        self._adopted = False
         self.health.frequency = 0.0
         self.health.lag = 0.0
         self.program(None)
@@ -369,7 +369,7 @@ class Cell:
         """
         if self.freshness.state is Source.LOST:
             return
-        first, self._adopted = not self._adopted, True
+        first = not self.delivery.ready
         self.forcing.lift()
         for index, value in values.items():
             self.image.tell(index, value, now)
@@ -377,7 +377,7 @@ class Cell:
         if first:
             detail = adopted(self.image, len(values), self.delivery.unread)
             self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=detail))
-        self._fall_back(self._fallbacks.due(entered.union(values), over=self.adoption.over), now)
+        self._fallbacks.apply(self._fallbacks.due(entered.union(values), over=self.adoption.over), now)
         self._force_inputs(now)
         self._notify(Direction.INPUT)
 
@@ -479,7 +479,7 @@ class Cell:
         if former in (None, OPERATOR):
             return False
         members = self.ownership.locks[lock].members
-        self._fall_back([member for member in members if member != forced], now)
+        self._fallbacks.apply([member for member in members if member != forced], now)
         return True
 
     def _end_forces(self, variables: Sequence[int], now: float, detail: str) -> None:
@@ -491,7 +491,7 @@ class Cell:
                     now, EventKind.UNFORCED, variable=index, writer=OPERATOR, old=force.value, detail=detail
                 )
             )
-        self._fall_back(
+        self._fallbacks.apply(
             [index for index in variables if self.definition.variables[index].lock is not None], now
         )
         self._settle(
@@ -530,18 +530,15 @@ class Cell:
 
     def _count_adoption(self, now: float) -> None:
         """What nobody has claimed by the end of `adopt_for` falls back."""
-        step, left = self.adoption.look(now, adopted=self._adopted), self.adoption.left(now)
+        step, left = self.adoption.look(now, adopted=self.delivery.ready), self.adoption.left(now)
         pending = self._fallbacks.of_nobody(self.image.inputs) if left or step is Step.END else []
         self.health.adoption = left if pending else 0.0
         if step is Step.BEGIN and pending:
             detail = f"in {left:g} s, without an owner by then: {named(self.image, pending)}"
             self.events.append(Event(now, EventKind.ADOPTION_ENDS, detail=detail))
-        elif step is Step.END and self._adopted:
-            self._fall_back(pending, now)
+        elif step is Step.END and self.delivery.ready:
+            self._fallbacks.apply(pending, now)
             self._notify(Direction.INPUT)
-
-    def _fall_back(self, variables: Iterable[int], now: float) -> None:
-        self._fallbacks.apply(variables, now, adopted=self._adopted)
 
     def _set_inputs(self, values: Sequence[tuple[int, Value]], now: float) -> None:
         self.image.tell_all(values, now)

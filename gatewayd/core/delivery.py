@@ -32,6 +32,7 @@ class Delivery:
         "differing",
         "given_at",
         "owed",
+        "ready",
         "under_way",
         "unread",
     )
@@ -40,6 +41,8 @@ class Delivery:
         self._image = image
         self._health = health
         self._record = record
+        self.ready = False
+        """Whether the robot is connected and its inputs were adopted."""
         self.given_at: list[float] = [-math.inf] * len(image.variables)
         """When each input was last given in this session; minus infinity if it was not."""
         self.owed: set[int] = set()
@@ -94,6 +97,7 @@ class Delivery:
 
     def adopted(self, values: Collection[int]) -> set[int]:
         """What these inputs hold was read; returns the inputs that are in the session since this adoption."""
+        self.ready = True
         image = self._image
         present = {index for index in image.inputs if image.available[index]}
         entered = present - self._seen
@@ -109,6 +113,7 @@ class Delivery:
 
     def lost(self) -> None:
         """The session has ended. What was under way is owed to the next one; what the robot holds is not known."""
+        self.ready = False
         self._seen.clear()
         self._forget(self._image.inputs)
 
@@ -149,6 +154,7 @@ class Delivery:
     ) -> None:
         """Go on where `former` stands; `variables`: old -> new index, `places`: the same by what is in a register."""
         self._health = health
+        self.ready = former.ready
         for source, target in variables.items():
             self.given_at[target] = former.given_at[source]
         self.owed = set(places(former.owed))

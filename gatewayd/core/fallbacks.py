@@ -35,11 +35,11 @@ class Fallbacks:
         self._delivery = delivery
         self._record = record
 
-    def apply(self, variables: Iterable[int], now: float, *, adopted: bool) -> None:
-        """Give these inputs their fallbacks; without the robot (not `adopted`) or the register they are owed."""
+    def apply(self, variables: Iterable[int], now: float) -> None:
+        """Give these inputs their fallbacks; without the robot or the register they are owed."""
         image, delivery = self._image, self._delivery
         for index in variables:
-            if not (adopted and image.available[index]):
+            if not (delivery.ready and image.available[index]):
                 delivery.owed.add(index)
                 continue
             delivery.owed.discard(index)

@@ -44,7 +44,6 @@ def succeed(old: Cell, definition: CellDefinition, now: float) -> Succession:
     _take_source(old, new)
     _take_history(old, new, match)
     _take_forcing(old, new, match)
-    new._adopted = old._adopted
     new.adoption.succeed(old.adoption)
     new.delivery.succeed(old.delivery, new.health, match.variables, match.due)
     new._next_heartbeat = old._next_heartbeat
@@ -122,7 +121,9 @@ def _release(old: Cell, match: _Match, now: float) -> tuple[str, ...]:
     gone = _inputs_without_successor(match)
     released = {member for lock in ending for member in old.ownership.locks[lock].members}
     if old.accepts_writes:
-        old._fall_back([index for index in gone if index not in released and old.image.available[index]], now)
+        old._fallbacks.apply(
+            [index for index in gone if index not in released and old.image.available[index]], now
+        )
         old._notify(Direction.INPUT)
     owed = (old.definition.variables[index] for index in gone if index in old.delivery.owed)
     return tuple(variable.name for variable in owed if variable.on_release.kind is not FallbackKind.HOLD)

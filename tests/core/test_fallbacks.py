@@ -30,11 +30,12 @@ class Bench:
 
 def test_without_the_robot_they_are_owed(press: CellDefinition) -> None:
     bench = Bench(press)
-    bench.fallbacks.apply([START], 1.0, adopted=False)
+    bench.fallbacks.apply([START], 1.0)
     assert bench.image.values[START] is True
     assert bench.delivery.owed == {START}
     assert bench.fallbacks.due((), over=False) == [START]
-    bench.fallbacks.apply([START, PART], 2.0, adopted=True)
+    bench.delivery.ready = True
+    bench.fallbacks.apply([START, PART], 2.0)
     assert (bench.delivery.owed, bench.delivery.under_way) == (set(), {START}), "part is to be held"
     (event,) = bench.events
     assert (event.kind, event.old, event.new) == (EventKind.FALLBACK, True, False)
