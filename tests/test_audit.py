@@ -144,7 +144,7 @@ def test_what_was_written_stands_before_the_fallback(cell: Cell, audit: Audit) -
 
 
 def test_the_local_operator_is_in_it(cell: Cell, audit: Audit) -> None:
-    assert cell.force(REAL, 2.5, 1.0, 3.0, "by anna") is None
+    assert cell.operator.force(REAL, 2.5, 1.0, 3.0, "by anna") is None
     cell.tick(3.0)
     told = [(one.what, one.writer, one.new, one.detail) for one in happened(audit)]
     assert ("value forced", "operator", 2.5, "by anna") in told

@@ -181,7 +181,7 @@ async def test_what_differs_is_told_apart_and_in_order(word: Cell, caplog: pytes
 def test_what_the_local_operator_does_is_told_at_the_default_level(
     cell: Cell, caplog: pytest.LogCaptureFixture
 ) -> None:
-    cell.take_lock(0, 1.0, detail="by anna")
+    cell.operator.take_lock(0, 1.0, detail="by anna")
     assert told(caplog) == (
         "lock acquired",
         logging.WARNING,

@@ -202,13 +202,13 @@ class Api:
         """Take a lock; `for` seconds, or until it is released. The lock as it is then."""
         station, lock = self._lock(name, body)
         seconds = _seconds(body, required=False)
-        station.cell.take_lock(lock, moment.now, moment.now + seconds, who)
+        station.cell.operator.take_lock(lock, moment.now, moment.now + seconds, who)
         return lock_view(station.cell, lock, moment.now)
 
     def release(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
         """Release a lock, whoever holds it. The lock as it is then."""
         station, lock = self._lock(name, body)
-        if not station.cell.free_lock(lock, moment.now, who):
+        if not station.cell.operator.free_lock(lock, moment.now, who):
             raise ApiError(409, "not_owned", f"nobody owns {name}")
         return lock_view(station.cell, lock, moment.now)
 
@@ -219,7 +219,7 @@ class Api:
         variable = cell.definition.variables[index]
         value = _value(variable.kind, body.get("value"))
         seconds = _seconds(body, required=True)
-        refusal = cell.force(index, value, moment.now, moment.now + seconds, who)
+        refusal = cell.operator.force(index, value, moment.now, moment.now + seconds, who)
         if refusal is not None:
             raise ApiError(409, _CODES[refusal.reason], f"{name} cannot be forced: {_why(refusal, station)}")
         return self._view(station, index, moment)
@@ -227,7 +227,7 @@ class Api:
     def unforce(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
         """End a force. The variable as it is then."""
         station, index = self._variable(name, body)
-        if not station.cell.unforce(index, moment.now, who):
+        if not station.cell.operator.unforce(index, moment.now, who):
             raise ApiError(409, "not_forced", f"{name} is not forced")
         return self._view(station, index, moment)
 

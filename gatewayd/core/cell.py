@@ -12,22 +12,22 @@ from dataclasses import dataclass
 
 from gatewayd.core.admission import Admission, Change
 from gatewayd.core.adoption import Adoption, Step, adopted, named
-from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, Value
+from gatewayd.core.definition import CellDefinition, Direction, Value
 from gatewayd.core.delivery import Delivery
 from gatewayd.core.events import Event, EventKind, EventRing
 from gatewayd.core.fallbacks import Fallbacks
-from gatewayd.core.forcing import Force, Forcing
+from gatewayd.core.forcing import Forcing
 from gatewayd.core.freshness import Freshness, Source
 from gatewayd.core.health import Health
 from gatewayd.core.image import ProcessImage
 from gatewayd.core.lag import Lag
-from gatewayd.core.limits import within
 from gatewayd.core.locking import Locking
+from gatewayd.core.operator import Operator
 from gatewayd.core.ownership import Act, LockTable, Move
 from gatewayd.core.program import is_running
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.refusal_log import REFUSAL_INTERVAL, RefusalLog
-from gatewayd.core.requester import LOCAL_OPERATOR, Requester
+from gatewayd.core.requester import Requester
 from gatewayd.core.supervision import WriterTable
 
 __all__ = ["HEARTBEAT_PERIOD", "REFUSAL_INTERVAL", "Cell", "Change", "LastRefusal", "Written"]
@@ -80,6 +80,19 @@ class Cell:
             self._fallbacks.apply,
             lambda: self._notify(Direction.INPUT),
         )
+        self.operator = Operator(
+            definition,
+            self.image,
+            self.ownership,
+            self.forcing,
+            self._admission,
+            self._locking,
+            self._fallbacks,
+            self.delivery,
+            self.events.append,
+            self.refuse,
+            self._notify,
+        )
         self._refusals = RefusalLog(self.events.append)
         self._next_heartbeat: float | None = None
 
@@ -100,7 +113,7 @@ class Cell:
 
         Members of a lock that is taken over and that the request does not write take their release fallback.
         """
-        self._release_expired(now)
+        self.operator.release_expired(now)
         verdict = self._admission.judge(requester, changes, adopted=self.delivery.ready)
         refusal = verdict.refusal
         if refusal is None or refusal.reason is not Reason.WAITED:
@@ -196,88 +209,9 @@ class Cell:
         """Whether some lock follows this connection."""
         return connection != 0 and connection in self.ownership.connections
 
-    # -- local operator ------------------------------------------------------------------------------------------
-
-    def take_lock(self, lock: int, now: float, until: float = math.inf, detail: str = "") -> None:
-        """The local operator takes a lock from whoever holds it; nobody else gets it until `until` or `free_lock`.
-
-        Taken from a writer, all its members take their release fallback, as with any takeover. Taking it again changes
-        `until`.
-        """
-        self._release_expired(now)
-        self.forcing.hold(lock, until)
-        if self._hold(lock, now, detail):
-            self._notify(Direction.INPUT)
-
-    def free_lock(self, lock: int, now: float, detail: str = "") -> bool:
-        """The local operator releases a lock, whoever holds it; release fallbacks apply. Whether there was an owner."""
-        self._release_expired(now)
-        owner = self.ownership.owners[lock]
-        if owner is None:
-            return False
-        by = f"released by the local operator{detail and f' ({detail})'}"
-        if owner == OPERATOR:
-            self.forcing.holds.pop(lock, None)
-            self._end_forces(
-                [one for one in self.ownership.locks[lock].members if one in self.forcing.forces], now, by
-            )
-        if self.ownership.owners[lock] is not None:
-            self._locking.free([lock], now, by)
-        return True
-
-    def force(
-        self, variable: int, value: Value, now: float, until: float, detail: str = ""
-    ) -> Refusal | None:
-        """The local operator puts `value` in place of what the variable's source tells, at the latest until `until`.
-
-        The robot gets a forced input as the operator's, who holds its lock so long; the fieldbus sees a forced output.
-        The other members of a lock that was a writer's take their release fallback.
-        Forcing it again changes value and `until`. Refused like any write: limits, robot, register.
-        """
-        self._release_expired(now)
-        declared = self.definition.variables[variable]
-        is_input = declared.direction is Direction.INPUT
-        if is_input:
-            verdict = self._admission.judge(
-                LOCAL_OPERATOR, [Change(variable, value)], adopted=self.delivery.ready
-            )
-            allowed, refusal = dict(verdict.values).get(variable), verdict.refusal
-        else:
-            allowed, refusal = within(declared, value), None
-        if allowed is None:
-            refusal = refusal or Refusal(Reason.OUT_OF_LIMITS, variable)
-            self.refuse(LOCAL_OPERATOR, refusal, now, value)
-            return refusal
-        old = self.image.values[variable]
-        self.forcing.lift()
-        self.forcing.put(variable, Force(allowed, now, until))
-        if declared.lock is not None:
-            self._hold(declared.lock, now, detail, forced=variable)
-        self.events.append(
-            Event(
-                now, EventKind.FORCED, variable, declared.lock, OPERATOR, old=old, new=allowed, detail=detail
-            )
-        )
-        if is_input:
-            self._set_inputs([(variable, allowed)], now)
-        self._notify(Direction.OUTPUT)
-        return None
-
-    def unforce(self, variable: int, now: float, detail: str = "") -> bool:
-        """End a force: an output shows the truth again, an input's release fallback applies. Whether there was one."""
-        self._release_expired(now)
-        if variable not in self.forcing.forces:
-            return False
-        self._end_forces([variable], now, f"ended by the local operator{detail and f' ({detail})'}")
-        return True
-
     def stop(self, now: float, detail: str) -> None:
         """End every force and release every lock, the operator's as well; release fallbacks apply."""
-        self.forcing.holds.clear()
-        self._end_forces(list(self.forcing.forces), now, detail)
-        self._locking.free(
-            [lock for lock, owner in enumerate(self.ownership.owners) if owner is not None], now, detail
-        )
+        self.operator.end(self.forcing.forces, range(len(self.definition.locks)), now, detail)
 
     # -- robot side ----------------------------------------------------------------------------------------------
 
@@ -378,7 +312,7 @@ class Cell:
             detail = adopted(self.image, len(values), self.delivery.unread)
             self.events.append(Event(now, EventKind.INPUTS_ADOPTED, detail=detail))
         self._fallbacks.apply(self._fallbacks.due(entered.union(values), over=self.adoption.over), now)
-        self._force_inputs(now)
+        self.operator.give_forced(now)
         self._notify(Direction.INPUT)
 
     def complete(self, variables: Iterable[int], now: float) -> None:
@@ -428,7 +362,7 @@ class Cell:
 
     def tick(self, now: float) -> None:
         """Notice what only time brings: ended leases, silent writers, a silent or frozen robot."""
-        self._release_expired(now)
+        self.operator.release_expired(now)
         self._locking.silence(now)
         was_fresh = self.freshness.state is Source.FRESH
         self.freshness.tick(now)
@@ -449,7 +383,7 @@ class Cell:
     # -- inside --------------------------------------------------------------------------------------------------
 
     def _act(self, requester: Requester, variable: int, act: Act, now: float) -> Refusal | None:
-        self._release_expired(now)
+        self.operator.release_expired(now)
         lock = self.definition.variables[variable].lock
         judged = self._admission.judge_lock(requester, variable, act)
         if not isinstance(judged, Refusal):
@@ -464,69 +398,6 @@ class Cell:
             self.writer_seen(requester, now, wrote=True)
         self.refuse(requester, judged, now)
         return judged
-
-    def _hold(self, lock: int, now: float, detail: str, forced: int | None = None) -> bool:
-        """The operator holds the lock for as long as its takes and forces last; `forced` is about to be given.
-
-        Whether it was a writer's, so that its other members fell back.
-        """
-        until = self.forcing.until(lock, self.ownership.locks[lock].members)
-        assert until is not None
-        former = self.ownership.hold(lock, until)
-        if former != OPERATOR:
-            kind = EventKind.ACQUIRED if former is None else EventKind.TAKEN_OVER
-            self.events.append(Event(now, kind, lock=lock, writer=OPERATOR, other=former, detail=detail))
-        if former in (None, OPERATOR):
-            return False
-        members = self.ownership.locks[lock].members
-        self._fallbacks.apply([member for member in members if member != forced], now)
-        return True
-
-    def _end_forces(self, variables: Sequence[int], now: float, detail: str) -> None:
-        self.forcing.lift()
-        for index in variables:
-            force = self.forcing.forces.pop(index)
-            self.events.append(
-                Event(
-                    now, EventKind.UNFORCED, variable=index, writer=OPERATOR, old=force.value, detail=detail
-                )
-            )
-        self._fallbacks.apply(
-            [index for index in variables if self.definition.variables[index].lock is not None], now
-        )
-        self._settle(
-            {lock for index in variables if (lock := self.definition.variables[index].lock) is not None},
-            now,
-            detail,
-        )
-        self.image.find_unreadable()
-        self._notify(Direction.INPUT)
-        self._notify(Direction.OUTPUT)
-
-    def _settle(self, locks: Iterable[int], now: float, detail: str) -> None:
-        """Release the locks that the operator no longer needs."""
-        for lock in sorted(locks):
-            until = self.forcing.until(lock, self.ownership.locks[lock].members)
-            if until is not None:
-                self.ownership.hold(lock, until)
-            elif self.ownership.owners[lock] == OPERATOR:
-                self._locking.free([lock], now, detail)
-
-    def _force_inputs(self, now: float) -> None:
-        """The robot gets what is forced, whatever its inputs held when they were adopted."""
-        for index, force in self.forcing.forces.items():
-            if self.definition.variables[index].direction is Direction.INPUT and self.image.available[index]:
-                self.image.tell(index, force.value, now)
-                self.delivery.give(((index, force.value),), now)
-
-    def _release_expired(self, now: float) -> None:
-        forces, holds = self.forcing.due(now)
-        if forces or holds:
-            for lock in holds:
-                del self.forcing.holds[lock]
-            self._end_forces(forces, now, "time limit")
-            self._settle(holds, now, "time limit")
-        self._locking.expire(now)
 
     def _count_adoption(self, now: float) -> None:
         """What nobody has claimed by the end of `adopt_for` falls back."""

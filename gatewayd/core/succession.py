@@ -110,14 +110,12 @@ def _place(variable: Variable) -> tuple[object, ...]:
 
 
 def _release(old: Cell, match: _Match, now: float) -> tuple[str, ...]:
-    old._release_expired(now)
+    old.operator.release_expired(now)
     detail = "not the same in the new mapping"
     owners = enumerate(old.ownership.owners)
     ending = [lock for lock, owner in owners if owner is not None and not match.may_keep(lock, owner)]
-    for lock in ending:
-        old.forcing.holds.pop(lock, None)
-    old._end_forces([index for index in old.forcing.forces if not _force_goes_on(match, index)], now, detail)
-    old._locking.free([lock for lock in ending if old.ownership.owners[lock] is not None], now, detail)
+    forces = [index for index in old.forcing.forces if not _force_goes_on(match, index)]
+    old.operator.end(forces, ending, now, detail)
     gone = _inputs_without_successor(match)
     released = {member for lock in ending for member in old.ownership.locks[lock].members}
     if old.accepts_writes:

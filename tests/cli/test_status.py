@@ -42,7 +42,7 @@ def test_a_degraded_one_says_why(gateway: Running, invoke: Invoke) -> None:
 
 
 def test_what_is_forced_is_degraded(gateway: Running, invoke: Invoke) -> None:
-    gateway.do(lambda cell: cell.force(CYCLES, 9, 0.0, 10.0**9))
+    gateway.do(lambda cell: cell.operator.force(CYCLES, 9, 0.0, 10.0**9))
     done = invoke("status")
     assert done.exit_code == 1
     assert "forced by the local operator: cycles" in done.output

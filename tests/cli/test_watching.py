@@ -56,7 +56,7 @@ def test_wide_ones_show_both_places(served: Served) -> None:
 
 def test_owner_lease_and_force(served: Served) -> None:
     assert served.cell.write(Requester(0), [Change(SPEED, 0.5)], 1.0) is None
-    assert served.cell.force(CYCLES, 99, 1.0, 31.0) is None
+    assert served.cell.operator.force(CYCLES, 99, 1.0, 31.0) is None
     lines = picture(glimpse(served), View(), 100, 30)
     (speed,) = [line for line in lines if " speed " in line]
     (cycles,) = [line for line in lines if " ← cycles " in line]
@@ -112,7 +112,7 @@ class TestKeys:
         assert counts == [4, 8, 12]
 
     def test_only_bad(self, served: Served) -> None:
-        assert served.cell.force(CYCLES, 99, 0.5, 31.0) is None
+        assert served.cell.operator.force(CYCLES, 99, 0.5, 31.0) is None
         view = press(View(), "b")
         assert [one["name"] for one in chosen(glimpse(served).variables, view)] == ["cycles"]
         assert "no variable fits" in "\n".join(picture(glimpse(served), replace(view, filter="x"), 100, 30))

@@ -75,8 +75,8 @@ async def test_what_waited_while_the_gateway_stood_still_is_not_carried_out(  # 
         reloaded.append(force)
         return Outcome(0)
 
-    press.cell.take_lock(1, 0.0, 1e9, "by anna")
-    press.cell.force(LIMIT, 3.0, 0.0, 1e9, "by anna")
+    press.cell.operator.take_lock(1, 0.0, 1e9, "by anna")
+    press.cell.operator.force(LIMIT, 3.0, 0.0, 1e9, "by anna")
     owners, events = list(press.cell.ownership.owners), press.cell.events.count
     found = tmp_path / "late.sock"
     async with server.serving(bind(found), Api(gateway, audit, stood_still=lambda: stood_still), reload):

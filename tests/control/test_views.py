@@ -45,8 +45,8 @@ def test_events_and_records_have_documented_fields_only(api: Api, press: Served)
     cell = press.cell
     assert cell.write(Requester(PLC), [Change(LIMIT, 1.0)], 1.0) is None
     assert cell.write(Requester(HMI), [Change(LIMIT, 2.0)], 1.1) is not None
-    assert cell.force(CYCLES, 5, 1.2, 2.0, "by anna") is None
-    cell.take_lock(2, 1.3, detail="by anna")
+    assert cell.operator.force(CYCLES, 5, 1.2, 2.0, "by anna") is None
+    cell.operator.take_lock(2, 1.3, detail="by anna")
     cell.robot_lost("gone", 1.4)
     events = api.events({}, at(2.0))["events"]
     records = api.audit({}, at(2.0))["records"]
@@ -61,7 +61,7 @@ def test_events_and_records_have_documented_fields_only(api: Api, press: Served)
 
 def test_events_records_and_the_last_refusal_are_told_in_the_same_words(api: Api, press: Served) -> None:
     assert press.cell.write(Requester(PLC), [Change(SPEED, 1.0)], 1.0) is None
-    assert press.cell.force(SPEED, 2.0, 1.1, 2.0, "by anna") is None
+    assert press.cell.operator.force(SPEED, 2.0, 1.1, 2.0, "by anna") is None
     assert press.cell.write(Requester(PLC), [Change(LIMIT, 999.0)], 1.2) is not None
     same = [
         ("operator forced speed to 2 (by anna)", True),
@@ -103,7 +103,7 @@ def test_the_robots_side_is_named_as_the_mapping_names_it(
 
 
 def test_a_force_is_told_with_what_is_left_of_it(api: Api, press: Served) -> None:
-    assert press.cell.force(CYCLES, 7, 1.0, 11.0) is None
+    assert press.cell.operator.force(CYCLES, 7, 1.0, 11.0) is None
     (found,) = api.variables({"name": "cycles"}, at(4.0))["variables"]
     assert (found["value"], found["quality"], found["age"]) == (7, "forced", 3.0)
     assert found["forced"] == {"value": 7, "remaining": 7.0}
@@ -134,7 +134,7 @@ class TestProblems:
         assert problems(press.cell, 0.0) == ["5 of 12 variables unavailable: start, limit, speed and 2 more"]
 
     def test_what_the_operator_left_behind(self, press: Served) -> None:
-        assert press.cell.force(SPEED, 1.0, 0.0, 9.0) is None
+        assert press.cell.operator.force(SPEED, 1.0, 0.0, 9.0) is None
         assert problems(press.cell, 0.0) == [
             "forced by the local operator: speed",
             "locks held by the local operator: motion",

@@ -526,7 +526,7 @@ def test_a_connection_does_not_end_what_a_higher_writer_or_the_operator_took_fro
         cell.writer_connected(via(HMI, connection), 1.0)
     assert cell.write(via(HMI, 7), [Change(LAMP, True), Change(PART, 1)], 1.0) is None
     assert cell.write(via(PLC, 9), [Change(LAMP, True)], 1.1) is None
-    cell.take_lock(2, 1.1)
+    cell.operator.take_lock(2, 1.1)
     cell.writer_disconnected(via(HMI, 7), 1.2, "closed")
     assert (owner(cell, 1), owner(cell, 2)) == (PLC, OPERATOR)
     assert cell.image.values[LAMP] is True
@@ -632,7 +632,7 @@ def test_reads_do_not_feed_a_time_out_that_counts_writes(press: CellDefinition, 
 def test_after_a_gap_what_ended_is_released_and_nobody_is_accused(cell: Cell) -> None:
     write(cell, AUX, FORCE, 50.0, 1.0)
     write(cell, PLC, PART, 5, 1.0)
-    assert cell.force(CYCLES, 9, 1.0, 3.0) is None
+    assert cell.operator.force(CYCLES, 9, 1.0, 3.0) is None
     cell.gap(1.5, 5.0)
     assert owner(cell, 2) is None, "its lease has ended"
     assert owner(cell, 3) == AUX
@@ -886,12 +886,12 @@ def test_outputs_of_a_program_are_good_while_it_runs(press: CellDefinition, conn
         assert (cell.unreadable == {ALARM}) is not good
         seen.append(good)
     assert seen == [False, False, False, True, True, True, True, False, False, True]
-    cell.force(CYCLES, 77, 0.2, math.inf)
+    cell.operator.force(CYCLES, 77, 0.2, math.inf)
     assert cell.package_arrived(0.21, 0.21)
     cell.program(1)
     cell.outputs_written(0.21)
     assert (cell.image.values[CYCLES], quality(cell, CYCLES)) == (77, Quality.FORCED)
-    cell.unforce(CYCLES, 0.22)
+    cell.operator.unforce(CYCLES, 0.22)
     assert (cell.image.values[CYCLES], quality(cell, CYCLES)) == (0, Quality.NOT_RUNNING)
     cell.robot_lost("gone", 0.3)
     assert cell.health.program is None
@@ -907,7 +907,7 @@ def test_a_value_that_a_place_cannot_show_is_not_good_and_forced_if_forced(
     connect(cell, 0.0)
     assert write(cell, PLC, PART, 10, 1.0) is None
     assert (cell.image.values[PART], quality(cell, PART)) == (10, Quality.OUT_OF_RANGE)
-    assert cell.force(PART, 11, 1.0, 2.0) is None
+    assert cell.operator.force(PART, 11, 1.0, 2.0) is None
     assert quality(cell, PART) is Quality.FORCED
     cell.tick(2.0)
     assert quality(cell, PART) is Quality.OUT_OF_RANGE

@@ -118,7 +118,7 @@ def test_a_difference_is_a_quality_until_it_reads_back(cell: Cell) -> None:
 
 
 def test_a_forced_input_that_differs_says_so(cell: Cell) -> None:
-    assert cell.force(PART, 7, 1.0, 100.0) is None
+    assert cell.operator.force(PART, 7, 1.0, 100.0) is None
     assert cell.ownership.owners[cell.definition.variables[PART].lock or 0] == OPERATOR
     cell.read_back({PART: "sent 7, holds 99"}, (), {}, 2.0)
     assert cell.image.quality[PART] is Quality.DIFFERS

@@ -261,9 +261,9 @@ def test_what_is_now_valid_while_a_program_runs_is_good_only_if_one_does(
 
 
 def test_forces_and_taken_locks_of_the_operator_go_on(cell: Cell, press: CellDefinition) -> None:
-    assert cell.force(FORCE, 33.0, 1.0, until=9.0) is None
-    assert cell.force(CYCLES, 1234, 1.0, until=9.0) is None
-    cell.take_lock(2, 1.0, until=8.0)
+    assert cell.operator.force(FORCE, 33.0, 1.0, until=9.0) is None
+    assert cell.operator.force(CYCLES, 1234, 1.0, until=9.0) is None
+    cell.operator.take_lock(2, 1.0, until=8.0)
     new = succeed(cell, without(press, "lamp"), 2.0).cell
     force, cycles = FORCE - 1, CYCLES - 1
     assert (new.image.values[force], new.image.values[cycles]) == (33.0, 1234)
@@ -277,7 +277,7 @@ def test_forces_and_taken_locks_of_the_operator_go_on(cell: Cell, press: CellDef
 
 
 def test_the_force_of_what_is_gone_ends(cell: Cell, press: CellDefinition) -> None:
-    assert cell.force(FORCE, 33.0, 1.0, until=9.0) is None
+    assert cell.operator.force(FORCE, 33.0, 1.0, until=9.0) is None
     new = succeed(cell, without(press, "force"), 2.0).cell
     assert cell.image.values[FORCE] == 10.0
     assert not new.forcing.forces
@@ -319,10 +319,10 @@ DEEDS: dict[str, Callable[[Cell, int, int, int, float], object]] = {
     "disconnected": lambda cell, who, which, _, now: cell.writer_disconnected(via(who, which), now, "closed"),
     "gap": lambda cell, who, _which, _, now: cell.gap(now - who, now),
     "available": lambda cell, who, which, _, now: cell.set_availability([which], bool(who), "in use", now),
-    "force": lambda cell, _who, which, number, now: cell.force(
+    "force": lambda cell, _who, which, number, now: cell.operator.force(
         which, _value(cell, which, number), now, now + 2.0
     ),
-    "take": lambda cell, _who, which, _, now: cell.take_lock(which % 5, now, now + 2.0),
+    "take": lambda cell, _who, which, _, now: cell.operator.take_lock(which % 5, now, now + 2.0),
     "connect": _connect,
     "lost": lambda cell, _who, _which, _, now: cell.robot_lost("cable", now),
     "package": _package,

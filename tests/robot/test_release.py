@@ -116,16 +116,16 @@ async def another_takes_over(rig: Rig, _until: Until) -> None:
 
 async def operator_frees(rig: Rig, _until: Until) -> None:
     for lock in range(len(rig.cell.definition.locks)):
-        rig.cell.free_lock(lock, time.monotonic())
+        rig.cell.operator.free_lock(lock, time.monotonic())
 
 
 async def force_ends(rig: Rig, _until: Until) -> None:
     """The operator has forced the very values that the PLC wrote."""
     now = time.monotonic()
     for index, value in enumerate(rig.cell.image.values[: len(rig.cell.image.inputs)]):
-        assert rig.cell.force(index, value, now, now + 100) is None
+        assert rig.cell.operator.force(index, value, now, now + 100) is None
     for index in rig.cell.image.inputs:
-        rig.cell.unforce(index, now)
+        rig.cell.operator.unforce(index, now)
 
 
 async def gateway_stops(rig: Rig, until: Until) -> None:

@@ -94,7 +94,7 @@ def test_what_never_came_is_infinitely_old(probes: Probes, station: Station) -> 
 
 
 def test_the_local_operator_owns_under_a_name(probes: Probes, cell: Cell) -> None:
-    cell.take_lock(2, time.monotonic())
+    cell.operator.take_lock(2, time.monotonic())
     assert one(read(probes), "gatewayd_locks_owned", cell="press", writer="operator") == 1
 
 

@@ -55,7 +55,7 @@ def test_robot_yellow_before_its_first_package(cell: Cell, now: float) -> None:
 def test_gateway_tells_the_worst_first(cell: Cell, now: float) -> None:
     assert gateway(cell, (), (), now).level is Level.GOOD
     assert gateway(cell, (), ["not listening"], now).words == "not listening"
-    cell.force(CYCLES, 5, now, now + 60)
+    cell.operator.force(CYCLES, 5, now, now + 60)
     assert gateway(cell, (), (), now).words == "1 value forced by the local operator"
     cell.events.append(Event(now, EventKind.READ_BACK_DIFFERS, detail="int 0: 1, not 2"))
     assert gateway(cell, (), (), now).words == "read-back differs: int 0: 1, not 2"

@@ -75,7 +75,7 @@ def test_owned_locks_tell_owner_and_what_is_left(station: Station, probes: Probe
 
 def test_a_forced_output_tells_the_age_of_its_force(station: Station, probes: Probes) -> None:
     now = time.monotonic()
-    station.cell.force(CYCLES, 77, now - 1, now + 60)
+    station.cell.operator.force(CYCLES, 77, now - 1, now + 60)
     found = told(station, probes)
     assert (found["values"][CYCLES], found["quality"][CYCLES]) == (77, 4)
     assert found["ages"][CYCLES] >= 1000

@@ -1,0 +1,193 @@
+"""The local operator: takes and frees locks, and puts values in place of what their sources tell.
+
+He stands above every writer: what he takes nobody else gets, whatever lease or priority the mapping declares.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from gatewayd.core.admission import Admission, Change
+from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, Value
+from gatewayd.core.delivery import Delivery
+from gatewayd.core.events import Event, EventKind
+from gatewayd.core.fallbacks import Fallbacks
+from gatewayd.core.forcing import Force, Forcing
+from gatewayd.core.image import ProcessImage
+from gatewayd.core.limits import within
+from gatewayd.core.locking import Locking
+from gatewayd.core.ownership import LockTable
+from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import LOCAL_OPERATOR, Requester
+
+__all__ = ["Operator"]
+
+
+@dataclass(slots=True, eq=False)
+class Operator:
+    """Carries out what the local operator of one cell asks for; `forcing` is what he holds and forces."""
+
+    _definition: CellDefinition
+    _image: ProcessImage
+    _ownership: LockTable
+    forcing: Forcing
+    _admission: Admission
+    _locking: Locking
+    _fallbacks: Fallbacks
+    _delivery: Delivery
+    _record: Callable[[Event], None]
+    _refuse: Callable[[Requester, Refusal, float, Value], None]
+    _notify: Callable[[Direction], None]
+
+    def take_lock(self, lock: int, now: float, until: float = math.inf, detail: str = "") -> None:
+        """The local operator takes a lock from whoever holds it; nobody else gets it until `until` or `free_lock`.
+
+        Taken from a writer, all its members take their release fallback, as with any takeover. Taking it again changes
+        `until`.
+        """
+        self.release_expired(now)
+        self.forcing.hold(lock, until)
+        if self._hold(lock, now, detail):
+            self._notify(Direction.INPUT)
+
+    def free_lock(self, lock: int, now: float, detail: str = "") -> bool:
+        """The local operator releases a lock, whoever holds it; release fallbacks apply. Whether there was an owner."""
+        self.release_expired(now)
+        owner = self._ownership.owners[lock]
+        if owner is None:
+            return False
+        by = f"released by the local operator{detail and f' ({detail})'}"
+        if owner == OPERATOR:
+            members = self._ownership.locks[lock].members
+            self.end([member for member in members if member in self.forcing.forces], [lock], now, by)
+        else:
+            self._locking.free([lock], now, by)
+        return True
+
+    def force(
+        self, variable: int, value: Value, now: float, until: float, detail: str = ""
+    ) -> Refusal | None:
+        """The local operator puts `value` in place of what the variable's source tells, at the latest until `until`.
+
+        The robot gets a forced input as the operator's, who holds its lock so long; the fieldbus sees a forced output.
+        The other members of a lock that was a writer's take their release fallback.
+        Forcing it again changes value and `until`. Refused like any write: limits, robot, register.
+        """
+        self.release_expired(now)
+        declared = self._definition.variables[variable]
+        is_input = declared.direction is Direction.INPUT
+        if is_input:
+            verdict = self._admission.judge(
+                LOCAL_OPERATOR, [Change(variable, value)], adopted=self._delivery.ready
+            )
+            allowed, refusal = dict(verdict.values).get(variable), verdict.refusal
+        else:
+            allowed, refusal = within(declared, value), None
+        if allowed is None:
+            refusal = refusal or Refusal(Reason.OUT_OF_LIMITS, variable)
+            self._refuse(LOCAL_OPERATOR, refusal, now, value)
+            return refusal
+        old = self._image.values[variable]
+        self.forcing.lift()
+        self.forcing.put(variable, Force(allowed, now, until))
+        if declared.lock is not None:
+            self._hold(declared.lock, now, detail, forced=variable)
+        self._record(
+            Event(
+                now, EventKind.FORCED, variable, declared.lock, OPERATOR, old=old, new=allowed, detail=detail
+            )
+        )
+        if is_input:
+            self._give(variable, allowed, now)
+            self._notify(Direction.INPUT)
+        self._notify(Direction.OUTPUT)
+        return None
+
+    def unforce(self, variable: int, now: float, detail: str = "") -> bool:
+        """End a force: an output shows the truth again, an input's release fallback applies. Whether there was one."""
+        self.release_expired(now)
+        if variable not in self.forcing.forces:
+            return False
+        self._end_forces([variable], now, f"ended by the local operator{detail and f' ({detail})'}")
+        return True
+
+    def end(self, variables: Iterable[int], locks: Sequence[int], now: float, detail: str) -> None:
+        """End these forces and release these locks, whoever owns them; release fallbacks apply."""
+        for lock in locks:
+            self.forcing.holds.pop(lock, None)
+        self._end_forces(list(variables), now, detail)
+        self._locking.free([lock for lock in locks if self._ownership.owners[lock] is not None], now, detail)
+
+    def release_expired(self, now: float) -> None:
+        """End what time has ended: forces, what the operator took, and leases."""
+        forces, holds = self.forcing.due(now)
+        if forces or holds:
+            for lock in holds:
+                del self.forcing.holds[lock]
+            self._end_forces(forces, now, "time limit")
+            self._settle(holds, now, "time limit")
+        self._locking.expire(now)
+
+    def give_forced(self, now: float) -> None:
+        """The robot gets what is forced, whatever its inputs held when they were adopted."""
+        for index, force in self.forcing.forces.items():
+            if (
+                self._definition.variables[index].direction is Direction.INPUT
+                and self._image.available[index]
+            ):
+                self._give(index, force.value, now)
+
+    # -- inside --------------------------------------------------------------------------------------------------
+
+    def _give(self, variable: int, value: Value, now: float) -> None:
+        self._image.tell(variable, value, now)
+        self._delivery.give(((variable, value),), now)
+
+    def _hold(self, lock: int, now: float, detail: str, forced: int | None = None) -> bool:
+        """The operator holds the lock for as long as its takes and forces last; `forced` is about to be given.
+
+        Whether it was a writer's, so that its other members fell back.
+        """
+        until = self.forcing.until(lock, self._ownership.locks[lock].members)
+        assert until is not None
+        former = self._ownership.hold(lock, until)
+        if former != OPERATOR:
+            kind = EventKind.ACQUIRED if former is None else EventKind.TAKEN_OVER
+            self._record(Event(now, kind, lock=lock, writer=OPERATOR, other=former, detail=detail))
+        if former in (None, OPERATOR):
+            return False
+        members = self._ownership.locks[lock].members
+        self._fallbacks.apply([member for member in members if member != forced], now)
+        return True
+
+    def _end_forces(self, variables: Sequence[int], now: float, detail: str) -> None:
+        self.forcing.lift()
+        for index in variables:
+            force = self.forcing.forces.pop(index)
+            self._record(
+                Event(
+                    now, EventKind.UNFORCED, variable=index, writer=OPERATOR, old=force.value, detail=detail
+                )
+            )
+        self._fallbacks.apply(
+            [index for index in variables if self._definition.variables[index].lock is not None], now
+        )
+        self._settle(
+            {lock for index in variables if (lock := self._definition.variables[index].lock) is not None},
+            now,
+            detail,
+        )
+        self._image.find_unreadable()
+        self._notify(Direction.INPUT)
+        self._notify(Direction.OUTPUT)
+
+    def _settle(self, locks: Iterable[int], now: float, detail: str) -> None:
+        """Release the locks that the operator no longer needs."""
+        for lock in sorted(locks):
+            until = self.forcing.until(lock, self._ownership.locks[lock].members)
+            if until is not None:
+                self._ownership.hold(lock, until)
+            elif self._ownership.owners[lock] == OPERATOR:
+                self._locking.free([lock], now, detail)
