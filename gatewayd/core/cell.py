@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 from gatewayd.core.admission import Admission, Change
 from gatewayd.core.adoption import Adoption, Step, adopted, named
@@ -22,15 +22,16 @@ from gatewayd.core.health import Health
 from gatewayd.core.image import ProcessImage
 from gatewayd.core.lag import Lag
 from gatewayd.core.locking import Locking
+from gatewayd.core.match import Match
 from gatewayd.core.operator import Operator
 from gatewayd.core.ownership import Act, LockTable, Move
 from gatewayd.core.program import is_running
 from gatewayd.core.refusal import Reason, Refusal
-from gatewayd.core.refusal_log import REFUSAL_INTERVAL, RefusalLog
+from gatewayd.core.refusal_log import REFUSAL_INTERVAL, LastRefusal, RefusalLog
 from gatewayd.core.requester import Requester
 from gatewayd.core.supervision import WriterTable
 
-__all__ = ["HEARTBEAT_PERIOD", "REFUSAL_INTERVAL", "Cell", "Change", "LastRefusal", "Written"]
+__all__ = ["HEARTBEAT_PERIOD", "REFUSAL_INTERVAL", "Cell", "Change", "Written"]
 
 HEARTBEAT_PERIOD = 0.1
 """Seconds between two counts of the heartbeat."""
@@ -39,17 +40,6 @@ NOTABLE_GAP = 0.5
 
 Written = Sequence[tuple[int, Value, Value]]
 """What a write changed: variable, old and new value."""
-
-
-@dataclass(frozen=True, slots=True)
-class LastRefusal:
-    """What the status block tells of the last refusal."""
-
-    refusal: Refusal
-    writer: int | None
-    time: float
-    peer: str = ""
-    """Address of the peer, where no writer is declared for it."""
 
 
 class Cell:
@@ -315,6 +305,11 @@ class Cell:
         self.operator.give_forced(now)
         self._notify(Direction.INPUT)
 
+    def fall_back(self, variables: Iterable[int], now: float) -> None:
+        """Inputs take their release fallbacks; without the robot or the register they are owed."""
+        self._fallbacks.apply(variables, now)
+        self._notify(Direction.INPUT)
+
     def complete(self, variables: Iterable[int], now: float) -> None:
         """Inputs that go out with one that was written, and of which nobody knows what the robot holds, fall back."""
         self._fallbacks.complete(variables, now)
@@ -380,6 +375,26 @@ class Cell:
         self._locking.gap(since, now)
         self.tick(now)
 
+    # -- successor -----------------------------------------------------------------------------------------------
+
+    def succeed(self, former: Cell, match: Match, now: float) -> None:
+        """Go on where `former` stands, which must not be used for anything afterwards."""
+        former.forcing.lift()
+        self.image.succeed(former.image, match.variables)
+        self.ownership.succeed(former.ownership, match.locks, match.writers, now)
+        self.writers.succeed(former.writers, match.writers)
+        self.freshness.succeed(former.freshness)
+        self.lag.succeed(former.lag)
+        self.health = replace(former.health)
+        self.events.succeed(former.events, match)
+        last = former.last_refusal
+        self.last_refusal = last.translated(match) if last is not None else None
+        self._refusals.succeed(former._refusals, match)
+        self.forcing.succeed(former.forcing, match.variables, match.locks)
+        self.adoption.succeed(former.adoption)
+        self.delivery.succeed(former.delivery, self.health, match.variables, match.due)
+        self._next_heartbeat = former._next_heartbeat
+
     # -- inside --------------------------------------------------------------------------------------------------
 
     def _act(self, requester: Requester, variable: int, act: Act, now: float) -> Refusal | None:
@@ -408,8 +423,7 @@ class Cell:
             detail = f"in {left:g} s, without an owner by then: {named(self.image, pending)}"
             self.events.append(Event(now, EventKind.ADOPTION_ENDS, detail=detail))
         elif step is Step.END and self.delivery.ready:
-            self._fallbacks.apply(pending, now)
-            self._notify(Direction.INPUT)
+            self.fall_back(pending, now)
 
     def _set_inputs(self, values: Sequence[tuple[int, Value]], now: float) -> None:
         self.image.tell_all(values, now)

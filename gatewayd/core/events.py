@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from gatewayd.core.definition import Value
+from gatewayd.core.match import Match, at
 from gatewayd.core.refusal import Reason
 
-__all__ = ["CAPACITY", "Event", "EventKind", "EventRing"]
+__all__ = ["CAPACITY", "Event", "EventKind", "EventRing", "translated"]
 
 CAPACITY = 1000
 """Events kept; older ones are forgotten."""
@@ -82,8 +83,40 @@ class EventRing:
         for listener in self.listeners:
             listener(event)
 
+    def succeed(self, former: EventRing, match: Match) -> None:
+        """Go on with the events of `former`; nobody hears them again."""
+        self._events.extend(translated(event, match) for event in former)
+        self.count = former.count
+
     def __iter__(self) -> Iterator[Event]:
         return iter(self._events)
 
     def __len__(self) -> int:
         return len(self._events)
+
+
+def translated(event: Event, match: Match) -> Event:
+    """The event with the new indices; of what is gone the name is kept in the detail."""
+    former = event.variable, event.lock, event.writer, event.other
+    indices = (
+        at(match.variables, event.variable),
+        at(match.locks, event.lock),
+        at(match.writers, event.writer),
+        at(match.writers, event.other),
+    )
+    if indices == former:
+        return event
+    variable, lock, writer, other = indices
+    detail = ", ".join(filter(None, (event.detail, *_names_gone(event, match))))
+    return replace(event, variable=variable, lock=lock, writer=writer, other=other, detail=detail)
+
+
+def _names_gone(event: Event, match: Match) -> Iterator[str]:
+    definition = match.old
+    if event.variable is not None and event.variable not in match.variables:
+        yield f"variable {definition.variables[event.variable].name}, since removed"
+    elif event.variable is None and event.lock is not None and event.lock not in match.locks:
+        yield f"lock {definition.locks[event.lock].name}, since removed"
+    for role, writer in (("writer", event.writer), ("other", event.other)):
+        if writer is not None and writer not in match.writers:
+            yield f"{role} {definition.writers[writer].name}, since removed"

@@ -8,7 +8,7 @@ does; a forced input is FORCED while the robot has it, and says what is wrong (s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from gatewayd.core.definition import Direction, Value
@@ -97,3 +97,10 @@ class Forcing:
             elif quality in (Quality.GOOD, Quality.OUT_OF_RANGE):
                 image.quality[index] = Quality.FORCED
         image.find_unreadable()
+
+    def succeed(self, former: Forcing, variables: Mapping[int, int], locks: Mapping[int, int]) -> None:
+        """Go on with all that `former` forces and holds; its overlay is lifted, this one's is laid."""
+        self.forces.update({variables[index]: force for index, force in former.forces.items()})
+        self.holds.update({locks[lock]: until for lock, until in former.holds.items()})
+        self.next_due = former.next_due
+        self.lay()

@@ -6,13 +6,34 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from gatewayd.core.events import Event
-from gatewayd.core.refusal import Reason
+from gatewayd.core.events import Event, translated
+from gatewayd.core.match import Match, at
+from gatewayd.core.refusal import Reason, Refusal
 
-__all__ = ["REFUSAL_INTERVAL", "RefusalLog"]
+__all__ = ["REFUSAL_INTERVAL", "LastRefusal", "RefusalLog"]
 
 REFUSAL_INTERVAL = 10.0
 """Seconds in which equal refusals are counted instead of told again: a PLC may retry a hundred times a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class LastRefusal:
+    """What the status block tells of the last refusal."""
+
+    refusal: Refusal
+    writer: int | None
+    time: float
+    peer: str = ""
+    """Address of the peer, where no writer is declared for it."""
+
+    def translated(self, match: Match) -> LastRefusal:
+        """With the new indices."""
+        refusal = replace(
+            self.refusal,
+            variable=at(match.variables, self.refusal.variable),
+            holder=at(match.writers, self.refusal.holder),
+        )
+        return replace(self, refusal=refusal, writer=at(match.writers, self.writer))
 
 
 @dataclass(slots=True)
@@ -60,3 +81,16 @@ class RefusalLog:
             self._tell(replace(told.last, time=now, repeats=told.untold - 1, detail=detail))
             self._told[key] = _Told(now)
         self._next = min((told.time + REFUSAL_INTERVAL for told in self._told.values()), default=math.inf)
+
+    def succeed(self, former: RefusalLog, match: Match) -> None:
+        """Go on counting what `former` counts; of what is gone, tell what was only counted."""
+        for (writer, variable, reason), told in former._told.items():
+            if (writer is None or writer in match.writers) and (
+                variable is None or variable in match.variables
+            ):
+                key = at(match.writers, writer), at(match.variables, variable), reason
+                told.last = translated(told.last, match) if told.last is not None else None
+                self._told[key] = told
+            elif told.last is not None:
+                self._tell(translated(replace(told.last, repeats=told.untold - 1), match))
+        self._next = former._next
