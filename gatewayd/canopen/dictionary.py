@@ -209,6 +209,12 @@ class Dictionary:
             raise Abort(AbortCode.NO_SUBINDEX if index in self._objects else AbortCode.NO_OBJECT)
         return found
 
+    def resume(self, former: Dictionary) -> None:
+        """Take over every value that a client may have written."""
+        for key, entry in former._entries.items():
+            if entry.access.writable and entry.sink is None:
+                self._entries[key].value = entry.value
+
     def read(self, index: int, subindex: int) -> bytes:
         """What an SDO upload returns. Raises Abort."""
         entry = self.entry(index, subindex)

@@ -162,6 +162,13 @@ class Emergency:
         if self._active.pop((code, instance), None) is not None and not self._active:
             self._queue(ErrorCode.NONE, b"", now)
 
+    def judge(self, code: ErrorCode, wrong: bool, now: float) -> None:
+        """The error is there, or it is not."""
+        if wrong:
+            self.raise_error(code, now)
+        else:
+            self.clear(code, now)
+
     def restart(self, *, forget: bool) -> None:
         """NMT reset: no active error, nothing waits; with `forget` (reset node) the history is empty as well."""
         self._active.clear()

@@ -1,34 +1,11 @@
 """The node: all services of a CiA 301 slave put together over one cell. Pure: frames and time in, frames out.
 
-What befalls the node, and what follows:
-
-| happening | writers of the cell | NMT (1029h = 0 / 1 / 2) | EMCY |
-|---|---|---|---|
-| RPDO in OPERATIONAL, SDO request | the writer is alive | | |
-| heartbeat of a node of 1016h ends | its writer is lost, and refused till it is back \
-| PRE-OPERATIONAL / as it is / STOPPED | 8130h till it is back |
-| heartbeat that the mapping promises ends, or does not come after the first write or lock request \
-| its writer is lost, and refused till it is back | as it is | |
-| node whose heartbeat is promised boots | its writer is lost | as it is | |
-| guarding stays away | | PRE-OPERATIONAL / as it is / STOPPED | 8130h until it is back |
-| RPDO deadline passes | the RPDO writer is lost | as it is | 8250h until it is received |
-| OPERATIONAL left | the RPDO writer is lost | | |
-| SDO no longer allowed (STOPPED, reset) | the SDO writer is lost | | |
-| bus off, down or absent | all are lost | PRE-OPERATIONAL / as it is / STOPPED | none goes out |
-| bus is back | | "reset communication" if its loss had ended OPERATIONAL / as it is / as it is | 8140h, 0000h after \
-bus-off |
-| controller passive | | as it is | 8120h until it is no more |
-| received frames lost | | as it is | 8110h until none was lost for `OVERRUN_TIME` |
-| robot lost / stale / holds something else / registers unavailable | | as it is | FF10h / FF11h / FF12h / FF13h until \
-that has not been so for `QUIET` |
-
 Nothing is sent while the bus carries nothing: a queue would only send old news later. A node that is started while the
 bus carries nothing boots when it does.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
@@ -37,17 +14,19 @@ from typing import Final, Protocol
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.clock import TimeConsumer
 from gatewayd.canopen.cob_ids import Function
-from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary, Entry, Object
+from gatewayd.canopen.communication_errors import CommunicationErrors
+from gatewayd.canopen.dictionary import Dictionary, Entry, Object
 from gatewayd.canopen.emergency import Emergency, ErrorCode
 from gatewayd.canopen.frame import Frame, Priority, Send
+from gatewayd.canopen.gap import Waiting
 from gatewayd.canopen.guarding import NodeGuarding
 from gatewayd.canopen.heartbeat import HeartbeatConsumer, HeartbeatProducer
-from gatewayd.canopen.identity import ErrorBehaviour, Identity, identity_objects
+from gatewayd.canopen.identity import Identity, identity_objects
 from gatewayd.canopen.lss import LssSlave
 from gatewayd.canopen.nmt import ALLOWED, UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
 from gatewayd.canopen.observer import NodeCounters, Observer
 from gatewayd.canopen.pdo.parameters import Configuration, PdoTable
-from gatewayd.canopen.pdo.receive import Fault, ReceiveEngine
+from gatewayd.canopen.pdo.receive import ReceiveEngine
 from gatewayd.canopen.pdo.transmit import TransmitEngine
 from gatewayd.canopen.peers import Peers
 from gatewayd.canopen.plan import CanopenPlan
@@ -56,7 +35,7 @@ from gatewayd.canopen.robot_errors import RobotErrors
 from gatewayd.canopen.sdo import SdoServer
 from gatewayd.canopen.sdo.parameters import server_parameter
 from gatewayd.canopen.status_objects import StatusObjects
-from gatewayd.canopen.storage import Parameters, Store, StoreError
+from gatewayd.canopen.storage import Parameters, Store
 from gatewayd.canopen.sync import Sync
 from gatewayd.canopen.variables import VariableObjects
 from gatewayd.core.cell import Cell
@@ -64,19 +43,10 @@ from gatewayd.core.definition import Direction
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 
-__all__ = ["LATE_PARAMETER", "OVERRUN_TIME", "Node"]
-
-OVERRUN_TIME: Final = 1.0
-"""Seconds without a lost frame after which the overrun is over."""
-
-LATE_PARAMETER: Final = 0.5
-"""Seconds that a download of a parameter may have waited while the process stood still."""
+__all__ = ["Node"]
 
 SDO_LENGTH: Final = 8
 """Bytes of every SDO frame."""
-
-_FIRST_OF_CELL: Final = 0x2000
-"""Where the objects of the communication end."""
 
 Handler = Callable[[Frame, float], None]
 
@@ -113,12 +83,9 @@ class Node:
         self._observer = observer if observer is not None else Observer()
         self._now = 0.0
         self._started = False
-        self._fell = self._was_off = False
         self._store_damaged = False
-        self._overrun_until = math.inf
         self._routes: dict[int, tuple[Service, Handler]] = {}
         self._handlers: dict[int, Handler] = {}
-        self._synchronous: frozenset[int] = frozenset()
         self.parameters = Parameters(
             store,
             plan.node,
@@ -143,12 +110,20 @@ class Node:
         self.robot_errors = RobotErrors(
             cell, self.emergency, lambda: self._started and self.nmt.state is not NmtState.INITIALISING
         )
-        self.behaviour = ErrorBehaviour()
+        self.transmit = TransmitEngine(cell, self._send)
+        self.errors = CommunicationErrors(
+            self.emergency,
+            self.nmt,
+            self.transmit,
+            self.counters,
+            lose_node=self._lose_node,
+            lose_rpdo=partial(self._lose, plan.rpdo_writer),
+        )
         self.producer = HeartbeatProducer(self._send, self._node, self._state, alive, plan.heartbeat)
         self.consumer = HeartbeatConsumer(
             plan.consumers,
-            lost=self._heartbeat_lost,
-            back=self._heartbeat_back,
+            lost=self.errors.heartbeat_lost,
+            back=self.errors.heartbeat_back,
             changed=self._watch_changed,
         )
         self.promises = Promises(
@@ -157,27 +132,30 @@ class Node:
             broken=partial(self._lose_node, "no heartbeat of node {}"),
             booted=partial(self._lose_node, "node {} has restarted"),
         )
-        self._peers = Peers(cell, self.promises, self.consumer)
+        self._waiting = Waiting()
+        self._peers = Peers(cell, self.promises, self.consumer, self._waiting)
         self.guarding = NodeGuarding(
             self._send,
             self._node,
             self._state,
             lambda: self.producer.enabled,
-            lost=self._guarding_lost,
-            back=partial(self.emergency.clear, ErrorCode.HEARTBEAT),
+            lost=self.errors.guarding_lost,
+            back=self.errors.guarding_back,
         )
         self.sync = Sync(
             self._send,
             plan.sync,
             allowed=lambda: self.nmt.allows(Service.SYNC),
             on_sync=self._on_sync,
-            wrong_length=self._sync_length,
+            wrong_length=self.errors.sync_length,
             changed=self._route,
         )
         self.time = TimeConsumer(on_time=self._observer.time_told, changed=self._route)
-        self.transmit = TransmitEngine(cell, self._send)
         self.receive_pdos = ReceiveEngine(
-            cell, partial(self._peers.requester, plan.rpdo_writer), self._fault_raised, self._fault_cleared
+            cell,
+            partial(self._peers.requester, plan.rpdo_writer),
+            self.errors.fault_raised,
+            self.errors.fault_cleared,
         )
         self.pdos = PdoTable(
             replace(plan, node=node),
@@ -185,7 +163,7 @@ class Node:
             self._find,
             self._pdo_changed,
         )
-        self.dictionary = Dictionary(self._objects(identity), self._permit)
+        self.dictionary = Dictionary(self._objects(identity), self._waiting.permit)
         self.parameters.bind(self.dictionary)
         self.sdo = SdoServer(self.dictionary)
         self._timed: tuple[_Timed, ...] = (
@@ -198,6 +176,7 @@ class Node:
             self.guarding,
             self.robot_errors,
             self.emergency,
+            self.errors,
         )
 
     # -- what the link calls -------------------------------------------------------------------------------------
@@ -239,19 +218,17 @@ class Node:
         """
         self._now, self._started = now, True
         self.bus, self.counters = former.bus, former.counters
-        self._fell, self._was_off = former._fell, former._was_off
+        self.errors.resume(former.errors)
         self.promises.resume(former.promises)  # what was reported, before the reset compares again
         self._reset(NmtCommand.RESET_NODE, now)
-        for one in former.dictionary:
-            for entry in one.entries:
-                if entry.access.writable and entry.sink is None:
-                    self._find(one.index, entry.subindex).value = entry.value
+        self.dictionary.resume(former.dictionary)
         self.pdos.reload()
         self.consumer.restart(now)
         self.consumer.resume(former.consumer)
         self.promises.resume(former.promises)
         self.guarding.resume(former.guarding)
         self.emergency.resume(former.emergency)
+        self._waiting.resume(former._waiting)
         self._peers.resume(former._peers)
         self._route()
         self.nmt.resume(former.nmt.state, now)
@@ -286,24 +263,24 @@ class Node:
         """The bus is in another state, or told for the first time."""
         self._now = now
         old, self.bus = self.bus, state
-        self._was_off = self._was_off or state is BusState.BUS_OFF
         if old.carries and not state.carries:
-            self._bus_lost(now)
-        elif state.carries and not old.carries:
-            self._bus_back(now)
-        self._judge_passive(now)
+            self.lose_writers(f"bus {state.name.lower().replace('_', '-')}", now)
+            self.receive_pdos.forget()
+            self.sdo.reset()
+            self.errors.bus_lost(now)
+        elif state.carries and not old.carries and self._started:
+            self.errors.bus_back(now)
+        self.errors.bus_seen(state, now)
 
     def frames_lost(self, count: int, now: float) -> None:
         """So many received frames found no room in a buffer."""
         self._now = now
-        self.counters.overruns += count
-        self._overrun_until = now + OVERRUN_TIME
-        self.emergency.raise_error(ErrorCode.OVERRUN, now)
+        self.errors.frames_lost(count, now)
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`. What is received until `caught_up` may have waited so long."""
         self._now = now
-        self._peers.gap(since, now)
+        self._waiting.gap(since, now)
         self.consumer.gap(since, now)
         self.promises.gap(since, now)
         self.guarding.gap(since, now)
@@ -311,7 +288,7 @@ class Node:
 
     def caught_up(self) -> None:
         """Everything that waited was received."""
-        self._peers.caught_up()
+        self._waiting.caught_up()
 
     def tick(self, now: float) -> None:
         """Do what time brings. Cheap before `next_deadline`."""
@@ -319,14 +296,11 @@ class Node:
         for service in self._timed:
             service.tick(now)
         self._answer(self.sdo.tick(now))
-        if now >= self._overrun_until:
-            self._overrun_until = math.inf
-            self.emergency.clear(ErrorCode.OVERRUN, now)
 
     def next_deadline(self, now: float) -> float:
         """When `tick` is wanted, not before `now`; infinity if time alone brings nothing."""
         due = min(service.next_deadline(now) for service in self._timed)
-        return max(now, min(due, self.sdo.next_deadline(now), self._overrun_until))
+        return max(now, min(due, self.sdo.next_deadline(now)))
 
     def renew(self, can_id: int, now: float) -> Frame | None:
         """The cyclic frame that would be sent with this COB-ID now, in place of one that waited; None: none."""
@@ -346,7 +320,7 @@ class Node:
                 routes[time] = (Service.TIME, self.time.receive)
             routes[self.sync.cob_id] = (Service.SYNC, self.sync.receive)
             for node in self.consumer.nodes | self.promises.nodes:
-                routes[Function.ERROR_CONTROL + node] = (Service.ERROR_CONTROL, self._receive_heartbeat)
+                routes[Function.ERROR_CONTROL + node] = (Service.ERROR_CONTROL, self._peers.heartbeat)
             routes[Function.ERROR_CONTROL + self.node_id] = (Service.ERROR_CONTROL, self._receive_guarding)
             routes[Function.SDO_REQUEST + self.node_id] = (Service.SDO, self._receive_sdo)
             routes[Function.NMT] = (Service.NODE_CONTROL, self.nmt.receive)
@@ -366,7 +340,7 @@ class Node:
     def _receive_pdo(self, frame: Frame, now: float) -> None:
         if frame.remote:
             return
-        if frame.can_id in self._synchronous and not self.sync.window_open(now):
+        if frame.can_id in self.receive_pdos.synchronous_ids and not self.sync.window_open(now):
             self.counters.outside_window += 1
             return
         self.promises.write(self.plan.rpdo_writer, now)
@@ -378,18 +352,8 @@ class Node:
             self._peers.heard(self.plan.sdo_writer, "SDO", now)
             self._answer(self.sdo.receive(frame.data, now))
 
-    def _receive_heartbeat(self, frame: Frame, now: float) -> None:
-        self.consumer.receive(frame, now)
-        if self.promises.receive(frame, now):
-            self._peers.heartbeat(frame.can_id - Function.ERROR_CONTROL, now)
-
     def _receive_guarding(self, frame: Frame, now: float) -> None:
-        self.guarding.receive(frame, now, late=self._peers.waited > 0)
-
-    def _permit(self, index: int) -> None:
-        """A parameter is not set by a client that has given up; what variables and locks wait for the cell judges."""
-        if index < _FIRST_OF_CELL and self._peers.waited > LATE_PARAMETER:
-            raise Abort(AbortCode.DEVICE_STATE)
+        self.guarding.receive(frame, now, late=self._waiting.seconds > 0)
 
     def _answer(self, answers: Iterable[bytes]) -> None:
         for data in answers:
@@ -435,7 +399,7 @@ class Node:
         self.guarding.restart(now)
         self.sync.restart(now)
         self._route()
-        self._judge_passive(now)
+        self.errors.bus_seen(self.bus, now)
         self._judge_store(now)
 
     def _configured(self, now: float) -> None:
@@ -445,24 +409,10 @@ class Node:
 
     # -- errors --------------------------------------------------------------------------------------------------
 
-    def _communication_error(self, now: float) -> None:
-        self.counters.communication_errors += 1
-        reaction = self.behaviour.reaction(self.nmt.state)
-        if reaction is not None:
-            self.nmt.command(reaction, now)
-
     def _lose(self, writer: int | None, reason: str, now: float) -> None:
         self._peers.lose(writer, reason, now)
         if writer == self.plan.rpdo_writer:
             self.receive_pdos.forget()
-
-    def _heartbeat_lost(self, node: int, now: float) -> None:
-        self.emergency.raise_error(ErrorCode.HEARTBEAT, now, bytes([node]), instance=node)
-        self._lose_node("no heartbeat of node {}", node, now)
-        self._communication_error(now)
-
-    def _heartbeat_back(self, node: int, now: float) -> None:
-        self.emergency.clear(ErrorCode.HEARTBEAT, now, instance=node)
 
     def _lose_node(self, reason: str, node: int, now: float) -> None:
         """Its writers are lost; by the mapping's promise that is no communication error, whoever else is."""
@@ -475,21 +425,6 @@ class Node:
         for text in self.promises.weakened([writer.name for writer in self.cell.definition.writers]):
             self._observer.report(text)
 
-    def _guarding_lost(self, now: float) -> None:
-        self.emergency.raise_error(ErrorCode.HEARTBEAT, now)
-        self._communication_error(now)
-
-    def _sync_length(self, length: int, now: float) -> None:
-        self.emergency.raise_error(ErrorCode.SYNC_LENGTH, now, bytes([length]))
-
-    def _fault_raised(self, fault: Fault, number: int, now: float) -> None:
-        self.emergency.raise_error(fault.value, now, number.to_bytes(2, "little"), instance=number)
-        if fault is Fault.TIMEOUT:
-            self._lose(self.plan.rpdo_writer, f"RPDO {number} stays away", now)
-
-    def _fault_cleared(self, fault: Fault, number: int, now: float) -> None:
-        self.emergency.clear(fault.value, now, instance=number)
-
     def _emergencies_allowed(self) -> bool:
         return self.bus.carries and self.nmt.allows(Service.EMCY)
 
@@ -499,43 +434,7 @@ class Node:
             self._judge_store(self._now)
 
     def _judge_store(self, now: float) -> None:
-        self._judge(ErrorCode.STORED_PARAMETERS, self._store_damaged, now)
-
-    def _judge_passive(self, now: float) -> None:
-        self._judge(ErrorCode.PASSIVE, self.bus is BusState.PASSIVE, now)
-
-    def _judge(self, code: ErrorCode, wrong: bool, now: float) -> None:
-        if wrong:
-            self.emergency.raise_error(code, now)
-        else:
-            self.emergency.clear(code, now)
-
-    # -- bus -----------------------------------------------------------------------------------------------------
-
-    def _bus_lost(self, now: float) -> None:
-        self._peers.lose_all(f"bus {self.bus.name.lower().replace('_', '-')}", now)
-        self.receive_pdos.forget()
-        self.sdo.reset()
-        was_operational = self.nmt.state is NmtState.OPERATIONAL
-        self._communication_error(now)
-        self._fell = was_operational and self.nmt.state is NmtState.PRE_OPERATIONAL
-
-    def _bus_back(self, now: float) -> None:
-        if not self._started:
-            return
-        fell, self._fell = self._fell, False
-        was_off, self._was_off = self._was_off, False
-        if self.nmt.state is NmtState.INITIALISING:
-            self.nmt.boot(now)
-        elif fell:
-            self.nmt.command(NmtCommand.RESET_COMMUNICATION, now)
-        elif self.nmt.state is NmtState.OPERATIONAL:
-            # What was sent meanwhile has reached nobody: every TPDO starts anew.
-            self.transmit.nmt(False, now)
-            self.transmit.nmt(True, now)
-        if was_off:
-            self.emergency.raise_error(ErrorCode.BUS_OFF_RECOVERED, now)
-            self.emergency.clear(ErrorCode.BUS_OFF_RECOVERED, now)
+        self.emergency.judge(ErrorCode.STORED_PARAMETERS, self._store_damaged, now)
 
     # -- assembly ------------------------------------------------------------------------------------------------
 
@@ -556,7 +455,7 @@ class Node:
             self.time,
             self.consumer,
             self.producer,
-            self.behaviour,
+            self.errors.behaviour,
             self.pdos,
             VariableObjects(self.plan, self.cell, self._clock, asking),
             StatusObjects(self.cell, self._clock, requester, asking),
@@ -574,24 +473,16 @@ class Node:
             self.transmit.configure(number, configuration)
             return
         self.receive_pdos.configure(number, configuration)
-        immediate = {
-            pdo.configuration.can_id for pdo in self.receive_pdos.pdos if not pdo.configuration.is_synchronous
-        }
-        self._synchronous = self.receive_pdos.can_ids - immediate
         if self._started:
             self._route()
 
     def _on_sync(self, counter: int | None, now: float) -> None:
-        self.emergency.clear(ErrorCode.SYNC_LENGTH, now)
-        self.transmit.on_sync(counter, now, late=self._peers.waited > 0)
+        self.errors.sync_right(now)
+        self.transmit.on_sync(counter, now, late=self._waiting.seconds > 0)
         self.receive_pdos.on_sync(now)
 
     def _store_lss(self, node: int, bit_rate: int) -> bool:
-        try:
-            self.parameters.save_lss(node, bit_rate if bit_rate != self.plan.bitrate else None)
-        except StoreError:
-            return False
-        return True
+        return self.parameters.save_lss(node, bit_rate if bit_rate != self.plan.bitrate else None)
 
     def _node(self) -> int:
         return self.lss.node

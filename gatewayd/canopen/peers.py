@@ -7,9 +7,11 @@ One that is not believed is neither alive nor connected here, and what it asks o
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
+from gatewayd.canopen.cob_ids import Function
+from gatewayd.canopen.frame import Frame
+from gatewayd.canopen.gap import Waiting
 from gatewayd.canopen.heartbeat import HeartbeatConsumer, Watch
 from gatewayd.canopen.promise import Promise, Promises
 from gatewayd.core.cell import Cell
@@ -21,13 +23,11 @@ __all__ = ["Peers"]
 class Peers:
     """The CANopen writers of one cell. A writer of None is nobody."""
 
-    def __init__(self, cell: Cell, promises: Promises, watch: HeartbeatConsumer) -> None:
-        self.waited = 0.0
-        """Seconds for which what is served now may have waited while the process stood still."""
-        self._waiting_since = math.inf
+    def __init__(self, cell: Cell, promises: Promises, watch: HeartbeatConsumer, waiting: Waiting) -> None:
         self._cell = cell
         self._promises = promises
         self._watch = watch
+        self._waiting = waiting
         self._alive: set[int] = set()
         self._requesters = {
             writer: Requester(writer, connection=new_connection())
@@ -36,7 +36,6 @@ class Peers:
 
     def resume(self, former: Peers) -> None:
         """The living writers of the cell that this one succeeded, by name; the cell has them counted already."""
-        self.waited, self._waiting_since = former.waited, former._waiting_since
         names = {one.name: index for index, one in enumerate(self._cell.definition.writers)}
         before = former._cell.definition.writers
         self._alive = {names[before[writer].name] for writer in former._alive if before[writer].name in names}
@@ -44,15 +43,6 @@ class Peers:
             index = None if writer is None else names.get(before[writer].name)
             if (writer is None) is (index is None):
                 self._requesters[index] = replace(requester, writer=index)
-
-    def gap(self, since: float, now: float) -> None:
-        """The process stood still: until `caught_up`, what is served may have waited so long."""
-        self._waiting_since = min(self._waiting_since, since)
-        self.waited = now - self._waiting_since
-
-    def caught_up(self) -> None:
-        """What is served from now on came in time."""
-        self._waiting_since, self.waited = math.inf, 0.0
 
     def believed(self, writer: int | None) -> bool:
         """Whether the writer keeps what it promised, as far as can be known yet."""
@@ -64,9 +54,9 @@ class Peers:
     def requester(self, writer: int | None) -> Requester:
         """The writer as a sender of requests, with what can be vouched for now."""
         requester, trusted = self._requesters[writer], self.believed(writer)
-        if trusted and not self.waited:
+        if trusted and not self._waiting.seconds:
             return requester
-        return replace(requester, trusted=trusted, waited=self.waited)
+        return replace(requester, trusted=trusted, waited=self._waiting.seconds)
 
     def asking(self, writer: int | None, now: float) -> Requester:
         """The writer as one that asks for a write or a lock now: what it promised binds it from the first time on."""
@@ -89,9 +79,12 @@ class Peers:
         if self.connect(writer, service, now) and writer is not None:
             self._cell.writer_seen(self._requesters[writer], now)
 
-    def heartbeat(self, node: int, now: float) -> None:
-        """The node's heartbeat: its writers still live. It makes no writer of one who wrote nothing."""
-        for writer in self._promises.of(node):
+    def heartbeat(self, frame: Frame, now: float) -> None:
+        """A watched node's heartbeat: its writers still live. It makes no writer of one who wrote nothing."""
+        self._watch.receive(frame, now)
+        if not self._promises.receive(frame, now):
+            return
+        for writer in self._promises.of(frame.can_id - Function.ERROR_CONTROL):
             if writer in self._alive:
                 self._cell.writer_seen(self._requesters[writer], now)
 

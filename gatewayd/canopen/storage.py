@@ -241,9 +241,13 @@ class Parameters:
                     entry.value = self._saved.values.get((one.index, entry.subindex), entry.default)
         self._node = node
 
-    def save_lss(self, node: int, bitrate: int | None) -> None:
-        """Keep what an LSS master stores. Raises StoreError."""
-        self._replace(replace(self._saved, lss=LssSettings(node, self._planned, bitrate)))
+    def save_lss(self, node: int, bitrate: int | None) -> bool:
+        """Keep what an LSS master stores; whether that succeeded."""
+        try:
+            self._replace(replace(self._saved, lss=LssSettings(node, self._planned, bitrate)))
+        except StoreError:
+            return False
+        return True
 
     def _load(self) -> Saved:
         try:

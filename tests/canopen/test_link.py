@@ -254,7 +254,7 @@ async def test_what_waited_through_a_gap_is_read_before_anything_else_and_only_t
         receive = node.nmt.receive
 
         def observed(frame: Frame, now: float) -> None:
-            waited.append(node._peers.waited)
+            waited.append(node._waiting.seconds)
             receive(frame, now)
 
         node._handlers[0] = observed
@@ -279,7 +279,7 @@ async def test_more_than_is_read_in_one_go_has_waited_all_the_same(
     async with running(station):
         await until(lambda: station.frames(HEARTBEAT))
         node = station.link.node
-        node._handlers[0] = lambda _frame, _now: waited.append(node._peers.waited)
+        node._handlers[0] = lambda _frame, _now: waited.append(node._waiting.seconds)
         for _ in range(1000):
             station.send(0x000, b"\x80\5")
         now = clock.now()
@@ -287,7 +287,7 @@ async def test_more_than_is_read_in_one_go_has_waited_all_the_same(
         station.link.gap(now, now + 0.1)
         await until(lambda: len(waited) == 1000)
         assert min(waited) >= 4.0
-        await until(lambda: node._peers.waited == 0.0)
+        await until(lambda: node._waiting.seconds == 0.0)
 
 
 def test_a_pdo_that_a_gap_kept_from_being_sent_tells_what_is_so_after_it(station: Station) -> None:
@@ -319,7 +319,7 @@ def test_a_pdo_that_a_gap_kept_from_being_sent_tells_what_is_so_after_it(station
 
 async def test_a_link_that_does_not_run_has_nothing_that_waits(station: Station) -> None:
     station.link.gap(0.0, 4.0)
-    assert station.link.node._peers.waited == 0.0
+    assert station.link.node._waiting.seconds == 0.0
 
 
 async def test_a_bus_that_was_stuck_for_seconds_gets_nothing_old(station: Station) -> None:

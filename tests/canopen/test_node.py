@@ -13,10 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.canopen.bus import BusState
+from gatewayd.canopen.communication_errors import OVERRUN_TIME
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
-from gatewayd.canopen.node import OVERRUN_TIME, Node
+from gatewayd.canopen.node import Node
 from gatewayd.canopen.observer import Observer
 from gatewayd.canopen.plan import CanopenPlan, Consumer, ObjectPlan, PdoEntry, PdoPlan, SyncPlan
 from gatewayd.canopen.storage import MemoryStore, Saved, Store

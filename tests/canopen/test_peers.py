@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.canopen.frame import Frame
+from gatewayd.canopen.gap import Waiting
 from gatewayd.canopen.heartbeat import HeartbeatConsumer
 from gatewayd.canopen.peers import Peers
 from gatewayd.canopen.plan import Consumer
@@ -29,17 +30,15 @@ class Bench:
             changed=lambda: None,
         )
         self.promises = Promises(PROMISES, also=self.watch.time, broken=self._lost, booted=self._lost)
-        self.peers = Peers(self.cell, self.promises, self.watch)
+        self.waiting = Waiting()
+        self.peers = Peers(self.cell, self.promises, self.watch, self.waiting)
 
     def _lost(self, node: int, now: float) -> None:
         for writer in self.promises.of(node):
             self.peers.lose(writer, "silent", now)
 
     def heartbeat(self, now: float) -> None:
-        frame = Frame(0x700 + NODE, b"\5")
-        self.watch.receive(frame, now)
-        if self.promises.receive(frame, now):
-            self.peers.heartbeat(NODE, now)
+        self.peers.heartbeat(Frame(0x700 + NODE, b"\5"), now)
 
     def rpdo(self, writer: int, now: float) -> bool:
         """Whether the writer of an RPDO is believed."""
@@ -147,7 +146,7 @@ def test_what_is_no_longer_watched_is_promised_all_the_same(bench: Bench) -> Non
 
 
 def test_requests_that_waited_say_so(bench: Bench) -> None:
-    bench.peers.waited = 2.5
+    bench.waiting.gap(1.0, 3.5)
     assert bench.peers.requester(FREE).waited == 2.5
-    bench.peers.waited = 0.0
+    bench.waiting.caught_up()
     assert bench.peers.requester(FREE) is bench.peers.requester(FREE)

@@ -202,7 +202,7 @@ def test_a_disk_that_fails_is_told_and_nothing_changes(tmp_path: Path) -> None:
 
 def test_lss_settings_and_parameters_share_the_file(path: Path) -> None:
     kept = Kept(JsonStore(path))
-    kept.service.save_lss(9, 250_000)
+    assert kept.service.save_lss(9, 250_000)
     kept.client.write(0x1017, 0, 50)
     kept.signed(0x1010, 1, b"save")
     kept.signed(0x1011, 1, b"load")

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.cob_ids import Function
+from gatewayd.canopen.communication_errors import OVERRUN_TIME
 from gatewayd.canopen.dictionary import Entry, Object, Pdo
 from gatewayd.canopen.eds import objects_of
 from gatewayd.canopen.emergency import ErrorCode, register_of
 from gatewayd.canopen.identity import REACTIONS
 from gatewayd.canopen.lss import Command
 from gatewayd.canopen.nmt import ALLOWED, NmtState, Service
-from gatewayd.canopen.node import OVERRUN_TIME
 from gatewayd.canopen.robot_errors import QUIET
 from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES
 from gatewayd.canopen.variables import ABORT_OF
@@ -269,7 +269,7 @@ def emergencies() -> str:
 
 def happenings() -> str:
     """What befalls the node, and what follows."""
-    text = _docstring_table("node.py").replace("`OVERRUN_TIME`", f"{OVERRUN_TIME:g} s")
+    text = _docstring_table("communication_errors.py").replace("`OVERRUN_TIME`", f"{OVERRUN_TIME:g} s")
     return text.replace("`QUIET`", f"{QUIET:g} s")
 
 

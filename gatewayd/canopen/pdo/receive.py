@@ -130,6 +130,8 @@ class ReceiveEngine:
         self.wrong_length = 0
         """Frames that were too short or too long."""
         self.is_operational = False
+        self.synchronous_ids: frozenset[int] = frozenset()
+        """The identifiers of RPDOs that all wait for SYNC."""
         self._cell = cell
         self._requester = requester
         self._raised = raised
@@ -171,6 +173,8 @@ class ReceiveEngine:
             by_can_id[can_id] = (*by_can_id.get(can_id, ()), pdo)
         self._by_can_id = by_can_id
         self._synchronous = tuple(pdo for pdo in self.pdos if pdo.configuration.is_synchronous)
+        immediate = {pdo.configuration.can_id for pdo in self.pdos if not pdo.configuration.is_synchronous}
+        self.synchronous_ids = self.can_ids - immediate
         self._deadline = None
 
     def nmt(self, operational: bool, now: float) -> None:
