@@ -156,6 +156,7 @@ class CommunicationErrors:
         """Take over what the bus has done to another node."""
         self._counters = former._counters
         self._fell, self._was_off = former._fell, former._was_off
+        self._overrun_until = former._overrun_until
 
     def _communication_error(self, now: float) -> None:
         self._counters.communication_errors += 1

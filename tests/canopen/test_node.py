@@ -976,6 +976,14 @@ def test_a_synchronous_rpdo_waits_through_a_reload() -> None:
     assert plant.cell.image.values[PART] == 7
 
 
+def test_an_overrun_ends_though_the_node_was_succeeded_meanwhile() -> None:
+    plant = Plant().operational()
+    plant.node.frames_lost(3, plant.now)
+    assert _emergencies(plant.take()) == [0x8110]
+    _reload(plant)
+    assert _emergencies(plant.run(OVERRUN_TIME)) == [0]
+
+
 @pytest.mark.parametrize("missed", [False, True])
 def test_a_guarding_master_is_watched_through_a_reload(missed: bool) -> None:
     plant = Plant(replace(PLAN, heartbeat=0)).operational()
