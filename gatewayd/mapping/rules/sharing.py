@@ -188,9 +188,12 @@ def _shared_bit(rule: Rule, cell: ExpandedCell, bit: _Bit, other: _Bit) -> Diagn
     lock = cell.locks[bit.lock]
     owners = " or ".join(f"`{name}`" for name in lock.owners[:2]) + (" and others" if lock.owners[2:] else "")
     message = (
-        f"writing {where(bit.place)} does not take `{variable.name}`, which {owners} may own: "
+        f"writing the whole register does not acquire `{variable.name}` at {where(bit.place)}, which {owners} may own: "
         f"`{neighbour.name}` shares the register"
     )
     related = (Related(other.place.position, f"`{neighbour.name}` is here"),)
-    hint = "give it a register of its own or a coil, put the bits of the register into one `group`, or name one owner"
+    hint = (
+        "give it a register of its own or a coil, put the bits of the register into one `group`, or name one owner; "
+        "as it is, function 22 (mask write) or a lock request acquires it"
+    )
     return rule.at(bit.place.position, message, hint=hint, related=related)
