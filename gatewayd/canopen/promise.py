@@ -88,12 +88,12 @@ class Promises:
         self._broken = broken
         self._booted = booted
         found: dict[int, _Node] = {}
-        for one in consumers:
-            if one.writer is not None:
-                timeout = one.timeout / 1000
-                known = found.get(one.node, _Node(one.node, timeout, ()))
-                writers = (*known.writers, one.writer)
-                found[one.node] = _Node(one.node, min(known.timeout, timeout), writers)
+        for consumer in consumers:
+            if consumer.writer is not None:
+                timeout = consumer.timeout / 1000
+                known = found.get(consumer.node, _Node(consumer.node, timeout, ()))
+                writers = (*known.writers, consumer.writer)
+                found[consumer.node] = _Node(consumer.node, min(known.timeout, timeout), writers)
         self._nodes = found
         self._weaker: frozenset[tuple[int, float]] = frozenset()
         """What was reported: nodes to which 1016h gives more than the mapping, and how much."""

@@ -142,8 +142,9 @@ def problems(cell: Cell, now: float, no_robot: str = "") -> list[str]:
 def _not_good(cell: Cell) -> Iterator[str]:
     """What is wrong with single variables."""
     quality = cell.image.quality
-    if cell.health.unadopted:
-        yield f"what the robot holds is not known for {counted(cell.health.unadopted, 'input')}"
+    unread = [cell.definition.variables[index].name for index in sorted(cell.delivery.unread)]
+    if unread:
+        yield f"what the robot holds is not known for {counted(len(unread), 'input')}: {_list(unread)}"
     for its, words in _NOT_GOOD.items():
         count = quality.count(its)
         if count:
@@ -261,7 +262,7 @@ _SOURCES = {
 _NOT_GOOD = {
     Quality.UNAVAILABLE: "unavailable",
     Quality.DIFFERS: "different in the robot",
-    Quality.OUT_OF_RANGE: "out of the range of their places",
+    Quality.OUT_OF_RANGE: "with a value that a register or object cannot show",
 }
 """Qualities of single variables that somebody should look at."""
 _LISTED = 3

@@ -16,7 +16,7 @@ from gatewayd.core.image import ProcessImage
 
 __all__ = ["Adoption", "Step", "adopted", "named", "would_fall_back"]
 
-_NAMED = 2
+_NAMED = 8
 """Variables that an event names one by one."""
 
 
@@ -88,4 +88,5 @@ def named(image: ProcessImage, inputs: Sequence[int]) -> str:
 
 def adopted(image: ProcessImage, count: int, unread: Collection[int]) -> str:
     """What an adoption came to: `58 variables; not readable: a, b and 3 more`."""
-    return f"{count} variables" + (f"; not readable: {named(image, sorted(unread))}" if unread else "")
+    counted = f"{count} variable" if count == 1 else f"{count} variables"
+    return counted + (f"; not readable: {named(image, sorted(unread))}" if unread else "")

@@ -135,7 +135,11 @@ def _duration(value: object) -> float:
         refuse(syntax.BAD_DURATION, f"`{text}` is not a duration", hint)
     seconds = float(match[1]) * _SECONDS[match[2]]
     if not 0 < seconds <= _LONGEST:
-        refuse(syntax.OUT_OF_RANGE, f"the duration `{text}` is not between 1ms and 24h", hint)
+        refuse(
+            syntax.OUT_OF_RANGE,
+            f"the duration `{text}` is not between 1ms and 24h",
+            "write a longer or shorter one, or leave the key out: the reference has its default",
+        )
     return seconds
 
 

@@ -63,9 +63,9 @@ def shown_of(cell: ExpandedCell) -> list[Shown]:
 
 
 def _objects(node: CanopenCell | None) -> Iterator[tuple[int, CanType]]:
-    for one in node.objects if node is not None else ():
-        if one.plan.type is not CanType.BOOLEAN:
-            yield one.variable, one.plan.type
+    for placed in node.objects if node is not None else ():
+        if placed.plan.type is not CanType.BOOLEAN:
+            yield placed.variable, placed.plan.type
 
 
 @lru_cache(maxsize=4096)

@@ -58,7 +58,7 @@ def _domain_unknown(
     if not any(needs.type in accepted.recipe.names for accepted in session.inputs.values()):
         why = refused.get((needs.type, False), "not claimed")
         return f"current or voltage cannot be chosen without {needs.type}: {why}"
-    chosen = any(one.field == needs.type and one.bit in (None, needs.bit) for one in variables)
+    chosen = any(variable.field == needs.type and variable.bit in (None, needs.bit) for variable in variables)
     if chosen or DOMAINS in session.outputs.names:
         return None
     return f"whether it is current or voltage is neither mapped ({needs.type}) nor sent by the controller ({DOMAINS})"

@@ -208,7 +208,7 @@ class ClaimedInputs:
 
     def sent(self, due: Due, now: float) -> list[str]:
         """Take down that a package was sent. Returns registers that are known by it and can join the others."""
-        recipe = next(one for one in self._recipes if one.accepted is due.recipe)
+        recipe = next(recipe for recipe in self._recipes if recipe.accepted is due.recipe)
         former, recipe.sent, recipe.sent_at = recipe.sent, due.values, now
         for name, slot in recipe.transfer.slots.items():
             if due.values[slot] != former[slot] or name in recipe.unknown:

@@ -327,14 +327,14 @@ class Claims:
         for name in accepted.recipe.names:
             group.refused.pop(name, None)
         if group.is_of_registers():
-            self._groups = [one for one in self._groups if one.key not in accepted.recipe.names]
+            self._groups = [other for other in self._groups if other.key not in accepted.recipe.names]
         self._used += 1
         self._changed = True
         self._queue.popleft()
 
     def _refuse(self, group: _Group, refused: Mapping[str, str]) -> None:
         """Note refusals; a register that was to join stays in the recipe of its own that it has."""
-        alone = {one.key for one in self._groups if one is not group and one.held is not None}
+        alone = {other.key for other in self._groups if other is not group and other.held is not None}
         group.wanted = tuple(name for name in group.wanted if not (name in refused and name in alone))
         group.refused.update({name: word for name, word in refused.items() if name not in alone})
         group.asking = tuple(name for name in group.asking if name not in refused)

@@ -55,15 +55,16 @@ def test_what_the_robot_holds_and_how_late_it_is(gateway: Running, invoke: Invok
         cell.image.quality[CYCLES] = Quality.OUT_OF_RANGE
         cell.image.quality[SPEED] = Quality.NOT_RUNNING
         health = cell.health
+        cell.delivery.unread |= {LIMIT, SPEED}
         health.differing, health.unadopted, health.lag, health.adoption, health.gaps = 1, 2, 0.25, 8.0, 3
 
     gateway.do(trouble)
     done = invoke("status")
     assert done.exit_code == 1
     for words in (
-        "! press: what the robot holds is not known for 2 inputs",
+        "! press: what the robot holds is not known for 2 inputs: limit, speed",
         "! press: 1 of 12 variables different in the robot: limit",
-        "! press: 1 of 12 variables out of the range of their places: cycles",
+        "! press: 1 of 12 variables with a value that a register or object cannot show: cycles",
         "2 inputs not known, 1 input different in the robot, 250 ms behind",
         "adopted values without an owner fall back in 8.0 s",
         "12: 9 good, 1 differs, 1 out of range, 1 not running",

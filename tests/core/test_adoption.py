@@ -53,7 +53,7 @@ def test_what_nobody_claims_falls_back_with_a_warning_before(press: CellDefiniti
     cell.tick(1.0)
     assert cell.health.adoption == 10.0
     (warning,) = [event for event in cell.events if event.kind is EventKind.ADOPTION_ENDS]
-    assert warning.detail == "in 10 s, without an owner by then: start, lamp and 1 more"
+    assert warning.detail == "in 10 s, without an owner by then: start, lamp, force"
     assert cell.write(Requester(PLC), [Change(LAMP, value=True)], 7.0) is None
     cell.tick(10.9)
     assert cell.image.values[:4] == [True, True, 7, 99.0]
@@ -121,4 +121,7 @@ def test_names_and_texts(press: CellDefinition) -> None:
     assert would_fall_back(image, [START, LAMP, PART], unread={LAMP, PART}) == [START, LAMP]
     assert named(image, [START]) == "start"
     assert adopted(image, 3, ()) == "3 variables"
-    assert adopted(image, 3, {PART, START, LAMP}) == "3 variables; not readable: start, lamp and 1 more"
+    assert adopted(image, 3, {PART, START, LAMP}) == "3 variables; not readable: start, lamp, part"
+    many = ProcessImage(tuple(replace(press.variables[START], name=f"v{n}") for n in range(10)))
+    assert named(many, range(10)) == "v0, v1, v2, v3, v4, v5, v6, v7 and 2 more"
+    assert adopted(image, 1, ()) == "1 variable"

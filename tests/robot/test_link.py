@@ -478,7 +478,9 @@ async def test_what_cannot_be_read_is_named_and_not_sent_before_it_is_written(un
 
     async with joined(SHARED, prepare=prepare) as rig:
         await until(lambda: rig.cell.accepts_writes)
-        assert rig.events(EventKind.INPUTS_ADOPTED) == ["1 variables; not readable: first, second and 2 more"]
+        assert rig.events(EventKind.INPUTS_ADOPTED) == [
+            "1 variable; not readable: first, second, third, number"
+        ]
         assert rig.cell.health.unadopted == 4
         assert rig.cell.image.quality == [Quality.NEVER] * 4 + [Quality.GOOD]
         rig.write((4, 89))

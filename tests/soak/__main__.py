@@ -11,6 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from tests.soak.faults import FAULTS, ROUND
 from tests.soak.run import PAUSES, soak
 
 __all__: list[str] = []
@@ -24,13 +25,21 @@ def _main() -> int:
         "--seed", type=int, default=random.randrange(2**32), help="which faults (default: any)"
     )
     parser.add_argument("--speed", choices=sorted(PAUSES), default="real", help="pauses between faults")
+    parser.add_argument(
+        "--only", choices=sorted(FAULTS), action="append", help="this kind of fault (repeatable)"
+    )
     options = parser.parse_args()
     # However it is ended, its processes end with it.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     directory = Path(tempfile.mkdtemp(prefix="gatewayd-soak-"))
     print(f"soak: {options.seconds:g} s, --seed {options.seed}, --speed {options.speed}", flush=True)
     measured = soak(
-        directory, options.seconds, options.seed, options.speed, lambda line: print(line, flush=True)
+        directory,
+        options.seconds,
+        options.seed,
+        options.speed,
+        lambda line: print(line, flush=True),
+        among=options.only or ROUND,
     )
     for table in measured.tables():
         print(f"\n{table}")

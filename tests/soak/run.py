@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from random import Random
 
@@ -24,17 +24,23 @@ _SETTLED = 10.0
 """Seconds for connections that nobody ends: three of idle time-out, and the look for it."""
 
 
-def kinds(seed: int) -> Iterator[tuple[str, Random]]:
+def kinds(seed: int, among: Sequence[str] = ROUND) -> Iterator[tuple[str, Random]]:
     """Round after round in random order, each kind with the chance that it draws from."""
     chance = Random(seed)
     while True:
-        for kind in chance.sample(ROUND, len(ROUND)):
+        for kind in chance.sample(among, len(among)):
             # Its own, so that what one fault draws, which may depend on timing, moves no other.
             yield kind, Random(chance.getrandbits(64))
 
 
 def soak(
-    directory: Path, seconds: float, seed: int, speed: str, say: Callable[[str], None] = lambda _line: None
+    directory: Path,
+    seconds: float,
+    seed: int,
+    speed: str,
+    say: Callable[[str], None] = lambda _line: None,
+    *,
+    among: Sequence[str] = ROUND,
 ) -> Measured:
     """Run; ends early only if the daemon does. `say` hears of every fault."""
     measured = Measured()
@@ -43,7 +49,7 @@ def soak(
         time.sleep(_WARM_UP)
         begin = time.monotonic()
         _sample(rig, measured, begin)
-        for kind, chance in kinds(seed):
+        for kind, chance in kinds(seed, among):
             if time.monotonic() - begin >= seconds:
                 break
             time.sleep(chance.uniform(*PAUSES[speed]))

@@ -35,7 +35,7 @@ before you command.)
 def inherited_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first member with `hold` in each group that is taken over in pieces."""
     for lock in _taken_over(cell):
-        held = [one for one in _members(cell, lock) if one.spec.on_release.kind is FallbackKind.HOLD]
+        held = [member for member in _members(cell, lock) if member.spec.on_release.kind is FallbackKind.HOLD]
         if lock.whole or not held:
             continue
         assert lock.group is not None
@@ -87,14 +87,14 @@ def _members(cell: ExpandedCell, lock: ConcreteLock) -> list[ConcreteVariable]:
 
 
 def _names(variables: Iterable[ConcreteVariable]) -> str:
-    return names_and_more(list(dict.fromkeys(one.part.name for one in variables)))
+    return names_and_more(list(dict.fromkeys(variable.part.name for variable in variables)))
 
 
 def _writes_whole(cell: ExpandedCell, members: list[ConcreteVariable], writer: WriterSpec) -> bool:
     """Whether one request of a writer can write all of them. SDO writes one at a time."""
     if writer.modbus and any(_is_block(cell, members, area) for area in _LONGEST_WRITE):
         return True
-    wanted = {one.index for one in members}
+    wanted = {member.index for member in members}
     pdos = cell.canopen.pdos if cell.canopen is not None else ()
     return writer.by_rpdo and any(wanted <= {entry.variable for entry in pdo.entries} for pdo in pdos)
 
@@ -111,7 +111,7 @@ def _is_block(cell: ExpandedCell, members: list[ConcreteVariable], area: Area) -
 
 def _places(cell: ExpandedCell, members: list[ConcreteVariable], area: Area) -> list[ConcretePlacement]:
     """Where they lie in an area: of each the first place, by address."""
-    wanted = {one.index for one in members}
+    wanted = {member.index for member in members}
     first: dict[int, ConcretePlacement] = {}
     for place in cell.placements:
         if place.area is area and place.variable.index in wanted:
@@ -156,7 +156,7 @@ def shared_register(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             if line in reported or bit.place.variable.index in with_coil or not _is_shared(cell, bit):
                 continue
             reported.add(line)
-            yield _shared_bit(rule, cell, bit, next(one for one in bits if one.lock != bit.lock))
+            yield _shared_bit(rule, cell, bit, next(other for other in bits if other.lock != bit.lock))
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,9 +188,12 @@ def _shared_bit(rule: Rule, cell: ExpandedCell, bit: _Bit, other: _Bit) -> Diagn
     lock = cell.locks[bit.lock]
     owners = " or ".join(f"`{name}`" for name in lock.owners[:2]) + (" and others" if lock.owners[2:] else "")
     message = (
-        f"writing {where(bit.place)} does not take `{variable.name}`, which {owners} may own: "
+        f"writing the whole register does not acquire `{variable.name}` at {where(bit.place)}, which {owners} may own: "
         f"`{neighbour.name}` shares the register"
     )
     related = (Related(other.place.position, f"`{neighbour.name}` is here"),)
-    hint = "give it a register of its own or a coil, put the bits of the register into one `group`, or name one owner"
+    hint = (
+        "give it a register of its own or a coil, put the bits of the register into one `group`, or name one owner; "
+        "as it is, function 22 (mask write) or a lock request acquires it"
+    )
     return rule.at(bit.place.position, message, hint=hint, related=related)
