@@ -111,7 +111,9 @@ class Rig:
         for name in WRITERS:
             for field in FIELDS_OF[name]:
                 mine = [one for one in entries(journal(self.directory, name)) if one.field == field]
-                found += unheard(field, self.witness.changes[field], mine, self.witness.watching)
+                found += unheard(
+                    field, self.witness.changes[field], mine, self.witness.watching, self.record.stops
+                )
         return found
 
     def close(self) -> None:

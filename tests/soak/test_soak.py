@@ -13,7 +13,7 @@ from tests.soak.faults import FAULTS, ROUND
 from tests.soak.journal import SENT, Entry, Journal, entries
 from tests.soak.look import torn
 from tests.soak.run import kinds, soak
-from tests.soak.truth import Period, Record, misheld, unheard
+from tests.soak.truth import FALLBACK, Period, Record, misheld, unheard
 from tests.soak.verdict import MEMORY_BOUND, THREADS_BOUND, Measured, Sample
 
 SECONDS = float(os.environ.get("GATEWAYD_SOAK_SECONDS", "20"))
@@ -101,6 +101,7 @@ def test_what_the_robot_held_must_have_been_written_lately(
         ([], 6, True, 0),
         ([Change(10.02, 8, 0.0)], 0, True, 0),
         ([Change(10.2, 8, 0.0)], 0, True, 1),
+        ([Change(10.06, 8, 0.04)], 0, True, 0),
     ],
 )
 def test_what_was_acknowledged_must_have_been_there(
@@ -109,6 +110,19 @@ def test_what_was_acknowledged_must_have_been_there(
     """Unless nobody looked, or the next value took its place at once."""
     written = [sent(10.0, 7), Entry(10.01, A, 7, outcome)]
     assert len(list(unheard(A, changes, written, lambda _since, _until: watched))) == count
+
+
+@pytest.mark.parametrize(
+    "stop, came, count",
+    [(10.015, FALLBACK, 0), (10.015, 8, 1), (10.1, FALLBACK, 1), (9.0, FALLBACK, 1)],
+    ids=["the lease ended", "another value came", "long after", "long before"],
+)
+def test_a_gateway_that_is_stopped_before_its_package_may_give_the_fallback(
+    stop: float, came: float, count: int
+) -> None:
+    written = [sent(10.0, 7), Entry(10.01, A, 7, 0)]
+    changes = [Change(9.5, 6, 0.0), Change(12.0, came, 0.0)]
+    assert len(list(unheard(A, changes, written, lambda _since, _until: True, [stop]))) == count
 
 
 def test_lies_are_told_but_not_all_of_them() -> None:

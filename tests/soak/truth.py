@@ -46,6 +46,8 @@ class Record:
     periods: list[Period] = field(default_factory=list)
     pauses: list[Period] = field(default_factory=list)
     """In which a writer stood still: what it was about to write it wrote afterwards."""
+    stops: list[float] = field(default_factory=list)
+    """When the gateway was stopped: between an acknowledgement and its package, the lease may end in the meantime."""
 
 
 def misheld(name: str, changes: Sequence[Change], entries: Sequence[Entry], record: Record) -> Iterator[str]:
@@ -86,8 +88,12 @@ def unheard(
     changes: Sequence[Change],
     entries: Sequence[Entry],
     watching: Callable[[float, float], bool],
+    stops: Sequence[float] = (),
 ) -> Iterator[str]:
-    """What was acknowledged and never seen in the robot's field, though it was watched and nothing took its place."""
+    """What was acknowledged and never seen in the robot's field, though it was watched and nothing took its place.
+
+    Where the gateway was stopped before the package left, its fallback may be seen instead.
+    """
     times = [change.time for change in changes]
     begun = 0.0
     for entry in entries:
@@ -98,6 +104,16 @@ def unheard(
             held = changes[first - 1].value if first else None
             last = bisect.bisect_right(times, entry.time + _REACHED)
             seen = changes[first:last]
-            overtaken = any(change.time < entry.time + _CYCLES for change in seen)
+            overtaken = any(change.time - change.blind < entry.time + _CYCLES for change in seen)
+            overtaken |= any(
+                begun <= stop <= entry.time + _CYCLES and _next(changes, times, stop) == FALLBACK
+                for stop in stops
+            )
             if held != entry.value and not overtaken and all(one.value != entry.value for one in seen):
                 yield f"{name} never held {entry.value}, acknowledged at {entry.time:.3f}"
+
+
+def _next(changes: Sequence[Change], times: Sequence[float], moment: float) -> float | None:
+    """The first value that came after this moment."""
+    place = bisect.bisect_right(times, moment)
+    return changes[place].value if place < len(changes) else None

@@ -39,6 +39,7 @@ def stand_still(rig: Rig, chance: Random) -> None:
         asking.start()
         time.sleep(chance.uniform(*chance.choice(_STILL)))
 
+    rig.record.stops.append(time.monotonic())
     suspend(rig.daemon, meanwhile)
     continued = rig.witness.timestamp(time.monotonic())
     asking.join(PATIENCE)
