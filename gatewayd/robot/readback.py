@@ -122,22 +122,25 @@ class ReadBack:
         parts = transfer.parts[name]
         if recent is None:
             return
-        if any(same(held, values) for values in recent):
-            self._in_flight(parts)
-            return
+        # The newest are the likely ones.
+        is_in_flight = any(same(held, values) for values in reversed(recent))
         present = list(sent)
         for part in parts:
             index, value = part.variable, part.of(held)
-            if any(same((value,), (part.of(values),)) for values in recent):
+            if package.given_at[index] == -math.inf:
+                # Nothing of ours is under way: what is read back is what the controller has made of it since.
+                if not same((value,), (part.of(sent),)):
+                    finding.follow[index] = value
+                    _put(part, present, value)
+            elif is_in_flight:
+                self._since.pop(index, None)
+            elif any(same((value,), (part.of(values),)) for values in recent):
                 self._since.pop(index, None)
                 if index in package.differing and same((value,), (part.of(sent),)):
                     finding.agree.add(index)
-            elif package.given_at[index] == -math.inf:
-                finding.follow[index] = value
-                _put(part, present, value)
             elif package.now - self._since.setdefault(index, package.now) >= window:
                 finding.differ[index] = f"{name}: sent {_text(sent)}, the controller holds {_text(held)}"
-        self._free(transfer, name, held, present, recent)
+        self._free(transfer, name, held, present)
         if not same(present, sent):
             finding.sent[name] = present
             self.note(name, present, package.now, is_sent=False)
@@ -151,16 +154,9 @@ class ReadBack:
             self._since.pop(part.variable, None)
 
     @staticmethod
-    def _free(
-        transfer: InputTransfer,
-        name: str,
-        held: Sequence[Value],
-        present: list[Value],
-        recent: Sequence[Sequence[Value]],
-    ) -> None:
+    def _free(transfer: InputTransfer, name: str, held: Sequence[Value], present: list[Value]) -> None:
         """Bits and elements that no variable carries follow the controller."""
-        free = transfer.free(name, held)
-        if any(same(free, transfer.free(name, values)) for values in recent):
+        if same(transfer.free(name, held), transfer.free(name, present)):
             return
         own = present.copy()
         present[:] = held

@@ -169,6 +169,32 @@ def test_what_nobody_gave_follows_the_controller_and_is_not_overwritten() -> Non
     assert bench.compare(7, 3.5, 12.1) == Finding(is_settled=True)
 
 
+def test_a_short_pulse_of_somebody_else_is_not_sent_again_by_a_neighbours_write() -> None:
+    """What it held a moment ago is no value that is under way: nobody gave it."""
+    bench = Bench()
+    assert bench.compare(5, 3.5, 11.0).follow == {REAL: 3.5}
+    assert bench.compare(5, 2.5, 11.002).follow == {REAL: 2.5}
+    bench.write(NUMBER, 7, 11.004)
+    assert bench.send(11.004) == {REGISTERS_KEY: (7, 2.5)}
+
+
+def test_a_short_pulse_in_a_shared_word_is_not_sent_again() -> None:
+    """Neither that of a mapped bit nor that of a free one, though the word itself is under way."""
+    bits = tuple(
+        Variable(bit + 1, f"bit{bit}", Direction.INPUT, ValueKind.BOOL, "input_int_register_0", bit=bit)
+        for bit in range(2)
+    )
+    only = Recipe(("input_int_register_0",), (DataType.INT32,))
+    bench = Bench(bits, session({REGISTERS_KEY: InputRecipe(REGISTERS_KEY, 1, only)}))
+    bench.compare(0, 2.5, 10.5)
+    bench.write(0, True, 11.0)
+    assert bench.send(11.0) == {REGISTERS_KEY: (0b001,)}
+    bench.compare(0b111, 2.5, 11.01)
+    bench.compare(0b001, 2.5, 11.02)
+    bench.write(0, False, 11.03)
+    assert bench.send(11.03) == {REGISTERS_KEY: (0,)}
+
+
 def test_bits_that_no_variable_carries_follow_too() -> None:
     bit = (Variable(1, "bit", Direction.INPUT, ValueKind.BOOL, "input_int_register_0", bit=3),)
     only = Recipe(("input_int_register_0",), (DataType.INT32,))
