@@ -15,7 +15,7 @@ from tests.soak.browser import COMPLAINT
 from tests.soak.cell import FIELDS, FIELDS_OF, command, journal, mapping
 from tests.soak.journal import entries
 from tests.soak.look import Look
-from tests.soak.truth import Record, misheld, unheard
+from tests.soak.truth import NOT_CONNECTED, Record, misheld, unheard
 
 __all__ = ["PATIENCE", "WRITERS", "Rig"]
 
@@ -108,11 +108,12 @@ class Rig:
             changes = self.witness.changes[field]
             of_field = sorted(entry for entry in noted if entry.field == field)
             found += misheld(field, changes, of_field, self.record)
+        lost = sorted(entry.time for entry in noted if entry.outcome == NOT_CONNECTED)
         for name in WRITERS:
             for field in FIELDS_OF[name]:
                 mine = [one for one in entries(journal(self.directory, name)) if one.field == field]
                 found += unheard(
-                    field, self.witness.changes[field], mine, self.witness.watching, self.record.stops
+                    field, self.witness.changes[field], mine, self.witness.watching, self.record.stops, lost
                 )
         return found
 

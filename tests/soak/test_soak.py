@@ -125,6 +125,16 @@ def test_a_gateway_that_is_stopped_before_its_package_may_give_the_fallback(
     assert len(list(unheard(A, changes, written, lambda _since, _until: True, [stop]))) == count
 
 
+@pytest.mark.parametrize(
+    "lost, count", [(10.05, 0), (10.2, 1), (9.9, 1)], ids=["breaking", "later", "before"]
+)
+def test_what_went_into_a_breaking_connection_is_no_lie(lost: float, count: int) -> None:
+    """The next request is answered that the robot is not connected: that it is not there is visible."""
+    written = [sent(10.0, 7), Entry(10.01, A, 7, 0)]
+    changes = [Change(9.5, 6, 0.0)]
+    assert len(list(unheard(A, changes, written, lambda _since, _until: True, (), [lost]))) == count
+
+
 def test_lies_are_told_but_not_all_of_them() -> None:
     measured = good()
     measured.lies = [f"lie {number}" for number in range(30)]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from tests.e2e.witness import Change
 from tests.soak.journal import SENT, Entry
 
-__all__ = ["FALLBACK", "LATELY", "Period", "Record", "misheld", "unheard"]
+__all__ = ["FALLBACK", "LATELY", "NOT_CONNECTED", "Period", "Record", "misheld", "unheard"]
 
 FALLBACK = 0
 """What every input of the cell declares for `on_release`."""
@@ -22,6 +22,11 @@ LATELY = 2.0
 long a write may wait, and as much for a busy machine."""
 _REACHED = 1.0
 """Seconds in which what was acknowledged is seen in the robot."""
+_BREAKING = 0.1
+"""Seconds before the answer that the robot is not connected in which its connection was breaking already: what was
+acknowledged in them is not there after the next connect, as the image shows."""
+NOT_CONNECTED = 11
+"""Exception code 0B."""
 _CYCLES = 0.03
 """Seconds in which a value may be overtaken by the next one without having been seen."""
 _AROUND = 0.2
@@ -89,16 +94,22 @@ def unheard(
     entries: Sequence[Entry],
     watching: Callable[[float, float], bool],
     stops: Sequence[float] = (),
+    lost: Sequence[float] = (),
 ) -> Iterator[str]:
     """What was acknowledged and never seen in the robot's field, though it was watched and nothing took its place.
 
-    Where the gateway was stopped before the package left, its fallback may be seen instead.
+    Where the gateway was stopped before the package left, its fallback may be seen instead. `lost`: when somebody was
+    answered that the robot is not connected, in order; what was acknowledged just before went into a broken connection.
     """
     times = [change.time for change in changes]
     begun = 0.0
     for entry in entries:
         if entry.outcome == SENT:
             begun = entry.time
+        elif entry.outcome == 0 and bisect.bisect_left(lost, entry.time) < bisect.bisect_right(
+            lost, entry.time + _BREAKING
+        ):
+            continue
         elif entry.outcome == 0 and watching(entry.time - _AROUND, entry.time + _REACHED):
             first = bisect.bisect_left(times, begun)
             held = changes[first - 1].value if first else None
