@@ -28,6 +28,12 @@ def _main() -> int:
     parser.add_argument(
         "--only", choices=sorted(FAULTS), action="append", help="this kind of fault (repeatable)"
     )
+    parser.add_argument(
+        "--witness",
+        choices=("fail", "report"),
+        default="fail",
+        help="what follows from a finding about what the robot got: failure (default), or only a line",
+    )
     options = parser.parse_args()
     # However it is ended, its processes end with it.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
@@ -43,6 +49,10 @@ def _main() -> int:
     )
     for table in measured.tables():
         print(f"\n{table}")
+    if options.witness == "report":
+        for one in measured.lies:
+            print(f"soak: TO LOOK AT: {one}")
+        measured.lies = []
     found = measured.verdict()
     for one in found:
         print(f"soak: NOT GOOD: {one}")

@@ -113,7 +113,12 @@ class Rig:
             for field in FIELDS_OF[name]:
                 mine = [one for one in entries(journal(self.directory, name)) if one.field == field]
                 found += unheard(
-                    field, self.witness.changes[field], mine, self.witness.watching, self.record.stops, lost
+                    field,
+                    self.witness.changes[field],
+                    mine,
+                    self.witness.watching,
+                    self.record.stops,
+                    lost=lost,
                 )
         return found
 

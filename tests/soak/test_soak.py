@@ -132,7 +132,7 @@ def test_what_went_into_a_breaking_connection_is_no_lie(lost: float, count: int)
     """The next request is answered that the robot is not connected: that it is not there is visible."""
     written = [sent(10.0, 7), Entry(10.01, A, 7, 0)]
     changes = [Change(9.5, 6, 0.0)]
-    assert len(list(unheard(A, changes, written, lambda _since, _until: True, (), [lost]))) == count
+    assert len(list(unheard(A, changes, written, lambda _since, _until: True, lost=[lost]))) == count
 
 
 def test_lies_are_told_but_not_all_of_them() -> None:

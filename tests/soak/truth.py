@@ -94,6 +94,7 @@ def unheard(
     entries: Sequence[Entry],
     watching: Callable[[float, float], bool],
     stops: Sequence[float] = (),
+    *,
     lost: Sequence[float] = (),
 ) -> Iterator[str]:
     """What was acknowledged and never seen in the robot's field, though it was watched and nothing took its place.
