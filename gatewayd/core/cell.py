@@ -68,6 +68,7 @@ class Cell:
             self.writers,
             self.events.append,
             self._fallbacks.apply,
+            self._fallbacks.inherited,
             lambda: self._notify(Direction.INPUT),
         )
         self.operator = Operator(

@@ -81,6 +81,17 @@ class Fallbacks:
         """Those that nobody owns and for which a fallback would change something."""
         return would_fall_back(self._image, filter(self._is_ownerless, variables), self._delivery.unread)
 
+    def inherited(self, lock: int, writer: int) -> list[int]:
+        """The members of a free group whose values are not from this session: adopted, or not even read.
+
+        Another writer may have left them, unless nobody but `writer` can own the lock. A variable that is guarded alone
+        is no command that is composed of what two writers meant: whoever claims it may keep it.
+        """
+        declared = self._ownership.locks[lock]
+        if len(declared.members) == 1 or declared.owners == (writer,):
+            return []
+        return [index for index in declared.members if not self._delivery.is_given(index)]
+
     def _is_ownerless(self, index: int) -> bool:
         lock = self._definition.variables[index].lock
         return lock is not None and self._ownership.owners[lock] is None and self._image.available[index]

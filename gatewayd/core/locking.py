@@ -1,12 +1,14 @@
 """Locks change hands: by writing and requesting, with time, with the end of a connection and the loss of a writer.
 
 Whatever ends an ownership gives the members their `on_release`: a release all of them, a takeover those that its
-request does not write, so that nobody inherits a command. Every change is an event.
+request does not write, so that nobody inherits a command. Taking a free group that several writers may own does the
+same to members that were only adopted: another of them may have left those. Every change is an event.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from gatewayd.core.definition import Value
 from gatewayd.core.events import Event, EventKind
@@ -17,25 +19,18 @@ from gatewayd.core.supervision import WriterTable
 __all__ = ["Locking"]
 
 
+@dataclass(slots=True, eq=False)
 class Locking:
     """Carries out what becomes of the locks of one cell."""
 
-    __slots__ = ("_fall_back", "_notify", "_ownership", "_record", "_writers")
-
-    def __init__(
-        self,
-        ownership: LockTable,
-        writers: WriterTable,
-        record: Callable[[Event], None],
-        fall_back: Callable[[Iterable[int], float], None],
-        notify: Callable[[], None],
-    ) -> None:
-        self._ownership = ownership
-        self._writers = writers
-        self._record = record
-        self._fall_back = fall_back
-        self._notify = notify
-        """Says that inputs have changed."""
+    _ownership: LockTable
+    _writers: WriterTable
+    _record: Callable[[Event], None]
+    _fall_back: Callable[[Iterable[int], float], None]
+    _inherited: Callable[[int, int], list[int]]
+    """The members of a free lock that fall back when this writer takes it."""
+    _notify: Callable[[], None]
+    """Says that inputs have changed."""
 
     def move(
         self,
@@ -43,10 +38,11 @@ class Locking:
         moves: Mapping[int, Move],
         now: float,
         written: Sequence[tuple[int, Value]] = (),
-    ) -> None:
-        """The requester acquires, renews or takes over. What was taken over and is not `written` falls back.
+    ) -> bool:
+        """The requester acquires, renews or takes over. What it inherits and does not write falls back.
 
-        The caller sets what is written and notifies, so that the robot gets all of it in one package.
+        Returns whether something did. The caller sets what is written and notifies, so that the robot gets all of it
+        in one package.
         """
         writer, connection = requester.writer, requester.connection
         assert writer is not None
@@ -63,6 +59,7 @@ class Locking:
                 continue
             if move is Move.ACQUIRE:
                 self._record(Event(now, EventKind.ACQUIRED, lock=lock, writer=writer))
+                dropped += self._inherited(lock, writer)
             elif move is Move.TAKE_OVER:
                 self._record(Event(now, EventKind.TAKEN_OVER, lock=lock, writer=writer, other=former))
                 dropped += locks[lock].members
@@ -72,11 +69,11 @@ class Locking:
         if dropped:
             given = {index for index, _value in written}
             self._fall_back([index for index in dropped if index not in given], now)
+        return bool(dropped)
 
     def take(self, requester: Requester, lock: int, move: Move, now: float) -> None:
         """The requester takes or renews a lock without writing."""
-        self.move(requester, {lock: move}, now)
-        if move is Move.TAKE_OVER:
+        if self.move(requester, {lock: move}, now):
             self._notify()
 
     def renew(self, requester: Requester, moves: Mapping[int, Move], now: float) -> None:

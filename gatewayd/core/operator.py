@@ -44,8 +44,8 @@ class Operator:
     def take_lock(self, lock: int, now: float, until: float = math.inf, detail: str = "") -> None:
         """The local operator takes a lock from whoever holds it; nobody else gets it until `until` or `free_lock`.
 
-        Taken from a writer, all its members take their release fallback, as with any takeover. Taking it again changes
-        `until`.
+        Taken from a writer, all its members take their release fallback, as with any takeover; of a free group
+        those do that were only adopted. Taking it again changes `until`.
         """
         self.release_expired(now)
         self.forcing.hold(lock, until)
@@ -72,7 +72,7 @@ class Operator:
         """The local operator puts `value` in place of what the variable's source tells, at the latest until `until`.
 
         The robot gets a forced input as the operator's, who holds its lock so long; the fieldbus sees a forced output.
-        The other members of a lock that was a writer's take their release fallback.
+        The other members of its lock take their release fallback, as `take_lock` says.
         Forcing it again changes value and `until`. Refused like any write: limits, robot, register.
         """
         self.release_expired(now)
@@ -148,7 +148,7 @@ class Operator:
     def _hold(self, lock: int, now: float, detail: str, forced: int | None = None) -> bool:
         """The operator holds the lock for as long as its takes and forces last; `forced` is about to be given.
 
-        Whether it was a writer's, so that its other members fell back.
+        Its other members fall back if it was a writer's, else those that were only adopted. Whether any had to.
         """
         until = self.forcing.until(lock, self._ownership.locks[lock].members)
         assert until is not None
@@ -156,11 +156,12 @@ class Operator:
         if former != OPERATOR:
             kind = EventKind.ACQUIRED if former is None else EventKind.TAKEN_OVER
             self._record(Event(now, kind, lock=lock, writer=OPERATOR, other=former, detail=detail))
-        if former in (None, OPERATOR):
+        if former == OPERATOR:
             return False
         members = self._ownership.locks[lock].members
-        self._fallbacks.apply([member for member in members if member != forced], now)
-        return True
+        dropped = self._fallbacks.inherited(lock, OPERATOR) if former is None else members
+        self._fallbacks.apply([member for member in dropped if member != forced], now)
+        return bool(dropped)
 
     def _end_forces(self, variables: Sequence[int], now: float, detail: str) -> None:
         self.forcing.lift()

@@ -12,9 +12,9 @@ from gatewayd.core.image import ProcessImage
 from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
 
-START, LAMP, PART, FORCE = range(4)
-PLC = 0
-HELD = {START: True, LAMP: True, PART: 7, FORCE: 99.0, 4: 0.0, 5: 7}
+START, LAMP, PART, FORCE, SPEED, PATH = range(6)
+PLC, HMI = range(2)
+HELD = {START: True, LAMP: True, PART: 7, FORCE: 99.0, SPEED: 0.0, PATH: 7}
 """What the robot holds: of start, lamp and force the fallback would change something."""
 
 
@@ -70,6 +70,59 @@ def test_an_owner_keeps_what_it_claimed(press: CellDefinition) -> None:
     assert cell.request(Requester(PLC), START, 5.0) is None
     cell.tick(20.0)
     assert cell.image.values[START] is True
+
+
+def test_the_group_of_a_dead_writer_is_not_inherited(press: CellDefinition) -> None:
+    """The new owner's path would run at the speed that another one left in the robot."""
+    cell = Cell(press)
+    cell.robot_connected(0.0)
+    cell.adopt({SPEED: 0.9, PATH: 3}, 0.5)
+    assert cell.write(Requester(HMI), [Change(PATH, 5)], 1.0) is None
+    assert (cell.image.values[SPEED], cell.image.values[PATH]) == (0.0, 5)
+    assert SPEED in cell.delivery.under_way
+    assert cell.write(Requester(HMI), [Change(SPEED, 0.2)], 1.1) is None
+    assert (cell.image.values[SPEED], cell.image.values[PATH]) == (0.2, 5)
+
+
+def test_requesting_a_group_drops_all_that_was_adopted(press: CellDefinition) -> None:
+    cell = Cell(press)
+    cell.robot_connected(0.0)
+    cell.adopt({SPEED: 0.9, PATH: 3}, 0.5)
+    assert cell.request(Requester(PLC), PATH, 1.0) is None
+    assert (cell.image.values[SPEED], cell.image.values[PATH]) == (0.0, 7)
+
+
+def test_the_operator_inherits_nothing_either(press: CellDefinition) -> None:
+    cell = Cell(press)
+    cell.robot_connected(0.0)
+    cell.adopt({SPEED: 0.9, PATH: 3}, 0.5)
+    assert cell.operator.force(PATH, 5, 1.0, until=9.0) is None
+    assert (cell.image.values[SPEED], cell.image.values[PATH]) == (0.0, 5)
+
+
+def test_a_variable_that_is_guarded_alone_is_claimed_as_it_is(press: CellDefinition) -> None:
+    cell = connected(press)
+    assert cell.request(Requester(HMI), FORCE, 1.0) is None
+    assert cell.image.values[FORCE] == 99.0
+
+
+def test_an_only_owner_goes_on_with_its_own_values(press: CellDefinition) -> None:
+    """Nobody else can have left them, so a PLC that writes its group in several requests causes no step."""
+    locks = tuple(replace(lock, owners=(PLC,)) for lock in press.locks)
+    cell = Cell(replace(press, locks=locks))
+    cell.robot_connected(0.0)
+    cell.adopt({SPEED: 0.9, PATH: 3}, 0.5)
+    assert cell.write(Requester(PLC), [Change(PATH, 5)], 1.0) is None
+    assert cell.image.values[SPEED] == 0.9
+
+
+def test_a_writer_that_outlasts_a_session_keeps_its_group(press: CellDefinition) -> None:
+    cell = connected(press)
+    assert cell.write(Requester(PLC), [Change(SPEED, 0.4), Change(PATH, 3)], 1.0) is None
+    cell.robot_connected(1.5)
+    cell.adopt({SPEED: 0.4, PATH: 3}, 1.6)
+    assert cell.write(Requester(PLC), [Change(PATH, 5)], 1.7) is None
+    assert cell.image.values[SPEED] == 0.4
 
 
 def test_without_anything_to_fall_back_there_is_no_warning(press: CellDefinition) -> None:

@@ -101,7 +101,7 @@ def test_values_of_one_request_are_told_to_the_listeners_at_once(cell: Cell) -> 
     seen: list[tuple[Direction, list[Value]]] = []
     cell.listeners.append(lambda direction: seen.append((direction, cell.image.values[START:CYCLES])))
     cell.write(Requester(PLC), [Change(START, True), Change(PART, 3), Change(SPEED, 0.5)], 1.0)
-    assert seen == [(Direction.INPUT, [True, False, 3, 0.0, 0.5, 0])]
+    assert seen == [(Direction.INPUT, [True, False, 3, 0.0, 0.5, 7])]
 
 
 def test_a_nan_passes_only_where_no_limits_are_and_falls_back_like_any_value(
@@ -251,12 +251,14 @@ def test_a_takeover_by_request_drops_every_member(cell: Cell) -> None:
     assert len(seen) == 1, "renewing changes nothing"
 
 
-def test_acquiring_a_free_lock_changes_nothing(cell: Cell) -> None:
-    cell.adopt({SPEED: 0.4, PATH: 3}, 0.5)
+def test_acquiring_a_free_lock_changes_nothing_that_was_given_in_this_session(cell: Cell) -> None:
+    cell.write(Requester(HMI), [Change(SPEED, 0.4), Change(PATH, 3)], 0.5)
+    assert cell.release(Requester(HMI), PATH, 0.6) is None
+    before = fallbacks(cell)
     assert cell.request(Requester(HMI), PATH, 1.0) is None
     assert write(cell, HMI, PATH, 4, 1.1) is None
-    assert cell.image.values[SPEED : PATH + 1] == [0.4, 4]
-    assert fallbacks(cell) == []
+    assert cell.image.values[SPEED : PATH + 1] == [0.0, 4]
+    assert fallbacks(cell) == before
 
 
 def test_what_a_takeover_drops_waits_for_its_register(cell: Cell) -> None:
@@ -434,10 +436,10 @@ def test_a_due_fallback_does_not_undo_a_later_write(cell: Cell) -> None:
 
 def test_clear_on_connect_spares_what_is_owned(press: CellDefinition) -> None:
     cell = Cell(replace(press, clear_on_connect=True))
-    cell.request(Requester(PLC), PATH, 0.5)
+    cell.request(Requester(PLC), FORCE, 0.5)
     cell.robot_connected(0.5)
-    cell.adopt({START: True, PART: 5, PATH: 6}, 0.5)
-    assert cell.image.values[START : PATH + 1] == [False, False, 5, 10.0, 0.0, 6]
+    cell.adopt({START: True, PART: 5, FORCE: 33.0}, 0.5)
+    assert cell.image.values[START : PATH + 1] == [False, False, 5, 33.0, 0.0, 7]
 
 
 def test_adopting_takes_over_what_the_controller_holds(press: CellDefinition) -> None:

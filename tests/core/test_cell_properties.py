@@ -185,6 +185,8 @@ class Model:
         self.due: set[int] = set()
         self.under_way: set[int] = set()
         self.entered: set[int] = set()
+        self.given: set[int] = set()
+        """Inputs that got their value in this session, written or as a fallback."""
         self.connections: Counter[int] = Counter()
         self.worked: dict[int, int] = {}
         """By which connection the owner of a lock last worked with it."""
@@ -217,11 +219,14 @@ class Model:
         assert writer is not None
         if former is None:
             self.events[EventKind.ACQUIRED] += 1
+            inherited = set(LOCKS[lock].members) - self.given if lock == 4 else set()
         elif former != writer:
             self.events[EventKind.TAKEN_OVER] += 1
-            for index in LOCKS[lock].members:
-                if index not in written:
-                    self.fall_back(index, now)
+            inherited = set(LOCKS[lock].members)
+        else:
+            inherited = set()
+        for index in inherited.difference(written):
+            self.fall_back(index, now)
         self.owner[lock], self.worked[lock] = writer, by.connection
         self.abandoned.pop(lock, None)
         lease = LOCKS[lock].lease
@@ -331,6 +336,7 @@ class Model:
         if self.value[index] != new:
             self.events[EventKind.FALLBACK] += 1
         self.put(index, new, now)
+        self.given.add(index)
         self.under_way.add(index)
 
     def fits(self, index: int, value: Value) -> Value | None:
@@ -445,6 +451,7 @@ class Model:
                 assert value is not None
                 self.due.discard(change.variable)
                 self.under_way.discard(change.variable)
+                self.given.add(change.variable)
                 self.put(change.variable, value, now)
         self.accepted += 1
 
@@ -506,6 +513,7 @@ class Model:
             self.due |= self.under_way
             self.under_way.clear()
             self.entered.clear()
+            self.given.clear()
             self.dim()
             self.events[EventKind.ROBOT_LOST] += 1
 
@@ -552,6 +560,7 @@ class Model:
         if gone:
             self.good.discard(index)
             self.entered.discard(index)
+            self.given.discard(index)
             if index in self.under_way:
                 self.under_way.discard(index)
                 self.due.add(index)

@@ -29,11 +29,17 @@ class Bench:
         self.writers = WriterTable([Writer("plc"), Writer("hmi", timeout=1.0)], self.locks.locks)
         self.events: list[Event] = []
         self.fallen: list[int] = []
+        self.adopted: set[int] = set()
         self.notified = 0
-        self.locking = Locking(self.locks, self.writers, self.events.append, self.fall_back, self.notify)
+        self.locking = Locking(
+            self.locks, self.writers, self.events.append, self.fall_back, self.inherited, self.notify
+        )
 
     def fall_back(self, variables: Iterable[int], _now: float) -> None:
         self.fallen += variables
+
+    def inherited(self, lock: int, _writer: int) -> list[int]:
+        return sorted(self.adopted.intersection(self.locks.locks[lock].members))
 
     def notify(self) -> None:
         self.notified += 1
@@ -62,6 +68,14 @@ def test_taking_without_writing_drops_all_and_notifies(bench: Bench) -> None:
     assert (bench.fallen, bench.notified) == ([], 0)
     bench.locking.take(Requester(PLC), GROUP, Move.TAKE_OVER, 2.0)
     assert (bench.fallen, bench.notified) == ([A, B], 1)
+
+
+def test_taking_a_free_lock_drops_what_was_only_adopted(bench: Bench) -> None:
+    bench.adopted = {A, B, C}
+    bench.locking.move(Requester(HMI), {GROUP: Move.ACQUIRE}, 1.0, [(A, 1)])
+    assert (bench.fallen, bench.notified) == ([B], 0)
+    bench.locking.take(Requester(HMI), SINGLE, Move.ACQUIRE, 1.0)
+    assert (bench.fallen, bench.notified) == ([B, C], 1)
 
 
 def test_what_time_ends_is_released_with_its_reason(bench: Bench) -> None:

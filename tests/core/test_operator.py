@@ -56,12 +56,17 @@ class TestLocks:
         assert seen == [[0.0, 7]]
         assert kinds(cell)[-3:] == [EventKind.TAKEN_OVER, EventKind.FALLBACK, EventKind.FALLBACK]
 
-    def test_what_nobody_owned_or_he_has_already_stays_as_it_is(self, cell: Cell) -> None:
-        cell.adopt({SPEED: 0.4, PATH: 3}, 0.5)
+    def test_what_was_given_or_he_has_already_stays_as_it_is(self, cell: Cell) -> None:
         cell.operator.take_lock(MOTION, 1.0)
+        assert cell.operator.force(PATH, 3, 1.5, SECOND) is None
         cell.operator.take_lock(MOTION, 2.0)
         assert cell.operator.force(SPEED, 0.5, 3.0, SECOND) is None
         assert cell.image.values[SPEED : PATH + 1] == [0.5, 3]
+
+    def test_of_a_free_group_he_inherits_nothing_that_was_only_adopted(self, cell: Cell) -> None:
+        cell.adopt({SPEED: 0.4, PATH: 3}, 0.5)
+        cell.operator.take_lock(MOTION, 1.0)
+        assert cell.image.values[SPEED : PATH + 1] == [0.0, 7]
 
     def test_not_even_the_first_of_a_takeover_list_gets_it_back(self, cell: Cell) -> None:
         cell.operator.take_lock(MOTION, 1.0)
