@@ -68,7 +68,7 @@ install: $(VENV)/.made ## Install as the package would, below DESTDIR (as root; 
 	packaging/install "$(DESTDIR)" $(PY)
 
 fuzz: $(VENV)/.dev ## Try the parsers and the running daemon with 100,000 hostile cases (CASES=1000000)
-	GATEWAYD_FUZZ_CASES=$(CASES) $(PY) -m pytest --timeout 1800 tests/e2e/test_hostile.py tests/modbus/test_fuzz.py tests/rtde $(ARGS)
+	GATEWAYD_FUZZ_CASES=$(CASES) $(PY) -m pytest --timeout 1800 tests/e2e/test_hostile.py tests/links/modbus_server/test_fuzz.py tests/rtde $(ARGS)
 
 soak: $(VENV)/.dev ## Torment the running daemon for an hour, from a seed (SECONDS=300 ARGS="--seed 7 --speed fast")
 	$(PY) -m tests.soak --seconds $(SECONDS) $(ARGS)

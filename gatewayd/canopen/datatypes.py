@@ -5,9 +5,11 @@ from __future__ import annotations
 import struct
 from enum import Enum
 
-from gatewayd.core.definition import Value
-
 __all__ = ["CanType"]
+
+
+Value = bool | int | float
+"""What a numeric type holds."""
 
 
 class CanType(Enum):

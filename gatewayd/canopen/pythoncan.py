@@ -22,14 +22,14 @@ from typing import Any
 
 import can
 
-from gatewayd import clock
-from gatewayd.aside import aside
 from gatewayd.canopen.bus import DRAIN, BusError, BusHandler
 from gatewayd.canopen.cob_ids import BASIC_FRAME
 from gatewayd.canopen.errors import ErrorClass, ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.supervised import SupervisedBus
 from gatewayd.canopen.supervision import LOOK, Event
+from gatewayd.loop import clock
+from gatewayd.loop.threads import aside
 
 __all__ = ["ASK", "ASK_LIMIT", "PythonCanBus"]
 

@@ -12,13 +12,13 @@ import socket
 import struct
 from collections.abc import Iterable
 
-from gatewayd import clock
 from gatewayd.canopen.bus import DRAIN, BusError, BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.interface import ControllerState, Interface, InterfaceReader
 from gatewayd.canopen.supervised import SupervisedBus
 from gatewayd.canopen.supervision import LOOK, Event, event_of_errno
+from gatewayd.loop import clock
 
 __all__ = ["RECEIVE_BUFFER", "SEND_BUFFER", "SocketCanBus", "filters", "pack", "seen"]
 

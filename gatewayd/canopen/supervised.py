@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 
-from gatewayd import clock
 from gatewayd.canopen.bus import BusCounters, BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.supervision import Event, Supervisor, event_of_error
+from gatewayd.loop import clock
 
 __all__ = ["LAG", "ROOM_RETRY", "SupervisedBus"]
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from gatewayd.canopen.cob_ids import BASIC_FRAME, is_restricted
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
-from gatewayd.canopen.plan import SyncPlan
 
-__all__ = ["GREATEST_COUNTER", "LEAST_PERIOD", "PRODUCER", "Sync"]
+__all__ = ["GREATEST_COUNTER", "LEAST_PERIOD", "PRODUCER", "Sync", "SyncPlan"]
 
 PRODUCER = 0x4000_0000
 """Bit 30 of 1005h: this node sends SYNC."""
@@ -19,6 +19,18 @@ _DO_NOT_CARE = 0x8000_0000
 GREATEST_COUNTER = 240
 LEAST_PERIOD = 1000
 """Microseconds: a shorter cycle would fill the bus, and no timer of this node keeps it."""
+
+
+@dataclass(frozen=True, slots=True)
+class SyncPlan:
+    """What this node has to do with SYNC."""
+
+    cob_id: int = 0x80
+    producer: bool = False
+    period: int = 0
+    """Communication cycle period in us; 0: none."""
+    counter: int = 0
+    """Synchronous counter overflow value; 0: SYNC carries no counter."""
 
 
 class Sync:

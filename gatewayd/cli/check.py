@@ -10,7 +10,7 @@ from click.shell_completion import CompletionItem
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from gatewayd.mapping.report import Outcome, Unreadable
+    from gatewayd.report.findings import Outcome, Unreadable
 
 __all__ = ["command"]
 
@@ -110,7 +110,7 @@ def command(
 
 def _check(files: tuple[str, ...], *, separately: bool) -> Outcome:
     from gatewayd.mapping.loader import load, load_together
-    from gatewayd.mapping.report import Outcome
+    from gatewayd.report.findings import Outcome
 
     readable: list[tuple[str, bytes]] = []
     unreadable: list[Unreadable] = []
@@ -131,7 +131,7 @@ def _named(files: tuple[str, ...]) -> Iterator[str]:
     from os.path import isdir
     from pathlib import Path
 
-    from gatewayd.startup import PATTERN
+    from gatewayd.service.startup import PATTERN
 
     for file in files:
         inside = sorted(Path(file).glob(PATTERN)) if isdir(file) else []  # noqa: PTH112 - as in startup.py
@@ -143,8 +143,8 @@ def _read(file: str) -> bytes | Unreadable:
     from pathlib import Path
 
     from gatewayd.mapping.loader import read_bytes
-    from gatewayd.mapping.report import Unreadable
     from gatewayd.mapping.source import MAXIMUM_BYTES
+    from gatewayd.report.findings import Unreadable
 
     try:
         if file == STDIN:
@@ -162,7 +162,7 @@ def _shown(file: str) -> str:
 
 
 def _written(outcome: Outcome, form: str) -> str:
-    from gatewayd.mapping.report import as_github, as_json, as_text
+    from gatewayd.report.findings import as_github, as_json, as_text
 
     if form == "json":
         return as_json(outcome)

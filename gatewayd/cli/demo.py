@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gatewayd import clock
+from gatewayd.loop import clock
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gatewayd.printable import printable
+from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
     from gatewayd.mapping.plan import Plan
@@ -49,7 +49,7 @@ def command(context: click.Context, old: str, new: str, form: str) -> None:
 
     Compared is what the files mean: order of keys, spelling and formatting do not count. `-` reads standard input.
     """
-    from gatewayd.mapping.diff import as_json, as_text, compare
+    from gatewayd.report.diff import as_json, as_text, compare
 
     if old == new == "-":
         raise click.UsageError("only one of the two files can be standard input")
@@ -68,8 +68,8 @@ def _load(file: str) -> Plan | None:
     from pathlib import Path
 
     from gatewayd.mapping.loader import load, read_bytes
-    from gatewayd.mapping.report import Outcome, as_text
     from gatewayd.mapping.source import MAXIMUM_BYTES
+    from gatewayd.report.findings import Outcome, as_text
 
     name = "stdin" if file == "-" else str(click.format_filename(file))
     try:

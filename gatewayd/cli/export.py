@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from gatewayd.printable import printable
+from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
     from gatewayd.canopen.dictionary import Dictionary
-    from gatewayd.canopen.plan import CanopenPlan
+    from gatewayd.links.canopen_node.plan import CanopenPlan
     from gatewayd.mapping.plan import Plan
 
 __all__ = ["command"]
@@ -71,7 +71,7 @@ def eds(context: click.Context, file: str, output: str) -> None:
     gives the same bytes. The sheet is valid for any node-ID; COB-IDs beyond the four predefined of each direction are
     those of the mapping.
     """
-    from gatewayd.canopen.eds import eds_text, objects_of, sheet_of
+    from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
 
     plan, canopen = _node(context, file)
     dictionary = objects_of(canopen, plan.cell)
@@ -95,7 +95,7 @@ def dcf(context: click.Context, file: str, output: str) -> None:
     """Write the device configuration file (CiA 306) of a mapping FILE: its data sheet with the node-ID, the bit-rate
     and the value of every parameter as the mapping has them.
     """
-    from gatewayd.canopen.eds import Commissioning, dcf_text, objects_of, sheet_of
+    from gatewayd.links.canopen_node.eds import Commissioning, dcf_text, objects_of, sheet_of
 
     plan, canopen = _node(context, file)
     commissioning = Commissioning(canopen.node, canopen.bitrate, plan.cell.name)
@@ -120,7 +120,7 @@ def urscript(context: click.Context, file: str, output: str) -> None:
     """Write the lines of a mapping FILE for the robot program: the watchdog that stops it when the gateway or a
     required writer is gone.
     """
-    from gatewayd.mapping.urscript import watchdog_script
+    from gatewayd.links.robot.urscript import watchdog_script
 
     plan = _plan(context, file)
     if plan.robot.watchdog is None:
@@ -156,8 +156,8 @@ def _plan(context: click.Context, file: str) -> Plan:
     from pathlib import Path
 
     from gatewayd.mapping.loader import load, read_bytes
-    from gatewayd.mapping.report import Outcome, as_text
     from gatewayd.mapping.source import MAXIMUM_BYTES
+    from gatewayd.report.findings import Outcome, as_text
 
     name = "stdin" if file == STDIN else str(click.format_filename(file))
     try:

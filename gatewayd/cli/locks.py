@@ -120,7 +120,7 @@ def _post(
 
 
 def _print(locks: list[dict[str, Any]]) -> None:
-    from gatewayd.figures import age
+    from gatewayd.report.format import age
 
     several = len({lock["cell"] for lock in locks}) > 1
     rows = [("lock", "owner", "left", "may own it", "variables")]

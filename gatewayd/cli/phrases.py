@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from gatewayd.figures import age
+from gatewayd.report.format import age
 
 __all__ = ["clock", "owner", "places", "quality"]
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from gatewayd.printable import json_text, printable, printable_answer
+from gatewayd.report.printable import json_text, printable, printable_answer
 
 if TYPE_CHECKING:
     from gatewayd.control.client import Client

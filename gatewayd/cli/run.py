@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gatewayd.signals import SIGNALS
+from gatewayd.service.signals import SIGNALS
 
 if TYPE_CHECKING:
     import asyncio
 
-    from gatewayd.daemon import Daemon
-    from gatewayd.signals import Effect
-    from gatewayd.startup import Startup
-    from gatewayd.status.launch import Settings
+    from gatewayd.service.daemon import Daemon
+    from gatewayd.service.signals import Effect
+    from gatewayd.service.startup import Startup
+    from gatewayd.web.launch import Settings
 
 __all__ = ["command"]
 
@@ -110,8 +110,8 @@ def command(
     A FILE may also be a directory: all its *.yaml files are meant. Cells with the same `modbus: listen:` share one
     listener and differ by their unit id. Robots, PLCs and interfaces may come and go in any order.
     """
-    from gatewayd.logs import Format, configure
-    from gatewayd.logstream import LogStream
+    from gatewayd.logs.records import Format, configure
+    from gatewayd.logs.stream import LogStream
 
     page = _settings(status, token_file) if status else None
     stream = LogStream(_descriptor())
@@ -130,7 +130,7 @@ def command(
 
 def _settings(status: str, token_file: Path | None) -> Settings:
     # Its import brings the daemon's, which otherwise happens while the mapping files are read.
-    from gatewayd.status.launch import Settings, SettingsError
+    from gatewayd.web.launch import Settings, SettingsError
 
     try:
         return Settings(status, token_file)
@@ -145,8 +145,8 @@ def _descriptor() -> int:
 
 def _load(files: Sequence[Path], *, strict: bool) -> Startup | int:
     """What there is to serve, or the exit code."""
-    from gatewayd.compilation import CompilationError
-    from gatewayd.startup import load_plans
+    from gatewayd.service.compilation import CompilationError
+    from gatewayd.service.startup import load_plans
 
     try:
         found = load_plans(files, _import_the_daemon, lambda: SIGNALS.stopping)
@@ -172,9 +172,9 @@ def _run(
 ) -> int:
     import asyncio
 
-    from gatewayd import clock
-    from gatewayd.daemon import Daemon
-    from gatewayd.startup import state_directory
+    from gatewayd.loop import clock
+    from gatewayd.service.daemon import Daemon
+    from gatewayd.service.startup import state_directory
 
     daemon = Daemon(found.plans, state or state_directory(os.environ))
     with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
@@ -183,23 +183,23 @@ def _run(
 
 
 def _log_stop(text: str) -> None:
-    from gatewayd.logs import fields
-    from gatewayd.signals import name_of
+    from gatewayd.logs.records import fields
+    from gatewayd.service.signals import name_of
 
     logging.getLogger("gatewayd.run").info(text, extra=fields(signal=name_of(SIGNALS.stopped_by)))
 
 
 def _import_the_daemon() -> None:
     """What takes as long as reading the files, and can be done meanwhile."""
-    import gatewayd.daemon
-    import gatewayd.operation
-    import gatewayd.reload
-    import gatewayd.service  # noqa: F401
+    import gatewayd.service.daemon
+    import gatewayd.service.operator
+    import gatewayd.service.reload
+    import gatewayd.service.watchdog  # noqa: F401
 
 
 def _socket(named: Path | None) -> Path | None:
     from gatewayd.control.paths import default_socket
-    from gatewayd.logs import fields
+    from gatewayd.logs.records import fields
 
     if named is not None:
         return None if str(named) == "none" else named
@@ -233,12 +233,12 @@ async def _serve(
 ) -> None:
     import asyncio
 
-    from gatewayd import clock
-    from gatewayd.operation import Operation, Standstill
-    from gatewayd.reload import Reloader
-    from gatewayd.service import Service
-    from gatewayd.status.launch import serve
-    from gatewayd.systemd import Notifier
+    from gatewayd.loop import clock
+    from gatewayd.service.operator import Operation, Standstill
+    from gatewayd.service.reload import Reloader
+    from gatewayd.service.systemd import Notifier
+    from gatewayd.service.watchdog import Service
+    from gatewayd.web.launch import serve
 
     stop = asyncio.Event()
     service = Service(Notifier(os.environ, os.getpid()), daemon, notes)
@@ -288,9 +288,9 @@ class _Obedience:
         self._logged: dict[int, float] = {}
 
     def __call__(self, number: int, effect: Effect) -> None:
-        from gatewayd import clock
-        from gatewayd.logs import fields
-        from gatewayd.signals import Effect, name_of
+        from gatewayd.logs.records import fields
+        from gatewayd.loop import clock
+        from gatewayd.service.signals import Effect, name_of
 
         if effect is Effect.END:
             _log_stop("stopping")

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from gatewayd.printable import printable
+from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from gatewayd.mapping.loader import Loaded
     from gatewayd.mapping.plan import Plan
-    from gatewayd.mapping.table import Row
+    from gatewayd.report.table import Row
 
 __all__ = ["command"]
 
@@ -68,7 +68,7 @@ def command(context: click.Context, file: str, form: str, *, every: bool) -> Non
     if form == "table":
         _print_table(loaded, plan, every=every)
         return
-    from gatewayd.mapping.table import as_csv, as_json, as_markdown, rows
+    from gatewayd.report.table import as_csv, as_json, as_markdown, rows
 
     table = rows(loaded.cell)
     written = {
@@ -98,7 +98,7 @@ def _load(context: click.Context, file: str) -> Loaded:
 
 
 def _complain(loaded: Loaded) -> None:
-    from gatewayd.mapping.report import Outcome, as_text
+    from gatewayd.report.findings import Outcome, as_text
 
     click.echo(as_text(Outcome((loaded.name,), loaded.diagnostics)), nl=False, err=True)
 
@@ -109,7 +109,7 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
 
     from rich.console import Console
 
-    from gatewayd.mapping.table import by_line, rows
+    from gatewayd.report.table import by_line, rows
 
     entries = [(row, row) for row in rows(loaded.cell)] if every else list(by_line(loaded.cell))
     known = sys.stdout.isatty() or "COLUMNS" in os.environ
@@ -174,7 +174,7 @@ def _table(entries: list[tuple[Row, Row]], *, wide: bool) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    from gatewayd.mapping.table import formula, limits, lost, policy
+    from gatewayd.report.table import formula, limits, lost, policy
 
     table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False)
     for title, whole in _COLUMNS.items():
@@ -221,7 +221,7 @@ def _pdo_table(loaded: Loaded) -> Table:
     from rich.text import Text
 
     from gatewayd.core.definition import Direction
-    from gatewayd.mapping.pdo_table import pdo_rows
+    from gatewayd.links.canopen_node.pdo_table import pdo_rows
     from gatewayd.mapping.rules.wording import seconds
 
     table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False)
@@ -252,7 +252,7 @@ _PDO_COLUMNS = ("PDO", "COB-ID", "transmission", "inhibit", "event", "bits", "va
 
 def _loads(loaded: Loaded) -> Iterator[str]:
     """What no PDO carries, and the share of the bus in the worst case for each bit-rate."""
-    from gatewayd.mapping.pdo_table import by_sdo_only, load_by_bit_rate
+    from gatewayd.links.canopen_node.pdo_table import by_sdo_only, load_by_bit_rate
 
     objects = by_sdo_only(loaded.cell)
     if objects:

@@ -81,7 +81,7 @@ def _narrowed(answer: Answer, cell: str) -> dict[str, Any]:
 
 def _lines(answer: Answer, locks: list[Answer], events: list[Answer]) -> Iterator[str]:
     from gatewayd.cli.phrases import clock
-    from gatewayd.figures import span
+    from gatewayd.report.format import span
 
     healthy = answer["healthy"]
     state = click.style("healthy" if healthy else "degraded", fg="green" if healthy else "red", bold=True)
@@ -102,7 +102,7 @@ def _lines(answer: Answer, locks: list[Answer], events: list[Answer]) -> Iterato
 
 
 def _cell(cell: Answer, locks: list[Answer]) -> Iterator[str]:
-    from gatewayd.figures import counted
+    from gatewayd.report.format import counted
 
     yield (
         click.style(cell["name"], bold=True)
@@ -142,7 +142,7 @@ _STATES = {
 
 
 def _robot(robot: Answer) -> list[str]:
-    from gatewayd.figures import age, counted
+    from gatewayd.report.format import age, counted
 
     words, colour = _STATES[robot["state"]]
     first = f"{robot['address']} {click.style(words, fg=colour)}"
@@ -170,7 +170,7 @@ def _robot(robot: Answer) -> list[str]:
 
 
 def _writer(writer: Answer, locks: int) -> str:
-    from gatewayd.figures import age
+    from gatewayd.report.format import age
 
     if writer["alive"]:
         state, colour = f"there, last request {age(writer['age'])} ago", "green"
@@ -193,7 +193,7 @@ def _variables(counts: Answer) -> str:
 
 
 def _locks(locks: list[Answer]) -> list[str]:
-    from gatewayd.figures import age
+    from gatewayd.report.format import age
 
     held = [
         f"{lock['name']}: {lock['owner']}"
@@ -206,7 +206,7 @@ def _locks(locks: list[Answer]) -> list[str]:
 
 
 def _writes(cell: Answer) -> list[str]:
-    from gatewayd.figures import age
+    from gatewayd.report.format import age
 
     writes, last = cell["writes"], cell["last_refusal"]
     lines = [f"{writes['accepted']} accepted, {writes['refused']} refused"]

@@ -32,7 +32,7 @@ Exit codes:
 def command(name: str | None, socket: Path | None, cell: str | None, *, every: bool) -> None:
     """End the force of variable NAME: an output shows the truth again, an input its release fallback."""
     from gatewayd.control.client import segment
-    from gatewayd.figures import value
+    from gatewayd.report.format import value
 
     if every == (name is not None):
         raise click.UsageError("name one variable, or use --all")

@@ -23,7 +23,7 @@ from gatewayd.cli.remote import (
     refusals,
     socket_option,
 )
-from gatewayd.printable import printable
+from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
     from rich.console import Console

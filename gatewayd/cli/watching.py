@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from gatewayd.cli import phrases
-from gatewayd.figures import age, counted, value
+from gatewayd.report.format import age, counted, value
 
 __all__ = ["KEYS", "Glimpse", "Show", "View", "chosen", "plain", "press", "screen", "settled"]
 

@@ -15,7 +15,6 @@ from fnmatch import fnmatchcase
 from typing import Any, Protocol
 
 from gatewayd import __version__
-from gatewayd.audit import Audit, Record, utc
 from gatewayd.control.views import (
     Json,
     StationView,
@@ -29,6 +28,7 @@ from gatewayd.control.views import (
 from gatewayd.core.definition import Value, ValueKind
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.mapping.plan import Plan
+from gatewayd.service.audit import Audit, Record, utc
 
 __all__ = ["API_VERSION", "LONGEST_FORCE", "STALE_ACT", "Api", "ApiError", "Cursor", "Gateway", "Moment"]
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gatewayd.control.api import Api
-from gatewayd.logs import fields
+from gatewayd.logs.records import fields
 
 __all__ = ["MODE", "RETRY_PERIOD", "Endpoint", "Reload", "Reloaded", "SocketTaken", "bind"]
 

@@ -16,13 +16,13 @@ from typing import Any
 
 from aiohttp import web
 
-from gatewayd import clock
-from gatewayd.aside import aside
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
 from gatewayd.control.views import Json
-from gatewayd.logs import fields
-from gatewayd.printable import json_text
+from gatewayd.logs.records import fields
+from gatewayd.loop import clock
+from gatewayd.loop.threads import aside
+from gatewayd.report.printable import json_text
 
 __all__ = ["ALIVE_PERIOD", "FOLLOWERS", "GREATEST_BODY", "application", "serving"]
 

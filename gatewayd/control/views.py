@@ -10,16 +10,17 @@ import re
 from collections.abc import Iterator
 from typing import Any, Protocol
 
-from gatewayd.audit import Record, plain_value, utc
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import OPERATOR, Direction, Fallback, FallbackKind, Variable
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.health import CAN_BUS, NMT_STATES
 from gatewayd.core.image import Quality
-from gatewayd.figures import counted, span
-from gatewayd.happening import Happening
-from gatewayd.mapping.plan import Placement, Plan
+from gatewayd.links.modbus_server.plan import Placement
+from gatewayd.mapping.plan import Plan
+from gatewayd.report.event_text import Happening
+from gatewayd.report.format import counted, span
+from gatewayd.service.audit import Record, plain_value, utc
 
 __all__ = [
     "Json",

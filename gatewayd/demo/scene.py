@@ -13,13 +13,13 @@ from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from gatewayd import clock
 from gatewayd.core.cell import Cell
-from gatewayd.daemon import Daemon
 from gatewayd.demo.master import Master
 from gatewayd.demo.plc import FORCE_SHARE, Plc
+from gatewayd.loop import clock
 from gatewayd.mapping.loader import load
-from gatewayd.mapping.table import Row, rows
+from gatewayd.report.table import Row, rows
+from gatewayd.service.daemon import Daemon
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import parse
 from gatewayd.simulator.server import SimulatedController

@@ -13,9 +13,9 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
 from gatewayd.demo.scene import Scene
-from gatewayd.figures import age, value
-from gatewayd.happening import BAD, STRANGER, Happening
-from gatewayd.mapping.table import Row
+from gatewayd.report.event_text import BAD, STRANGER, Happening
+from gatewayd.report.format import age, value
+from gatewayd.report.table import Row
 
 __all__ = [
     "PDO_REFUSAL_SHOWN",

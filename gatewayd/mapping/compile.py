@@ -13,7 +13,8 @@ from enum import Enum
 from ipaddress import IPv4Network, IPv6Network
 from typing import Any, Final
 
-from gatewayd.canopen.plan import CanopenPlan, Consumer, PdoEntry, PdoPlan, SyncPlan
+from gatewayd.canopen.heartbeat import Consumer
+from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import (
     CellDefinition,
     Direction,
@@ -26,12 +27,17 @@ from gatewayd.core.definition import (
     Variable,
     Writer,
 )
-from gatewayd.mapping.can_expand import CanopenCell, ConcretePdo
-from gatewayd.mapping.codec import Codec
+from gatewayd.links.canopen_node.expand import CanopenCell, ConcretePdo
+from gatewayd.links.canopen_node.plan import CanopenPlan, PdoEntry, PdoPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, Network, Placement
+from gatewayd.links.modbus_server.sections import Modbus
+from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
+from gatewayd.links.robot.sections import ADOPT_FOR, Robot
 from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
-from gatewayd.mapping.model import ADOPT_FOR, Modbus, Robot, WriterSpec
-from gatewayd.mapping.plan import ModbusPlan, Network, Placement, Plan, RobotPlan, WatchdogPlan
+from gatewayd.mapping.model import WriterSpec
+from gatewayd.mapping.plan import Plan
 from gatewayd.mapping.shown import Shown, shown_of
+from gatewayd.modbus.codec import Codec
 from gatewayd.rtde.catalogue import Series
 
 __all__ = ["PROGRAM_STATE", "compile_plan", "fingerprint", "package_period"]

@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from gatewayd.mapping.can_model import (
+from gatewayd.links.canopen_node.sections import (
     AUTO,
     NO_PDO,
     Canopen,
@@ -24,22 +24,13 @@ from gatewayd.mapping.can_model import (
     PdoSpec,
     Sync,
 )
+from gatewayd.links.modbus_server.sections import Modbus, PlacementSpec
+from gatewayd.links.robot.sections import Robot, Watchdog
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule
-from gatewayd.mapping.model import (
-    ANY,
-    FORMAT_VERSION,
-    Group,
-    MappingFile,
-    Modbus,
-    PlacementSpec,
-    Robot,
-    Section,
-    VariableSpec,
-    Watchdog,
-    WriterSpec,
-)
+from gatewayd.mapping.model import ANY, FORMAT_VERSION, Group, MappingFile, VariableSpec, WriterSpec
 from gatewayd.mapping.rules import syntax
 from gatewayd.mapping.scalars import CellName, Name
+from gatewayd.mapping.section import Section
 from gatewayd.mapping.source import Entry, Items, Node, Scalar, Source, Table
 
 __all__ = ["Document", "Part", "read_document"]

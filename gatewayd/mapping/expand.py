@@ -12,13 +12,14 @@ from enum import Enum, auto
 from typing import Final
 
 from gatewayd.core.definition import Direction, ValueKind
-from gatewayd.mapping.can_expand import Candidate, CanopenCell, expand_canopen
-from gatewayd.mapping.codec import TYPES, Codec, make_codec
+from gatewayd.links.canopen_node.expand import Candidate, CanopenCell, expand_canopen
+from gatewayd.links.modbus_server.sections import PlacementSpec
+from gatewayd.links.robot.reference import ReferenceProblem, Target, UnresolvedReference, resolve
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Document, Part
-from gatewayd.mapping.model import ANY, Group, PlacementSpec, VariableSpec
-from gatewayd.mapping.plan import Area
-from gatewayd.mapping.reference import ReferenceProblem, Target, UnresolvedReference, resolve
+from gatewayd.mapping.model import ANY, Group, VariableSpec
+from gatewayd.modbus.areas import Area
+from gatewayd.modbus.codec import TYPES, Codec, make_codec
 from gatewayd.rtde.catalogue import INPUTS, Field
 from gatewayd.rtde.types import DataType
 

@@ -16,8 +16,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf
 from pydantic_core import PydanticCustomError
 
 from gatewayd.core.definition import Fallback, FallbackKind
+from gatewayd.links.modbus_server.plan import Network
 from gatewayd.mapping.diagnostics import Rule
-from gatewayd.mapping.plan import Network
 from gatewayd.mapping.rules import syntax
 from gatewayd.mapping.source import RealNumber, WholeNumber
 

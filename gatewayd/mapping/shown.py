@@ -16,9 +16,9 @@ from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import ValueKind
-from gatewayd.mapping.can_expand import CanopenCell
-from gatewayd.mapping.codec import TYPES, Codec
+from gatewayd.links.canopen_node.expand import CanopenCell
 from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
+from gatewayd.modbus.codec import TYPES, Codec
 
 __all__ = ["EVERYTHING", "Shown", "shown_of"]
 

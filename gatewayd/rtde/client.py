@@ -14,6 +14,7 @@ import socket
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from gatewayd.loop.progress import turning
 from gatewayd.rtde.claims import InputRecipe
 from gatewayd.rtde.connection import ClientHandler, Connection, Tolerances
 from gatewayd.rtde.lists import ListMemory
@@ -23,7 +24,6 @@ from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.resolve import resolve
 from gatewayd.rtde.types import DEFAULT_PORT
-from gatewayd.turning import turning
 
 __all__ = [
     "ClientHandler",

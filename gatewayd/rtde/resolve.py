@@ -6,7 +6,7 @@ import socket
 from contextlib import suppress
 from functools import partial
 
-from gatewayd.aside import aside
+from gatewayd.loop.threads import aside
 
 __all__ = ["SocketAddress", "resolve"]
 

@@ -19,13 +19,13 @@ import can
 import canopen
 from can.interfaces.socketcan import socketcan as stock_socketcan
 
-from gatewayd.canopen import link as link_module
-from gatewayd.canopen.eds import eds_text, objects_of, sheet_of
-from gatewayd.canopen.link import CanLink
 from gatewayd.canopen.socketcan import SocketCanBus
-from gatewayd.canopen.storage import MemoryStore
 from gatewayd.canopen.supervision import Event
 from gatewayd.core.cell import Cell
+from gatewayd.links.canopen_node import runtime as link_module
+from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.runtime import CanLink
+from gatewayd.links.canopen_node.storage import MemoryStore
 from gatewayd.mapping.loader import load
 
 __all__ = ["NODE"]

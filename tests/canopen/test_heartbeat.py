@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 
 from gatewayd.canopen.dictionary import AbortCode
 from gatewayd.canopen.frame import Frame
-from gatewayd.canopen.heartbeat import LEAST_CONSUMERS, HeartbeatConsumer, HeartbeatProducer, Watch
+from gatewayd.canopen.heartbeat import LEAST_CONSUMERS, Consumer, HeartbeatConsumer, HeartbeatProducer, Watch
 from gatewayd.canopen.nmt import NmtState
-from gatewayd.canopen.plan import Consumer
-from tests.canopen.wire import Client, Wire
+from tests.links.canopen_node.wire import Client, Wire
 
 
 class Producer:

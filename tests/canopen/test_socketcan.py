@@ -15,7 +15,7 @@ from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.interface import ControllerState, Interface
 from gatewayd.canopen.socketcan import SocketCanBus, filters, pack, seen
 from gatewayd.canopen.supervision import Event
-from tests.canopen.recorder import Recorder
+from tests.links.canopen_node.recorder import Recorder
 
 
 def test_frame_layout() -> None:

@@ -13,7 +13,7 @@ from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.errors import decode
 from gatewayd.canopen.supervised import ROOM_RETRY, SupervisedBus
 from gatewayd.canopen.supervision import Event
-from tests.canopen.recorder import Recorder, until
+from tests.links.canopen_node.recorder import Recorder, until
 
 BUS_OFF = 0x2000_0040
 NOBODY_TELLS = -1

@@ -1,4 +1,4 @@
-"""`gatewayd diff`: its exit codes and forms. What it tells: tests/mapping/test_diff.py."""
+"""`gatewayd diff`: its exit codes and forms. What it tells: tests/report/test_diff.py."""
 
 from __future__ import annotations
 

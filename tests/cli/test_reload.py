@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from gatewayd.audit import Audit
 from gatewayd.cli.reload import command
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import bind
 from gatewayd.control.server import serving
-from gatewayd.daemon import Daemon
-from gatewayd.reload import Outcome
-from gatewayd.reload import Result as Ended
+from gatewayd.service.audit import Audit
+from gatewayd.service.daemon import Daemon
+from gatewayd.service.reload import Outcome
+from gatewayd.service.reload import Result as Ended
 
 CHANGE = "press: 1 variable added"
 DETAIL = "+ more: direction output"

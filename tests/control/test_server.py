@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
-from gatewayd.audit import Audit
 from gatewayd.control import server
 from gatewayd.control.api import Api
 from gatewayd.control.client import Client, ControlError
 from gatewayd.control.endpoint import bind
+from gatewayd.service.audit import Audit
 from tests.control.served import CYCLES, LIMIT, FixedGateway, Served
 
 

@@ -16,8 +16,8 @@ from gatewayd.control.views import cell_view, declared_view, problems
 from gatewayd.core.cell import Change
 from gatewayd.core.requester import Requester
 from gatewayd.mapping.loader import load
-from gatewayd.sentence import sentence
-from gatewayd.station import Station
+from gatewayd.report.summary import sentence
+from gatewayd.service.cell_runtime import Station
 from tests.control.served import CYCLES, LIMIT, SPEED, Served, at
 
 PLC, HMI = 0, 1

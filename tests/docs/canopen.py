@@ -10,21 +10,21 @@ from pathlib import Path
 
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.cob_ids import Function
-from gatewayd.canopen.communication_errors import OVERRUN_TIME
 from gatewayd.canopen.dictionary import Entry, Object, Pdo
-from gatewayd.canopen.eds import objects_of
 from gatewayd.canopen.emergency import ErrorCode, register_of
 from gatewayd.canopen.identity import REACTIONS
 from gatewayd.canopen.lss import Command
 from gatewayd.canopen.nmt import ALLOWED, NmtState, Service
-from gatewayd.canopen.robot_errors import QUIET
-from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES
-from gatewayd.canopen.variables import ABORT_OF
 from gatewayd.core.refusal import Reason
 from gatewayd.core.status import FIELDS, TABLES
-from gatewayd.mapping.bus_load import BIT_RATES, frame_bits
+from gatewayd.links.canopen_node.bus_load import BIT_RATES, frame_bits
+from gatewayd.links.canopen_node.communication_errors import OVERRUN_TIME
+from gatewayd.links.canopen_node.eds import objects_of
+from gatewayd.links.canopen_node.pdo_table import load_by_bit_rate, pdo_rows
+from gatewayd.links.canopen_node.robot_errors import QUIET
+from gatewayd.links.canopen_node.status_objects import HEADER, TABLE_INDICES
+from gatewayd.links.canopen_node.variables import ABORT_OF
 from gatewayd.mapping.loader import load
-from gatewayd.mapping.pdo_table import load_by_bit_rate, pdo_rows
 
 __all__ = ["PARTS", "table"]
 

@@ -27,14 +27,14 @@ from gatewayd.core.image import Quality
 from gatewayd.core.program import STATES
 from gatewayd.core.refusal import PRECEDENCE, Reason
 from gatewayd.core.status import BASE, FIELDS, TABLES
-from gatewayd.eventlog import LEVELS
-from gatewayd.logs import LEVELS as LEVEL_NAMES
-from gatewayd.mapping.plan import Area
+from gatewayd.links.modbus_server.functions import EXCEPTION_OF, ExceptionCode
+from gatewayd.logs.events import LEVELS
+from gatewayd.logs.records import LEVELS as LEVEL_NAMES
 from gatewayd.mapping.schema import mapping_schema
-from gatewayd.modbus.functions import EXCEPTION_OF, ExceptionCode
+from gatewayd.modbus.areas import Area
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series
-from gatewayd.status.histogram import BOUNDS
-from gatewayd.status.metrics import METRICS, PROCESS_METRICS
+from gatewayd.web.histogram import BOUNDS
+from gatewayd.web.metrics import METRICS, PROCESS_METRICS
 from tests.docs import canopen
 from tests.docs.canopen import table
 

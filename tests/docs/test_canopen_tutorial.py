@@ -13,8 +13,8 @@ from pathlib import Path
 import can
 import pytest
 
-from gatewayd.daemon import Daemon
 from gatewayd.mapping.loader import load
+from gatewayd.service.daemon import Daemon
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import DEMO, parse
 from gatewayd.simulator.server import SimulatedController

@@ -12,8 +12,8 @@ import time
 from pathlib import Path
 
 from gatewayd.core.cell import Cell
+from gatewayd.links.robot.runtime import RobotLink
 from gatewayd.mapping.loader import load
-from gatewayd.robot.link import RobotLink
 from gatewayd.rtde.client import ClientSettings, Loss, RtdeClient
 
 __all__ = ["resident_kilobytes"]

@@ -13,13 +13,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gatewayd.canopen.eds import eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together
-from gatewayd.mapping.report import Outcome, as_github, as_json, as_text
 from gatewayd.mapping.source import parse, plain
-from gatewayd.mapping.table import as_csv, as_markdown, rows
-from gatewayd.mapping.table import as_json as table_as_json
+from gatewayd.report.findings import Outcome, as_github, as_json, as_text
+from gatewayd.report.table import as_csv, as_markdown, rows
+from gatewayd.report.table import as_json as table_as_json
 
 ROOT = Path(__file__).parents[2]
 SEEDS = [

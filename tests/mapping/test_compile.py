@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.plan import CanopenPlan, Consumer, ObjectPlan, PdoEntry, PdoPlan, SyncPlan
+from gatewayd.canopen.heartbeat import Consumer
+from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import (
     Direction,
     Fallback,
@@ -16,11 +17,14 @@ from gatewayd.core.definition import (
     Variable,
     Writer,
 )
+from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, PdoPlan
+from gatewayd.links.robot.plan import WatchdogPlan
 from gatewayd.mapping.compile import compile_plan
 from gatewayd.mapping.document import read_document
 from gatewayd.mapping.expand import expand
-from gatewayd.mapping.plan import Area, Plan, WatchdogPlan
+from gatewayd.mapping.plan import Plan
 from gatewayd.mapping.source import parse
+from gatewayd.modbus.areas import Area
 
 FINGERPRINT = 0x3DE7_CFA4
 """Of `GOOD`, since the first version of the language."""

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.mapping.codec import ORDERS, TYPES
 from gatewayd.mapping.compiled import Compiled, CompiledFile, Unreadable
 from gatewayd.mapping.loader import load
+from gatewayd.modbus.codec import ORDERS, TYPES
 
 MAPPINGS = sorted((Path(__file__).parents[2] / "mappings").glob("*.yaml"))
 HEAD = "gatewayd: 1\ncell: all\nrobot: {host: 10.0.0.1}\nmodbus: {listen: '127.0.0.1:1502'}\nvariables:\n"

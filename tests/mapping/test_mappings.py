@@ -8,7 +8,8 @@ import pytest
 
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.loader import Loaded, load, load_together
-from gatewayd.mapping.plan import Area, Plan
+from gatewayd.mapping.plan import Plan
+from gatewayd.modbus.areas import Area
 
 MAPPINGS = Path(__file__).parents[2] / "mappings"
 NAMES = [path.name for path in sorted(MAPPINGS.glob("*.yaml"))]

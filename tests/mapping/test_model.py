@@ -8,18 +8,20 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from gatewayd.core.definition import Fallback
+from gatewayd.links.modbus_server.sections import Modbus, PlacementSpec
+from gatewayd.links.robot.sections import Robot, Watchdog
 from gatewayd.mapping import model
-from gatewayd.mapping.plan import Area
+from gatewayd.modbus.areas import Area
 
 SECTIONS = [
     model.MappingFile,
-    model.Robot,
-    model.Watchdog,
-    model.Modbus,
+    Robot,
+    Watchdog,
+    Modbus,
     model.WriterSpec,
     model.Group,
     model.VariableSpec,
-    model.PlacementSpec,
+    PlacementSpec,
 ]
 
 
@@ -76,15 +78,15 @@ def test_placement_names_exactly_one_area(value: Any) -> None:
 @pytest.mark.parametrize(
     "section, value",
     [
-        (model.Robot, {"host": "r", "port": 0}),
-        (model.Robot, {"host": "r", "frequency": 501}),
-        (model.Robot, {"host": ""}),
-        (model.Robot, {"host": "no host"}),
-        (model.Robot, {"host": "r", "verify": "yes"}),
-        (model.Robot, {"host": "r", "port": "30004"}),
-        (model.Modbus, {"unit": 0}),
-        (model.Modbus, {"unit": 248}),
-        (model.Modbus, {"connections": 0}),
+        (Robot, {"host": "r", "port": 0}),
+        (Robot, {"host": "r", "frequency": 501}),
+        (Robot, {"host": ""}),
+        (Robot, {"host": "no host"}),
+        (Robot, {"host": "r", "verify": "yes"}),
+        (Robot, {"host": "r", "port": "30004"}),
+        (Modbus, {"unit": 0}),
+        (Modbus, {"unit": 248}),
+        (Modbus, {"connections": 0}),
         (model.VariableSpec, {"robot": "x", "limits": [0]}),
         (model.VariableSpec, {"robot": "x", "limits": [0, 1, 2]}),
         (model.VariableSpec, {"robot": "x", "deadband": -1}),
@@ -99,9 +101,9 @@ def test_values_out_of_their_range_are_refused(section: type[BaseModel], value: 
 
 def test_defaults_are_the_documented_ones() -> None:
     """The contract names these; changing one changes the meaning of every file that relies on it."""
-    robot = model.Robot.model_validate({"host": "r"})
+    robot = Robot.model_validate({"host": "r"})
     assert (robot.port, robot.frequency, robot.on_connect, robot.verify) == (30004, 0, "adopt", True)
-    modbus = model.Modbus()
+    modbus = Modbus()
     assert (str(modbus.listen), modbus.unit, modbus.allow, modbus.connections) == ("127.0.0.1:502", 1, (), 32)
     assert (modbus.idle_timeout, modbus.gaps, modbus.order) == (60.0, "refuse", "ABCD")
     variable = model.VariableSpec.model_validate({"robot": "x"})
@@ -110,4 +112,4 @@ def test_defaults_are_the_documented_ones() -> None:
 
 def test_models_are_immutable() -> None:
     with pytest.raises(ValidationError):
-        model.Modbus().unit = 2
+        Modbus().unit = 2

@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from gatewayd.core import status
+from gatewayd.links.modbus_server.rules import places
 from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
 from gatewayd.mapping.loader import load, load_together
-from gatewayd.mapping.rules import bounds, catalogue, places, wording
+from gatewayd.mapping.rules import bounds, catalogue, wording
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference"

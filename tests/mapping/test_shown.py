@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.pdo.codec import fit
 from gatewayd.core.definition import Variable
+from gatewayd.links.canopen_node.pdo.codec import fit
 from gatewayd.mapping.loader import load
 
 FLOAT32 = float.fromhex("0x1.fffffep+127")

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from math import isclose, isfinite
 
 from gatewayd.core.definition import Direction, ValueKind
-from gatewayd.mapping.codec import TYPES, Codec
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule, Severity
 from gatewayd.mapping.expand import ConcretePlacement, ConcreteVariable, ExpandedCell, PlacementProblem
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.wording import first_of_each_line, number, where
+from gatewayd.modbus.codec import TYPES, Codec
 
 __all__ = ["GROWING", "range_of"]
 

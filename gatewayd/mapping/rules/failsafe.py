@@ -6,11 +6,11 @@ import re
 from collections.abc import Iterator
 
 from gatewayd.core.definition import Direction, FallbackKind, ValueKind
+from gatewayd.links.robot.rules.fields import LEAST_RATE
 from gatewayd.mapping.compile import package_period
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.rtde import LEAST_RATE
 from gatewayd.mapping.rules.wording import number, seconds
 
 __all__ = ["silent_motion"]

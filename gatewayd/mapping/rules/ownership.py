@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from gatewayd.core.definition import Direction
+from gatewayd.links.modbus_server.plan import Network
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expand import ConcreteLock, ConcreteVariable, ExpandedCell
 from gatewayd.mapping.model import ANY, Group, VariableSpec, WriterSpec
-from gatewayd.mapping.plan import Network
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.wording import did_you_mean, seconds
 

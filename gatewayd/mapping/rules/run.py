@@ -4,25 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gatewayd.links.canopen_node.rules import bus, node, pdo_company, pdo_members, pdos
+from gatewayd.links.modbus_server.rules import listener, places
+from gatewayd.links.robot.rules import companions
+from gatewayd.links.robot.rules import fields as robot_fields
 from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.expand import ExpandedCell
-from gatewayd.mapping.rules import (
-    bounds,
-    can_bus,
-    canopen,
-    companions,
-    conversion,
-    failsafe,
-    listener,
-    ownership,
-    pdo_company,
-    pdo_members,
-    pdos,
-    places,
-    rtde,
-    sharing,
-    supervision,
-)
+from gatewayd.mapping.rules import bounds, conversion, failsafe, ownership, sharing, supervision
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
 __all__ = ["FAMILY_MODULES", "check_cell", "check_plant"]
@@ -31,13 +19,13 @@ FAMILY_MODULES = (
     bounds,
     places,
     listener,
-    rtde,
+    robot_fields,
     companions,
-    canopen,
+    node,
     pdos,
     pdo_members,
     pdo_company,
-    can_bus,
+    bus,
     ownership,
     sharing,
     failsafe,

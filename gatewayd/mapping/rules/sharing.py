@@ -9,9 +9,9 @@ from gatewayd.core.definition import Direction, FallbackKind
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.expand import ConcreteLock, ConcretePlacement, ConcreteVariable, ExpandedCell
 from gatewayd.mapping.model import WriterSpec
-from gatewayd.mapping.plan import Area
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.wording import names_and_more, where
+from gatewayd.modbus.areas import Area
 
 __all__: list[str] = []
 

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Iterable, Iterator, Sequence
 
 from gatewayd.mapping.expand import ConcretePlacement
-from gatewayd.mapping.plan import Area
+from gatewayd.modbus.areas import Area
 
 __all__ = [
     "AREA_WORDS",

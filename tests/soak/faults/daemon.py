@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from random import Random
 
-from gatewayd.auditfile import GREATEST_SIZE, KEPT
+from gatewayd.service.audit_file import GREATEST_SIZE, KEPT
 from tests.e2e.plc import STRANGER, Plc
 from tests.e2e.processes import HOST, wait_for
 from tests.soak.cell import MOMENT, STALE_AFTER, VARIANTS

@@ -1,0 +1,410 @@
+"""Rules GW401, GW413 to GW415, GW420 to GW425, GW432, GW435: the node, number types, who writes by CANopen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.core.definition import Direction, ValueKind
+from gatewayd.links.canopen_node.bus_load import BIT_RATES, FIRST_EVENT_TYPE
+from gatewayd.links.canopen_node.expand import MappedObject
+from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
+from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
+from gatewayd.mapping.model import WriterSpec
+from gatewayd.mapping.rules.conversion import GROWING, range_of
+from gatewayd.mapping.rules.registry import cell_rule
+from gatewayd.mapping.rules.wording import number, one_and_more, seconds
+
+__all__: list[str] = []
+
+_REAL32_DIGITS = 2**24
+_MODBUS, _RPDO, _SDO = "Modbus", "RPDO", "SDO"
+
+
+@cell_rule(
+    "GW401",
+    "no-canopen-section",
+    "variables or writers on CANopen in a file without a canopen section",
+    """
+The section `canopen:` says which bus the cell is on and which node it is. Without it `canopen:` at variables
+and writers leads nowhere. `canopen: {channel: can0, bitrate: 500000, node: 16}` is enough.
+""",
+)
+def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """The first variable, else the first writer, that names CANopen."""
+    if cell.document.has("canopen"):
+        return
+    hint = "add `canopen: {channel: can0, bitrate: 500000, node: 16}`"
+    for part in cell.document.variables.values():
+        if part.spec.canopen is not None:
+            message = f"`{part.name}` is on CANopen, but the file has no section `canopen`"
+            yield rule.at(part.key_at("canopen"), message, hint=hint)
+            return
+    for writer in cell.document.writers.values():
+        if writer.spec.canopen is not None:
+            message = f"the writer `{writer.name}` is on CANopen, but the file has no section `canopen`"
+            yield rule.at(writer.key_at("canopen"), message, hint=hint)
+            return
+
+
+@cell_rule(
+    "GW413",
+    "canopen-type",
+    "a CANopen type that does not suit the robot's type",
+    """
+A bit of the robot is a BOOLEAN, an integer one of INTEGER8 to INTEGER64 and UNSIGNED8 to UNSIGNED64, a double
+REAL64 or REAL32. CANopen variables have no scale: a double cannot be sent as an integer.
+""",
+)
+def canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Types of another kind."""
+    for variable, one in _lines(cell):
+        if not one.fits and variable.spec.canopen is not None:
+            message = (
+                f"`{variable.part.name}` ({variable.target}, {variable.type.word}) cannot be "
+                f"{variable.spec.canopen.type}"
+            )
+            hint = f"write {_suited(variable)}, or leave `type` out"
+            yield rule.at(variable.at("canopen", "type"), message, hint=hint)
+
+
+def _suited(variable: ConcreteVariable) -> str:
+    if variable.kind is ValueKind.BOOL:
+        return "BOOLEAN"
+    return "REAL64 or REAL32" if variable.kind is ValueKind.FLOAT else "an INTEGER or UNSIGNED type"
+
+
+@cell_rule(
+    "GW414",
+    "real32-loss",
+    "a double of the robot in a REAL32 that loses digits",
+    """
+The robot's reals have 15 digits, a REAL32 has 7. For forces, speeds and poses that is plenty, and it halves
+the number of PDOs; write `type: REAL32` at the variable to say so. It is not enough for the controller's time,
+which a REAL32 shows in steps of 1/32 s after three days, nor for limits beyond 16777216.
+""",
+    Severity.WARNING,
+)
+def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Reals that are REAL32 without their line saying so, and those for which it is never enough."""
+    for variable, one in _lines(cell):
+        place = variable.spec.canopen
+        if one.plan.type is not CanType.REAL32 or variable.kind is not ValueKind.FLOAT:
+            continue
+        limits = variable.spec.limits
+        coarse = limits is not None and max(-limits[0], limits[1]) > _REAL32_DIGITS
+        if variable.field.name in GROWING or coarse:
+            message = f"`{variable.part.name}` needs more digits than a REAL32 has"
+            yield rule.at(_type_place(variable), message, hint="write `canopen: {type: REAL64}`")
+        elif place is None or place.type is None:
+            message = f"`{variable.part.name}` is a double of the robot and becomes a REAL32 with 7 digits"
+            hint = "write `canopen: {type: REAL32}` if that is enough, or `{type: REAL64}`"
+            yield rule.at(_type_place(variable), message, hint=hint)
+
+
+@cell_rule(
+    "GW415",
+    "narrow-canopen-type",
+    "an integer from the robot in a CANopen type too small for it",
+    """
+The robot's integer can take values that the type cannot show: they appear as the nearest one that it can.
+Use a wider type; or, if the values stay small, say so with `limits` at the variable (at an output they only
+state the range).
+""",
+    Severity.WARNING,
+)
+def narrow_canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Integer outputs in types that do not hold their range."""
+    for variable, one in _lines(cell):
+        bounds = range_of(variable)
+        if variable.direction is Direction.INPUT or bounds is None or not one.fits:
+            continue
+        low, high = _reach(one.plan.type)
+        if bounds[0] < low or bounds[1] > high:
+            message = (
+                f"`{variable.part.name}` can be {number(bounds[0])} to {number(bounds[1])}, "
+                f"{one.plan.type.name} shows {low} to {high}"
+            )
+            hint = "use a wider type, or state the range with `limits: [least, greatest]`"
+            yield rule.at(_type_place(variable), message, hint=hint)
+
+
+def _reach(can_type: CanType) -> tuple[int, int]:
+    if can_type.name.startswith("UNSIGNED"):
+        return 0, (1 << can_type.bits) - 1
+    return -(1 << can_type.bits - 1), (1 << can_type.bits - 1) - 1
+
+
+@cell_rule(
+    "GW420",
+    "watched-itself",
+    "a writer whose heartbeat is that of this node",
+    """
+`node` at a writer is the node-ID of the device that writes, the PLC or the master. With the node-ID of this
+cell the gateway would watch itself and never notice that the writer is gone.
+""",
+)
+def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Writers with the node-ID of the cell."""
+    canopen = cell.document.canopen
+    if canopen is None:
+        return
+    for writer in cell.document.writers.values():
+        if writer.spec.node == canopen.spec.node:
+            message = (
+                f"the writer `{writer.name}` has the node-ID {writer.spec.node}, which is this cell's own"
+            )
+            related = (Related(canopen.at("node"), f"this cell is node {canopen.spec.node}"),)
+            hint = "write the node-ID of the master, often 1 or 127"
+            yield rule.at(writer.at("node"), message, hint=hint, related=related)
+
+
+@cell_rule(
+    "GW421",
+    "unknown-bit-rate",
+    "a bit-rate that CANopen does not have",
+    """
+CiA 301 knows 10, 20, 50, 125, 250, 500, 800 and 1000 kbit/s. All nodes of a bus have the same one. The number
+is written in bit/s: 500000.
+""",
+)
+def unknown_bit_rate(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Bit-rates outside the list."""
+    canopen = cell.document.canopen
+    if canopen is None or canopen.spec.bitrate in BIT_RATES:
+        return
+    rate = canopen.spec.bitrate
+    near = rate * 1000 if rate * 1000 in BIT_RATES else min(BIT_RATES, key=lambda known: abs(known - rate))
+    message = f"{rate} bit/s is no bit-rate of CANopen"
+    yield rule.at(canopen.at("bitrate"), message, hint=f"write {near}, if that is the bit-rate of the bus")
+
+
+@cell_rule(
+    "GW422",
+    "idle-canopen-writer",
+    "a writer by PDO or SDO where there is nothing for it to write",
+    """
+The writer writes by RPDO, and no variable towards the robot is in a PDO; or by SDO, and none is an object.
+Give its variables `canopen: auto`, or remove the writer.
+""",
+    Severity.WARNING,
+)
+def idle_canopen_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Writers whose service carries no input."""
+    node = cell.canopen
+    if node is None or len(cell.document.declared("variables")) > len(cell.document.variables):
+        return
+    by_sdo = any(one.direction is Direction.INPUT for one in node.objects)
+    by_rpdo = any(entry.direction is Direction.INPUT for pdo in node.pdos for entry in pdo.entries)
+    for writer in cell.document.writers.values():
+        if (writer.spec.canopen == "rpdo" and not by_rpdo) or (writer.spec.by_sdo and not by_sdo):
+            what = "in a PDO" if by_sdo else "on CANopen"
+            message = f"`{writer.name}` writes by {writer.spec.canopen}, and no variable towards the robot is {what}"
+            hint = "write `canopen: auto` at its variables, or remove `canopen` here"
+            yield rule.at(writer.at("canopen"), message, hint=hint)
+
+
+@cell_rule(
+    "GW423",
+    "out-of-reach",
+    "an input that none of its owners can write where it lies",
+    """
+A writer with an IP address writes by Modbus, one with `canopen: rpdo` by PDO, one with `canopen: sdo` by SDO.
+A variable has to lie where one of its owners can write. And a PDO is taken whole or refused whole: with one
+variable in it that its writer may not own, nothing of it would ever arrive. To let CANopen only read the
+variable back, write `canopen: object` beside its Modbus address.
+""",
+)
+def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Inputs in RPDOs that no RPDO writer owns, and inputs without any common way."""
+    if not cell.document.writers:
+        return
+    in_pdos = _in_pdos(cell)
+    for variable in _inputs(cell):
+        owners = _owners(cell, variable)
+        ways = _ways(variable, in_pdos)
+        if not owners or not ways:
+            continue
+        reach = set().union(*(_of_writer(writer) for _, writer in owners))
+        names = one_and_more([name for name, _ in owners])
+        if _RPDO in ways and _RPDO not in reach:
+            message = f"`{variable.part.name}` is in an RPDO, and its owner {names} does not write by RPDO"
+            hint = "name a writer with `canopen: rpdo` as owner, or write `canopen: object`"
+            yield rule.at(_canopen_place(variable), message, hint=hint)
+        elif not ways & reach:
+            message = (
+                f"`{variable.part.name}` can be written by {' and '.join(sorted(ways))} only, "
+                f"its owner {names} writes by {' and '.join(sorted(reach))}"
+            )
+            hint = "name another owner, or put the variable where its owner writes"
+            yield rule.at(variable.position, message, hint=hint)
+
+
+@cell_rule(
+    "GW432",
+    "owner-elsewhere",
+    "an owner that cannot write where the variable lies",
+    """
+Of several owners one has no way to the variable: a CANopen writer of a variable that is only on Modbus, a
+Modbus client of one that is only on CANopen, an RPDO writer of one that is in no PDO. It can never own it.
+""",
+    Severity.WARNING,
+)
+def owner_elsewhere(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Named owners without a common way, where another one has one."""
+    in_pdos = _in_pdos(cell)
+    reported: set[Position] = set()
+    for variable in _inputs(cell):
+        assert variable.lock is not None
+        lock = cell.locks[variable.lock]
+        ways = _ways(variable, in_pdos)
+        owners = _owners(cell, variable)
+        if lock.is_any or not ways or not any(ways & _of_writer(writer) for _, writer in owners):
+            continue
+        for name, writer in owners:
+            if not ways & _of_writer(writer) and lock.position not in reported:
+                reported.add(lock.position)
+                message = (
+                    f"the owner `{name}` writes by {' and '.join(sorted(_of_writer(writer)))}, "
+                    f"`{variable.part.name}` can be written by {' and '.join(sorted(ways))} only"
+                )
+                hint = f"put `{variable.part.name}` where `{name}` writes, or remove that owner"
+                yield rule.at(lock.position, message, hint=hint)
+
+
+def _of_writer(writer: WriterSpec) -> set[str]:
+    ways = ((_MODBUS, bool(writer.modbus)), (_RPDO, writer.by_rpdo), (_SDO, writer.by_sdo))
+    return {way for way, has in ways if has}
+
+
+def _ways(variable: ConcreteVariable, in_pdos: set[int]) -> set[str]:
+    in_pdo = variable.index in in_pdos
+    ways = (
+        (_MODBUS, bool(variable.spec.modbus)),
+        (_RPDO, in_pdo),
+        (_SDO, in_pdo or variable.spec.canopen is not None),
+    )
+    return {way for way, has in ways if has}
+
+
+def _owners(cell: ExpandedCell, variable: ConcreteVariable) -> list[tuple[str, WriterSpec]]:
+    if variable.lock is None:
+        return []
+    return [(name, cell.document.writers[name].spec) for name in cell.locks[variable.lock].owners]
+
+
+def _in_pdos(cell: ExpandedCell) -> set[int]:
+    pdos = cell.canopen.pdos if cell.canopen is not None else ()
+    return {entry.variable for pdo in pdos for entry in pdo.entries}
+
+
+def _inputs(cell: ExpandedCell) -> Iterator[ConcreteVariable]:
+    """The first input of each line that has an owner, on a cell with a node."""
+    if cell.canopen is None:
+        return
+    for variable in cell.variables:
+        if variable.direction is Direction.INPUT and variable.lock is not None and not variable.member:
+            yield variable
+
+
+@cell_rule(
+    "GW424",
+    "two-canopen-writers",
+    "two writers for one service of the node",
+    """
+Frames on a CAN bus do not say who sent them: a node cannot tell one master from another. There is one writer
+for all RPDOs and one for all SDO requests (`any` is both).
+""",
+)
+def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Second writers by RPDO, and by SDO."""
+    writers = cell.document.writers.values()
+    for service in ("by_rpdo", "by_sdo"):
+        found = [writer for writer in writers if getattr(writer.spec, service)]
+        for other in found[1:]:
+            first = found[0]
+            if service == "by_sdo" and other.spec.by_rpdo and first.spec.by_rpdo:
+                continue
+            message = f"`{other.name}` writes by {service[3:].upper()} too, like `{first.name}`"
+            related = (Related(first.at("canopen"), f"`{first.name}` is here"),)
+            hint = "make one writer of the two, or let one write by rpdo and the other by sdo"
+            yield rule.at(other.at("canopen"), message, hint=hint, related=related)
+
+
+@cell_rule(
+    "GW425",
+    "half-supervision",
+    "a watched heartbeat without a node, a time, or CANopen",
+    """
+The heartbeat of a CANopen writer is watched when both are known: `node`, its node-ID, and `heartbeat`, the time
+after which it is lost. The time must be longer than the heartbeat time of the device, better twice as long. A writer
+that never tells its heartbeat is lost so long after its first PDO or SDO request.
+""",
+)
+def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`node` without `heartbeat` and the other way round, and either without `canopen`."""
+    for writer in cell.document.writers.values():
+        given = [key for key in ("node", "heartbeat") if getattr(writer.spec, key) is not None]
+        if not given:
+            continue
+        if writer.spec.canopen is None:
+            message = f"the writer `{writer.name}` has `{given[0]}`, but does not write by CANopen"
+            hint = f"add `canopen: rpdo`, or remove `{given[0]}`"
+            yield rule.at(writer.key_at(given[0]), message, hint=hint)
+        elif len(given) == 1:
+            other = "heartbeat" if given[0] == "node" else "node"
+            message = f"the writer `{writer.name}` has `{given[0]}` without `{other}`"
+            hint = (
+                "add `heartbeat: 500ms`"
+                if other == "heartbeat"
+                else "add `node: 1`, the node-ID of the writer"
+            )
+            yield rule.at(writer.key_at(given[0]), message, hint=hint)
+
+
+@cell_rule(
+    "GW435",
+    "timeout-of-silence",
+    "a timeout for a CANopen writer that may be silent for good reason",
+    """
+`timeout` is the time without any PDO or SDO request after which a writer counts as lost. A master that sends its
+PDOs when a value changes says nothing while nothing changes, and would lose its variables over and over. Watch its
+heartbeat (`node` and `heartbeat`) in place of the timeout. Where the master sends in any case, say so: with a
+`deadline` for its PDOs, or with a synchronous type.
+""",
+    Severity.WARNING,
+)
+def timeout_of_silence(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`timeout` of RPDO writers without a heartbeat where no RPDO has to come."""
+    if cell.canopen is None:
+        return
+    received = [pdo for pdo in cell.canopen.pdos if pdo.direction is Direction.INPUT]
+    if not received or any(pdo.event is not None or pdo.transmission < FIRST_EVENT_TYPE for pdo in received):
+        return
+    for writer in cell.document.writers.values():
+        spec = writer.spec
+        if spec.by_rpdo and not spec.modbus and spec.timeout is not None and spec.heartbeat is None:
+            message = (
+                f"`{writer.name}` is lost after {seconds(spec.timeout)} without a PDO, and none has to come"
+            )
+            hint = "write `node: 1, heartbeat: 1s` in place of `timeout`, or give the PDOs a `deadline`"
+            yield rule.at(writer.at("timeout"), message, hint=hint)
+
+
+def _lines(cell: ExpandedCell) -> Iterator[tuple[ConcreteVariable, MappedObject]]:
+    """The first variable of each line that is an object, with the object."""
+    seen: set[str] = set()
+    for one in cell.canopen.objects if cell.canopen is not None else ():
+        variable = cell.variables[one.variable]
+        if variable.part.name not in seen:
+            seen.add(variable.part.name)
+            yield variable, one
+
+
+def _canopen_place(variable: ConcreteVariable) -> Position:
+    return variable.part.at("canopen") if variable.spec.canopen is not None else variable.position
+
+
+def _type_place(variable: ConcreteVariable) -> Position:
+    """Place of the type where it is written, else of what stands for it."""
+    return variable.part.at("canopen", "type") if variable.spec.canopen is not None else variable.position

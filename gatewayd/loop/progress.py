@@ -1,0 +1,40 @@
+"""Long waits taken in short turns, so that a part that waits can be told from one that hangs."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import TypeVar
+
+from gatewayd.loop import clock
+
+__all__ = ["GRACE", "TURN", "turning"]
+
+TURN = 0.25
+"""Seconds between two turns of a part, whatever it waits for."""
+GRACE = 1.0
+"""Seconds beyond its own limit after which a wait is no wait any more."""
+
+_Result = TypeVar("_Result")
+
+
+async def turning(work: Awaitable[_Result], turn: Callable[[], None], limit: float) -> _Result:
+    """The result of `work`, which ends by itself within `limit` seconds; `turn` is called every TURN seconds meanwhile.
+
+    Work that outlasts its limit by GRACE seconds hangs, and `turn` is called no more. Raises what the work raises. A
+    cancellation ends the work first.
+    """
+    task = asyncio.ensure_future(work)
+    end = clock.now() + limit + GRACE
+    try:
+        while not task.done():
+            if clock.now() < end:
+                turn()
+            await asyncio.wait((task,), timeout=TURN)
+    except asyncio.CancelledError:
+        task.cancel()
+        await asyncio.wait((task,))
+        if not task.cancelled():
+            task.exception()  # else asyncio complains that nobody asked for it
+        raise
+    return task.result()

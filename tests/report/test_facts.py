@@ -1,0 +1,210 @@
+"""Nothing that a plan means is left out of what is told of it, also of sections that are not known yet."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, cast
+
+import pytest
+
+from gatewayd.core.definition import Direction, Fallback, FallbackKind, Limits, ValueKind
+from gatewayd.mapping.loader import load
+from gatewayd.mapping.plan import Plan
+from gatewayd.report import facts
+
+TEXT = """\
+gatewayd: 1
+cell: press
+robot:
+  host: 127.0.0.1
+  watchdog: {field: input_int_register_23, frequency: 10, requires: plc}
+modbus: {listen: '127.0.0.1:1502', allow: [127.0.0.0/8], idle_timeout: 60s}
+writers: {plc: {modbus: [127.0.0.2, 127.0.1.0/24], timeout: 100ms}, hmi: {modbus: 127.0.0.3}}
+groups: {motion: {owner: [plc, hmi], lease: 2s}}
+variables:
+  word:   {robot: input_bit_registers32_to_63, modbus: 0, owner: plc}
+  bit:    {robot: input_bit_register_3, modbus: [{holding: 2.3}, {coil: 7}], owner: plc}
+  speed:  {robot: input_double_register_1, modbus: {holding: 24, type: int16, scale: 0.1, offset: -5, order: BADC},
+           group: motion, limits: [-1, 1.5]}
+  path:   {robot: input_int_register_1, modbus: 30, group: motion, on_release: 7}
+  pose:   {robot: 'actual_TCP_pose[2]', modbus: 40, on_stale: exception}
+  door:   {robot: actual_digital_input_bits.3, modbus: {discrete: 64}, on_stale: true, comment: front}
+"""
+
+
+def plan() -> Plan:
+    loaded = load(TEXT.encode(), "cell.yaml")
+    assert loaded.plan is not None, loaded.diagnostics
+    return loaded.plan
+
+
+def told(of: Plan) -> tuple[object, ...]:
+    return facts.links(of), facts.writers(of), facts.groups(of), facts.variables(of)
+
+
+def test_variables_are_told_as_the_file_spells_them() -> None:
+    found = facts.variables(plan())
+    assert found["word"]["robot"] == "input_bit_registers32_to_63"
+    assert found["word"]["type"] == "uint32"
+    assert found["bit"]["robot"] == "input_bit_register_3"
+    assert found["bit"]["modbus"] == "holding 2.3 (400003.3), coil 7 (000008)"
+    assert found["speed"]["modbus"] == "holding 24 (400025) int16 BADC * 0.1 + -5"
+    assert found["speed"]["limits"] == "-1..1.5"
+    assert (found["speed"]["group"], "owner" in found["speed"]) == ("motion", False)
+    assert found["path"]["on_release"] == "7"
+    assert (found["pose"]["robot"], found["pose"]["on_stale"]) == ("actual_TCP_pose[2]", "exception")
+    assert (found["door"]["robot"], found["door"]["on_stale"]) == ("actual_digital_input_bits.3", "true")
+    assert facts.groups(plan())["motion"] == {"members": "speed, path", "owner": "plc > hmi", "lease": "2 s"}
+    assert facts.writers(plan())["plc"] == {"modbus": "127.0.0.2, 127.0.1.0/24", "timeout": "0.1 s"}
+
+
+OTHERWISE: dict[type, Any] = {str: "other", bool: None, int: 77, float: 0.123456789, tuple: ()}
+KNOWN = {
+    "source", "fingerprint", "number", "name", "lock", "low", "high", "members", "kind", "cell", "shown", "shows_nan",
+}  # fmt: skip
+"""Fields that a difference is told by elsewhere (numbers, names), or that follow from others."""
+
+
+def changed(value: Any) -> Any:
+    match value:
+        case bool():
+            return not value
+        case Direction():
+            return Direction.OUTPUT if value is Direction.INPUT else Direction.INPUT
+        case ValueKind():
+            return ValueKind((value + 1) % 3)
+        case Fallback():
+            return Fallback(FallbackKind.VALUE, 55)
+        case Limits() | None:
+            return Limits(3, 4, clamp=True)
+    return OTHERWISE[type(value)]
+
+
+CASES = [
+    *(("robot", field.name) for field in dataclasses.fields(plan().robot)),
+    *(("modbus", field.name) for field in dataclasses.fields(cast("Any", plan().modbus))),
+    *(("variables", field.name) for field in dataclasses.fields(plan().cell.variables[0])),
+    *(("locks", field.name) for field in dataclasses.fields(plan().cell.locks[0])),
+    *(("writers", field.name) for field in dataclasses.fields(plan().cell.writers[0])),
+    ("cell", "stale_after"),
+    ("cell", "adopt_for"),
+    ("cell", "clear_on_connect"),
+]
+
+
+@pytest.mark.parametrize("part, name", [case for case in CASES if case[1] not in KNOWN])
+def test_whatever_differs_is_told(part: str, name: str) -> None:
+    """Each field of the plan, by itself, to another value: some fact is another one."""
+    old = plan()
+    cell: Any = old.cell
+    if part in ("robot", "modbus"):
+        section = getattr(old, part)
+        other = None if name == "watchdog" else changed(getattr(section, name))
+        new = dataclasses.replace(old, **{part: dataclasses.replace(section, **{name: other})})
+    elif part == "cell":
+        new = dataclasses.replace(old, cell=dataclasses.replace(cell, **{name: changed(getattr(cell, name))}))
+    else:
+        things = list(getattr(cell, part))
+        # The last lock is the one with several owners; the last variable is an output, the first an input.
+        index = -1 if part == "locks" or name == "on_stale" else 0
+        other = {"bit": 3, "element": 3, "lease": 9.0}.get(name) or changed(getattr(things[index], name))
+        things[index] = dataclasses.replace(things[index], **{name: other})
+        new = dataclasses.replace(old, cell=dataclasses.replace(cell, **{part: tuple(things)}))
+    assert told(new) != told(old)
+
+
+class Kind(Enum):
+    SLOW = 1
+
+
+@dataclass(frozen=True)
+class Entry:
+    variable: int | None
+    index: int
+
+
+@dataclass(frozen=True)
+class CanType:
+    name: str
+
+
+@dataclass(frozen=True)
+class Object:
+    variable: int
+    index: int
+    subindex: int
+    type: CanType
+
+
+@dataclass(frozen=True)
+class Canopen:
+    channel: str
+    kind: Kind
+    sync: bool
+    rpdo_writer: int | None
+    pdos: tuple[Entry, ...]
+    objects: tuple[Object, ...]
+
+
+@dataclass(frozen=True)
+class WithCanopen:
+    source: str
+    cell: object
+    robot: object
+    modbus: object
+    canopen: Canopen
+
+
+def test_a_canopen_section_is_told_by_names() -> None:
+    old = plan()
+    node = Canopen(
+        "can0",
+        Kind.SLOW,
+        sync=False,
+        rpdo_writer=1,
+        pdos=(Entry(3, 1), Entry(None, 2)),
+        objects=(Object(1, 0x2001, 3, CanType("UNSIGNED8")),),
+    )
+    new = cast("Plan", WithCanopen(old.source, old.cell, old.robot, old.modbus, node))
+    assert facts.links(new)["canopen"] == {
+        "channel": "can0",
+        "kind": "slow",
+        "sync": "false",
+        "rpdo_writer": "hmi",
+        "pdos": "variable=path index=1; variable=none index=2",
+    }
+    assert facts.variables(new)["bit"]["canopen"] == "2001h sub 3 UNSIGNED8"
+
+
+def test_keys_of_supervision_and_takeover_are_told() -> None:
+    text = TEXT.replace("timeout: 100ms}", "timeout: 100ms, timeout_counts: writes, grace: 2s}")
+    text = text.replace("{owner: [plc, hmi], lease: 2s}", "{owner: [plc, hmi], lease: 2s, whole: true}")
+    text = text.replace("  host: 127.0.0.1\n", "  host: 127.0.0.1\n  adopt_for: none\n")
+    loaded = load(text.replace("on_stale: exception", "valid: running").encode(), "cell.yaml")
+    assert loaded.plan is not None, loaded.diagnostics
+    assert facts.writers(loaded.plan)["plc"] == {
+        "modbus": "127.0.0.2, 127.0.1.0/24",
+        "timeout": "0.1 s",
+        "timeout_counts": "writes",
+        "grace": "2 s",
+    }
+    assert facts.groups(loaded.plan)["motion"]["takeover"] == "whole"
+    assert facts.variables(loaded.plan)["pose"]["valid"] == "running"
+    robot = facts.links(loaded.plan)["robot"]
+    assert robot["adopt_for"] == "none"
+    assert "runtime_state" in robot["subscribed"].split()
+    assert facts.links(plan())["robot"]["adopt_for"] == "10 s"
+
+
+def test_status_words_in_a_pdo_are_told_by_name() -> None:
+    text = TEXT.replace(
+        "writers:",
+        "canopen: {channel: can0, bitrate: 500000, node: 16, pdos: {p: {status: [flags, quality of door]}}}\nwriters:",
+    )
+    loaded = load(text.encode(), "cell.yaml")
+    assert loaded.plan is not None, loaded.diagnostics
+    pdos = facts.links(loaded.plan)["canopen"]["pdos"]
+    assert "index=24384 subindex=6 bits=16 quality_of=door" in pdos
+    assert pdos.count("quality_of") == 1
