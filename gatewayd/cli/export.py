@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from gatewayd.links.canopen_node.plan import canopen_of
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
@@ -123,7 +125,7 @@ def urscript(context: click.Context, file: str, output: str) -> None:
     from gatewayd.links.robot.urscript import watchdog_script
 
     plan = _plan(context, file)
-    if plan.robot.watchdog is None:
+    if robot_of(plan).watchdog is None:
         _stop(
             context,
             f"{plan.source}: the mapping declares no watchdog: add `watchdog:` to the section `robot`",
@@ -133,13 +135,14 @@ def urscript(context: click.Context, file: str, output: str) -> None:
 
 def _node(context: click.Context, file: str) -> tuple[Plan, CanopenPlan]:
     plan = _plan(context, file)
-    if plan.canopen is None:
+    canopen = canopen_of(plan)
+    if canopen is None:
         _stop(
             context,
             f"{plan.source}: the cell is on no CAN bus: "
             "add `canopen: {channel: can0, bitrate: 500000, node: 16}`",
         )
-    return plan, plan.canopen
+    return plan, canopen
 
 
 def _read_back(context: click.Context, text: str, dictionary: Dictionary, plan: CanopenPlan) -> None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
+from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
@@ -127,11 +129,15 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
 def _heading(plan: Plan) -> str:
     count = len(plan.cell.variables)
     parts = [f"{plan.cell.name}: {count} variable" + ("" if count == 1 else "s")]
-    if plan.modbus is not None:
-        host = f"[{plan.modbus.host}]" if ":" in plan.modbus.host else plan.modbus.host
-        parts.append(f"Modbus TCP {host}:{plan.modbus.port} unit {plan.modbus.unit}")
-    if plan.canopen is not None:
-        parts.append(f"CANopen {plan.canopen.channel} node {plan.canopen.node}")
+    if modbus_of(plan) is not None:
+        host = (
+            f"[{plan.the(ModbusPlan).host}]"
+            if ":" in plan.the(ModbusPlan).host
+            else plan.the(ModbusPlan).host
+        )
+        parts.append(f"Modbus TCP {host}:{plan.the(ModbusPlan).port} unit {plan.the(ModbusPlan).unit}")
+    if canopen_of(plan) is not None:
+        parts.append(f"CANopen {plan.the(CanopenPlan).channel} node {plan.the(CanopenPlan).node}")
     parts.append(f"fingerprint {plan.cell.fingerprint:08X}")
     return ", ".join(parts)
 
@@ -160,9 +166,9 @@ def _notes(loaded: Loaded, plan: Plan, *, shortened: bool) -> list[str]:
         )
     if any(variable.valid_running for variable in plan.cell.variables):
         notes.append("running: not good while the robot program does not run")
-    if plan.modbus is not None:
+    if modbus_of(plan) is not None:
         notes.append("status of the gateway: holding and input registers from 60000 (460001, 360001)")
-    if plan.canopen is not None:
+    if canopen_of(plan) is not None:
         notes.append("status of the gateway: objects from 5F00h")
     if shortened:
         notes.append("ranges on one line of the file are one row here; --all shows each variable")

@@ -16,7 +16,9 @@ from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.health import CAN_BUS, NMT_STATES
 from gatewayd.core.image import Quality
-from gatewayd.links.modbus_server.plan import Placement
+from gatewayd.links.canopen_node.plan import canopen_of
+from gatewayd.links.modbus_server.plan import Placement, modbus_of
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.event_text import Happening
 from gatewayd.report.format import counted, span
@@ -70,8 +72,11 @@ def cell_view(station: StationView, now: float) -> Json:
     plan, cell = station.plan, station.cell
     health, definition, quality = cell.health, cell.definition, cell.image.quality
     owners = cell.ownership.owners
+    modbus, canopen = modbus_of(plan), canopen_of(plan)
     found = problems(
-        cell, now, station.robot.trouble.removeprefix(f"{_address(plan.robot.host, plan.robot.port)}: ")
+        cell,
+        now,
+        station.robot.trouble.removeprefix(f"{_address(robot_of(plan).host, robot_of(plan).port)}: "),
     )
     return {
         "name": definition.name,
@@ -81,17 +86,17 @@ def cell_view(station: StationView, now: float) -> Json:
         "problems": found,
         "robot": _robot(plan, cell, now),
         "modbus": None
-        if plan.modbus is None
+        if modbus is None
         else {
-            "listen": _address(plan.modbus.host, plan.modbus.port),
-            "unit": plan.modbus.unit,
+            "listen": _address(modbus.host, modbus.port),
+            "unit": modbus.unit,
             "connections": health.modbus_connections,
         },
         "canopen": None
-        if plan.canopen is None
+        if canopen is None
         else {
-            "channel": f"{plan.canopen.interface}:{plan.canopen.channel}",
-            "node": plan.canopen.node,
+            "channel": f"{canopen.interface}:{canopen.channel}",
+            "node": canopen.node,
             "bus": CAN_BUS[health.can_bus],
             "nmt_state": NMT_STATES.get(health.nmt_state, str(health.nmt_state)),
         },
@@ -155,7 +160,8 @@ def _not_good(cell: Cell) -> Iterator[str]:
 def declared_view(plan: Plan) -> tuple[Json, ...]:
     """What the mapping says of each variable: the part of its view that does not change."""
     places: dict[int, list[Json]] = {}
-    for one in plan.modbus.placements if plan.modbus is not None else ():
+    modbus = modbus_of(plan)
+    for one in modbus.placements if modbus is not None else ():
         places.setdefault(one.variable, []).append(_place(one))
     objects = _objects(plan)
     return tuple(
@@ -273,7 +279,7 @@ _LISTED = 3
 def _robot(plan: Plan, cell: Cell, now: float) -> Json:
     health = cell.health
     return {
-        "address": _address(plan.robot.host, plan.robot.port),
+        "address": _address(robot_of(plan).host, robot_of(plan).port),
         "state": cell.freshness.state.name.lower(),
         "writable": cell.accepts_writes,
         "age": _seconds(now - cell.freshness.last_progress),
@@ -287,7 +293,7 @@ def _robot(plan: Plan, cell: Cell, now: float) -> Json:
         "unadopted": health.unadopted,
         "differing": health.differing,
         "adoption": _seconds(health.adoption),
-        "watchdog": None if plan.robot.watchdog is None else health.watchdog_fed,
+        "watchdog": None if robot_of(plan).watchdog is None else health.watchdog_fed,
     }
 
 
@@ -346,7 +352,7 @@ def _fallback(fallback: Fallback) -> object:
 
 def _objects(plan: Plan) -> dict[int, Json]:
     """Where each variable lies in the object dictionary, and the COB-ID of the PDO that carries it, by index."""
-    canopen = plan.canopen
+    canopen = canopen_of(plan)
     if canopen is None:
         return {}
     cob_ids = {entry.variable: pdo.cob_id for pdo in canopen.pdos for entry in pdo.entries}

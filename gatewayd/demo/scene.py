@@ -16,6 +16,9 @@ from tempfile import TemporaryDirectory
 from gatewayd.core.cell import Cell
 from gatewayd.demo.master import Master
 from gatewayd.demo.plc import FORCE_SHARE, Plc
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
+from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.loop import clock
 from gatewayd.mapping.loader import load
 from gatewayd.report.table import Row, rows
@@ -52,8 +55,8 @@ class Scene:
     def __init__(self, port: int) -> None:
         loaded = load(files(__package__).joinpath(MAPPING).read_bytes(), MAPPING)
         assert loaded.plan is not None
-        assert loaded.plan.modbus is not None
-        assert loaded.plan.canopen is not None
+        assert modbus_of(loaded.plan) is not None
+        assert canopen_of(loaded.plan) is not None
         self.rows: tuple[Row, ...] = rows(loaded.cell)
         self.port = port or free_port(HOST)
         self.started = clock.now()
@@ -62,10 +65,11 @@ class Scene:
         self.robot = SimulatedController(Controller(program=parse(ROBOT_PROGRAM, "robot program")), host=HOST)
         self.robot.set("input_double_register_1", _FULL_SPEED)
         self.plc = Plc(HOST, self.port, PLC_ADDRESS)
-        self.master = Master(loaded.plan.canopen.channel)
-        self.can_writer = loaded.plan.canopen.rpdo_writer
+        self.master = Master(loaded.plan.the(CanopenPlan).channel)
+        self.can_writer = loaded.plan.the(CanopenPlan).rpdo_writer
         """Index of the writer that the master is."""
-        self._plan = replace(loaded.plan, modbus=replace(loaded.plan.modbus, host=HOST, port=self.port))
+        modbus = replace(loaded.plan.the(ModbusPlan), host=HOST, port=self.port)
+        self._plan = loaded.plan.with_links(modbus=modbus)
         self._daemon: Daemon | None = None
         self._state = TemporaryDirectory(prefix="gatewayd-demo-")
 
@@ -80,8 +84,8 @@ class Scene:
         """Everything runs inside the block. What follows it sees the parties as they ended."""
         stop = asyncio.Event()
         async with self.robot:
-            robot = replace(self._plan.robot, host=HOST, port=self.robot.port)
-            self._daemon = Daemon([replace(self._plan, robot=robot)], Path(self._state.name))
+            robot = replace(robot_of(self._plan), host=HOST, port=self.robot.port)
+            self._daemon = Daemon([self._plan.with_links(robot=robot)], Path(self._state.name))
             line = asyncio.create_task(self.master.run())
             gateway = asyncio.create_task(self._daemon.run(stop))
             plc = asyncio.create_task(self.plc.run())

@@ -35,7 +35,7 @@ from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
 from gatewayd.links.robot.sections import ADOPT_FOR, Robot
 from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
 from gatewayd.mapping.model import WriterSpec
-from gatewayd.mapping.plan import Plan
+from gatewayd.mapping.plan import LinkPlan, Plan
 from gatewayd.mapping.shown import Shown, shown_of
 from gatewayd.modbus.codec import Codec
 from gatewayd.rtde.catalogue import Series
@@ -83,7 +83,13 @@ def compile_plan(cell: ExpandedCell) -> Plan:
     )
     modbus = _modbus(cell, document.modbus.spec) if document.modbus is not None else None
     canopen = _canopen(cell, cell.canopen) if cell.canopen is not None else None
-    plan = Plan(document.source.name, definition, _robot(cell, robot, writers), modbus, canopen)
+    links: dict[str, LinkPlan | None] = {
+        "robot": _robot(cell, robot, writers),
+        "modbus": modbus,
+        "canopen": canopen,
+    }
+    present = {name: link for name, link in links.items() if link is not None}
+    plan = Plan(document.source.name, definition, present)
     return dataclasses.replace(plan, cell=dataclasses.replace(definition, fingerprint=fingerprint(plan)))
 
 
@@ -279,6 +285,10 @@ def fingerprint(plan: Plan) -> int:
 
 def _meaning(thing: Any) -> Any:
     match thing:
+        case Plan():
+            return {"cell": _meaning(thing.cell)} | {
+                name: _meaning(link) for name, link in thing.links.items()
+            }
         case Codec():
             return [getattr(thing, name) for name in _CODEC_MEANING]
         case Enum():

@@ -6,14 +6,22 @@ between processes (pickle), and equals what it was there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from gatewayd.core.definition import CellDefinition
-from gatewayd.links.canopen_node.plan import CanopenPlan
-from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.links.robot.plan import RobotPlan
 
-__all__ = ["Plan"]
+__all__ = ["LinkPlan", "Plan"]
+
+
+class LinkPlan:
+    """One link of a cell, compiled: a frozen dataclass of the link's own that fits into a pickle."""
+
+    __slots__ = ()
+
+
+_LinkPlan = TypeVar("_LinkPlan", bound=LinkPlan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +31,18 @@ class Plan:
     source: str
     """Path of the mapping file as given."""
     cell: CellDefinition
-    robot: RobotPlan
-    modbus: ModbusPlan | None
-    canopen: CanopenPlan | None = None
+    links: Mapping[str, LinkPlan] = field(default_factory=dict)
+    """By name of the link: the key of its section."""
+
+    def of(self, kind: type[_LinkPlan]) -> dict[str, _LinkPlan]:
+        """The links of one kind by name."""
+        return {name: plan for name, plan in self.links.items() if isinstance(plan, kind)}
+
+    def the(self, kind: type[_LinkPlan]) -> _LinkPlan:
+        """The only link of one kind; ValueError if there is none, or more."""
+        (found,) = self.of(kind).values()
+        return found
+
+    def with_links(self, **links: LinkPlan) -> Plan:
+        """The same cell with these links in place of those of the same names."""
+        return replace(self, links={**self.links, **links})

@@ -13,7 +13,9 @@ from enum import Enum
 from typing import Any
 
 from gatewayd.core.definition import Direction, Fallback, Lock, ValueKind, Variable
-from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
+from gatewayd.links.canopen_node.plan import canopen_of
+from gatewayd.links.modbus_server.plan import ModbusPlan, Placement, modbus_of
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.areas import AREA_NAMES
 
@@ -31,7 +33,8 @@ _BIT_WORD = re.compile(r"(input|output)_bit_registers(0|32)_to_(?:31|63)")
 def variables(plan: Plan) -> dict[str, Facts]:
     """Facts by name of the variable, in the order of the file."""
     places: dict[int, list[Placement]] = {}
-    for placement in plan.modbus.placements if plan.modbus is not None else ():
+    modbus = modbus_of(plan)
+    for placement in modbus.placements if modbus is not None else ():
         places.setdefault(placement.variable, []).append(placement)
     objects = _objects(plan)
     found: dict[str, Facts] = {}
@@ -70,8 +73,9 @@ def groups(plan: Plan) -> dict[str, Facts]:
 def writers(plan: Plan) -> dict[str, Facts]:
     """Facts by name of the writer."""
     found: dict[str, Facts] = {}
+    modbus = modbus_of(plan)
     for index, writer in enumerate(plan.cell.writers):
-        networks = plan.modbus.writers if plan.modbus is not None else ()
+        networks = modbus.writers if modbus is not None else ()
         peers = ", ".join(_network(network) for network, one in networks if one == index)
         timeout = "" if writer.timeout is None else _seconds(writer.timeout)
         heartbeat = "" if writer.heartbeat is None else _seconds(writer.heartbeat)
@@ -92,9 +96,10 @@ def writers(plan: Plan) -> dict[str, Facts]:
 def links(plan: Plan) -> dict[str, Facts]:
     """Facts by link: `robot`, `modbus`, and `canopen` where the plan has one."""
     found: dict[str, Facts] = {"robot": _told(_robot(plan))}
-    if plan.modbus is not None:
-        found["modbus"] = _told(_modbus(plan.modbus))
-    canopen = getattr(plan, "canopen", None)
+    modbus = modbus_of(plan)
+    if modbus is not None:
+        found["modbus"] = _told(_modbus(modbus))
+    canopen = canopen_of(plan)
     if canopen is not None:
         found["canopen"] = _told(
             {
@@ -107,7 +112,7 @@ def links(plan: Plan) -> dict[str, Facts]:
 
 
 def _robot(plan: Plan) -> dict[str, str]:
-    robot, watchdog = plan.robot, plan.robot.watchdog
+    robot, watchdog = robot_of(plan), robot_of(plan).watchdog
     return {
         "host": robot.host,
         "port": str(robot.port),
@@ -191,7 +196,7 @@ def _place(placement: Placement) -> str:
 def _objects(plan: Plan) -> dict[int, str]:
     """CANopen objects by variable index, for any plan whose `canopen` has `objects`."""
     found: dict[int, str] = {}
-    for one in getattr(getattr(plan, "canopen", None), "objects", ()):
+    for one in getattr(canopen_of(plan), "objects", ()):
         text = f"{one.index:04X}h sub {one.subindex} {_text(plan, 'type', one.type)}"
         found[one.variable] = f"{found[one.variable]}, {text}" if one.variable in found else text
     return found

@@ -12,6 +12,7 @@ from typing import Any
 
 from gatewayd.core.definition import Direction, Fallback
 from gatewayd.links.canopen_node.pdo_table import as_document, load_by_bit_rate, object_place, pdo_rows
+from gatewayd.links.modbus_server.plan import modbus_of
 from gatewayd.mapping.expand import ConcretePlacement, ConcreteVariable, ExpandedCell
 from gatewayd.mapping.plan import Plan
 from gatewayd.mapping.rules.wording import cob, seconds
@@ -204,7 +205,7 @@ def as_json(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
 
     Keys are only ever added within a version.
     """
-    modbus = plan.modbus
+    modbus = modbus_of(plan)
     document = {
         "version": 1,
         "cell": plan.cell.name,
@@ -219,8 +220,8 @@ def as_json(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
 def as_markdown(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
     """A Markdown page with the columns that a PLC programmer needs; the PDO table after it."""
     lines = [f"# Registers of {plan.cell.name}", ""]
-    if plan.modbus is not None:
-        modbus = plan.modbus
+    modbus = modbus_of(plan)
+    if modbus is not None:
         lines += [
             (
                 f"Modbus TCP, port {modbus.port}, unit {modbus.unit}. Fingerprint of the mapping: "

@@ -10,6 +10,8 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.health import CAN_BUS
 from gatewayd.core.succession import Succession, succeed
+from gatewayd.links.canopen_node.plan import canopen_of
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.links.robot.runtime import RobotLink
 from gatewayd.logs.events import EventLog
 from gatewayd.mapping.plan import Plan
@@ -49,7 +51,7 @@ class Station:
 
     def __post_init__(self) -> None:
         self._furnish(Cell(self.plan.cell))
-        self.robot = RobotLink(self.plan.robot, self.cell)
+        self.robot = RobotLink(robot_of(self.plan), self.cell)
         self.can = self._can_link()
 
     @property
@@ -73,16 +75,16 @@ class Station:
 
         A CANopen node whose objects or PDOs change is made anew, and boots.
         """
-        can, canopen = self.can, plan.canopen
+        can, canopen = self.can, canopen_of(plan)
         stays = can is not None and canopen is not None and can.fits(canopen, plan.cell)
         if can is not None and not stays:
             can.node.lose_writers("the new mapping needs another node", now)
         succession = self._hand_over(plan.cell, now)
         self.plan = plan
         self._furnish(succession.cell)
-        if not self.robot.rebind(plan.robot, self.cell, now):
+        if not self.robot.rebind(robot_of(plan), self.cell, now):
             self.cell.robot_lost("the new mapping needs another session", now)
-            self.robot = RobotLink(plan.robot, self.cell, self.robot)
+            self.robot = RobotLink(robot_of(plan), self.cell, self.robot)
         if can is not None and canopen is not None and stays:
             can.rebind(canopen, self.cell, now)
         else:
@@ -108,7 +110,7 @@ class Station:
         cell.events.listeners.append(EventLog(cell))
 
     def _can_link(self) -> CanLink | None:
-        plan = self.plan.canopen
+        plan = canopen_of(self.plan)
         if plan is None:
             return None
         # Most cells have no CAN, and start sooner without it.

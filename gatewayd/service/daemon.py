@@ -19,7 +19,7 @@ from pathlib import Path
 from gatewayd.core.cell import Cell
 from gatewayd.links.modbus_server.listener import ListenError, ModbusListener
 from gatewayd.links.modbus_server.peers import PeerEvent, PeerEventKind
-from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.loop.progress import turning
@@ -118,7 +118,7 @@ class Daemon:
 
         One that must wait for the end of a present listener, of the same port, is left to `swap`.
         """
-        wanted = {(plan.modbus.host, plan.modbus.port) for plan in plans if plan.modbus is not None}
+        wanted = {(unit.host, unit.port) for plan in plans if (unit := modbus_of(plan)) is not None}
         present = {listener.address for listener in self.listeners}
         ports = {port for _host, port in present - wanted}
         opened: list[ModbusListener] = []
@@ -194,7 +194,7 @@ class Daemon:
         """Have a listener for every address of the stations' plans, and no other."""
         units: dict[Address, list[tuple[ModbusPlan, Cell]]] = {}
         for station in self.stations:
-            modbus = station.plan.modbus
+            modbus = modbus_of(station.plan)
             if modbus is not None:
                 units.setdefault((modbus.host, modbus.port), []).append((modbus, station.cell))
         for listener in [one for one in self.listeners if one.address not in units]:
@@ -223,7 +223,7 @@ class Daemon:
 
     def _is_reachable(self, station: Station) -> bool:
         """Whether a writer can reach the cell; one without a fieldbus waits for none."""
-        modbus = station.plan.modbus
+        modbus = modbus_of(station.plan)
         if modbus is None and station.can is None:
             return True
         served = modbus is not None and any(

@@ -17,8 +17,10 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Fallback, Lock, Variable
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality
+from gatewayd.links.canopen_node.plan import canopen_of
 from gatewayd.links.modbus_server.listener import ModbusListener
-from gatewayd.links.modbus_server.plan import Placement
+from gatewayd.links.modbus_server.plan import Placement, modbus_of
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.report.event_text import Happening
 from gatewayd.report.printable import json_text
 from gatewayd.service.cell_runtime import Station
@@ -77,7 +79,7 @@ def overview(daemon: Daemon, version: str) -> dict[str, object]:
 
 def layout(station: Station) -> dict[str, object]:
     """What the mapping fixes. It is the same as long as the fingerprint is."""
-    definition, modbus = station.cell.definition, station.plan.modbus
+    definition, modbus = station.cell.definition, modbus_of(station.plan)
     places: dict[int, list[dict[str, object]]] = {}
     for one in modbus.placements if modbus is not None else ():
         places.setdefault(one.variable, []).append(_place(one))
@@ -86,7 +88,7 @@ def layout(station: Station) -> dict[str, object]:
     return {
         "cell": definition.name,
         "fingerprint": _fingerprint(station.cell),
-        "robot": f"{station.plan.robot.host}:{station.plan.robot.port}",
+        "robot": f"{robot_of(station.plan).host}:{robot_of(station.plan).port}",
         "modbus": None if modbus is None else {"listen": _listen(station), "unit": modbus.unit},
         "writers": [{"name": one.name, "timeout": one.timeout} for one in definition.writers],
         "locks": [_lock(one, station.cell) for one in definition.locks],
@@ -138,7 +140,7 @@ def _place(place: Placement) -> dict[str, object]:
 
 def _objects(station: Station) -> dict[int, dict[str, object]]:
     """The CANopen side, in the form of a Modbus place: object, and COB-ID of the PDO that carries it."""
-    canopen = station.plan.canopen
+    canopen = canopen_of(station.plan)
     if canopen is None:
         return {}
     cob_ids = {entry.variable: f"COB-ID 0x{pdo.cob_id:03X}" for pdo in canopen.pdos for entry in pdo.entries}
@@ -236,14 +238,14 @@ def _event(event: Event, cell: Cell, number: int, at: float, more: int) -> dict[
 def _picture(station: Station, probes: Probes, now: float) -> dict[str, object]:
     cell = station.cell
     robot = picture.robot(
-        cell, f"{station.plan.robot.host}:{station.plan.robot.port}", station.robot.trouble, now
+        cell, f"{robot_of(station.plan).host}:{robot_of(station.plan).port}", station.robot.trouble, now
     )
     gateway = picture.gateway(cell, probes.late, probes.troubles(), now)
     listener = _listener(station, probes.daemon)
     buses = []
     if listener is not None:
         buses.append(picture.bus(listener.name, listener.connections, listening=listener.listening))
-    can, canopen = station.can, station.plan.canopen
+    can, canopen = station.can, canopen_of(station.plan)
     if can is not None and canopen is not None:
         nmt = can.node.nmt.state.name.lower().replace("_", "-")
         buses.append(picture.can_bus(canopen.channel, cell.health.can_bus, can.node.node_id, nmt))
@@ -268,7 +270,7 @@ def _listener(station: Station, daemon: Daemon) -> ModbusListener | None:
 
 
 def _listen(station: Station) -> str:
-    modbus = station.plan.modbus
+    modbus = modbus_of(station.plan)
     if modbus is None:
         return ""
     return f"[{modbus.host}]:{modbus.port}" if ":" in modbus.host else f"{modbus.host}:{modbus.port}"

@@ -15,6 +15,7 @@ from gatewayd.control.api import Api
 from gatewayd.control.views import cell_view, declared_view, problems
 from gatewayd.core.cell import Change
 from gatewayd.core.requester import Requester
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.mapping.loader import load
 from gatewayd.report.summary import sentence
 from gatewayd.service.cell_runtime import Station
@@ -170,10 +171,10 @@ def test_a_variable_on_canopen_tells_its_object_and_pdo() -> None:
     mapping = Path(__file__).parents[2] / "mappings" / "two-buses.yaml"
     plan = load(mapping.read_bytes(), mapping.name).plan
     assert plan is not None
-    assert plan.canopen is not None
+    assert canopen_of(plan) is not None
     found = {one["name"]: one["canopen"] for one in declared_view(plan)}
-    carried = {entry.variable for pdo in plan.canopen.pdos for entry in pdo.entries}
-    for one in plan.canopen.objects:
+    carried = {entry.variable for pdo in plan.the(CanopenPlan).pdos for entry in pdo.entries}
+    for one in plan.the(CanopenPlan).objects:
         told = found[plan.cell.variables[one.variable].name]
         assert told["object"] == f"{one.index:04X}h:{one.subindex:02X}"
         assert told["type"] == one.type.name

@@ -21,6 +21,7 @@ from gatewayd.links.canopen_node.bus_load import BIT_RATES, frame_bits
 from gatewayd.links.canopen_node.communication_errors import OVERRUN_TIME
 from gatewayd.links.canopen_node.eds import objects_of
 from gatewayd.links.canopen_node.pdo_table import load_by_bit_rate, pdo_rows
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.robot_errors import QUIET
 from gatewayd.links.canopen_node.status_objects import HEADER, TABLE_INDICES
 from gatewayd.links.canopen_node.variables import ABORT_OF
@@ -123,8 +124,8 @@ _COLUMNS = ("index", "sub", "name", "type", "access", "stored", "meaning")
 def _sample() -> tuple[Object, ...]:
     plan = load(_SAMPLE, "sample").plan
     assert plan is not None
-    assert plan.canopen is not None
-    return tuple(objects_of(plan.canopen, plan.cell))
+    assert canopen_of(plan) is not None
+    return tuple(objects_of(plan.the(CanopenPlan), plan.cell))
 
 
 def communication_objects() -> str:

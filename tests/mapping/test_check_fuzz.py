@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together
 from gatewayd.mapping.source import parse, plain
@@ -24,7 +25,7 @@ from gatewayd.report.table import as_json as table_as_json
 ROOT = Path(__file__).parents[2]
 SEEDS = [
     *sorted((ROOT / "mappings").glob("*.yaml")),
-    *sorted((ROOT / "docs/reference/rules").glob("*/*.yaml")),
+    *sorted((ROOT / "gatewayd").rglob("GW*/*.yaml")),
 ]
 SLOW = 5.0
 """Seconds; a thousand times what a check takes, for a machine that does something else."""
@@ -56,7 +57,7 @@ def examine(data: bytes) -> Loaded:
         assert as_csv(table)
         assert as_markdown(loaded.plan, loaded.cell, table)
         assert table_as_json(loaded.plan, loaded.cell, table)
-        canopen = loaded.plan.canopen
+        canopen = loaded.plan.the(CanopenPlan)
         if canopen is not None:
             cell = loaded.plan.cell
             assert eds_text(objects_of(canopen, cell), sheet_of(canopen, cell)).isascii()

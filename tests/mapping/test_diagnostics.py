@@ -52,4 +52,4 @@ def test_unknown_rule_is_none() -> None:
 def test_malformed_and_used_ids_are_refused(rule_id: str, slug: str) -> None:
     """Ids and slugs are well formed and unique."""
     with pytest.raises(ValueError, match=rule_id):
-        diagnostics.declare(rule_id, slug, "summary", "why")
+        diagnostics.declare(rule_id, slug, "summary")

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gatewayd.core.definition import Direction
+from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together, read_bytes
 from gatewayd.mapping.source import MAXIMUM_BYTES
@@ -176,8 +177,8 @@ def test_plans_are_consistent(made: list[tuple[str, str, int, str, str]]) -> Non
         assert all(owner < len(cell.writers) for owner in lock.owners)
     for variable in cell.variables:
         assert (variable.lock is not None) == (variable.direction is Direction.INPUT)
-    assert plan.modbus is not None
-    for placement in plan.modbus.placements:
+    assert modbus_of(plan) is not None
+    for placement in plan.the(ModbusPlan).placements:
         variable = cell.variables[placement.variable]
         if placement.codec is not None:
             assert len(placement.codec.encode(variable.kind.zero)) == 2 * placement.words

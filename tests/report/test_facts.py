@@ -10,6 +10,8 @@ from typing import Any, cast
 import pytest
 
 from gatewayd.core.definition import Direction, Fallback, FallbackKind, Limits, ValueKind
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 from gatewayd.report import facts
@@ -83,8 +85,8 @@ def changed(value: Any) -> Any:
 
 
 CASES = [
-    *(("robot", field.name) for field in dataclasses.fields(plan().robot)),
-    *(("modbus", field.name) for field in dataclasses.fields(cast("Any", plan().modbus))),
+    *(("robot", field.name) for field in dataclasses.fields(plan().the(RobotPlan))),
+    *(("modbus", field.name) for field in dataclasses.fields(cast("Any", plan().the(ModbusPlan)))),
     *(("variables", field.name) for field in dataclasses.fields(plan().cell.variables[0])),
     *(("locks", field.name) for field in dataclasses.fields(plan().cell.locks[0])),
     *(("writers", field.name) for field in dataclasses.fields(plan().cell.writers[0])),
@@ -167,7 +169,7 @@ def test_a_canopen_section_is_told_by_names() -> None:
         pdos=(Entry(3, 1), Entry(None, 2)),
         objects=(Object(1, 0x2001, 3, CanType("UNSIGNED8")),),
     )
-    new = cast("Plan", WithCanopen(old.source, old.cell, old.robot, old.modbus, node))
+    new = cast("Plan", WithCanopen(old.source, old.cell, old.the(RobotPlan), old.the(ModbusPlan), node))
     assert facts.links(new)["canopen"] == {
         "channel": "can0",
         "kind": "slow",

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from gatewayd.core.events import Event, EventKind
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.mapping.loader import load
 from gatewayd.service.cell_runtime import Station
 from gatewayd.service.daemon import Daemon
@@ -156,8 +157,8 @@ def test_a_can_bus_is_named_and_tells_its_node(tmp_path: Path) -> None:
     mapping = Path(__file__).parents[2] / "mappings" / "canopen-only.yaml"
     plan = load(mapping.read_bytes(), mapping.name).plan
     assert plan is not None
-    assert plan.canopen is not None
+    assert canopen_of(plan) is not None
     daemon = Daemon([plan], tmp_path)
     [bus] = told(daemon.stations[0], Probes(daemon))["picture"]["buses"]
-    assert (bus["name"], bus["level"]) == (f"CAN {plan.canopen.channel}", "bad")
-    assert bus["facts"] == f"node {plan.canopen.node}, initialising"
+    assert (bus["name"], bus["level"]) == (f"CAN {plan.the(CanopenPlan).channel}", "bad")
+    assert bus["facts"] == f"node {plan.the(CanopenPlan).node}, initialising"

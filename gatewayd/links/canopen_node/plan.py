@@ -8,15 +8,9 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.heartbeat import Consumer
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import CellDefinition, Direction
+from gatewayd.mapping.plan import LinkPlan, Plan
 
-__all__ = [
-    "FIRST_STATUS_OBJECT",
-    "CanopenPlan",
-    "ObjectPlan",
-    "PdoEntry",
-    "PdoPlan",
-    "by_name",
-]
+__all__ = ["FIRST_STATUS_OBJECT", "CanopenPlan", "ObjectPlan", "PdoEntry", "PdoPlan", "by_name", "canopen_of"]
 
 FIRST_STATUS_OBJECT = 0x5F00
 """Where the status block begins in the object dictionary."""
@@ -75,7 +69,7 @@ class PdoPlan:
 
 
 @dataclass(frozen=True, slots=True)
-class CanopenPlan:
+class CanopenPlan(LinkPlan):
     """One node on one bus."""
 
     interface: str
@@ -128,3 +122,8 @@ def by_name(plan: CanopenPlan, definition: CellDefinition) -> tuple[object, ...]
             for pdo in plan.pdos
         ],
     )
+
+
+def canopen_of(plan: Plan) -> CanopenPlan | None:
+    """The CANopen node of a cell; None: it has none."""
+    return plan.of(CanopenPlan).get("canopen")

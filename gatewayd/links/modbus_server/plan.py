@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from ipaddress import IPv4Network, IPv6Network
 
+from gatewayd.mapping.plan import LinkPlan, Plan
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import Codec
 
-__all__ = ["ModbusPlan", "Network", "Placement"]
+__all__ = ["ModbusPlan", "Network", "Placement", "modbus_of"]
 
 Network = IPv4Network | IPv6Network
 
@@ -34,7 +35,7 @@ class Placement:
 
 
 @dataclass(frozen=True, slots=True)
-class ModbusPlan:
+class ModbusPlan(LinkPlan):
     """One unit on one listener."""
 
     host: str
@@ -49,3 +50,8 @@ class ModbusPlan:
     placements: tuple[Placement, ...]
     writers: tuple[tuple[Network, int], ...]
     """Peer network -> writer, most specific first."""
+
+
+def modbus_of(plan: Plan) -> ModbusPlan | None:
+    """The Modbus unit of a cell; None: it has none."""
+    return plan.of(ModbusPlan).get("modbus")

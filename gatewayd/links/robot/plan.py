@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["RobotPlan", "WatchdogPlan"]
+from gatewayd.mapping.plan import LinkPlan, Plan
+
+__all__ = ["RobotPlan", "WatchdogPlan", "robot_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +21,7 @@ class WatchdogPlan:
 
 
 @dataclass(frozen=True, slots=True)
-class RobotPlan:
+class RobotPlan(LinkPlan):
     """How to reach the controller and what to ask of it."""
 
     host: str
@@ -33,3 +35,8 @@ class RobotPlan:
     verify: bool
     """Compare what was written with what the controller reads back."""
     watchdog: WatchdogPlan | None = None
+
+
+def robot_of(plan: Plan) -> RobotPlan:
+    """The controller of a cell."""
+    return plan.of(RobotPlan)["robot"]

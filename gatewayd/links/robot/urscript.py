@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.mapping.plan import Plan
 
 __all__ = ["watchdog_script"]
@@ -15,7 +16,7 @@ def watchdog_script(plan: Plan) -> str:
 
     `rtde_set_watchdog` wants the least frequency of updates: half of the feeding, so that one late feed stops nothing.
     """
-    watchdog = plan.robot.watchdog
+    watchdog = robot_of(plan).watchdog
     if watchdog is None:
         return ""
     required = [plan.cell.writers[writer].name for writer in watchdog.requires]

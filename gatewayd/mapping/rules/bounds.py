@@ -20,10 +20,6 @@ MAXIMUM_WRITERS = 32
     "GW119",
     "too-many",
     "more variables or writers than one cell can hold",
-    """
-A cell holds at most 1024 variables and 32 writers: the status block has a fixed place for each. Split the
-cell's variables over two mapping files with two units.
-""",
 )
 def too_many(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first variable and the first writer beyond the limit."""
@@ -46,10 +42,6 @@ def too_many(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW124",
     "duplicate-cell",
     "two files describe a cell of the same name",
-    """
-The name of the cell stands in every log line and in the status of the gateway. Two cells of one name
-could not be told apart at 3 a.m.; most often the file was copied and not renamed.
-""",
 )
 def duplicate_cell(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Equal names of cells."""

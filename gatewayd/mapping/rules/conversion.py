@@ -44,10 +44,6 @@ GROWING = ("timestamp",)
     "GW701",
     "time-in-float32",
     "the controller's time in a float32",
-    """
-A float32 has 24 bits: after three days of uptime it shows the controller's time in steps of 1/32 s,
-coarser than the cycle of the robot. Use float64, or an integer type with a scale.
-""",
     Severity.WARNING,
 )
 def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -64,11 +60,6 @@ def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW702",
     "fraction-lost",
     "a real in an integer type without a scale",
-    """
-The robot's value is a real; an integer register without a scale shows it rounded to whole numbers, and
-poses (metres, radians) mostly as 0. Say how many robot units one count is: `scale: 0.001`. If whole
-numbers are meant, write `scale: 1`.
-""",
     Severity.WARNING,
 )
 def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -92,11 +83,6 @@ def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW703",
     "narrow-integer",
     "an integer from the robot in a register too small for it",
-    """
-The robot's integer can take values that the register cannot show: they appear as the nearest one that it
-can, 32767 for every greater number. Use the type of the robot's value; or, if the values stay small, say
-so with `limits` at the variable (at an output they only state the range).
-""",
     Severity.WARNING,
 )
 def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -122,11 +108,6 @@ def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW704",
     "coarse-scale",
     "a scale too coarse for the limits",
-    """
-One count of the register is `scale` robot units. Here fewer than ten counts lie between the limits, so
-the writer can hardly set anything between them. Most often the scale was written upside down: robot value
-= raw value * scale.
-""",
     Severity.WARNING,
 )
 def coarse_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -166,10 +147,6 @@ def _fine(span: float) -> float:
     "GW705",
     "limit-not-reachable",
     "a limit that the register type cannot express",
-    """
-The greatest and least number of the register, with scale and offset, do not reach the limits: part of the
-allowed range can never be written. Use a wider type, a coarser scale or an offset.
-""",
     Severity.WARNING,
 )
 def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -196,10 +173,6 @@ def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW706",
     "scale-of-zero",
     "a scale of zero",
-    """
-Robot value = raw value * scale + offset. With a scale of 0 every raw value means the same, and no robot
-value can be turned back into a raw one.
-""",
 )
 def scale_of_zero(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Scales of zero."""
@@ -213,9 +186,6 @@ def scale_of_zero(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW707",
     "scaled-bit",
     "scale, offset or order at a bit",
-    """
-A bit is true or false: nothing can be multiplied, and a single bit has no bytes to swap.
-""",
 )
 def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Number conversions of bits."""
@@ -233,12 +203,6 @@ def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW708",
     "uneven-scale",
     "an integer with a scale that does not come out even",
-    """
-The robot's value is a whole number. With this scale and offset, robot values turn into raw values between
-two counts (or raw values into robot values between two whole numbers) and are rounded: what is read back
-is not what was written. Scale integers by whole numbers when they are written, by 1/n when they are read,
-or not at all.
-""",
     Severity.WARNING,
 )
 def uneven_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -271,11 +235,6 @@ def _whole(value: float) -> bool:
     "GW709",
     "integer-in-real",
     "an integer in a real that has too few digits for it",
-    """
-A float32 holds whole numbers exactly up to 16777216, a float64 up to 9007199254740992. Beyond that
-neighbouring numbers become one: a counter in a float32 stands still after 16777216. Use an integer type;
-or, if the values stay small, say so with `limits` at the variable.
-""",
     Severity.WARNING,
 )
 def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -298,10 +257,6 @@ def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW710",
     "number-as-bool",
     "a number shown as 0 or 1",
-    """
-`type: bool` makes every number but 0 a 1. If one bit of the number is meant, map that bit
-(`robot_status_bits.1`); else use a number type.
-""",
     Severity.WARNING,
 )
 def number_as_bool(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -318,10 +273,6 @@ def number_as_bool(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW711",
     "fallback-not-shown",
     "a stale value that the register cannot show",
-    """
-`on_stale: -1` is meant to be seen by the PLC. A register of type uint16 shows it as 0, which looks like a
-good value. Use a type and scale that can express the value, or another value.
-""",
     Severity.WARNING,
 )
 def fallback_not_shown(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

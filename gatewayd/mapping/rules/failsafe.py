@@ -42,10 +42,6 @@ _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
     "GW601",
     "fallback-outside-limits",
     "a fallback value outside the limits",
-    """
-`on_release` is given to the robot when the owner is lost. A value outside `limits` would be refused from
-any writer, and must not come from the gateway itself.
-""",
 )
 def fallback_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`on_release` values beyond `limits`."""
@@ -67,10 +63,6 @@ def fallback_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
     "GW602",
     "fallback-type",
     "a fallback value that the variable cannot have",
-    """
-A fallback is a value of the robot's own type: true or false for a bit, a whole number within its range
-for an integer, a number for a double.
-""",
 )
 def fallback_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Fallback values of another type or beyond the type's range."""
@@ -108,12 +100,6 @@ def _mismatch(variable: ConcreteVariable, value: float) -> str | None:
     "GW603",
     "held-motion",
     "a motion command that stays on when its owner is lost",
-    """
-The variable looks like a command to move (by its name, or because it is the speed slider), it keeps its
-value when its owner is lost, and nothing supervises the owner: neither a lease nor a `timeout`. A PLC
-that dies with the command set leaves the robot moving. Use `on_release: clear`, or supervise the owner if
-holding is meant.
-""",
     Severity.WARNING,
 )
 def held_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -131,11 +117,6 @@ def held_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW604",
     "unsupervised-motion",
     "a motion command whose owner nobody supervises",
-    """
-The variable looks like a command to move, and its owner has neither a lease nor a `timeout`: the owner
-counts as lost only when its connection closes. A PLC whose program hangs keeps the connection, and the
-command stays set. Give the writer a `timeout`, or the variable a `lease`.
-""",
     Severity.WARNING,
 )
 def unsupervised_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -169,11 +150,6 @@ def _is_motion(variable: ConcreteVariable) -> bool:
     "GW605",
     "policy-of-other-side",
     "on_stale or valid at an input, or on_release at an output",
-    """
-`on_stale` is what the fieldbus sees of an output when the robot stops telling, and `valid` when an output is good at
-all; `on_release` is what the robot is given of an input when the owner is lost. At the other side they never act, and
-the policy that does act is the default.
-""",
 )
 def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Policies that belong to the other direction."""
@@ -196,11 +172,6 @@ def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     "GW607",
     "stale-too-soon",
     "stale_after shorter than the time between two packages",
-    """
-Between two packages nothing can be known. With `stale_after` shorter than that, every value would be
-stale before its successor can come, and all fallbacks would act all the time. Leave it out (five periods,
-at least 100ms), or give it several periods.
-""",
 )
 def stale_too_soon(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`stale_after` below the package period."""
@@ -221,10 +192,6 @@ def stale_too_soon(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW608",
     "limits-inverted",
     "limits that no value can satisfy",
-    """
-Limits are written `[least, greatest]`. With the greater first no value lies between them, and every write
-would be refused.
-""",
 )
 def limits_inverted(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Limits with the least not below the greatest."""
@@ -241,10 +208,6 @@ def limits_inverted(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW609",
     "limits-outside-type",
     "limits beyond what the robot's register can hold",
-    """
-The robot's register has a range of its own (INT32: -2147483648 to 2147483647). A limit beyond it can
-never act; most likely a digit is too many, or another register was meant.
-""",
 )
 def limits_outside_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Limits of integers beyond their type."""
@@ -267,11 +230,6 @@ def limits_outside_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW610",
     "limits-without-effect",
     "limits where nothing can be limited",
-    """
-Limits guard what a writer sends. A bit has only two values, so limits say nothing about it. What comes
-from the robot is shown as it is and never clamped; `limits` at an output only state the range that it
-keeps, for the conversion rules (GW703).
-""",
 )
 def limits_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Limits of bits, and clamping of outputs."""
@@ -288,11 +246,6 @@ def limits_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
     "GW611",
     "clear-outside-limits",
     "a fallback of zero that the limits exclude",
-    """
-When the owner is lost, an input is cleared to 0 unless `on_release` says otherwise. Here the limits
-exclude 0, so the robot would be given a value that no writer may send. Say `on_release: hold` or name a
-value.
-""",
     Severity.WARNING,
 )
 def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -320,10 +273,6 @@ def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     "GW612",
     "clamp-without-limits",
     "clamping without limits",
-    """
-`clamp: true` brings a value outside the limits to the nearer limit instead of refusing it. Without
-`limits` there is nothing to bring it to.
-""",
 )
 def clamp_without_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`clamp` at inputs without `limits`."""

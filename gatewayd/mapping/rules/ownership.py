@@ -24,10 +24,6 @@ _POLICY = ("owner", "lease", "takeover")
     "GW501",
     "no-writer",
     "input variables in a file without writers",
-    """
-An input variable is written by a writer, and a writer is known by its address. Without `writers:` every
-peer is unknown, every write is refused, and the inputs can never change.
-""",
 )
 def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first input of a file without writers."""
@@ -47,10 +43,6 @@ def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW502",
     "unknown-writer",
     "an owner that is not among the writers",
-    """
-Owners, and the writers that a watchdog requires, are named in the section `writers:`. A name that is not
-there can never own anything, and nobody would notice until the wrong one writes.
-""",
 )
 def unknown_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Names of owners and required writers that are not declared."""
@@ -72,10 +64,6 @@ def unknown_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW503",
     "writer-twice",
     "a writer that stands twice in one list",
-    """
-The order of the owners is their priority. A writer that stands twice has two priorities; most likely one
-of the two was meant to be another writer.
-""",
 )
 def writer_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Repeated names in lists of owners."""
@@ -94,10 +82,6 @@ def writer_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW504",
     "same-peer",
     "two writers with the same address",
-    """
-A Modbus client is recognised by its address alone. Two writers with the same address or network could not
-be told apart, and the rights of the second would never act.
-""",
 )
 def same_peer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Equal networks of one or of two writers."""
@@ -118,11 +102,6 @@ def same_peer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW505",
     "overlapping-peers",
     "the network of one writer holds the address of another",
-    """
-A client is taken for the writer with the most specific network that holds its address: the single address
-wins over the network around it. That is well defined, but easily missed by whoever reads the file.
-Networks that do not overlap say the same without a second thought.
-""",
     Severity.WARNING,
 )
 def overlapping_peers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -153,10 +132,6 @@ def overlapping_peers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW506",
     "group-of-one",
     "a group with a single variable",
-    """
-A group makes several variables owned together. With one member it does nothing that `owner` and `lease`
-at the variable would not do; most likely a second variable was meant to name it.
-""",
     Severity.WARNING,
 )
 def group_of_one(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -176,10 +151,6 @@ def group_of_one(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW507",
     "member-with-own-owner",
     "a member of a group with an owner or lease of its own",
-    """
-The variables of a group are only ever owned together, so owner, lease and takeover are the group's. A
-second statement at the variable contradicts it, or repeats it and will contradict it one day.
-""",
 )
 def member_with_own_owner(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`owner`, `lease` or `takeover` beside `group`."""
@@ -201,11 +172,6 @@ def member_with_own_owner(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
     "GW508",
     "short-lease",
     "a lease that ends before its owner can count as lost",
-    """
-The lease is how long an owner keeps a variable without writing it. One shorter than the writer's
-`timeout` ends while the writer still counts as alive: between two writes the variable falls back and
-comes again. Below 100ms every hiccup of the network does that.
-""",
     Severity.WARNING,
 )
 def short_lease(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -237,10 +203,6 @@ def short_lease(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW509",
     "idle-writer",
     "a writer that may write nothing",
-    """
-The writer is declared, but owns no variable and is required by no watchdog: every write of it is refused.
-Name it as an owner, or remove it.
-""",
     Severity.WARNING,
 )
 def idle_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -264,9 +226,6 @@ def idle_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW510",
     "unknown-group",
     "a group that is not declared",
-    """
-Groups are declared in the section `groups:` with their owners and their lease.
-""",
 )
 def unknown_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`group` with a name that is not declared."""
@@ -282,10 +241,6 @@ def unknown_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW511",
     "unused-group",
     "a group without a member",
-    """
-No variable names the group, so it owns nothing. Most likely its name is misspelt at the variables, or
-they were removed.
-""",
     Severity.WARNING,
 )
 def unused_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -303,10 +258,6 @@ def unused_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW512",
     "takeover-of-nobody",
     "takeover where there is no order of owners",
-    """
-`takeover: true` lets a writer named earlier take a variable from one named later. With a single owner, or
-with `any`, nobody is named earlier, so it does nothing.
-""",
     Severity.WARNING,
 )
 def takeover_of_nobody(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -325,10 +276,6 @@ def takeover_of_nobody(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW513",
     "owner-of-output",
     "an owner of a variable that nobody writes",
-    """
-An output variable flows from the robot to the fieldbus. Nobody writes it, so nobody owns it. If the PLC
-is meant to write it, it must be an input register of the robot.
-""",
 )
 def owner_of_output(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`owner`, `lease`, `takeover` or `group` at an output."""
@@ -365,11 +312,6 @@ def _counterpart(variable: ConcreteVariable) -> str:
     "GW514",
     "endless-lock",
     "a shared variable that a silent writer can keep for ever",
-    """
-Several writers may own the variable, there is no lease, and one of them has no `timeout`. If that one
-hangs with its connection open, it keeps the variable until somebody pulls the cable. Give the variable a
-lease, or the writer a timeout.
-""",
     Severity.WARNING,
 )
 def endless_lock(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -393,10 +335,6 @@ def endless_locks(cell: ExpandedCell) -> Iterator[tuple[ConcreteLock, str]]:
     "GW516",
     "any-among-owners",
     "the word any in a list of owners",
-    """
-`any` stands for all writers, first come first served. Beside named writers it contradicts their order.
-Write `any` alone, or name the writers by priority.
-""",
 )
 def any_among_owners(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`any` in lists of more than one owner."""
@@ -412,12 +350,6 @@ def any_among_owners(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW517",
     "reserved-writer-name",
     "a writer with a name that the gateway uses itself",
-    """
-Log, status, events and audit tell who wrote what by name. `operator` is the local operator, who takes locks and
-forces values by hand; `gateway` is the gateway itself, which applies fallbacks; `robot` is the owner of outputs;
-`undeclared` is a peer that no writer stands for, and `any` and `free` stand where no writer does. A writer of such
-a name could not be told from them.
-""",
 )
 def reserved_writer_name(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers named like parties that no mapping declares."""

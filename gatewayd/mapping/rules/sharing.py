@@ -23,13 +23,6 @@ _LONGEST_WRITE = {Area.HOLDING: 123, Area.COIL: 1968}
     "GW518",
     "inherited-value",
     "a held variable that the next owner of its group inherits",
-    """
-A writer that takes a group over inherits what it does not write itself. The other variables take `on_release`
-first, so that no command of the former owner goes on; but one with `on_release: hold` keeps the former owner's
-value, and the new owner's `go` acts on the old `target`. Give the variable another `on_release`, or let the group
-be taken over by writing all of it: `whole: true`. (A takeover by lock request keeps what is held in any case: write
-before you command.)
-""",
     Severity.WARNING,
 )
 def inherited_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -50,13 +43,6 @@ def inherited_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW519",
     "split-group",
     "a group that no single request can take over whole",
-    """
-A writer takes a group over with its first request; what that one does not write falls back (`on_release`) until the
-second one comes. One request writes the whole group where its variables lie side by side: up to 123 holding
-registers or 1968 coils without a gap and without anything else between them, or one RPDO. With `whole: true` a
-group that no request can write whole could only be taken over by lock request. Move the variables together; or,
-where the group need not change hands between two writers that are both there, write `takeover: false`.
-""",
     Severity.WARNING,
 )
 def split_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -133,15 +119,6 @@ def _first_apart(cell: ExpandedCell, members: list[ConcreteVariable]) -> Concret
     "GW520",
     "shared-register",
     "a bit of several possible owners in a register with bits of other locks",
-    """
-Whoever writes a register writes all of its bits, and most of them only because they lie there: a PLC that read the
-word before writing its own bit would bring back a bit that somebody else has just cleared. So a register takes
-those of its bits that the writer owns already or that nobody else may own; another bit is left alone where the word
-does not change it, and else the request is refused. A bit with several possible owners (`owner: any` is the
-default) is therefore not taken by writing the register. Give it a register of its own or a coil, put all bits of
-the register into one `group`, or name one owner. A client can also take it on purpose: with function 22 (mask
-write), or by a lock request in the status block.
-""",
     Severity.WARNING,
 )
 def shared_register(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

@@ -19,10 +19,6 @@ __all__: list[str] = []
     "GW515",
     "unsupervised-watchdog",
     "a watchdog that requires a writer without a timeout",
-    """
-The watchdog is fed while the required writers are alive. A writer without `timeout` counts as alive as
-long as its connection is open, even if its program stands still, so the robot program would not stop.
-""",
     Severity.WARNING,
 )
 def unsupervised_watchdog(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -48,12 +44,6 @@ def _unsupervised_requirements(cell: ExpandedCell) -> Iterator[tuple[Position, s
     "GW521",
     "unsupervised-writer",
     "a writer that keeps what it owns when its program hangs",
-    """
-The writer has no `timeout` (a CANopen writer no `heartbeat`), and what it owns has no lease: it counts as lost only
-when its connection ends. A PLC whose program has stopped, or whose cable was pulled, can leave the connection open
-for a long time, and its last values stay. `idle_timeout` does not help: a connection that holds something is not
-closed for idleness. Give the writer a `timeout` of some times the period in which it writes.
-""",
     Severity.WARNING,
 )
 def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -83,12 +73,6 @@ def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW522",
     "key-without-effect",
     "a key that nothing in the file lets act",
-    """
-`timeout_counts` says what feeds `timeout`, so it needs one. `grace` is how long what a writer owns outlives its
-connection, and a CANopen writer has none. `whole` is about takeovers, so the group needs owners by priority.
-`adopt_for` is about adopted inputs, and with `on_connect: fallback` none are adopted. A key that does nothing was
-meant to do something.
-""",
 )
 def key_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`timeout_counts`, `grace`, `whole` and `adopt_for` where they mean nothing."""
@@ -129,11 +113,6 @@ def _writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW613",
     "valid-without-program",
     "valid: running where no robot program writes",
-    """
-`valid: running` makes a variable good only while the robot program runs. That is for output registers, which hold
-the last word of a program that has stopped. What the controller itself measures and tells (`actual_q`,
-`robot_mode`) is as true without a program, and would only be hidden.
-""",
     Severity.WARNING,
 )
 def valid_without_program(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

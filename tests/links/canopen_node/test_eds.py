@@ -17,6 +17,7 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Dictionary, Entry, ObjectCode, array, variable
 from gatewayd.canopen.importer import differences
 from gatewayd.links.canopen_node.eds import Commissioning, Sheet, dcf_text, eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 
@@ -37,14 +38,14 @@ def plan() -> Plan:
 
 @pytest.fixture(scope="module")
 def dictionary(plan: Plan) -> Dictionary:
-    assert plan.canopen is not None
-    return objects_of(plan.canopen, plan.cell)
+    assert canopen_of(plan) is not None
+    return objects_of(plan.the(CanopenPlan), plan.cell)
 
 
 @pytest.fixture(scope="module")
 def text(plan: Plan, dictionary: Dictionary) -> str:
-    assert plan.canopen is not None
-    return eds_text(dictionary, sheet_of(plan.canopen, plan.cell))
+    assert canopen_of(plan) is not None
+    return eds_text(dictionary, sheet_of(plan.the(CanopenPlan), plan.cell))
 
 
 class _File(StringIO):
@@ -72,8 +73,11 @@ def test_golden(text: str) -> None:
 
 
 def test_same_mapping_same_bytes(plan: Plan, text: str) -> None:
-    assert plan.canopen is not None
-    assert eds_text(objects_of(plan.canopen, plan.cell), sheet_of(plan.canopen, plan.cell)) == text
+    assert canopen_of(plan) is not None
+    assert (
+        eds_text(objects_of(plan.the(CanopenPlan), plan.cell), sheet_of(plan.the(CanopenPlan), plan.cell))
+        == text
+    )
 
 
 def test_every_entry_comes_back_as_it_is(dictionary: Dictionary, text: str) -> None:
@@ -197,9 +201,11 @@ def test_sub_indices_with_gaps_are_counted_not_numbered() -> None:
 
 def test_configuration_of_a_commissioned_node(plan: Plan, dictionary: Dictionary) -> None:
     """Node-ID, bit-rate, and the value of whatever the node stores; nothing of what it only shows."""
-    assert plan.canopen is not None
+    assert canopen_of(plan) is not None
     text = dcf_text(
-        dictionary, sheet_of(plan.canopen, plan.cell, "dcf"), Commissioning(NODE, 500_000, "two-buses")
+        dictionary,
+        sheet_of(plan.the(CanopenPlan), plan.cell, "dcf"),
+        Commissioning(NODE, 500_000, "two-buses"),
     )
     od = imported(text, None)
     assert (od.node_id, od.bitrate) == (NODE, 500_000)

@@ -26,7 +26,7 @@ from gatewayd.core.succession import succeed
 from gatewayd.links.canopen_node.communication_errors import OVERRUN_TIME
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
-from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, PdoPlan
+from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, PdoPlan, canopen_of
 from gatewayd.links.canopen_node.storage import MemoryStore, Saved, Store
 from gatewayd.mapping.loader import load
 from tests.links.canopen_node.wire import Wire
@@ -611,12 +611,14 @@ def test_status_words_with_sync() -> None:
 def test_words_that_a_mapping_puts_into_a_tpdo_are_shown_as_its_mapping_and_sent() -> None:
     plan = load(_STATUS_MAPPING, "cell").plan
     assert plan is not None
-    assert plan.canopen is not None
+    assert canopen_of(plan) is not None
     wire, cell = Wire(), Cell(plan.cell)
-    node = Node(plan.canopen, cell, wire.send, MemoryStore(), lambda _now: True)
+    node = Node(plan.the(CanopenPlan), cell, wire.send, MemoryStore(), lambda _now: True)
     node.bus_changed(BusState.ACTIVE, 1.0)
     node.start(1.0)
-    number = next(pdo.number for pdo in plan.canopen.pdos if any(one.is_status for one in pdo.entries))
+    number = next(
+        pdo.number for pdo in plan.the(CanopenPlan).pdos if any(one.is_status for one in pdo.entries)
+    )
     shown = [node.dictionary.read(0x1A00 + number - 1, slot)[::-1].hex() for slot in (1, 2, 3)]
     assert sorted(shown) == ["5f000210", "5f000710", "5f400210"]
     node.receive(Frame(0, bytes([1, 1])), 1.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gatewayd.links.canopen_node.plan import by_name
+from gatewayd.links.canopen_node.plan import CanopenPlan, by_name
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 
@@ -19,15 +19,15 @@ def plan(before: str = "", more: str = "", modbus: str = "") -> Plan:
 
 
 def node(of: Plan) -> tuple[object, ...]:
-    assert of.canopen is not None
-    return by_name(of.canopen, of.cell)
+    assert of.the(CanopenPlan) is not None
+    return by_name(of.the(CanopenPlan), of.cell)
 
 
 def test_other_numbers_and_policies_are_the_same_node() -> None:
     shifted = plan(
         before=OTHER, modbus="modbus: {listen: '127.0.0.1:1502'}\n", more=", on_release: hold, lease: 9s"
     )
-    assert shifted.canopen != plan().canopen
+    assert shifted.the(CanopenPlan) != plan().the(CanopenPlan)
     assert node(shifted) == node(plan())
 
 
@@ -45,8 +45,6 @@ def test_the_quality_of_another_variable_is_another_node() -> None:
         loaded = load((head % first + "variables:\n" + variables).encode(), "a.yaml")
         assert loaded.plan is not None, loaded.diagnostics
         lines.append(loaded.plan)
-    places = [
-        [(one.index, one.subindex) for one in plan.canopen.pdos[0].entries] for plan in lines if plan.canopen
-    ]
+    places = [[(one.index, one.subindex) for one in plan.the(CanopenPlan).pdos[0].entries] for plan in lines]
     assert places[0] == places[1]
     assert node(lines[0]) != node(lines[1])

@@ -21,7 +21,7 @@ from gatewayd.canopen.pythoncan import PythonCanBus
 from gatewayd.core.cell import Cell
 from gatewayd.core.succession import succeed
 from gatewayd.links.canopen_node import runtime as link_module
-from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import LOSS_INTERVAL, CanLink
 from gatewayd.links.canopen_node.storage import MemoryStore
 from gatewayd.loop import clock
@@ -36,9 +36,9 @@ class Station:
 
     def __init__(self, channel: str, **changes: object) -> None:
         compiled_plan = compiled()
-        assert compiled_plan.canopen is not None
+        assert canopen_of(compiled_plan) is not None
         settings = {"channel": channel, "heartbeat": 10, **changes}
-        plan: CanopenPlan = replace(compiled_plan.canopen, **settings)  # type: ignore[arg-type]
+        plan: CanopenPlan = replace(compiled_plan.the(CanopenPlan), **settings)  # type: ignore[arg-type]
         self.names = {one.name: index for index, one in enumerate(compiled_plan.cell.variables)}
         self.cell = Cell(replace(compiled_plan.cell, stale_after=1e9))
         now = time.monotonic()

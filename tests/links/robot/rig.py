@@ -12,6 +12,7 @@ from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.events import EventKind
 from gatewayd.core.requester import Requester
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.links.robot.runtime import RobotLink
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
@@ -92,7 +93,7 @@ async def rigged(
 async def linked(robot: SimulatedController, plan: Plan) -> AsyncIterator[Rig]:
     """A cell and its link to that controller."""
     cell = Cell(plan.cell)
-    link = RobotLink(plan.robot, cell)
+    link = RobotLink(robot_of(plan), cell)
     task = asyncio.create_task(link.run())
     try:
         yield Rig(robot, cell, link, task)

@@ -13,6 +13,7 @@ from gatewayd.core.definition import CellDefinition
 from gatewayd.core.freshness import Source
 from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.simulator.server import SimulatedController
 from tests.links.robot.rig import HMI, PLC, Rig, linked, plan_for, rigged
 
@@ -155,7 +156,7 @@ async def mapping_removes_the_variables(rig: Rig, until: Until) -> None:
     rig.cell, old = succeed(rig.cell, plan.cell, now).cell, rig.cell
     rig.link.flush(now)
     old.listeners.clear()
-    assert not rig.link.rebind(plan.robot, rig.cell, now)
+    assert not rig.link.rebind(robot_of(plan), rig.cell, now)
     rig.task.cancel()
     await until(rig.task.done)
 

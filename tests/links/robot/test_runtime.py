@@ -19,6 +19,7 @@ from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
 from gatewayd.links.robot import readback as readback_module
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.rtde.catalogue import SoftwareVersion
 from gatewayd.simulator.server import SimulatedController
 from tests.links.robot.rig import HMI, PLC, Defect, Rig, Rigged, plan_for
@@ -333,7 +334,7 @@ def rebound(rig: Rig, variables: str, options: str = "") -> Cell | None:
     now = time.monotonic()
     new = succeed(rig.cell, plan.cell, now).cell
     rig.link.flush(now)
-    if not rig.link.rebind(plan.robot, new, now):
+    if not rig.link.rebind(robot_of(plan), new, now):
         return None
     rig.cell = new
     return new

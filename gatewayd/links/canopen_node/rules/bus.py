@@ -32,10 +32,6 @@ __all__: list[str] = []
     "GW407",
     "bus-cob-id-clash",
     "two cells on one bus that send with the same COB-ID",
-    """
-Only one node may send a COB-ID: two that send it at the same moment destroy each other's frames, and nobody
-knows whose values arrive. (One cell may receive what another sends: that is how a TPDO reaches another node.)
-""",
 )
 def bus_cob_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """TPDOs of one cell that another cell sends too, or that are a service of it."""
@@ -66,10 +62,6 @@ def bus_cob_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diag
     "GW408",
     "node-id-clash",
     "two cells with the same node-ID on one bus",
-    """
-The node-ID tells the nodes of a bus apart: all predefined COB-IDs follow from it. Two nodes with the same one
-answer the same requests and destroy each other's frames.
-""",
 )
 def node_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Equal node-IDs on one channel."""
@@ -89,9 +81,6 @@ def node_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnos
     "GW428",
     "bit-rate-clash",
     "two cells on one bus with different bit-rates",
-    """
-A bus has one bit-rate. A node with another one destroys every frame until it goes bus-off.
-""",
 )
 def bit_rate_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Different bit-rates on one channel."""
@@ -111,9 +100,6 @@ def bit_rate_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagno
     "GW429",
     "two-sync-producers",
     "two cells that send the same SYNC",
-    """
-SYNC has one producer. With two of them SYNC comes twice as often, at uneven distances, and counters jump.
-""",
 )
 def two_sync_producers(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Second producers of a COB-ID."""
@@ -133,12 +119,6 @@ def two_sync_producers(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Di
     "GW426",
     "bus-load-high",
     "a bus that can be loaded with more than 40 %",
-    """
-Counted are all PDOs at their greatest rate, SYNC and heartbeats, with frames of the greatest length. Above 40 %
-SDO transfers and other nodes become slow, and there is little room for one more device. `gatewayd show` lists
-what takes how much. What helps: an inhibit time (`pdo: {inhibit: 20ms}`), synchronous PDOs with a slower SYNC,
-REAL32, fewer variables in PDOs, a lower `frequency` of the robot, a higher bit-rate.
-""",
     Severity.WARNING,
 )
 def bus_load_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
@@ -150,12 +130,6 @@ def bus_load_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnos
     "GW427",
     "bus-load-too-high",
     "a bus that can be loaded with more than 70 %",
-    """
-Counted are all PDOs at their greatest rate, SYNC and heartbeats, with frames of the greatest length. Above 70 %
-frames of low priority (SDO, heartbeats) may wait until their time-out, and nodes are taken for lost. `gatewayd
-show` lists what takes how much. What helps: an inhibit time (`pdo: {inhibit: 20ms}`), synchronous PDOs with a
-slower SYNC, REAL32, fewer variables in PDOs, a lower `frequency` of the robot, a higher bit-rate.
-""",
 )
 def bus_load_too_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Buses above the second threshold."""

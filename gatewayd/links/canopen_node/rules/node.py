@@ -25,10 +25,6 @@ _MODBUS, _RPDO, _SDO = "Modbus", "RPDO", "SDO"
     "GW401",
     "no-canopen-section",
     "variables or writers on CANopen in a file without a canopen section",
-    """
-The section `canopen:` says which bus the cell is on and which node it is. Without it `canopen:` at variables
-and writers leads nowhere. `canopen: {channel: can0, bitrate: 500000, node: 16}` is enough.
-""",
 )
 def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first variable, else the first writer, that names CANopen."""
@@ -51,10 +47,6 @@ def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW413",
     "canopen-type",
     "a CANopen type that does not suit the robot's type",
-    """
-A bit of the robot is a BOOLEAN, an integer one of INTEGER8 to INTEGER64 and UNSIGNED8 to UNSIGNED64, a double
-REAL64 or REAL32. CANopen variables have no scale: a double cannot be sent as an integer.
-""",
 )
 def canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Types of another kind."""
@@ -78,11 +70,6 @@ def _suited(variable: ConcreteVariable) -> str:
     "GW414",
     "real32-loss",
     "a double of the robot in a REAL32 that loses digits",
-    """
-The robot's reals have 15 digits, a REAL32 has 7. For forces, speeds and poses that is plenty, and it halves
-the number of PDOs; write `type: REAL32` at the variable to say so. It is not enough for the controller's time,
-which a REAL32 shows in steps of 1/32 s after three days, nor for limits beyond 16777216.
-""",
     Severity.WARNING,
 )
 def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -106,11 +93,6 @@ def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW415",
     "narrow-canopen-type",
     "an integer from the robot in a CANopen type too small for it",
-    """
-The robot's integer can take values that the type cannot show: they appear as the nearest one that it can.
-Use a wider type; or, if the values stay small, say so with `limits` at the variable (at an output they only
-state the range).
-""",
     Severity.WARNING,
 )
 def narrow_canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -139,10 +121,6 @@ def _reach(can_type: CanType) -> tuple[int, int]:
     "GW420",
     "watched-itself",
     "a writer whose heartbeat is that of this node",
-    """
-`node` at a writer is the node-ID of the device that writes, the PLC or the master. With the node-ID of this
-cell the gateway would watch itself and never notice that the writer is gone.
-""",
 )
 def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers with the node-ID of the cell."""
@@ -163,10 +141,6 @@ def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW421",
     "unknown-bit-rate",
     "a bit-rate that CANopen does not have",
-    """
-CiA 301 knows 10, 20, 50, 125, 250, 500, 800 and 1000 kbit/s. All nodes of a bus have the same one. The number
-is written in bit/s: 500000.
-""",
 )
 def unknown_bit_rate(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Bit-rates outside the list."""
@@ -183,10 +157,6 @@ def unknown_bit_rate(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW422",
     "idle-canopen-writer",
     "a writer by PDO or SDO where there is nothing for it to write",
-    """
-The writer writes by RPDO, and no variable towards the robot is in a PDO; or by SDO, and none is an object.
-Give its variables `canopen: auto`, or remove the writer.
-""",
     Severity.WARNING,
 )
 def idle_canopen_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -208,12 +178,6 @@ def idle_canopen_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW423",
     "out-of-reach",
     "an input that none of its owners can write where it lies",
-    """
-A writer with an IP address writes by Modbus, one with `canopen: rpdo` by PDO, one with `canopen: sdo` by SDO.
-A variable has to lie where one of its owners can write. And a PDO is taken whole or refused whole: with one
-variable in it that its writer may not own, nothing of it would ever arrive. To let CANopen only read the
-variable back, write `canopen: object` beside its Modbus address.
-""",
 )
 def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Inputs in RPDOs that no RPDO writer owns, and inputs without any common way."""
@@ -244,10 +208,6 @@ def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW432",
     "owner-elsewhere",
     "an owner that cannot write where the variable lies",
-    """
-Of several owners one has no way to the variable: a CANopen writer of a variable that is only on Modbus, a
-Modbus client of one that is only on CANopen, an RPDO writer of one that is in no PDO. It can never own it.
-""",
     Severity.WARNING,
 )
 def owner_elsewhere(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -311,10 +271,6 @@ def _inputs(cell: ExpandedCell) -> Iterator[ConcreteVariable]:
     "GW424",
     "two-canopen-writers",
     "two writers for one service of the node",
-    """
-Frames on a CAN bus do not say who sent them: a node cannot tell one master from another. There is one writer
-for all RPDOs and one for all SDO requests (`any` is both).
-""",
 )
 def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Second writers by RPDO, and by SDO."""
@@ -335,11 +291,6 @@ def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW425",
     "half-supervision",
     "a watched heartbeat without a node, a time, or CANopen",
-    """
-The heartbeat of a CANopen writer is watched when both are known: `node`, its node-ID, and `heartbeat`, the time
-after which it is lost. The time must be longer than the heartbeat time of the device, better twice as long. A writer
-that never tells its heartbeat is lost so long after its first PDO or SDO request.
-""",
 )
 def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`node` without `heartbeat` and the other way round, and either without `canopen`."""
@@ -366,12 +317,6 @@ def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW435",
     "timeout-of-silence",
     "a timeout for a CANopen writer that may be silent for good reason",
-    """
-`timeout` is the time without any PDO or SDO request after which a writer counts as lost. A master that sends its
-PDOs when a value changes says nothing while nothing changes, and would lose its variables over and over. Watch its
-heartbeat (`node` and `heartbeat`) in place of the timeout. Where the master sends in any case, say so: with a
-`deadline` for its PDOs, or with a synchronous type.
-""",
     Severity.WARNING,
 )
 def timeout_of_silence(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

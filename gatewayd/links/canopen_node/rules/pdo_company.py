@@ -17,12 +17,6 @@ __all__: list[str] = []
     "GW433",
     "silenced-neighbour",
     "a variable whose PDO stops because of another variable in it",
-    """
-With `on_stale: exception` a PDO is no longer sent once the value is stale: the master sees its own time-out. All
-that is in the PDO stops with it, so the policy of its neighbours (`clear`, or a value) never reaches the master,
-which keeps their last values. The same goes for words of the status block, which would have said why. Put the
-variable into a PDO of its own, or give the whole PDO one policy.
-""",
     Severity.WARNING,
 )
 def silenced_neighbour(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -53,12 +47,6 @@ def silenced_neighbour(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW434",
     "contended-pdo",
     "variables in one PDO that may be held by different owners",
-    """
-A PDO is taken whole or refused whole, and all that is mapped in it is meant, bits too. Each one takes every variable
-that is free, whether the master changed it or not; and while another owner holds one of them, nothing of the PDO
-arrives and the others stand still too. Put them into a `group`, so that they are owned together, or into PDOs of
-their own, or give them one fixed owner.
-""",
     Severity.WARNING,
 )
 def contended_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

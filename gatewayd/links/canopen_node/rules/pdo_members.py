@@ -18,10 +18,6 @@ __all__: list[str] = []
     "GW410",
     "unknown-pdo",
     "a PDO that is not declared",
-    """
-`canopen: {pdo: NAME}` puts a variable into a PDO of the section `canopen: pdos:`. `auto` leaves the PDO to the
-automatic layout; `none` (or `canopen: object`) keeps the variable out of PDOs.
-""",
 )
 def unknown_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Names of PDOs at variables."""
@@ -42,11 +38,6 @@ def unknown_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW411",
     "variable-in-two-pdos",
     "a variable in two PDOs, or twice in one",
-    """
-A variable lies in one PDO: an input that came in two of them would jump between their values, and an output
-would only cost the bus twice. Also found here: a PDO that names a variable whose own line says
-`canopen: object`, which keeps it out of PDOs.
-""",
 )
 def variable_in_two_pdos(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Variables that are wanted once more."""
@@ -69,9 +60,6 @@ def variable_in_two_pdos(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     "GW412",
     "empty-pdo",
     "a PDO that carries nothing",
-    """
-The PDO names no variable and no status word, and no variable names it. It would take a COB-ID and send nothing.
-""",
 )
 def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """PDOs of the file without variables."""
@@ -91,11 +79,6 @@ def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW430",
     "unknown-pdo-variable",
     "a PDO that names a variable that does not exist",
-    """
-`variables` of a PDO names variables of this file, and so does `quality of` in its `status`: a single one
-(`start`), a whole family (`recipe`), one of a family (`recipe[3]`) or some of it (`recipe[0..7]`; inside a list in
-brackets it needs quotes).
-""",
 )
 def unknown_pdo_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Members without a line, and members that a family does not have."""

@@ -30,10 +30,6 @@ _WORDS = {Direction.INPUT: "towards the robot", Direction.OUTPUT: "from the robo
     "GW402",
     "pdo-too-long",
     "a PDO with more than 64 bits",
-    """
-A CAN frame carries eight bytes. A REAL64 or a 64-bit integer fills a PDO, two REAL32 or 32-bit integers do,
-or 64 bits. Move variables to another PDO, or give reals the type REAL32.
-""",
 )
 def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """PDOs of the file beyond eight bytes."""
@@ -51,11 +47,6 @@ def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW403",
     "pdo-misaligned",
     "a number in a PDO that does not begin at a byte",
-    """
-Only single bits may lie anywhere in a PDO. A number that begins in the middle of a byte is read wrongly by
-many masters and cannot be reached by most PLC programs. Put the numbers first and the bits last, or as many
-bits before a number as make whole bytes.
-""",
 )
 def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first number of each PDO off a byte boundary."""
@@ -73,10 +64,6 @@ def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW404",
     "mixed-pdo",
     "a PDO with variables of both directions",
-    """
-A PDO is sent by one node. What flows towards the robot comes in an RPDO, what comes from the robot and the words
-of the status block leave in a TPDO: two PDOs.
-""",
 )
 def mixed_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first variable of each PDO that flows the other way."""
@@ -103,12 +90,6 @@ class _Use:
     "GW405",
     "cob-id-clash",
     "one COB-ID for two services of the node",
-    """
-A COB-ID says what a frame is. With one COB-ID for two PDOs, or for a PDO and SYNC, EMCY or another service,
-the node and everybody else would take one for the other. The predefined PDOs of a node-ID are 0x180, 0x280,
-0x380, 0x480 (from the robot) and 0x200, 0x300, 0x400, 0x500 (towards it) plus the node-ID; EMCY is 0x080
-plus the node-ID, SYNC 0x080, TIME 0x100.
-""",
 )
 def cob_id_clash(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """COB-IDs of PDOs and of SYNC that are used already."""
@@ -150,11 +131,6 @@ def _services(node: CanopenCell) -> Iterator[_Use]:
     "GW406",
     "restricted-cob-id",
     "a COB-ID that no PDO and no SYNC may have",
-    """
-CiA 301 reserves 0x000 (NMT), 0x001 to 0x07F, 0x101 to 0x180, 0x581 to 0x5FF and 0x601 to 0x67F (SDO), 0x6E0
-to 0x6FF, 0x701 to 0x77F (heartbeat) and 0x780 to 0x7FF (LSS). Other nodes take frames with these identifiers
-for something else, and masters refuse to configure them.
-""",
 )
 def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Restricted COB-IDs of SYNC and PDOs, and in the declared ranges."""
@@ -183,12 +159,6 @@ def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW409",
     "too-few-cob-ids",
     "more PDOs than COB-IDs",
-    """
-Each node-ID has four predefined COB-IDs in each direction. Every further PDO needs one that nobody else on
-the bus uses, and only the planner of the bus knows which: declare them in `cob_ids`. The hint names
-identifiers that no predefined service has; check them against the other nodes. Fewer PDOs do as well:
-REAL32 in place of REAL64 halves them, and `canopen: object` keeps a variable out of PDOs.
-""",
 )
 def too_few_cob_ids(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """How many are missing in each direction, and which would do."""
@@ -243,10 +213,6 @@ def _spans(cob_ids: list[int]) -> str:
     "GW431",
     "pdo-key-of-other-side",
     "a key of a PDO that means nothing in its direction",
-    """
-`event` is the longest silence of a PDO that this node sends; a PDO that it receives has a `deadline` instead,
-after which it counts as missing. `sync_start` is for synchronous PDOs that this node sends.
-""",
 )
 def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`event` at RPDOs, `deadline` at TPDOs, `sync_start` where no SYNC counts."""
@@ -271,11 +237,6 @@ def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
     "GW416",
     "sync-without-period",
     "synchronous PDOs, and nobody says how often SYNC comes",
-    """
-Synchronous PDOs go with SYNC. How often that is decides about the load of the bus and about the age of the
-values, and cannot be seen from this file: state it with `sync: {period: 10ms}`. (It is stored in 1006h, where
-the master finds it too. `producer: true` lets this node send SYNC itself.)
-""",
     Severity.WARNING,
 )
 def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -294,9 +255,6 @@ def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW417",
     "producer-without-period",
     "a SYNC producer without a period",
-    """
-The node is to send SYNC, and the file does not say how often.
-""",
 )
 def producer_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`producer: true` alone."""
@@ -310,11 +268,6 @@ def producer_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
     "GW418",
     "inhibit-below-frame-time",
     "an inhibit time shorter than the frame itself",
-    """
-The inhibit time is the least distance of two transmissions of a PDO. A frame of 8 bytes takes 0.27 ms at
-500 kbit/s and 2.7 ms at 50 kbit/s: an inhibit time below that holds nothing back, and the PDO alone can fill
-the bus.
-""",
     Severity.WARNING,
 )
 def inhibit_below_frame_time(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -341,11 +294,6 @@ def inhibit_below_frame_time(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnos
     "GW419",
     "event-below-inhibit",
     "an event time shorter than the inhibit time",
-    """
-The event timer sends a PDO when nothing has changed for so long; the inhibit time keeps two transmissions
-apart. With an event time below the inhibit time the PDO is sent at every end of the inhibit time, and the
-event time means nothing.
-""",
     Severity.WARNING,
 )
 def event_below_inhibit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

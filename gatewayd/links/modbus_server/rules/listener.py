@@ -24,10 +24,6 @@ _SHARED = ("connections", "idle_timeout")
     "GW206",
     "unit-clash",
     "two cells with the same unit on one listener",
-    """
-Cells with the same listen address share the listener, and the unit identifier of a request says which
-cell is meant. Two cells with the same unit could not be told apart. Give each its own unit.
-""",
 )
 def unit_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Equal units on equal listen addresses."""
@@ -48,11 +44,6 @@ def unit_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic
     "GW207",
     "listen-clash",
     "two listeners that ask for the same port",
-    """
-A listener on `0.0.0.0` or `::` takes the port on every address of the machine. A second listener on the
-same port of one address cannot be opened beside it. Write the same listen address in both files (the
-cells then share the listener and differ in unit), or use another port.
-""",
 )
 def listen_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Wildcard and single addresses on one port."""
@@ -73,11 +64,6 @@ def listen_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnost
     "GW208",
     "listener-settings",
     "cells on one listener disagree about its connections",
-    """
-The number of connections and the idle time-out belong to the listener, not to the unit: a connection is open before
-a request says which cell it means. Of cells that share a listener the most generous number counts, so the other file
-does not say what happens. (Access lists may differ: each cell answers its own peers.)
-""",
     Severity.WARNING,
 )
 def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
@@ -100,10 +86,6 @@ def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Dia
     "GW216",
     "writer-shut-out",
     "a writer that the access list does not let in",
-    """
-`modbus: {allow: ...}` says who may connect at all. A writer whose address is not in it can never write,
-and its variables can never change.
-""",
 )
 def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers without a network that `allow` reaches."""
@@ -123,11 +105,6 @@ def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW217",
     "open-listener",
     "a listener on every address without an access list",
-    """
-Modbus has no passwords. A listener on `0.0.0.0` or `::` without `allow` serves whoever reaches any
-network of this machine, the office network included. Name the networks that may connect, or listen on the
-one address of the machine network.
-""",
     Severity.WARNING,
 )
 def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -143,11 +120,6 @@ def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW218",
     "foreign-port",
     "a privileged port that belongs to another service",
-    """
-Ports below 1024 need a privilege to open and belong to well-known services. Modbus TCP has 502, Modbus
-over TLS 802; any other low port is most likely a slip. Without the privilege use a port from 1024 on,
-such as 1502.
-""",
     Severity.WARNING,
 )
 def foreign_port(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -165,10 +137,6 @@ def foreign_port(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW219",
     "unreachable-listener",
     "a writer elsewhere, and a listener that only this machine reaches",
-    """
-A listener on 127.0.0.1 or ::1 is reached from this machine alone, so a writer with another address can
-never connect. Listen on the address of the machine network instead.
-""",
     Severity.WARNING,
 )
 def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

@@ -33,10 +33,6 @@ _KEYS = {Area.HOLDING: "holding", Area.INPUT: "input", Area.COIL: "coil", Area.D
     "GW202",
     "beyond-last-address",
     "a value that runs past address 65535",
-    """
-A Modbus area ends at address 65535. A value of several registers, or a range of variables, that begins
-before the end must also end before it. (Addresses above 65535 themselves are GW116.)
-""",
 )
 def beyond_last_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Placements that do not fit below the end of their area."""
@@ -55,11 +51,6 @@ def beyond_last_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW203",
     "status-block",
     "a variable in the registers of the status block",
-    """
-Registers from 60000 on (holding 460001, input 360001) are the status block: link states, ages, owners,
-the last refusal, the words to request and release locks. Its place is the same in every cell, so that one
-PLC function block serves all of them. Variables lie below.
-""",
 )
 def status_block(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Register placements at 60000 and above."""
@@ -80,12 +71,6 @@ def status_block(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW204",
     "traditional-address",
     "an address that looks like 40001 counting",
-    """
-Manuals count holding registers from 40001, input registers from 30001 and discrete inputs from 10001; the
-protocol counts each from 0. An address such as `40101` may mean either, and the two differ by one and by
-forty thousand, so it is refused and not guessed. Write the protocol address (manual 40101 is `100`);
-every table and message prints the 4xxxxx form beside it.
-""",
 )
 def traditional_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Written addresses in the range of the traditional notation of their area."""
@@ -107,10 +92,6 @@ def traditional_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW209",
     "number-in-bit",
     "a number in a place that holds a single bit",
-    """
-A coil, a discrete input and a single bit of a register (`100.3`) hold true or false. An integer or a real
-needs whole registers; one bit of an integer can be mapped by itself (`robot_status_bits.1`).
-""",
 )
 def number_in_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Numbers in coils, discrete inputs and single bits."""
@@ -130,11 +111,6 @@ def number_in_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW210",
     "input-in-read-only-area",
     "an input variable that lies only where nobody can write",
-    """
-An input variable flows from the fieldbus to the robot. Modbus has no function to write input registers or
-discrete inputs, so a variable that lies only there could never change. It may lie there in addition to a
-writable place, as a mirror.
-""",
 )
 def input_in_read_only_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Inputs all of whose placements are read-only."""
@@ -156,10 +132,6 @@ def input_in_read_only_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
     "GW211",
     "bit-without-place",
     "type bit at a whole register",
-    """
-`type: bit` says that a variable is one bit of a register, and the address must say which: `100.3`. For a
-whole register that is 0 or 1 the type is `bool`.
-""",
 )
 def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Type `bit` without a bit number."""
@@ -174,10 +146,6 @@ def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW222",
     "type-of-bit",
     "a number type for a place that holds a single bit",
-    """
-A coil, a discrete input and a single bit of a register have no number type: they hold true or false.
-Leave the type out, or give the variable a whole register and `type: bool`.
-""",
 )
 def type_of_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Number types at single bits."""
@@ -191,12 +159,6 @@ def type_of_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW212",
     "split-value",
     "a value that a client reading or writing in full blocks cuts in two",
-    """
-One request reads at most 125 and writes at most 123 registers. A client that works through a longer block
-of neighbouring registers in requests of full length cuts the value that lies across the boundary: its
-halves come from two different moments, and a write of half a value is refused. Leave a gap, so that the
-value begins at the boundary or the block ends before it.
-""",
     Severity.WARNING,
 )
 def split_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -239,11 +201,6 @@ def _cut(placements: list[ConcretePlacement], limit: int) -> Iterator[tuple[Conc
     "GW213",
     "mixed-directions",
     "a register that mixes bits of both directions",
-    """
-A PLC writes a register whole. If some of its bits come from the robot, every such write would have to
-write what nobody may write, and is refused. Keep the bits towards the robot and the bits from it in
-registers of their own.
-""",
 )
 def mixed_directions(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Holding registers with input bits and output bits."""
@@ -273,12 +230,6 @@ def _register(placement: ConcretePlacement) -> str:
     "GW214",
     "register-overlap",
     "two variables at the same place of an area",
-    """
-Two variables share a register, a bit or a coil: reading it could show only one of them, writing it would
-change both. Mind the length: int32, uint32 and float32 take two registers, float64 and the 64-bit
-integers four. The four areas (coils, discrete inputs, input registers, holding registers) count each for
-itself.
-""",
 )
 def register_overlap(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Overlaps of like with like."""
@@ -298,11 +249,6 @@ def register_overlap(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW215",
     "bit-in-number",
     "a register that holds bits and a number",
-    """
-A register is either sixteen bits or (part of) a number. A bit laid into the register of a number would
-change the number, and the number the bit. Mind the length: int32 and float32 take two registers, float64
-four.
-""",
 )
 def bit_in_number(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Overlaps of a packed bit with a number."""
@@ -387,10 +333,6 @@ def _first(addresses: range) -> int:
     "GW220",
     "no-modbus-section",
     "variables with Modbus addresses in a file without a modbus section",
-    """
-The section `modbus:` says where the gateway listens. Without it the addresses of the variables lead nowhere,
-and the gateway would serve nothing. `modbus: {listen: 127.0.0.1:1502}` is enough.
-""",
 )
 def no_modbus_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Placements without a listener."""
@@ -406,10 +348,6 @@ def no_modbus_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW221",
     "unmapped-variable",
     "a variable that no fieldbus can see",
-    """
-The variable is asked of the robot, but has no address on any fieldbus: nobody can read or write it. Give it
-one, or remove the line.
-""",
     Severity.WARNING,
 )
 def unmapped_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

@@ -17,10 +17,6 @@ __all__: list[str] = []
     "GW310",
     "missing-mask",
     "a speed slider or robot output without the mask that makes it act",
-    """
-The robot takes `speed_slider_fraction`, digital and analog outputs over only where the mask says so, and masks start
-at 0. Without the mask the value is written and nothing happens. Map the mask as a variable too.
-""",
 )
 def missing_mask(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Masked inputs whose mask is not mapped."""
@@ -34,10 +30,6 @@ def missing_mask(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW316",
     "missing-mask-bit",
     "a robot output whose own bit of the mask is not mapped",
-    """
-A mask makes its outputs act one by one: bit 3 of the mask stands for output 3. Other bits of the mask are mapped, but
-not the one of this output, so its value is written and nothing happens. Map that bit, or the mask as a whole.
-""",
     Severity.WARNING,
 )
 def missing_mask_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -52,12 +44,6 @@ def missing_mask_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW315",
     "missing-domain",
     "an analog output without what says whether it is a current or a voltage",
-    """
-An analog output is a ratio of a range, and `standard_analog_output_type` says of which: bit 0 for output 0, bit 1 for
-output 1, clear for a current (4 to 20 mA), set for a voltage (0 to 10 V). Where it is not mapped, the gateway keeps the
-domain that the output has on the controller: what 0.5 is then depends on whoever set the robot up. Map the bit, with
-the domain as its `on_release` (`true` for volts), so that the fallback has it too.
-""",
     Severity.WARNING,
 )
 def missing_domain(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

@@ -37,11 +37,6 @@ _WATCHDOG_TYPES = (DataType.INT32, DataType.DOUBLE)
     "GW301",
     "unknown-field",
     "a name that no RTDE guide and no implementation knows",
-    """
-The controller would answer NOT_FOUND, and the variable could never have a value. Names are case sensitive
-(`actual_TCP_pose`). General purpose registers are `input_bit_register_0` to `127`, `input_int_register_0`
-and `input_double_register_0` to `47`, and the same with `output_`.
-""",
 )
 def unknown_field(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """References and the watchdog with an unknown field."""
@@ -73,11 +68,6 @@ def _suggestion(name: str) -> str:
     "GW302",
     "watchdog-field",
     "a watchdog on a field that cannot be fed",
-    """
-The watchdog writes a changing number into an input register, and the robot program watches that register
-with `rtde_set_watchdog`. Outputs cannot be written, and the words of bits carry 32 commands at once: use
-an integer or double input register that nothing else uses, for example `input_int_register_23`.
-""",
 )
 def watchdog_field(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Watchdogs on outputs and on fields that are no plain number."""
@@ -98,10 +88,6 @@ def watchdog_field(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW303",
     "field-not-in-version",
     "a field that the controller software does not have yet",
-    """
-The file says which controller it is for (`series`, `version`), and that software does not have this
-field: the controller would answer NOT_FOUND. Update the controller, or leave the variable out.
-""",
 )
 def field_not_in_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Fields that come later than the given software."""
@@ -126,10 +112,6 @@ def field_not_in_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     "GW312",
     "series-and-version",
     "a software version that does not belong to the series",
-    """
-CB3 controllers run software 3.x, e-Series 5.x, PolyScope X 10.x. One of the two is wrong, and `check`
-would judge fields and rates for the wrong controller.
-""",
 )
 def series_and_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Major versions of another series."""
@@ -152,11 +134,6 @@ def series_and_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW304",
     "no-such-part",
     "a register, element or bit that the field does not have",
-    """
-The field exists, but not this part of it: a vector of six has elements 0 to 5, a UINT32 bits 0 to 31, the
-general purpose registers end at 47 (bits at 127). Elements are written `field[0]` and belong to vectors;
-bits are written `field.0` and belong to integers.
-""",
 )
 def no_such_part(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """References beyond or beside what a field consists of."""
@@ -197,11 +174,6 @@ def _last(item: Unresolved) -> int:
     "GW305",
     "input-mapped-twice",
     "two input variables on the same register or bits of the robot",
-    """
-Two variables that end in one register of the robot have two owners: each would overwrite the other's
-value, and neither owner would know. Map the register once; if two places of the Modbus map must show it,
-give the variable a list of places.
-""",
 )
 def input_mapped_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Inputs that share bits of a field."""
@@ -232,11 +204,6 @@ def _places(variable: ConcreteVariable) -> str:
     "GW306",
     "rate-above-base",
     "a rate above the controller's own",
-    """
-A controller sends at most one package per control cycle: 125 per second on CB3, 500 on e-Series and
-PolyScope X. Ask for that rate or less (`frequency: 0` asks for the controller's own). The same bound
-holds for the feeding of the watchdog.
-""",
 )
 def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Frequencies of packages and of the watchdog above the base rate."""
@@ -257,11 +224,6 @@ def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW307",
     "rate-not-a-divisor",
     "a rate that the controller cannot make",
-    """
-The controller sends every n-th control cycle, with a whole n, and rounds n down: asked for 200 Hz, an
-e-Series (500 Hz) sends every second cycle, 250 packages per second. Ask for a rate that divides the base
-rate, so that the file says what happens.
-""",
     Severity.WARNING,
 )
 def rate_not_a_divisor(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -285,10 +247,6 @@ def rate_not_a_divisor(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW314",
     "rate-too-low",
     "a rate of less than one package in ten seconds",
-    """
-With so few packages every value is old before it is read, and `stale_after` would have to be longer still. Most
-likely a period was written in the place of a rate: `frequency` is in Hz, so 20 ms are `frequency: 50`.
-""",
 )
 def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Frequencies below 0.1 Hz that are not 0."""
@@ -305,13 +263,6 @@ def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW308",
     "long-recipe",
     "more field names than an old controller takes in one request",
-    """
-Controllers before software 5.17 take at most 2048 bytes of field names in one request, and everything that is read
-all the time travels in one recipe: the outputs first, then with `verify: true` the read-backs of as many inputs as
-have room. An input without room is read in pieces when connecting, and what is written is not compared with it
-afterwards (which is what `verify: false` does with all of them). An output without room has no value. Leave fields
-out.
-""",
     Severity.WARNING,
 )
 def long_recipe(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -350,11 +301,6 @@ def _length(names: Sequence[str]) -> int:
     "GW309",
     "upper-range",
     "an input register outside the range for fieldbuses",
-    """
-Inputs 24 to 47 (bits 64 to 127) are meant for RTDE clients on the robot and beside it: URCaps, drivers
-and ur_rtde use them without asking. Whoever claims a register first has it, and the other is refused with
-IN_USE. Fieldbus and PLC use has bits 0 to 63, integers and doubles 0 to 23.
-""",
     Severity.WARNING,
 )
 def upper_range(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -376,10 +322,6 @@ def upper_range(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW311",
     "watchdog-mapped",
     "a variable on the register of the watchdog",
-    """
-The gateway feeds the watchdog's register by itself. A variable on the same register would let a PLC feed
-it, and the robot program would run on with a dead gateway.
-""",
 )
 def watchdog_mapped(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Input variables on the watchdog's field."""
@@ -399,10 +341,6 @@ def watchdog_mapped(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     "GW313",
     "robot-claimed-twice",
     "two cells that claim the same input of one robot",
-    """
-An RTDE input belongs to one client. Two cells of one gateway connect twice; the second one is refused
-with IN_USE for every input that the first one has. Put all inputs of a robot into one file.
-""",
 )
 def robot_claimed_twice(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Equal input fields of one controller in two cells."""

@@ -23,7 +23,7 @@ from gatewayd.canopen.frame import Frame, Priority
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Value
 from gatewayd.links.canopen_node.node import Node
-from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import CanLink
 from gatewayd.links.canopen_node.storage import MemoryStore
 from gatewayd.mapping.loader import load
@@ -76,8 +76,8 @@ class Device(ABC):
 
     def __init__(self, plan: Plan | None = None) -> None:
         self.plan = plan if plan is not None else compiled()
-        assert self.plan.canopen is not None
-        self.canopen: CanopenPlan = self.plan.canopen
+        assert canopen_of(self.plan) is not None
+        self.canopen: CanopenPlan = self.plan.the(CanopenPlan)
         self.store = MemoryStore()
         self.variables = {one.name: index for index, one in enumerate(self.plan.cell.variables)}
 

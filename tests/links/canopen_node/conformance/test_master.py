@@ -14,6 +14,7 @@ import pytest
 
 from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
 from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from tests.links.canopen_node.conformance.bench import NODE, LinkDevice, compiled
 
 SECONDS = 5.0
@@ -34,8 +35,10 @@ class Master:
         self.network = _network()
         self.network.connect(interface="virtual", channel=device.channel)
         plan = compiled()
-        assert plan.canopen is not None
-        sheet = io.StringIO(eds_text(objects_of(plan.canopen, plan.cell), sheet_of(plan.canopen, plan.cell)))
+        assert canopen_of(plan) is not None
+        sheet = io.StringIO(
+            eds_text(objects_of(plan.the(CanopenPlan), plan.cell), sheet_of(plan.the(CanopenPlan), plan.cell))
+        )
         sheet.name = "dut.eds"
         self.node: Any = self.network.add_node(canopen.RemoteNode(NODE, canopen.import_od(sheet, NODE)))
         self.node.sdo.RESPONSE_TIMEOUT = SECONDS

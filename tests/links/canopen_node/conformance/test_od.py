@@ -11,6 +11,7 @@ import pytest
 from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
 
 from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from tests.links.canopen_node.conformance.bench import NODE, Tester, compiled, little
 
 WRITABLE = ("rw", "wo", "rwr", "rww")
@@ -22,8 +23,8 @@ SIZES = {"b": 1, "h": 2, "i": 4, "q": 8}
 def _entries() -> Iterator[ODVariable]:
     """What the data sheet says, as python-canopen reads it."""
     plan = compiled()
-    assert plan.canopen is not None
-    text = eds_text(objects_of(plan.canopen, plan.cell), sheet_of(plan.canopen, plan.cell))
+    assert canopen_of(plan) is not None
+    text = eds_text(objects_of(plan.the(CanopenPlan), plan.cell), sheet_of(plan.the(CanopenPlan), plan.cell))
     # canopen wants to know where a text comes from.
     file = io.StringIO(text)
     file.name = "dut.eds"
