@@ -1,0 +1,235 @@
+"""What a kind of link has to say and do: the only thing that the rest of the gateway knows of Modbus or CANopen.
+
+A kind is a package with three modules that load apart, because not everybody needs all of it:
+
+- `declaration` (`KIND`): its key, how it describes a plan, what its status words and metrics are. Light; for everybody.
+- `language` (`LANGUAGE`): its part of the mapping language, with rules. For `check`, `show` and the compiling process.
+- `runtime` (`RUNTIME`): the link itself. For the daemon.
+
+Everything has a default but for what makes the kind one. `gatewayd.links.registry` names the packages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from pathlib import Path
+from typing import ClassVar, Protocol
+
+from gatewayd.core.cell import Cell
+from gatewayd.core.definition import CellDefinition
+from gatewayd.core.status import StatusField
+from gatewayd.mapping.plan import LinkPlan, Plan
+
+__all__ = [
+    "Context",
+    "Description",
+    "Level",
+    "Link",
+    "LinkHealth",
+    "LinkKind",
+    "LinkRuntime",
+    "MetricInfo",
+    "Place",
+    "PrepareError",
+    "Prepared",
+    "SharedPart",
+]
+
+# -- declaration -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class MetricInfo:
+    """A gauge or counter (`..._total`) with one sample for each cell; `figures` of the link's health has the value."""
+
+    name: str
+    figure: str
+    meaning: str
+    label: str = ""
+    """A further label; the figure is then a mapping from its values to numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a link shows one variable."""
+
+    text: str
+    """For people, in one piece: `holding 100 (400101) int32`."""
+    fields: Mapping[str, object]
+    """For programs: the object that the control interface has of it."""
+    area: str
+    """For the page: `holding`, `object`."""
+    address: str
+    notation: str
+    type: str
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A plan of a link in words. What is not set is missing; parts of a cell go by their names, never by index."""
+
+    settings: Mapping[str, str] = field(default_factory=dict)
+    """Fact -> text: two plans differ where these do, so every number that matters stands in one."""
+    places: Mapping[int, Sequence[Place]] = field(default_factory=dict)
+    """By index of the variable."""
+    writers: Mapping[int, str] = field(default_factory=dict)
+    """How the writer with this index is known."""
+    address: str = ""
+    """Where it is, in one piece, for headlines: `127.0.0.1:502, unit 1`."""
+    fields: Mapping[str, object] = field(default_factory=dict)
+    """What the control interface says of the link besides its health: `{"listen": ..., "unit": ...}`."""
+
+
+class LinkKind:
+    """One kind of link: what everybody may know of it."""
+
+    key: ClassVar[str]
+    """Of its section, and of its places at variables and writers: `modbus`."""
+    title: ClassVar[str]
+    """For headlines: `Modbus TCP server`."""
+    fields: ClassVar[Mapping[str, str]] = {}
+    """Fields of its object in the status of the control interface, and what they mean."""
+    status_fields: ClassVar[tuple[StatusField, ...]] = ()
+    """Words of the status block that its links tell (`Cell.health.words`), at addresses that nobody else has."""
+    metrics: ClassVar[tuple[MetricInfo, ...]] = ()
+
+    def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
+        """The plan in words."""
+        raise NotImplementedError
+
+    def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
+        """Whether a running link can go on with another plan (`Link.rebind`). Asked before anything moves."""
+        return False
+
+    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
+        """Facts among its settings by whose change owners would lose their connection, or find another robot."""
+        return ()
+
+    def disturbs(
+        self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
+    ) -> Iterable[str]:
+        """What else must not happen unasked, in words."""
+        return ()
+
+
+# -- runtime -----------------------------------------------------------------------------------------------------
+
+
+class Level(IntEnum):
+    """How a part of the picture is: idle things are grey, the others green, yellow and red."""
+
+    IDLE = 0
+    GOOD = 1
+    WARN = 2
+    BAD = 3
+
+
+@dataclass(frozen=True, slots=True)
+class LinkHealth:
+    """How a link is at this moment."""
+
+    level: Level = Level.GOOD
+    words: str = ""
+    """Its state in a few words: `listening`, `bus-off`."""
+    detail: str = ""
+    """More of it: `2 connections`."""
+    problems: tuple[str, ...] = ()
+    """What keeps the cell from being well, each in words with cause and remedy."""
+    figures: Mapping[str, object] = field(default_factory=dict)
+    """By name, for the control interface (`LinkKind.fields`) and metrics."""
+
+
+class Link:
+    """One connection to the outside of one cell."""
+
+    name: str
+    """Of the link within its cell: the key of its section."""
+
+    @property
+    def turns(self) -> int:
+        """Moves while `run` works, whatever the other side does; 0: it has not begun. For the watchdog."""
+        raise NotImplementedError
+
+    @property
+    def reachable(self) -> bool:
+        """Whether a writer can reach the cell by it."""
+        return False
+
+    @property
+    def settled(self) -> bool:
+        """False while it is about to know more: a reload waits a little."""
+        return True
+
+    async def run(self) -> None:
+        """Work until cancelled."""
+        raise NotImplementedError
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`; called before anything that waited is served."""
+
+    def release(self, reason: str, now: float) -> None:
+        """It will not go on: its writers are lost, in the old cell, before there is a new one."""
+
+    def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
+        """Go on with another plan and the successor of the cell; only where `LinkKind.fits` said so."""
+        raise NotImplementedError
+
+    def flush(self, now: float) -> None:
+        """Send at once what is due."""
+
+    async def close(self) -> None:
+        """Send what is still due; `run` is cancelled afterwards."""
+
+    def health(self) -> LinkHealth:
+        """How it is now."""
+        return LinkHealth()
+
+
+class PrepareError(OSError):
+    """Something that several cells use cannot be had; the text says what and why."""
+
+
+class Prepared(Protocol):
+    """What a shared part needs for other plans, ready and not in use yet."""
+
+    def commit(self) -> None:
+        """Use it. Cannot fail."""
+
+    async def abort(self) -> None:
+        """Give it back; nothing has changed."""
+
+
+class SharedPart:
+    """What the links of one kind use together in all cells: listeners."""
+
+    async def prepare(self, plans: Sequence[Plan]) -> Prepared:
+        """Have ready what these plans need. Raises PrepareError."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What a link is made with, besides plan and cell."""
+
+    name: str
+    """Of the link."""
+    state: Path
+    """Directory of what is kept across restarts."""
+    shared: SharedPart | None = None
+    """What the kind shares, as `LinkRuntime.share` made it."""
+    former: Link | None = None
+    """The link that this one replaces, whose `run` has ended or will have before this one's begins."""
+
+
+class LinkRuntime:
+    """Makes links of one kind."""
+
+    def share(self) -> SharedPart | None:
+        """What all links of the kind use together; made once for a daemon."""
+        return None
+
+    def make(self, plan: LinkPlan, cell: Cell, context: Context) -> Link:
+        """A link that does nothing before its `run`."""
+        raise NotImplementedError

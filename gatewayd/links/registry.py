@@ -1,0 +1,55 @@
+"""The kinds of links that there are. A new one is a package beside these and a line in `LINK_KINDS`."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+
+from gatewayd.links.contract import LinkKind, LinkRuntime
+from gatewayd.links.language import LinkLanguage
+
+__all__ = ["LINK_KINDS", "kind_of", "kinds", "language_of", "languages", "runtime_of"]
+
+LINK_KINDS = (
+    "gatewayd.links.robot",
+    "gatewayd.links.modbus_server",
+    "gatewayd.links.canopen_node",
+)
+"""Packages, imported when they are used. Their order is that of sections in lists and tables."""
+
+
+@cache
+def kinds() -> tuple[LinkKind, ...]:
+    """All kinds, in order."""
+    found = (import_module(f"{package}.declaration").KIND for package in LINK_KINDS)
+    return tuple(kind for kind in found if isinstance(kind, LinkKind))
+
+
+def kind_of(key: str) -> LinkKind:
+    """The kind whose links have this key."""
+    return next(kind for kind in kinds() if kind.key == key)
+
+
+@cache
+def language_of(key: str) -> LinkLanguage:
+    """What the kind with this key adds to the mapping language."""
+    language = import_module(f"{_package(key)}.language").LANGUAGE
+    assert isinstance(language, LinkLanguage)
+    return language
+
+
+def languages() -> tuple[LinkLanguage, ...]:
+    """What all kinds add to the mapping language, in order."""
+    return tuple(language_of(kind.key) for kind in kinds())
+
+
+@cache
+def runtime_of(key: str) -> LinkRuntime:
+    """What makes links of the kind with this key."""
+    runtime = import_module(f"{_package(key)}.runtime").RUNTIME
+    assert isinstance(runtime, LinkRuntime)
+    return runtime
+
+
+def _package(key: str) -> str:
+    return next(package for package, kind in zip(LINK_KINDS, kinds(), strict=True) if kind.key == key)
