@@ -286,7 +286,8 @@ def fingerprint(plan: Plan) -> int:
 def _meaning(thing: Any) -> Any:
     match thing:
         case Plan():
-            return {"cell": _meaning(thing.cell)} | {
+            # A cell without Modbus has always counted as one whose `modbus` is null.
+            return {"cell": _meaning(thing.cell), "modbus": None} | {
                 name: _meaning(link) for name, link in thing.links.items()
             }
         case Codec():

@@ -3,7 +3,7 @@ line, cannot steer a terminal, and shows what would otherwise be invisible.
 
 Used where text leaves for people: the formatter of the log, the commands' echo of what a gateway answers, the findings
 of a check, sentences about events, STATUS= of the service manager, labels of metrics. The page has the same in
-gatewayd/web/page/words.js. What programs read (JSON) keeps its exact content; `json_text` only spells it so that a terminal
+gatewayd/web/page/words.js. What programs read (JSON) keeps its content; `json_text` only spells it so that a terminal
 is safe as well.
 """
 

@@ -29,7 +29,7 @@ from gatewayd.mapping.loader import load
 
 __all__ = ["PARTS", "table"]
 
-_CANOPEN = Path(__file__).parent.parent.parent / "gatewayd" / "canopen"
+_NODE = Path(__file__).parents[2] / "gatewayd" / "links" / "canopen_node"
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
@@ -42,7 +42,7 @@ def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 
 def _docstring_table(module: str) -> str:
     """The table in the docstring of a module."""
-    text = ast.get_docstring(ast.parse((_CANOPEN / module).read_text())) or ""
+    text = ast.get_docstring(ast.parse((_NODE / module).read_text())) or ""
     return "\n".join(line for line in text.splitlines() if line.startswith("|"))
 
 

@@ -132,7 +132,7 @@ def test_an_exception_is_named_with_its_place_on_the_same_line(form: Format) -> 
     line = stream.getvalue()
     assert line.count("\n") == 1
     assert "ValueError: invalid literal" in line
-    assert "test_logs.py:" in line
+    assert "test_records.py:" in line
     assert "test_an_exception_is_named" in line
 
 

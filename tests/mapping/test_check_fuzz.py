@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
-from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.canopen_node.plan import canopen_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together
 from gatewayd.mapping.source import parse, plain
@@ -57,7 +57,7 @@ def examine(data: bytes) -> Loaded:
         assert as_csv(table)
         assert as_markdown(loaded.plan, loaded.cell, table)
         assert table_as_json(loaded.plan, loaded.cell, table)
-        canopen = loaded.plan.the(CanopenPlan)
+        canopen = canopen_of(loaded.plan)
         if canopen is not None:
             cell = loaded.plan.cell
             assert eds_text(objects_of(canopen, cell), sheet_of(canopen, cell)).isascii()

@@ -18,7 +18,7 @@ from gatewayd.core.definition import (
     Writer,
 )
 from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, PdoPlan, canopen_of
-from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan, robot_of
 from gatewayd.mapping.compile import compile_plan
 from gatewayd.mapping.document import read_document
@@ -270,13 +270,13 @@ def test_fingerprint_stays_with_the_meaning_of_the_canopen_side(old: str, new: s
 
 def test_a_canopen_section_changes_nothing_for_those_without() -> None:
     """Fingerprints that PLCs have stored stay what they were."""
-    assert compiled().the(CanopenPlan) is None
+    assert compiled().links.get("canopen") is None
     assert compiled().cell.fingerprint == FINGERPRINT
 
 
 def test_without_a_modbus_section_there_is_no_modbus_plan() -> None:
     text = "gatewayd: 1\ncell: c\nrobot: {host: r}\nvariables: {a: {robot: robot_mode}}"
-    assert compiled(text).the(ModbusPlan) is None
+    assert modbus_of(compiled(text)) is None
 
 
 @pytest.mark.parametrize(

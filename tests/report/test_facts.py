@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
-from enum import Enum
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
@@ -86,7 +84,7 @@ def changed(value: Any) -> Any:
 
 CASES = [
     *(("robot", field.name) for field in dataclasses.fields(plan().the(RobotPlan))),
-    *(("modbus", field.name) for field in dataclasses.fields(cast("Any", plan().the(ModbusPlan)))),
+    *(("modbus", field.name) for field in dataclasses.fields(plan().the(ModbusPlan))),
     *(("variables", field.name) for field in dataclasses.fields(plan().cell.variables[0])),
     *(("locks", field.name) for field in dataclasses.fields(plan().cell.locks[0])),
     *(("writers", field.name) for field in dataclasses.fields(plan().cell.writers[0])),
@@ -102,9 +100,9 @@ def test_whatever_differs_is_told(part: str, name: str) -> None:
     old = plan()
     cell: Any = old.cell
     if part in ("robot", "modbus"):
-        section = getattr(old, part)
+        section: Any = old.links[part]
         other = None if name == "watchdog" else changed(getattr(section, name))
-        new = dataclasses.replace(old, **{part: dataclasses.replace(section, **{name: other})})
+        new = old.with_links(**{part: dataclasses.replace(section, **{name: other})})
     elif part == "cell":
         new = dataclasses.replace(old, cell=dataclasses.replace(cell, **{name: changed(getattr(cell, name))}))
     else:
@@ -115,69 +113,6 @@ def test_whatever_differs_is_told(part: str, name: str) -> None:
         things[index] = dataclasses.replace(things[index], **{name: other})
         new = dataclasses.replace(old, cell=dataclasses.replace(cell, **{part: tuple(things)}))
     assert told(new) != told(old)
-
-
-class Kind(Enum):
-    SLOW = 1
-
-
-@dataclass(frozen=True)
-class Entry:
-    variable: int | None
-    index: int
-
-
-@dataclass(frozen=True)
-class CanType:
-    name: str
-
-
-@dataclass(frozen=True)
-class Object:
-    variable: int
-    index: int
-    subindex: int
-    type: CanType
-
-
-@dataclass(frozen=True)
-class Canopen:
-    channel: str
-    kind: Kind
-    sync: bool
-    rpdo_writer: int | None
-    pdos: tuple[Entry, ...]
-    objects: tuple[Object, ...]
-
-
-@dataclass(frozen=True)
-class WithCanopen:
-    source: str
-    cell: object
-    robot: object
-    modbus: object
-    canopen: Canopen
-
-
-def test_a_canopen_section_is_told_by_names() -> None:
-    old = plan()
-    node = Canopen(
-        "can0",
-        Kind.SLOW,
-        sync=False,
-        rpdo_writer=1,
-        pdos=(Entry(3, 1), Entry(None, 2)),
-        objects=(Object(1, 0x2001, 3, CanType("UNSIGNED8")),),
-    )
-    new = cast("Plan", WithCanopen(old.source, old.cell, old.the(RobotPlan), old.the(ModbusPlan), node))
-    assert facts.links(new)["canopen"] == {
-        "channel": "can0",
-        "kind": "slow",
-        "sync": "false",
-        "rpdo_writer": "hmi",
-        "pdos": "variable=path index=1; variable=none index=2",
-    }
-    assert facts.variables(new)["bit"]["canopen"] == "2001h sub 3 UNSIGNED8"
 
 
 def test_keys_of_supervision_and_takeover_are_told() -> None:

@@ -95,7 +95,10 @@ async def test_a_cancellation_does_not_wait_for_it(monkeypatch: pytest.MonkeyPat
 
 def test_the_daemon_has_nothing_of_it_in_memory() -> None:
     """Models and YAML were a third of what a gateway needed for the years in which it reads no file."""
-    modules = "daemon, operation, reload, service, startup, status.launch, status.listener"
+    modules = (
+        "service.daemon, service.operator, service.reload, service.watchdog, service.startup, "
+        "web.launch, web.listener"
+    )
     program = f"""
 import subprocess
 import sys

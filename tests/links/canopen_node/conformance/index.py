@@ -13,7 +13,7 @@ from pathlib import Path
 __all__ = ["CASES", "PAGE", "case_of", "renewed", "shown"]
 
 HERE = Path(__file__).parent
-ROOT = HERE.parents[2]
+ROOT = HERE.parents[3]
 PAGE = ROOT / "docs" / "reference" / "conformance.md"
 
 CASES = {
