@@ -13,7 +13,7 @@ from tests.soak.faults import FAULTS, ROUND
 from tests.soak.journal import SENT, Entry, Journal, entries
 from tests.soak.look import torn
 from tests.soak.run import kinds, soak
-from tests.soak.truth import FALLBACK, Period, Record, misheld, unheard
+from tests.soak.truth import FALLBACK, Period, Record, Stop, misheld, unheard
 from tests.soak.verdict import MEMORY_BOUND, THREADS_BOUND, Measured, Sample
 
 SECONDS = float(os.environ.get("GATEWAYD_SOAK_SECONDS", "20"))
@@ -113,15 +113,27 @@ def test_what_was_acknowledged_must_have_been_there(
 
 
 @pytest.mark.parametrize(
-    "stop, came, count",
-    [(10.015, FALLBACK, 0), (10.015, 8, 1), (10.1, FALLBACK, 1), (9.0, FALLBACK, 1)],
-    ids=["the lease ended", "another value came", "long after", "long before"],
+    "stop, next_change, count",
+    [
+        (Stop(10.015, 11.9), Change(12.0, FALLBACK, 0.0), 0),
+        (Stop(10.015, 11.8), Change(12.0, 8, 0.0), 1),
+        (Stop(10.015, 11.99), Change(12.0, 8, 0.0), 0),
+        (Stop(10.1, 11.9), Change(12.0, FALLBACK, 0.0), 1),
+        (Stop(9.0, 9.4), Change(12.0, FALLBACK, 0.0), 1),
+    ],
+    ids=[
+        "the lease ended",
+        "another value came later",
+        "another one came first",
+        "long after",
+        "long before",
+    ],
 )
-def test_a_gateway_that_is_stopped_before_its_package_may_give_the_fallback(
-    stop: float, came: float, count: int
+def test_a_gateway_that_is_stopped_before_its_package_may_send_something_else(
+    stop: Stop, next_change: Change, count: int
 ) -> None:
     written = [sent(10.0, 7), Entry(10.01, A, 7, 0)]
-    changes = [Change(9.5, 6, 0.0), Change(12.0, came, 0.0)]
+    changes = [Change(9.5, 6, 0.0), next_change]
     assert len(list(unheard(A, changes, written, lambda _since, _until: True, [stop]))) == count
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from tests.e2e.witness import Change
 from tests.soak.journal import SENT, Entry
 
-__all__ = ["FALLBACK", "LATELY", "NOT_CONNECTED", "Period", "Record", "misheld", "unheard"]
+__all__ = ["FALLBACK", "LATELY", "NOT_CONNECTED", "Period", "Record", "Stop", "misheld", "unheard"]
 
 FALLBACK = 0
 """What every input of the cell declares for `on_release`."""
@@ -29,6 +29,8 @@ NOT_CONNECTED = 11
 """Exception code 0B."""
 _CYCLES = 0.03
 """Seconds in which a value may be overtaken by the next one without having been seen."""
+_RESUMED = 0.1
+"""Seconds in which a process that was stopped goes on, on a busy machine."""
 _AROUND = 0.2
 """Seconds before an acknowledgement in which the connection to the robot must have stood."""
 
@@ -44,6 +46,14 @@ class Period:
     """None: any value."""
 
 
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """From when to when the gateway stood still."""
+
+    begin: float
+    end: float
+
+
 @dataclass(slots=True)
 class Record:
     """What faults did to the robot's inputs, and to those who write them."""
@@ -51,8 +61,7 @@ class Record:
     periods: list[Period] = field(default_factory=list)
     pauses: list[Period] = field(default_factory=list)
     """In which a writer stood still: what it was about to write it wrote afterwards."""
-    stops: list[float] = field(default_factory=list)
-    """When the gateway was stopped: between an acknowledgement and its package, the lease may end in the meantime."""
+    stops: list[Stop] = field(default_factory=list)
 
 
 def misheld(name: str, changes: Sequence[Change], entries: Sequence[Entry], record: Record) -> Iterator[str]:
@@ -93,14 +102,15 @@ def unheard(
     changes: Sequence[Change],
     entries: Sequence[Entry],
     watching: Callable[[float, float], bool],
-    stops: Sequence[float] = (),
+    stops: Sequence[Stop] = (),
     *,
     lost: Sequence[float] = (),
 ) -> Iterator[str]:
     """What was acknowledged and never seen in the robot's field, though it was watched and nothing took its place.
 
-    Where the gateway was stopped before the package left, its fallback may be seen instead. `lost`: when somebody was
-    answered that the robot is not connected, in order; what was acknowledged just before went into a broken connection.
+    Where the gateway was stopped before the package left, its fallback may be seen instead, or what came at once when
+    it went on: of two values that wait, the newer one is sent. `lost`: when somebody was answered that the robot is not
+    connected, in order; what was acknowledged just before went into a broken connection.
     """
     times = [change.time for change in changes]
     begun = 0.0
@@ -118,14 +128,17 @@ def unheard(
             seen = changes[first:last]
             overtaken = any(change.time - change.blind < entry.time + _CYCLES for change in seen)
             overtaken |= any(
-                begun <= stop <= entry.time + _CYCLES and _next(changes, times, stop) == FALLBACK
+                begun <= stop.begin <= entry.time + _CYCLES and _replaced(changes, times, stop)
                 for stop in stops
             )
             if held != entry.value and not overtaken and all(one.value != entry.value for one in seen):
                 yield f"{name} never held {entry.value}, acknowledged at {entry.time:.3f}"
 
 
-def _next(changes: Sequence[Change], times: Sequence[float], moment: float) -> float | None:
-    """The first value that came after this moment."""
-    place = bisect.bisect_right(times, moment)
-    return changes[place].value if place < len(changes) else None
+def _replaced(changes: Sequence[Change], times: Sequence[float], stop: Stop) -> bool:
+    """Whether the first value after the stop is the fallback of a lease that ended in it, or came at its very end."""
+    place = bisect.bisect_right(times, stop.begin)
+    if place == len(changes):
+        return False
+    change = changes[place]
+    return change.value == FALLBACK or change.time - change.blind < stop.end + _RESUMED

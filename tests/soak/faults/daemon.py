@@ -14,6 +14,7 @@ from tests.e2e.processes import HOST, wait_for
 from tests.soak.cell import MOMENT, STALE_AFTER, VARIANTS
 from tests.soak.faults.common import suspend
 from tests.soak.rig import PATIENCE, Rig
+from tests.soak.truth import Stop
 
 __all__ = ["broken_reload", "full_audit", "reload", "stand_still", "unwritable_audit"]
 
@@ -39,8 +40,9 @@ def stand_still(rig: Rig, chance: Random) -> None:
         asking.start()
         time.sleep(chance.uniform(*chance.choice(_STILL)))
 
-    rig.record.stops.append(time.monotonic())
+    begin = time.monotonic()
     suspend(rig.daemon, meanwhile)
+    rig.record.stops.append(Stop(begin, time.monotonic()))
     continued = rig.witness.timestamp(time.monotonic())
     asking.join(PATIENCE)
     reader.close()
