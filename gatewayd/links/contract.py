@@ -58,11 +58,13 @@ class Place:
     text: str
     """For people, in one piece: `holding 100 (400101) int32`."""
     fields: Mapping[str, object]
-    """For programs: the object that the control interface has of it."""
+    """For programs: the object that the control interface has of it (`LinkKind.place`)."""
     area: str
     """For the page: `holding`, `object`."""
     address: str
+    """Within the area: `100`, `0.3`, `2010h:01`."""
     notation: str
+    """The address as others spell it, or what else leads there: `400101`, `COB-ID 0x190`."""
     type: str
 
 
@@ -76,8 +78,10 @@ class Description:
     """By index of the variable."""
     writers: Mapping[int, str] = field(default_factory=dict)
     """How the writer with this index is known."""
+    headline: str = ""
+    """How the link is called in the picture: `Modbus 127.0.0.1:502`, `CAN can0`."""
     address: str = ""
-    """Where it is, in one piece, for headlines: `127.0.0.1:502, unit 1`."""
+    """Where it is, in one piece: `127.0.0.1:502 unit 1`."""
     fields: Mapping[str, object] = field(default_factory=dict)
     """What the control interface says of the link besides its health: `{"listen": ..., "unit": ...}`."""
 
@@ -91,6 +95,10 @@ class LinkKind:
     """For headlines: `Modbus TCP server`."""
     fields: ClassVar[Mapping[str, str]] = {}
     """Fields of its object in the status of the control interface, and what they mean."""
+    place: ClassVar[str] = ""
+    """What the control interface has of a variable at the key, in words; empty: its links have no places."""
+    has_one_place: ClassVar[bool] = False
+    """A variable has one place at most: the interface has that or null, not a list."""
     status_fields: ClassVar[tuple[StatusField, ...]] = ()
     """Words of the status block that its links tell (`Cell.health.words`), at addresses that nobody else has."""
     metrics: ClassVar[tuple[MetricInfo, ...]] = ()
@@ -104,7 +112,10 @@ class LinkKind:
         return False
 
     def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
-        """Facts among its settings by whose change owners would lose their connection, or find another robot."""
+        """Facts among its settings by whose change owners would lose their connection, or find another robot.
+
+        A link that is to be removed is asked with its present plan as both.
+        """
         return ()
 
     def disturbs(

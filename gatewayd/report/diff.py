@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from gatewayd.links.registry import kind_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.report import facts
 from gatewayd.report.facts import Facts
@@ -173,6 +174,7 @@ def objections(changes: Changes, owned: Collection[str]) -> tuple[str, ...]:
         *_touches_owned(changes, owned),
         *_turns_round(changes),
         *_cuts_owners_off(changes, owned),
+        *_disturbed(changes),
         *weakened(changes.old.cell, changes.new.cell),
     ]
     gone, before = len(changes.of(Kind.REMOVED)), len(changes.old.cell.variables)
@@ -216,22 +218,29 @@ def _cuts_owners_off(changes: Changes, owned: Collection[str]) -> Iterator[str]:
     if not owned:
         return
     whose = _shortened(sorted(owned))
-    moving = {
-        "modbus": ("listen", "unit"),
-        "robot": ("host", "port"),
-        "canopen": ("interface", "channel", "node"),
-    }
     for link in changes.links:
-        moved = [detail for what in moving.get(link.name, ()) if (detail := link.detail(what)) is not None]
-        if moved and link.kind is not Kind.ADDED:
+        moved = [detail for what in _moved(changes, link.name) if (detail := link.detail(what)) is not None]
+        if moved:
             yield f"{link.name} would move while {whose} owned: {_changed(moved)}"
     for writer in changes.writers:
-        if writer.kind is Kind.ADDED or writer.detail("modbus") is None:
+        if writer.kind is Kind.ADDED or not any(writer.detail(name) for name in changes.old.links):
             continue
         held = sorted(_may_own(changes.old, writer.name).intersection(owned))
         if held:
             change = _changed(writer.details)
             yield f"writer `{writer.name}` would change while {_shortened(held)} owned: {change}"
+
+
+def _moved(changes: Changes, link: str) -> Iterable[str]:
+    old = changes.old.links.get(link)
+    return () if old is None else kind_of(link).moved(old, changes.new.links.get(link, old))
+
+
+def _disturbed(changes: Changes) -> Iterator[str]:
+    """What the links object to themselves."""
+    old, new = changes.old, changes.new
+    for name in old.links.keys() & new.links.keys():
+        yield from kind_of(name).disturbs(old.links[name], new.links[name], old.cell, new.cell)
 
 
 def _members(plan: Plan, group: str) -> set[str]:
@@ -304,10 +313,6 @@ def as_json(changes: Changes) -> str:
         "renumbered": [{"name": one.name, "old": one.old, "new": one.new} for one in changes.renumbered],
     }
     return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
-
-
-def _identity(plan: Plan) -> dict[str, str]:
-    return {"source": plan.source, "cell": plan.cell.name, "fingerprint": f"{plan.cell.fingerprint:08X}"}
 
 
 def _as_object(one: Difference) -> dict[str, object]:

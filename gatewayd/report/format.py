@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["age", "counted", "span", "value"]
+__all__ = ["age", "counted", "exact", "seconds", "span", "value"]
 
 _DIGITS = 3
 
@@ -26,19 +26,29 @@ def _real(real: float) -> str:
     return f"{real:.{_DIGITS}f}".rstrip("0").rstrip(".")
 
 
-def age(seconds: float | None) -> str:
+def exact(number: float) -> str:
+    """Every digit that matters, and none that does not."""
+    return repr(number).removesuffix(".0").lower()
+
+
+def seconds(duration: float | None) -> str:
+    """`0.25 s`, with every digit that matters; empty for None."""
+    return "" if duration is None else f"{exact(duration)} s"
+
+
+def age(duration: float | None) -> str:
     """`12 ms`, `3.4 s`, `5 min`, `2 h`; `-` for never: None or infinity."""
-    if seconds is None or seconds == math.inf:
+    if duration is None or duration == math.inf:
         return "-"
-    if seconds < 1:
-        return f"{max(0.0, seconds) * 1000:.0f} ms"
-    return f"{seconds:.1f} s" if seconds < 60 else span(seconds)
+    if duration < 1:
+        return f"{max(0.0, duration) * 1000:.0f} ms"
+    return f"{duration:.1f} s" if duration < 60 else span(duration)
 
 
-def span(seconds: float) -> str:
+def span(duration: float) -> str:
     """Two units at most: `42 s`, `2 h 13 min`, `3 d 4 h`."""
     parts: list[str] = []
-    left = max(0, round(seconds))
+    left = max(0, round(duration))
     for size, unit in ((86400, "d"), (3600, "h"), (60, "min"), (1, "s")):
         count, left = divmod(left, size)
         if count or (unit == "s" and not parts):

@@ -1,4 +1,4 @@
-"""Nothing that a plan means is left out of what is told of it, also of sections that are not known yet."""
+"""Nothing that a plan means is left out of what is said of it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from typing import Any
 
 import pytest
 
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.heartbeat import Consumer
+from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import Direction, Fallback, FallbackKind, Limits, ValueKind
+from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, PdoPlan
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.mapping.loader import load
@@ -21,11 +25,18 @@ robot:
   host: 127.0.0.1
   watchdog: {field: input_int_register_23, frequency: 10, requires: plc}
 modbus: {listen: '127.0.0.1:1502', allow: [127.0.0.0/8], idle_timeout: 60s}
-writers: {plc: {modbus: [127.0.0.2, 127.0.1.0/24], timeout: 100ms}, hmi: {modbus: 127.0.0.3}}
+canopen:
+  {channel: can0, bitrate: 500000, node: 16,
+   pdos: {command: {variables: [order]}, answer: {status: [flags, quality of door]}}}
+writers:
+  plc:  {modbus: [127.0.0.2, 127.0.1.0/24], timeout: 100ms}
+  hmi:  {modbus: 127.0.0.3}
+  line: {canopen: rpdo, node: 1, heartbeat: 500ms}
 groups: {motion: {owner: [plc, hmi], lease: 2s}}
 variables:
   word:   {robot: input_bit_registers32_to_63, modbus: 0, owner: plc}
   bit:    {robot: input_bit_register_3, modbus: [{holding: 2.3}, {coil: 7}], owner: plc}
+  order:  {robot: input_int_register_2, canopen: {type: UNSIGNED16}, owner: line}
   speed:  {robot: input_double_register_1, modbus: {holding: 24, type: int16, scale: 0.1, offset: -5, order: BADC},
            group: motion, limits: [-1, 1.5]}
   path:   {robot: input_int_register_1, modbus: 30, group: motion, on_release: 7}
@@ -61,6 +72,12 @@ def test_variables_are_told_as_the_file_spells_them() -> None:
 
 
 OTHERWISE: dict[type, Any] = {str: "other", bool: None, int: 77, float: 0.123456789, tuple: ()}
+OF_LINKS: dict[str, Any] = {
+    "watchdog": None,
+    "sync": SyncPlan(producer=True),
+    "rpdo_writer": 0,
+    "sdo_writer": 0,
+}
 KNOWN = {
     "source", "fingerprint", "number", "name", "lock", "low", "high", "members", "kind", "cell", "shown", "shows_nan",
 }  # fmt: skip
@@ -85,6 +102,7 @@ def changed(value: Any) -> Any:
 CASES = [
     *(("robot", field.name) for field in dataclasses.fields(plan().the(RobotPlan))),
     *(("modbus", field.name) for field in dataclasses.fields(plan().the(ModbusPlan))),
+    *(("canopen", field.name) for field in dataclasses.fields(plan().the(CanopenPlan))),
     *(("variables", field.name) for field in dataclasses.fields(plan().cell.variables[0])),
     *(("locks", field.name) for field in dataclasses.fields(plan().cell.locks[0])),
     *(("writers", field.name) for field in dataclasses.fields(plan().cell.writers[0])),
@@ -99,9 +117,9 @@ def test_whatever_differs_is_told(part: str, name: str) -> None:
     """Each field of the plan, by itself, to another value: some fact is another one."""
     old = plan()
     cell: Any = old.cell
-    if part in ("robot", "modbus"):
+    if part in old.links:
         section: Any = old.links[part]
-        other = None if name == "watchdog" else changed(getattr(section, name))
+        other = OF_LINKS[name] if name in OF_LINKS else changed(getattr(section, name))
         new = old.with_links(**{part: dataclasses.replace(section, **{name: other})})
     elif part == "cell":
         new = dataclasses.replace(old, cell=dataclasses.replace(cell, **{name: changed(getattr(cell, name))}))
@@ -113,6 +131,44 @@ def test_whatever_differs_is_told(part: str, name: str) -> None:
         things[index] = dataclasses.replace(things[index], **{name: other})
         new = dataclasses.replace(old, cell=dataclasses.replace(cell, **{part: tuple(things)}))
     assert told(new) != told(old)
+
+
+NESTED = [
+    *(("sync", field.name) for field in dataclasses.fields(SyncPlan)),
+    *(("consumers", field.name) for field in dataclasses.fields(Consumer)),
+    *(("objects", field.name) for field in dataclasses.fields(ObjectPlan)),
+    *(("pdos", field.name) for field in dataclasses.fields(PdoPlan)),
+]
+
+
+@pytest.mark.parametrize("part, name", NESTED)
+def test_whatever_differs_inside_a_node_is_told(part: str, name: str) -> None:
+    """Each field of the first PDO, object, watched node, and of SYNC."""
+    old = plan()
+    canopen: Any = old.the(CanopenPlan)
+    things = getattr(canopen, part)
+    first: Any = things[0] if isinstance(things, tuple) else things
+    known: dict[str, Any] = {"writer": 0, "variable": 1, "type": CanType.REAL64}
+    other = known[name] if name in known else changed(getattr(first, name))
+    first = dataclasses.replace(first, **{name: other})
+    new = old.with_links(
+        canopen=dataclasses.replace(
+            canopen, **{part: (first, *things[1:]) if isinstance(things, tuple) else first}
+        )
+    )
+    assert told(new) != told(old)
+
+
+@pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(PdoEntry)])
+def test_whatever_differs_in_an_entry_of_a_pdo_is_told(name: str) -> None:
+    old = plan()
+    canopen = old.the(CanopenPlan)
+    pdo = canopen.pdos[0]
+    entry: Any = pdo.entries[0]
+    other = 1 if name in ("variable", "quality_of") else changed(getattr(entry, name))
+    entry = dataclasses.replace(entry, **{name: other})
+    pdos = (dataclasses.replace(pdo, entries=(entry, *pdo.entries[1:])), *canopen.pdos[1:])
+    assert told(old.with_links(canopen=dataclasses.replace(canopen, pdos=pdos))) != told(old)
 
 
 def test_keys_of_supervision_and_takeover_are_told() -> None:
@@ -136,12 +192,6 @@ def test_keys_of_supervision_and_takeover_are_told() -> None:
 
 
 def test_status_words_in_a_pdo_are_told_by_name() -> None:
-    text = TEXT.replace(
-        "writers:",
-        "canopen: {channel: can0, bitrate: 500000, node: 16, pdos: {p: {status: [flags, quality of door]}}}\nwriters:",
-    )
-    loaded = load(text.encode(), "cell.yaml")
-    assert loaded.plan is not None, loaded.diagnostics
-    pdos = facts.links(loaded.plan)["canopen"]["pdos"]
-    assert "index=24384 subindex=6 bits=16 quality_of=door" in pdos
+    pdos = facts.links(plan())["canopen"]["pdos"]
+    assert "index=24384 subindex=7 bits=16 quality_of=door" in pdos
     assert pdos.count("quality_of") == 1

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from gatewayd.links.contract import LinkKind
+from collections.abc import Iterable
+
+from gatewayd.core.definition import CellDefinition
+from gatewayd.links.contract import Description, LinkKind
+from gatewayd.links.modbus_server.description import description
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.mapping.plan import LinkPlan
 
 __all__ = ["KIND"]
 
@@ -12,6 +18,16 @@ class ModbusServer(LinkKind):
 
     key = "modbus"
     title = "Modbus TCP server"
+    place = "list of its places: `area`, `address` from 0, `bit` or null, `notation` (4xxxxx form)"
+
+    def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
+        """The unit and its map."""
+        assert isinstance(plan, ModbusPlan)
+        return description(plan)
+
+    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
+        """Clients of another listener or unit connect anew."""
+        return ("listen", "unit")
 
 
 KIND = ModbusServer()

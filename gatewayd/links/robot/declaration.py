@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from gatewayd.links.contract import LinkKind
+from collections.abc import Iterable
+
+from gatewayd.core.definition import CellDefinition
+from gatewayd.links.contract import Description, LinkKind
+from gatewayd.links.robot.description import description
+from gatewayd.links.robot.plan import RobotPlan
+from gatewayd.mapping.plan import LinkPlan
 
 __all__ = ["KIND"]
 
@@ -12,6 +18,15 @@ class Robot(LinkKind):
 
     key = "robot"
     title = "Universal Robots controller"
+
+    def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
+        """The session with the controller."""
+        assert isinstance(plan, RobotPlan)
+        return description(plan, cell)
+
+    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
+        """Another address is another robot."""
+        return ("host", "port")
 
 
 KIND = Robot()
