@@ -1,6 +1,7 @@
 """The shape of the package: who may import whom, and what every module has to have.
 
-The tables below are the rules; docs/explanation/architecture.md explains them. An exception is a line in a table.
+The tables below are the rules; docs/explanation/architecture.md explains them. An exception is a line in a table. Every
+test reports all that break its rule.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import ast
 import re
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -17,184 +18,170 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "gatewayd"
 
+LINK = {
+    "core",
+    "links.contract",
+    "links.language",
+    "logs.records",
+    "loop",
+    "mapping",
+    "report",
+}
+"""What a kind of link may import besides itself and the library of its protocol: never another link."""
+
 LAYERS: dict[str, set[str]] = {
     "gatewayd": set(),
-    "loop.threads": set(),
-    "loop.clock": set(),
+    "loop": {"loop"},
     "core": {"core"},
-    "rtde": {"loop.threads", "loop.clock", "rtde", "loop.progress"},
-    "robot": {"loop.clock", "core", "logs.records", "mapping.plan", "robot", "rtde"},
-    "links.robot.availability": {"core", "links.robot.companions", "rtde"},
-    "links.robot.companions": {"core", "links.robot.transfer", "rtde.companions"},
-    "links.robot.inputs": {
-        "core",
-        "links.robot.companions",
-        "links.robot.readback",
-        "links.robot.transfer",
-        "rtde",
-    },
-    "links.robot.readback": {"core", "links.robot.transfer"},
-    "links.robot.transfer": {"core"},
+    "rtde": {"loop", "rtde"},
+    "modbus": {"core.definition", "modbus"},
+    "canopen": {"canopen", "core.definition", "loop"},
     "simulator": {"rtde", "simulator"},
     "mapping": {
-        "canopen.cob_ids",
-        "canopen.datatypes",
-        "links.canopen_node.plan",
         "core.definition",
-        "core.status",
+        "links.contract",
+        "links.language",
+        "links.registry",
         "mapping",
         "report.printable",
-        "rtde.catalogue",
-        "rtde.companions",
-        "rtde.types",
     },
-    "modbus": {"loop.clock", "core", "logs.records", "modbus.codec", "mapping.plan", "modbus"},
-    "canopen": {"canopen", "core"},
-    "canopen.cob_ids": set(),
-    "canopen.datatypes": {"core.definition"},
-    "canopen.frame": set(),
-    "links.canopen_node.runtime": {"canopen", "loop.clock", "core", "logs.records", "loop.progress"},
-    "canopen.pythoncan": {"loop.threads", "canopen", "loop.clock"},
-    "canopen.socketcan": {"canopen", "loop.clock"},
-    "canopen.supervised": {"canopen", "loop.clock"},
-    "links.canopen_node.plan": {"canopen.datatypes", "core.definition"},
-    "canopen.sdo": {"canopen.cob_ids", "canopen.datatypes", "canopen.dictionary", "canopen.sdo"},
-    "logs.records": {"report.printable"},
-    "logs.stream": {"logs.records"},
-    "logs.events": {"core", "logs.records"},
+    "links": set(),
+    "links.contract": {"core", "mapping.plan"},
+    "links.language": {"core.definition", "links.contract", "mapping"},
+    "links.registry": {"links.contract", "links.language"},
+    "links.robot": {*LINK, "links.robot", "rtde"},
+    "links.modbus_server": {*LINK, "links.modbus_server", "modbus"},
+    "links.canopen_node": {*LINK, "canopen", "links.canopen_node"},
+    "report": {"core", "links.contract", "links.registry", "mapping", "report"},
     "report.format": set(),
-    "report.event_text": {"core", "report.format", "report.printable"},
-    "service.audit": {"loop.clock", "core", "report.event_text", "report.printable"},
-    "service.audit_file": {"logs.records"},
+    "report.printable": set(),
+    "logs": {"core", "logs", "report"},
     "control": {
-        "loop.threads",
-        "service.audit",
-        "loop.clock",
         "control",
         "core",
-        "report.format",
-        "report.event_text",
+        "links.contract",
+        "links.registry",
         "logs.records",
+        "loop",
         "mapping.plan",
-        "report.printable",
+        "report",
+        "service.audit",
     },
     "control.client": {"control.paths"},
-    "control.documented": set(),
     "control.paths": set(),
-    "service.liveness": set(),
-    "service.operator": {"service.audit", "service.audit_file", "loop.clock", "control", "core"},
-    "report.summary": {"core", "report.format"},
-    "service.watchdog": {
-        "loop.clock",
-        "core",
-        "service.liveness",
-        "logs.records",
-        "report.summary",
-        "service.systemd",
-    },
-    "service.compilation": {"gatewayd", "mapping.compiled"},
-    "report.printable": set(),
-    "service.signals": set(),
-    "service.reload": {
-        "loop.clock",
-        "service.compilation",
-        "core",
-        "logs.records",
-        "mapping.compiled",
-        "mapping.diagnostics",
-        "report.diff",
-        "mapping.plan",
-        "links.modbus_server.listener",
-        "links.robot.runtime",
-        "service.startup",
-    },
-    "service.startup": {
-        "service.compilation",
-        "logs.records",
-        "mapping.compiled",
-        "mapping.diagnostics",
-        "mapping.plan",
-    },
-    "web": {
-        "loop.clock",
+    "service": {
         "control",
         "core",
-        "service.daemon",
-        "report.event_text",
-        "service.liveness",
-        "logs.records",
+        "gatewayd",
+        "links.contract",
+        "links.registry",
+        "logs",
+        "loop",
+        "mapping.compiled",
+        "mapping.diagnostics",
         "mapping.plan",
-        "links.modbus_server.listener",
-        "report.printable",
-        "service.cell_runtime",
+        "report",
+        "service",
+    },
+    "service.assemble": {
+        "control",
+        "core",
+        "links.contract",
+        "links.registry",
+        "logs",
+        "loop",
+        "mapping.compiled",
+        "mapping.plan",
+        "report",
+        "service",
+        "web.launch",
+    },
+    "service.signals": set(),
+    "web": {
+        "control",
+        "core",
+        "links.contract",
+        "links.registry",
+        "logs.records",
+        "loop",
+        "mapping.plan",
+        "report",
+        "service",
         "web",
     },
-    "web.health": {"core"},
     "web.histogram": set(),
-    "web.picture": {"core", "report.format", "web.health"},
-    "service.systemd": {"report.printable"},
-    "loop.progress": {"loop.clock"},
     "demo": {
-        "loop.clock",
         "core",
-        "service.daemon",
         "demo",
-        "logs.events",
-        "report.format",
-        "report.event_text",
-        "logs.records",
+        "links.contract",
+        "links.registry",
+        "logs",
+        "loop",
         "mapping",
         "modbus",
-        "report.printable",
+        "report",
         "rtde",
+        "service",
         "simulator",
     },
     "cli": {
         "cli",
-        "loop.clock",
-        "service.compilation",
         "control",
         "core",
-        "service.daemon",
         "demo",
-        "logs.events",
-        "report.format",
-        "logs.records",
-        "logs.stream",
+        "links.contract",
+        "links.language",
+        "links.registry",
+        "logs",
+        "loop",
         "mapping",
-        "service.operator",
-        "report.printable",
-        "service.reload",
+        "report",
         "rtde",
-        "service.watchdog",
-        "service.signals",
+        "service",
         "simulator",
-        "service.startup",
         "web.launch",
-        "service.systemd",
-    },
-    "service.daemon": {
-        "loop.clock",
-        "core",
-        "logs.events",
-        "logs.records",
-        "mapping.plan",
-        "modbus",
-        "service.cell_runtime",
-        "loop.progress",
-    },
-    "service.cell_runtime": {"canopen", "core", "logs.events", "mapping.plan", "robot"},
-    "cli.export": {
-        "canopen.dictionary",
-        "links.canopen_node.eds",
-        "canopen.importer",
-        "links.canopen_node.plan",
-        "mapping",
-        "report.printable",
     },
     "__main__": {"cli", "report.printable", "service.signals"},
 }
 """Module or package -> what it and everything in it may import; the longest name that fits decides."""
+
+NOT_YET: dict[str, dict[str, str]] = {
+    "cli.export": {
+        "canopen.dictionary": "B",
+        "canopen.importer": "B",
+        "links.canopen_node": "B",
+        "links.robot": "B",
+    },
+    "cli.show": {"links.canopen_node": "B", "links.modbus_server": "B"},
+    "control.views": {"links.canopen_node": "C", "links.modbus_server": "C", "links.robot": "C"},
+    "demo": {"links.canopen_node": "C", "links.modbus_server": "C", "links.robot": "C"},
+    "links.canopen_node.bus_load": {"links.robot": "B", "rtde.catalogue": "B"},
+    "links.canopen_node.expand": {"rtde.types": "B"},
+    "mapping": {
+        "canopen.datatypes": "B",
+        "canopen.heartbeat": "B",
+        "canopen.sync": "B",
+        "links.canopen_node": "B",
+        "links.modbus_server": "B",
+        "links.robot": "B",
+        "modbus.areas": "B",
+        "modbus.codec": "B",
+        "rtde.catalogue": "B",
+        "rtde.types": "B",
+    },
+    "report.facts": {
+        "links.canopen_node": "C",
+        "links.modbus_server": "C",
+        "links.robot": "C",
+        "modbus.areas": "C",
+    },
+    "report.table": {"links.canopen_node": "B", "links.modbus_server": "B", "modbus.areas": "B"},
+    "service.cell_runtime": {"links.canopen_node": "A", "links.robot": "A"},
+    "service.daemon": {"links.modbus_server": "A"},
+    "service.reload": {"links.modbus_server": "A", "links.robot": "A"},
+    "web.view": {"links.canopen_node": "C", "links.modbus_server": "C", "links.robot": "C"},
+}
+"""Module or package -> what it imports against its layer for now, and who is about to change that."""
 
 LIBRARIES: dict[str, set[str]] = {
     "aiohttp": {"control.server", "web.guard", "web.listener"},
@@ -202,79 +189,52 @@ LIBRARIES: dict[str, set[str]] = {
     "canopen": {"canopen.importer"},
     "click": {"__main__", "cli"},
     "prometheus_client": {"web.metrics"},
-    "pydantic": {"mapping"},
+    "pydantic": {
+        "links.canopen_node.language",
+        "links.canopen_node.scalars",
+        "links.canopen_node.sections",
+        "links.modbus_server.language",
+        "links.modbus_server.sections",
+        "links.robot.language",
+        "links.robot.sections",
+        "mapping",
+    },
     "pydantic_core": {"mapping"},
-    "pymodbus": {"demo", "links.modbus_server.listener"},
+    "pymodbus": {"demo.plc", "links.modbus_server.listener"},
     "rich": {"cli", "demo", "report.table"},
     "ruamel": {"mapping.source"},
 }
 """Third-party package -> the only modules or packages that may know its types."""
 
-PURE = (
-    "control.api",
-    "control.documented",
-    "control.views",
-    "canopen.clock",
-    "canopen.cob_ids",
-    "links.canopen_node.communication_errors",
-    "canopen.datatypes",
-    "canopen.dictionary",
-    "links.canopen_node.eds",
-    "canopen.emergency",
-    "canopen.errors",
-    "canopen.frame",
-    "canopen.gap",
-    "canopen.guarding",
-    "canopen.heartbeat",
-    "canopen.identity",
-    "canopen.lss",
-    "canopen.nmt",
-    "links.canopen_node.node",
-    "links.canopen_node.pdo",
-    "links.canopen_node.observer",
-    "links.canopen_node.peers",
-    "links.canopen_node.plan",
-    "links.canopen_node.promise",
-    "canopen.queue",
-    "links.canopen_node.robot_errors",
-    "canopen.sdo",
-    "links.canopen_node.status_objects",
-    "links.canopen_node.storage",
-    "canopen.supervision",
-    "canopen.sync",
-    "links.canopen_node.variables",
-    "core",
-    "report.format",
-    "report.event_text",
-    "service.liveness",
-    "mapping",
-    "modbus.frames",
-    "links.modbus_server.functions",
-    "links.modbus_server.registers",
-    "report.printable",
-    "links.robot.availability",
-    "links.robot.companions",
-    "links.robot.inputs",
-    "links.robot.readback",
-    "links.robot.transfer",
-    "rtde.catalogue",
-    "rtde.claims",
-    "rtde.codec",
-    "rtde.companions",
-    "rtde.fields",
-    "rtde.lists",
-    "rtde.negotiation",
-    "rtde.pace",
-    "rtde.payloads",
-    "rtde.reading",
-    "rtde.recipe",
-    "rtde.session",
-    "report.summary",
-    "web.health",
-    "web.histogram",
-    "web.picture",
-)
-"""What has no socket, no event loop and no clock."""
+PURE = ("canopen", "control", "core", "links", "mapping", "modbus", "report", "rtde", "web")
+"""Packages without socket, event loop and clock: time is a parameter."""
+
+IMPURE = {
+    "canopen.interface": "asks a CAN interface for its state",
+    "canopen.pythoncan": "a driver",
+    "canopen.socketcan": "a driver",
+    "canopen.supervised": "a driver",
+    "control.client": "has the socket",
+    "control.endpoint": "has the socket",
+    "control.server": "speaks HTTP",
+    "links.canopen_node.runtime": "a link at work",
+    "links.modbus_server.listener": "has the sockets",
+    "links.modbus_server.polling": "has the sockets",
+    "links.modbus_server.runtime": "a link at work",
+    "links.modbus_server.sockets": "has the sockets",
+    "links.robot.runtime": "a link at work",
+    "rtde.client": "has the socket",
+    "rtde.connection": "has the socket",
+    "rtde.loss": "has the socket",
+    "rtde.resolve": "has the socket",
+    "web.guard": "speaks HTTP",
+    "web.launch": "has the socket",
+    "web.listener": "speaks HTTP",
+    "web.probes": "measures the loop",
+    "web.view": "tells the time of day",
+}
+"""Module in a pure package -> why it is none."""
+
 OTHER_CLOCK = {
     "cli.watch": "paints a terminal; times of the gateway come as ages",
     "loop.clock": "is made of it",
@@ -285,52 +245,88 @@ OTHER_CLOCK = {
 
 IMPURE_IMPORTS = {"asyncio", "select", "selectors", "signal", "socket", "subprocess", "threading", "time"}
 
-GREATEST_LENGTH = 500
+MAX_LENGTH = 500
 """Lines of a module."""
 
 WITHOUT_TEST_FILE: dict[str, str] = {
     "gatewayd": "the version",
     "__main__": "tests/cli/test_main.py tests it as a process",
-    "canopen": "a docstring",
     "canopen.frame": "records; tests/canopen/test_socketcan.py pins them byte by byte",
-    "links.canopen_node.observer": "counters, and calls that do nothing by themselves; tests/links/canopen_node/test_node.py",
-    "links.canopen_node.pdo": "a docstring",
     "cli": "tests/cli/test_main.py",
     "cli.completion": "tests/cli/test_main.py",
-    "control": "a docstring",
-    "core": "a docstring",
     "core.requester": "a record; tests/core/test_cell.py pins what its parts mean",
-    "mapping": "a docstring",
+    "links.canopen_node.declaration": "tests/links/test_registry.py",
+    "links.canopen_node.observer": "counters, and calls that do nothing; tests/links/canopen_node/test_node.py",
+    "links.contract": "records and protocols; tests/links/test_registry.py",
+    "links.language": "a protocol; tests/links/test_registry.py",
+    "links.modbus_server.declaration": "tests/links/test_registry.py",
+    "links.modbus_server.plan": "records; tests/mapping/test_compile.py pins their content",
+    "links.modbus_server.sections": "tests/mapping/test_model.py",
+    "links.robot.declaration": "tests/links/test_registry.py",
+    "links.robot.plan": "records; tests/mapping/test_compile.py pins their content",
+    "links.robot.sections": "tests/mapping/test_model.py",
     "mapping.plan": "records; tests/mapping/test_compile.py pins their content",
     "mapping.section": "three settings; tests/mapping/test_model.py pins what they do",
-    "modbus": "a docstring",
-    "robot": "a docstring",
-    "rtde": "a docstring",
+    "modbus.areas": "an enumeration; tests/mapping/test_compile.py",
     "rtde.messages": "records; tests/rtde/test_codec.py pins them byte by byte",
     "rtde.types": "records; tests/rtde/test_recipe.py pins their formats",
-    "simulator": "a docstring",
-    "web": "a docstring",
 }
-"""Module -> why it has no test file of its own."""
+"""Module -> why it has no test file of its own. A module that is only a docstring needs none."""
 
-TESTED_TOGETHER = {"mapping.rules": "tests/mapping/test_rules.py"}
+TESTED_TOGETHER = {
+    "links.canopen_node.rules": "tests/mapping/test_rules.py",
+    "links.modbus_server.rules": "tests/mapping/test_rules.py",
+    "links.robot.rules": "tests/mapping/test_rules.py",
+    "mapping.rules": "tests/mapping/test_rules.py",
+}
 """Package -> the one file that tests all its modules: rules are tested by their own bad and good examples."""
 
-WITHOUT_ALL = {
-    "control",
-    "core",
-    "mapping",
-    "canopen",
-    "links.canopen_node.pdo",
-    "demo",
-    "mapping.rules",
-    "modbus",
-    "robot",
-    "rtde",
-    "simulator",
-    "web",
+TO_COME = {
+    "links.canopen_node.language",
+    "links.modbus_server.language",
+    "links.modbus_server.runtime",
+    "links.robot.language",
+    "service.assemble",
 }
-"""Packages that export nothing themselves."""
+"""Modules that somebody is about to make."""
+
+SAME_NAME: dict[str, str] = {
+    "Access": "D",
+    "Claims": "E",
+    "Controller": "E",
+    "Endpoint": "B",
+    "Entry": "B",
+    "Event": "E",
+    "Frame": "E",
+    "Happening": "C",
+    "Kind": "C",
+    "Level": "A",
+    "Line": "E",
+    "Link": "A",
+    "MetricInfo": "A",
+    "Moment": "E",
+    "Move": "E",
+    "Node": "C",
+    "Operation": "E",
+    "Outcome": "C",
+    "Part": "E",
+    "Reference": "E",
+    "Robot": "B",
+    "Rule": "E",
+    "Run": "B",
+    "Service": "A",
+    "Session": "D",
+    "Source": "B",
+    "State": "E",
+    "Station": "A",
+    "Step": "E",
+    "Store": "E",
+    "Sync": "B",
+    "Unreadable": "C",
+    "View": "E",
+    "Waiting": "D",
+}
+"""Name of several public classes -> who is about to rename all but one."""
 
 
 def _modules() -> dict[str, Path]:
@@ -342,7 +338,6 @@ def _modules() -> dict[str, Path]:
 
 
 MODULES = _modules()
-every_module = pytest.mark.parametrize("module", MODULES)
 
 
 @cache
@@ -351,20 +346,29 @@ def tree(module: str) -> ast.Module:
     return ast.parse(MODULES[module].read_text())
 
 
-def imports(module: str) -> Iterator[str]:
+@cache
+def nodes(module: str) -> tuple[ast.AST, ...]:
+    """Everything in the source."""
+    return tuple(ast.walk(tree(module)))
+
+
+@cache
+def imports(module: str) -> frozenset[str]:
     """Full names of everything that is imported anywhere in the module, under TYPE_CHECKING and in functions too."""
-    for node in ast.walk(tree(module)):
+    found: set[str] = set()
+    for node in nodes(module):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{module}: relative import, line {node.lineno}"
             assert node.module is not None
             for alias in node.names:
                 inner = f"{node.module}.{alias.name}"
-                yield inner if inner.removeprefix("gatewayd.") in MODULES else node.module
+                found.add(inner if inner.removeprefix("gatewayd.") in MODULES else node.module)
+    return frozenset(found)
 
 
-def within(name: str, prefixes: set[str] | tuple[str, ...]) -> bool:
+def within(name: str, prefixes: Iterable[str]) -> bool:
     """Whether `name` is one of the modules or packages, or lies in one."""
     return any(name == prefix or name.startswith(prefix + ".") for prefix in prefixes)
 
@@ -376,72 +380,108 @@ def own_imports(module: str) -> Iterator[str]:
             yield name.removeprefix("gatewayd.")
 
 
-@every_module
-def test_imports_follow_the_layers(module: str) -> None:
-    layer = max((name for name in LAYERS if within(module, {name})), key=len, default=None)
-    assert layer is not None, f"{module} belongs to no layer: give it one in LAYERS"
-    foreign = [name for name in own_imports(module) if not within(name, LAYERS[layer])]
-    assert not foreign, f"{module} (layer {layer}) may not import {foreign}"
+def is_empty(module: str) -> bool:
+    """Whether it is a docstring alone."""
+    return len(tree(module).body) == 1
 
 
-@every_module
-def test_library_types_stay_in_their_adapter(module: str) -> None:
-    for name in imports(module):
-        library = name.partition(".")[0]
-        if library in LIBRARIES:
-            assert within(module, LIBRARIES[library]), f"{module} may not import {library}"
+def test_imports_follow_the_layers() -> None:
+    broken = []
+    for module in MODULES:
+        layer = max((name for name in LAYERS if within(module, {name})), key=len, default=None)
+        assert layer is not None, f"{module} belongs to no layer: give it one in LAYERS"
+        late = {name for place, names in NOT_YET.items() if within(module, {place}) for name in names}
+        foreign = {name for name in own_imports(module) if not within(name, LAYERS[layer] | late)}
+        broken += [f"{module} (layer {layer}) may not import {name}" for name in sorted(foreign)]
+    assert broken == []
 
 
-@every_module
-def test_pure_modules_have_no_socket_no_loop_and_no_clock(module: str) -> None:
-    if within(module, PURE):
-        assert not IMPURE_IMPORTS & {name.partition(".")[0] for name in imports(module)}
+def test_no_kind_of_link_is_known_by_name() -> None:
+    """Nobody but a link's own folder imports it; the registry names it. NOT_YET lists who still does."""
+    links = {name for name in LAYERS if name.startswith("links.") and MODULES[name].name == "__init__.py"}
+    named = {layer for layer, allowed in LAYERS.items() if {*links, "links"} & allowed}
+    assert named == links
 
 
-@every_module
-def test_whoever_meets_times_of_a_cell_asks_the_one_clock(module: str) -> None:
-    """CLOCK_MONOTONIC stands still while the machine is suspended, and the times of a cell go on."""
-    asked = [node for node in ast.walk(tree(module)) if isinstance(node, ast.Attribute | ast.Name)]
-    names = {ast.unparse(node) for node in asked}
-    assert ("time.monotonic" in names) == (module in OTHER_CLOCK)
-
-
-@every_module
-def test_nobody_imports_in_a_circle(module: str) -> None:
-    seen: set[str] = set()
-    waiting = set(own_imports(module))
-    while waiting:
-        name = waiting.pop()
-        assert name != module, f"{module} imports itself by way of others"
-        if name in MODULES and name not in seen:
-            seen.add(name)
-            waiting |= set(own_imports(name))
-
-
-@every_module
-def test_module_says_what_it_is(module: str) -> None:
-    assert ast.get_docstring(tree(module)), f"{module} has no docstring"
-
-
-@every_module
-def test_module_says_what_it_exports(module: str) -> None:
-    """`__all__` stands in every module that has something, and names only what is there."""
-    if module in WITHOUT_ALL:
-        return
-    found = [
-        ast.literal_eval(node.value)
-        for node in tree(module).body
-        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None
-        if "__all__" in map(ast.unparse, node.targets if isinstance(node, ast.Assign) else [node.target])
+def test_library_types_stay_in_their_adapter() -> None:
+    broken = [
+        f"{module} may not import {name}"
+        for module in MODULES
+        for name in sorted(imports(module))
+        if not within(module, LIBRARIES.get(name.partition(".")[0], {module}))
     ]
-    assert found, f"{module} has no __all__"
-    assert len(found[0]) == len(set(found[0]))
+    assert broken == []
 
 
-@every_module
-def test_module_is_short_enough_to_be_read(module: str) -> None:
-    lines = len(MODULES[module].read_text().splitlines())
-    assert lines <= GREATEST_LENGTH, f"{module} has {lines} lines"
+def test_pure_modules_have_no_socket_no_loop_and_no_clock() -> None:
+    for module in MODULES:
+        if within(module, PURE):
+            impure = IMPURE_IMPORTS & {name.partition(".")[0] for name in imports(module)}
+            assert not impure or module in IMPURE, f"{module} imports {impure}"
+
+
+def test_whoever_meets_times_of_a_cell_asks_the_one_clock() -> None:
+    """CLOCK_MONOTONIC stands still while the machine is suspended, and the times of a cell go on."""
+    asking = {
+        module
+        for module in MODULES
+        for node in nodes(module)
+        if isinstance(node, ast.Attribute)
+        and node.attr == "monotonic"
+        and ast.unparse(node) == "time.monotonic"
+    }
+    assert asking == set(OTHER_CLOCK)
+
+
+def test_nobody_imports_in_a_circle() -> None:
+    """Of the modules that are left when those without importers or imports among them go, none is left."""
+    left = {module: set(own_imports(module)) & set(MODULES) for module in MODULES}
+    while ends := [module for module, needed in left.items() if not needed & set(left)]:
+        for module in ends:
+            del left[module]
+    while starts := set(left) - set().union(*left.values()):
+        for module in starts:
+            del left[module]
+    assert sorted(left) == []
+
+
+def test_module_says_what_it_is() -> None:
+    assert [module for module in MODULES if not ast.get_docstring(tree(module))] == []
+
+
+def exported(module: str) -> list[str] | None:
+    """`__all__`."""
+    for node in tree(module).body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", node)]
+        if isinstance(node, ast.Assign | ast.AnnAssign) and "__all__" in map(ast.unparse, targets):
+            assert node.value is not None
+            return list(ast.literal_eval(node.value))
+    return None
+
+
+def test_module_says_what_it_exports() -> None:
+    """`__all__` stands in every module that has something, and names everything once."""
+    for module in MODULES:
+        if is_empty(module) or module == "mapping.rules":
+            continue
+        names = exported(module)
+        assert names is not None, f"{module} has no __all__"
+        assert len(names) == len(set(names)), module
+
+
+def test_public_classes_have_names_of_their_own() -> None:
+    """One name, one meaning, in the whole package."""
+    homes: dict[str, list[str]] = {}
+    for module in MODULES:
+        for node in tree(module).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, []).append(module)
+    assert {name: places for name, places in homes.items() if len(places) > 1 and name not in SAME_NAME} == {}
+
+
+def test_module_is_short_enough_to_be_read() -> None:
+    lengths = {module: len(path.read_text().splitlines()) for module, path in MODULES.items()}
+    assert {module: length for module, length in lengths.items() if length > MAX_LENGTH} == {}
 
 
 def file_of_tests(module: str) -> Path:
@@ -450,29 +490,22 @@ def file_of_tests(module: str) -> Path:
     return ROOT.joinpath("tests", *folders, f"test_{name}.py")
 
 
-@every_module
-def test_module_has_its_test_file(module: str) -> None:
-    together = [file for package, file in TESTED_TOGETHER.items() if within(module, {package})]
-    if together:
-        assert (ROOT / together[0]).exists()
-    elif module in WITHOUT_TEST_FILE:
-        assert not file_of_tests(module).exists(), (
-            f"{module} has a test file now: strike it from WITHOUT_TEST_FILE"
-        )
-    else:
-        assert file_of_tests(module).exists(), f"{file_of_tests(module).relative_to(ROOT)} is missing"
+def test_module_has_its_test_file() -> None:
+    for module in MODULES:
+        if within(module, TESTED_TOGETHER) or is_empty(module):
+            continue
+        path = file_of_tests(module)
+        if module in WITHOUT_TEST_FILE:
+            assert not path.exists(), f"{module} has a test file now: strike it from WITHOUT_TEST_FILE"
+        else:
+            assert path.exists(), f"{path.relative_to(ROOT)} is missing"
 
 
 def test_tables_name_only_what_exists() -> None:
     """No rule outlives the module that it is about."""
-    named = (
-        set(LAYERS)
-        | set(PURE)
-        | set(WITHOUT_TEST_FILE)
-        | set(TESTED_TOGETHER)
-        | set.union(*LIBRARIES.values())
-    )
-    assert named - set(MODULES) == set()
+    named = {*LAYERS, *PURE, *IMPURE, *WITHOUT_TEST_FILE, *TESTED_TOGETHER}.union(*LIBRARIES.values())
+    assert named - set(MODULES) - TO_COME == set()
+    assert [file for file in TESTED_TOGETHER.values() if not (ROOT / file).exists()] == []
 
 
 FORBIDDEN = {
