@@ -35,7 +35,7 @@ _GOODBYE = 0.2
 
 
 class ClientHandler(Protocol):
-    """What the user of a client is told, by synchronous calls from the event loop. They must not block.
+    """What the user of a client gets to know, by synchronous calls from the event loop. They must not block.
 
     An exception from one of them ends the client: `RtdeClient.run` raises it.
     """

@@ -1,6 +1,6 @@
 """When TPDOs are sent (CiA 301, 7.2.2 and 7.5.2.37): on change, on SYNC, by event timer, after the inhibit time.
 
-What a happening means for a TPDO follows from its schedule by the table `MOVES`:
+What a signal means for a TPDO follows from its schedule by the table `MOVES`:
 
 - event-driven (254, 255): sent at once when the content differs from what was sent last, when the event timer has run
   out, and when the PDO starts; within the inhibit time it waits, and then goes out with the newest content;
@@ -29,7 +29,15 @@ from gatewayd.core.status import StatusBlock
 from gatewayd.links.canopen_node.pdo.codec import ReadWord
 from gatewayd.links.canopen_node.pdo.parameters import Configuration
 
-__all__ = ["MOVES", "STATUS_LOOK", "Happening", "Move", "Schedule", "TransmitEngine", "TransmitPdo"]
+__all__ = [
+    "MOVES",
+    "STATUS_LOOK",
+    "Schedule",
+    "TransmitEngine",
+    "TransmitMove",
+    "TransmitPdo",
+    "TransmitSignal",
+]
 
 
 STATUS_LOOK: Final = 0.1
@@ -51,7 +59,7 @@ class Schedule(Enum):
         return cls.EVENT if transmission > 240 else cls.CYCLIC
 
 
-class Happening(Enum):
+class TransmitSignal(Enum):
     """What may make a TPDO be sent."""
 
     START = "OPERATIONAL was entered, the PDO became valid, or its variables may be read again"
@@ -61,7 +69,7 @@ class Happening(Enum):
     SYNC = "a SYNC was received"
 
 
-class Move(Enum):
+class TransmitMove(Enum):
     """What is done."""
 
     SEND = "send, as soon as the inhibit time allows"
@@ -71,15 +79,15 @@ class Move(Enum):
     REWIND = "begin to count anew"
 
 
-MOVES: dict[tuple[Schedule, Happening], Move] = {
-    (Schedule.EVENT, Happening.START): Move.SEND,
-    (Schedule.EVENT, Happening.CHANGE): Move.SEND_NEWS,
-    (Schedule.EVENT, Happening.TIMER): Move.SEND,
-    (Schedule.EVENT, Happening.INHIBIT_OVER): Move.SEND_NEWS,
-    (Schedule.ACYCLIC, Happening.START): Move.WAIT,
-    (Schedule.ACYCLIC, Happening.SYNC): Move.SEND_NEWS,
-    (Schedule.CYCLIC, Happening.START): Move.REWIND,
-    (Schedule.CYCLIC, Happening.SYNC): Move.COUNT,
+MOVES: dict[tuple[Schedule, TransmitSignal], TransmitMove] = {
+    (Schedule.EVENT, TransmitSignal.START): TransmitMove.SEND,
+    (Schedule.EVENT, TransmitSignal.CHANGE): TransmitMove.SEND_NEWS,
+    (Schedule.EVENT, TransmitSignal.TIMER): TransmitMove.SEND,
+    (Schedule.EVENT, TransmitSignal.INHIBIT_OVER): TransmitMove.SEND_NEWS,
+    (Schedule.ACYCLIC, TransmitSignal.START): TransmitMove.WAIT,
+    (Schedule.ACYCLIC, TransmitSignal.SYNC): TransmitMove.SEND_NEWS,
+    (Schedule.CYCLIC, TransmitSignal.START): TransmitMove.REWIND,
+    (Schedule.CYCLIC, TransmitSignal.SYNC): TransmitMove.COUNT,
 }
 """A pair that is not listed does nothing."""
 
@@ -115,7 +123,7 @@ class TransmitPdo:
         )
         self.configuration = configuration
         self.can_id = configuration.can_id
-        self.moves = {happening: move for (one, happening), move in MOVES.items() if one is schedule}
+        self.moves = {signal: move for (one, signal), move in MOVES.items() if one is schedule}
         self.gather = layout.gatherer(read)
         self.has_status = layout.has_status
         self.pack = layout.pack
@@ -205,12 +213,12 @@ class TransmitEngine:
         self._fresh: list[TransmitPdo] = []
         self._unreadable = frozenset[int]()
         self._deadline: float | None = math.inf
-        self._acts: dict[Move, Callable[[TransmitPdo, float], None]] = {
-            Move.SEND: self._send_forced,
-            Move.SEND_NEWS: self._send_news,
-            Move.WAIT: self._wait,
-            Move.COUNT: self._count,
-            Move.REWIND: self._rewind,
+        self._acts: dict[TransmitMove, Callable[[TransmitPdo, float], None]] = {
+            TransmitMove.SEND: self._send_forced,
+            TransmitMove.SEND_NEWS: self._send_news,
+            TransmitMove.WAIT: self._wait,
+            TransmitMove.COUNT: self._count,
+            TransmitMove.REWIND: self._rewind,
         }
 
     @property
@@ -272,8 +280,8 @@ class TransmitEngine:
             if pdo.is_stopped or not _counts(pdo, counter):
                 continue
             if not late:
-                self._happened(pdo, Happening.SYNC, now)
-            elif pdo.moves.get(Happening.SYNC) is Move.COUNT:
+                self._happened(pdo, TransmitSignal.SYNC, now)
+            elif pdo.moves.get(TransmitSignal.SYNC) is TransmitMove.COUNT:
                 pdo.count()
 
     def tick(self, now: float) -> None:
@@ -289,7 +297,7 @@ class TransmitEngine:
             self._compare(self._with_status, now)
         for pdo in self._event_driven:
             if pdo.waits and now >= pdo.earliest:
-                self._happened(pdo, Happening.INHIBIT_OVER, now)
+                self._happened(pdo, TransmitSignal.INHIBIT_OVER, now)
             if now >= pdo.due:
                 self._timer(pdo, now)
         self._deadline = None
@@ -333,7 +341,7 @@ class TransmitEngine:
         values = self._values
         for pdo in pdos:
             if pdo.gather(values) != pdo.content and not pdo.waits and not pdo.is_stopped:
-                self._happened(pdo, Happening.CHANGE, now)
+                self._happened(pdo, TransmitSignal.CHANGE, now)
 
     def _read_word(self, offset: int, words: int) -> int:
         return int.from_bytes(self._block.read(offset, words, self._now), "big")
@@ -352,7 +360,7 @@ class TransmitEngine:
             if pdo.is_stopped and not was_stopped:
                 self._stop(pdo)
             elif was_stopped and not pdo.is_stopped and pdo not in self._fresh:
-                self._happened(pdo, Happening.START, now)
+                self._happened(pdo, TransmitSignal.START, now)
         self._deadline = None
 
     def _start_fresh(self, now: float) -> None:
@@ -361,7 +369,7 @@ class TransmitEngine:
         for pdo in fresh:
             was_stopped, pdo.is_stopped = pdo.is_stopped, not self._unreadable.isdisjoint(pdo.guarded)
             if not pdo.is_stopped:
-                self._happened(pdo, Happening.START, now)
+                self._happened(pdo, TransmitSignal.START, now)
             elif not was_stopped:
                 self._stop(pdo)
         self._deadline = None
@@ -370,8 +378,8 @@ class TransmitEngine:
         self.stopped += 1
         pdo.rest()
 
-    def _happened(self, pdo: TransmitPdo, happening: Happening, now: float) -> None:
-        move = pdo.moves.get(happening)
+    def _happened(self, pdo: TransmitPdo, signal: TransmitSignal, now: float) -> None:
+        move = pdo.moves.get(signal)
         if move is not None:
             self._acts[move](pdo, now)
 
@@ -379,7 +387,7 @@ class TransmitEngine:
         period = pdo.configuration.event
         late = now - pdo.due
         pdo.due = math.inf
-        self._happened(pdo, Happening.TIMER, now)
+        self._happened(pdo, TransmitSignal.TIMER, now)
         if not pdo.waits and late < period:
             # Late calls do not add up: the next one is due a period after this one was.
             pdo.due -= late

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gatewayd.core.definition import Direction, Fallback, FallbackKind
-from gatewayd.links.canopen_node.pdo.transmit import MOVES, Happening, Schedule, TransmitEngine
+from gatewayd.links.canopen_node.pdo.transmit import MOVES, Schedule, TransmitEngine, TransmitSignal
 
 Bench = Any
 """`Bench` of conftest.py, which cannot be imported."""
@@ -352,5 +352,5 @@ def test_frames_are_counted(bench: Bench) -> None:
 
 
 def test_every_schedule_starts_and_no_row_is_for_a_schedule_that_sync_cannot_reach() -> None:
-    assert {schedule for schedule, happening in MOVES if happening is Happening.START} == set(Schedule)
-    assert (Schedule.EVENT, Happening.SYNC) not in MOVES
+    assert {schedule for schedule, signal in MOVES if signal is TransmitSignal.START} == set(Schedule)
+    assert (Schedule.EVENT, TransmitSignal.SYNC) not in MOVES
