@@ -17,6 +17,7 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.health import CAN_BUS, NMT_STATES
 from gatewayd.core.image import Quality
 from gatewayd.links.canopen_node.plan import canopen_of
+from gatewayd.links.contract import Link
 from gatewayd.links.modbus_server.plan import Placement, modbus_of
 from gatewayd.links.robot.plan import robot_of
 from gatewayd.mapping.plan import Plan
@@ -26,7 +27,7 @@ from gatewayd.service.audit import Record, plain_value, utc
 
 __all__ = [
     "Json",
-    "StationView",
+    "RuntimeView",
     "cell_view",
     "declared_view",
     "event_view",
@@ -43,15 +44,7 @@ _QUALITIES = tuple(one.name.lower() for one in Quality)
 _BIT_WORD = re.compile(r"(input|output)_bit_registers(\d+)_to_\d+")
 
 
-class RobotView(Protocol):
-    """The link to the controller."""
-
-    @property
-    def trouble(self) -> str:
-        """Why there is no session, if that is known."""
-
-
-class StationView(Protocol):
+class RuntimeView(Protocol):
     """One cell as the daemon serves it."""
 
     @property
@@ -63,21 +56,17 @@ class StationView(Protocol):
         """Its state."""
 
     @property
-    def robot(self) -> RobotView:
-        """Its robot."""
+    def source(self) -> Link:
+        """The link that values come from."""
 
 
-def cell_view(station: StationView, now: float) -> Json:
+def cell_view(runtime: RuntimeView, now: float) -> Json:
     """One cell of the status."""
-    plan, cell = station.plan, station.cell
+    plan, cell = runtime.plan, runtime.cell
     health, definition, quality = cell.health, cell.definition, cell.image.quality
     owners = cell.ownership.owners
     modbus, canopen = modbus_of(plan), canopen_of(plan)
-    found = problems(
-        cell,
-        now,
-        station.robot.trouble.removeprefix(f"{_address(robot_of(plan).host, robot_of(plan).port)}: "),
-    )
+    found = problems(cell, now, "; ".join(runtime.source.health().problems))
     return {
         "name": definition.name,
         "source": plan.source,

@@ -77,7 +77,7 @@ class Scene:
     def cell(self) -> Cell:
         """The gateway's cell."""
         assert self._daemon is not None
-        return self._daemon.stations[0].cell
+        return self._daemon.runtimes[0].cell
 
     @asynccontextmanager
     async def playing(self) -> AsyncIterator[None]:

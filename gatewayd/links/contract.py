@@ -11,7 +11,7 @@ Everything has a default but for what makes the kind one. `gatewayd.links.regist
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
@@ -35,6 +35,7 @@ __all__ = [
     "PrepareError",
     "Prepared",
     "SharedPart",
+    "SourceLink",
 ]
 
 # -- declaration -------------------------------------------------------------------------------------------------
@@ -102,6 +103,8 @@ class LinkKind:
     status_fields: ClassVar[tuple[StatusField, ...]] = ()
     """Words of the status block that its links tell (`Cell.health.words`), at addresses that nobody else has."""
     metrics: ClassVar[tuple[MetricInfo, ...]] = ()
+    usual: ClassVar[bool] = False
+    """Nearly every cell has one: its runtime is imported while the mapping files are read."""
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
         """The plan in words."""
@@ -141,6 +144,8 @@ class Level(IntEnum):
 class LinkHealth:
     """How a link is at this moment."""
 
+    name: str = ""
+    """For headlines: `Modbus 127.0.0.1:502`, `CAN can0`."""
     level: Level = Level.GOOD
     words: str = ""
     """Its state in a few words: `listening`, `bus-off`."""
@@ -155,18 +160,21 @@ class LinkHealth:
 class Link:
     """One connection to the outside of one cell."""
 
-    name: str
-    """Of the link within its cell: the key of its section."""
+    title: ClassVar[str]
+    """In the log, before the name of the cell: `robot link`."""
 
     @property
-    def turns(self) -> int:
-        """Moves while `run` works, whatever the other side does; 0: it has not begun. For the watchdog."""
-        raise NotImplementedError
+    def progress(self) -> int | None:
+        """Moves while `run` works, whatever the other side does; 0: it has not begun. For the watchdog.
+
+        None: the link has no work of its own, what it shares with others does it.
+        """
+        return None
 
     @property
-    def reachable(self) -> bool:
-        """Whether a writer can reach the cell by it."""
-        return False
+    def reachable(self) -> bool | None:
+        """Whether a writer can reach the cell by it now; None: no writer ever comes this way."""
+        return None
 
     @property
     def settled(self) -> bool:
@@ -175,13 +183,12 @@ class Link:
 
     async def run(self) -> None:
         """Work until cancelled."""
-        raise NotImplementedError
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`; called before anything that waited is served."""
 
-    def release(self, reason: str, now: float) -> None:
-        """It will not go on: its writers are lost, in the old cell, before there is a new one."""
+    def release(self, now: float) -> None:
+        """It will not go on: writers that it alone knows are lost, in the old cell, before there is a new one."""
 
     def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
         """Go on with another plan and the successor of the cell; only where `LinkKind.fits` said so."""
@@ -198,6 +205,16 @@ class Link:
         return LinkHealth()
 
 
+class SourceLink(Link):
+    """The link that tells the values of a cell and takes what is written: every cell has exactly one.
+
+    Its losses are the cell's (`Cell.robot_lost`), and freshness is about it.
+    """
+
+    sent_listeners: list[Callable[[], None]]
+    """Called after something that was written has been sent. They must not raise."""
+
+
 class PrepareError(OSError):
     """Something that several cells use cannot be had; the text says what and why."""
 
@@ -206,7 +223,7 @@ class Prepared(Protocol):
     """What a shared part needs for other plans, ready and not in use yet."""
 
     def commit(self) -> None:
-        """Use it. Cannot fail."""
+        """Have it in use by the next `SharedPart.serve`. Cannot fail."""
 
     async def abort(self) -> None:
         """Give it back; nothing has changed."""
@@ -215,17 +232,38 @@ class Prepared(Protocol):
 class SharedPart:
     """What the links of one kind use together in all cells: listeners."""
 
-    async def prepare(self, plans: Sequence[Plan]) -> Prepared:
-        """Have ready what these plans need. Raises PrepareError."""
+    async def run(self) -> None:
+        """Work until cancelled; what cannot be had yet is tried again."""
         raise NotImplementedError
+
+    def progress(self) -> Mapping[str, int]:
+        """A counter for each thing that has to go on, by its name for the log; 0: it has not begun."""
+        return {}
+
+    def troubles(self) -> Sequence[str]:
+        """What concerns the gateway as a whole, in a few words each."""
+        return ()
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`; called before anything that waited is served."""
+
+    async def prepare(self, plans: Sequence[Plan]) -> Prepared:
+        """Have ready what these plans need besides what there is. Raises PrepareError."""
+        raise NotImplementedError
+
+    def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
+        """Serve these links from now on, and no others. `successors` are cells that took the place of another one."""
+        raise NotImplementedError
+
+    async def close(self) -> None:
+        """Take nothing more: nobody writes afterwards."""
 
 
 @dataclass(frozen=True, slots=True)
 class Context:
     """What a link is made with, besides plan and cell."""
 
-    name: str
-    """Of the link."""
+    now: float
     state: Path
     """Directory of what is kept across restarts."""
     shared: SharedPart | None = None

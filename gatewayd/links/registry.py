@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 from gatewayd.links.contract import LinkKind, LinkRuntime
-from gatewayd.links.language import LinkLanguage
+
+if TYPE_CHECKING:
+    from gatewayd.links.language import LinkLanguage
 
 __all__ = ["LINK_KINDS", "kind_of", "kinds", "language_of", "languages", "runtime_of"]
 
@@ -33,8 +36,8 @@ def kind_of(key: str) -> LinkKind:
 @cache
 def language_of(key: str) -> LinkLanguage:
     """What the kind with this key adds to the mapping language."""
-    language = import_module(f"{_package(key)}.language").LANGUAGE
-    assert isinstance(language, LinkLanguage)
+    # The daemon, which has no use for models, imports this module and not those.
+    language: LinkLanguage = import_module(f"{_package(key)}.language").LANGUAGE
     return language
 
 

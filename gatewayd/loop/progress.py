@@ -8,9 +8,9 @@ from typing import TypeVar
 
 from gatewayd.loop import clock
 
-__all__ = ["GRACE", "TURN", "turning"]
+__all__ = ["GRACE", "STEP", "wait_with_progress"]
 
-TURN = 0.25
+STEP = 0.25
 """Seconds between two turns of a part, whatever it waits for."""
 GRACE = 1.0
 """Seconds beyond its own limit after which a wait is no wait any more."""
@@ -18,8 +18,8 @@ GRACE = 1.0
 _Result = TypeVar("_Result")
 
 
-async def turning(work: Awaitable[_Result], turn: Callable[[], None], limit: float) -> _Result:
-    """The result of `work`, which ends by itself within `limit` seconds; `turn` is called every TURN seconds meanwhile.
+async def wait_with_progress(work: Awaitable[_Result], turn: Callable[[], None], limit: float) -> _Result:
+    """The result of `work`, which ends by itself within `limit` seconds; `turn` is called every STEP seconds meanwhile.
 
     Work that outlasts its limit by GRACE seconds hangs, and `turn` is called no more. Raises what the work raises. A
     cancellation ends the work first.
@@ -30,7 +30,7 @@ async def turning(work: Awaitable[_Result], turn: Callable[[], None], limit: flo
         while not task.done():
             if clock.now() < end:
                 turn()
-            await asyncio.wait((task,), timeout=TURN)
+            await asyncio.wait((task,), timeout=STEP)
     except asyncio.CancelledError:
         task.cancel()
         await asyncio.wait((task,))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["age", "counted", "exact", "seconds", "span", "value"]
+__all__ = ["address", "age", "counted", "exact", "seconds", "span", "value"]
 
 _DIGITS = 3
 
@@ -59,3 +59,8 @@ def span(duration: float) -> str:
 def counted(count: int, noun: str) -> str:
     """`1 lock`, `2 locks`, `no locks`."""
     return f"{count or 'no'} {noun}{'' if count == 1 else 's'}"
+
+
+def address(host: str, port: int) -> str:
+    """`127.0.0.1:502`, `[::1]:502`."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"

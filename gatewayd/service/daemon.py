@@ -1,8 +1,8 @@
-"""The daemon: one process, one loop, several robot cells. The only module that knows every link.
+"""The daemon: one process, one loop, several robot cells.
 
-A cell that fails costs that cell: a link whose task ends in an error is started again, a listener whose port is taken
-is tried again, and the others never notice. A core whose ticks fail is left to the watchdog: nobody would notice what
-only time brings, and nothing may look fresh that nobody looks after.
+A cell that fails costs that cell: a link whose task ends in an error is started again, what cannot be had is tried
+again, and the others never notice. A core whose ticks fail is left to the watchdog: nobody would notice what only
+time brings, and nothing may look fresh that nobody looks after.
 """
 
 from __future__ import annotations
@@ -10,35 +10,29 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from itertools import zip_longest
 from pathlib import Path
 
 from gatewayd.core.cell import Cell
-from gatewayd.links.modbus_server.listener import ListenError, ModbusListener
-from gatewayd.links.modbus_server.peers import PeerEvent, PeerEventKind
-from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
-from gatewayd.logs.records import fields
+from gatewayd.links.contract import Link, SharedPart
 from gatewayd.loop import clock
-from gatewayd.loop.progress import turning
+from gatewayd.loop.retry import keep_running
 from gatewayd.mapping.plan import Plan
-from gatewayd.service.cell_runtime import Station
+from gatewayd.service.cell_runtime import CellRuntime
+from gatewayd.service.shared_parts import AllPrepared, SharedParts
 
 __all__ = ["CLOSING_TIME", "RETRY_PERIOD", "TICK", "Daemon"]
 
 TICK = 0.02
 """Seconds between two looks at leases, time-outs and staleness."""
 RETRY_PERIOD = 2.0
-"""Seconds between two attempts to open a listener or to start a failed link again."""
+"""Seconds after which a part that failed is started again."""
 CLOSING_TIME = 0.5
 """Seconds that the last packages to the robots may take when the daemon stops."""
 
 log = logging.getLogger("gatewayd.daemon")
-
-Address = tuple[str, int]
-"""Host and port of a listener."""
 
 
 class Daemon:
@@ -46,20 +40,20 @@ class Daemon:
 
     def __init__(self, plans: Sequence[Plan], state: Path) -> None:
         self._state = state
-        self.stations = [Station(plan, state) for plan in plans]
-        self.listeners: list[ModbusListener] = []
+        self.shared = SharedParts()
         self._group: asyncio.TaskGroup | None = None
         self._tasks: dict[object, asyncio.Task[None]] = {}
-        """Of stations (their clocks), links and listeners."""
+        """Of cells (their clocks), links and shared parts."""
         self._rests: Counter[object] = Counter()
-        """Turns of parts while they do not run: a link after an error, a listener whose port is taken."""
+        """Progress of parts that wait to be started again after an error."""
         self._observers: list[Callable[[Cell], None]] = []
-        self._serve({})
+        self.runtimes = [self._make(plan, clock.now()) for plan in plans]
+        self.shared.serve(self.runtimes, {})
 
     @property
     def cells(self) -> list[Cell]:
         """The cells that are served now."""
-        return [station.cell for station in self.stations]
+        return [runtime.cell for runtime in self.runtimes]
 
     def observe(self, observer: Callable[[Cell], None]) -> None:
         """Call `observer` with every cell, now and whenever a reload brings one, before anybody writes to it."""
@@ -67,31 +61,29 @@ class Daemon:
         for cell in self.cells:
             observer(cell)
 
-    def turns(self) -> dict[str, int]:
-        """A counter for each part that has to go on: cores, links, listeners. 0: it has not begun."""
-        rests = self._rests
-        found = {f"listener {one.name}": one.turns + rests[one] for one in self.listeners}
-        for station in self.stations:
-            name, robot, can = station.plan.cell.name, station.robot, station.can
-            found[f"core of {name}"] = station.cell.health.heartbeat
-            found[f"robot link of {name}"] = robot.turns + rests[robot]
-            if can is not None:
-                found[f"CAN link of {name}"] = can.turns + rests[can]
+    def progress(self) -> dict[str, int]:
+        """A counter for each part that has to go on: shared parts, cores, links. 0: it has not begun."""
+        found = self.shared.progress()
+        for runtime in self.runtimes:
+            name = runtime.plan.cell.name
+            found[f"core of {name}"] = runtime.cell.health.heartbeat
+            for link in runtime.links.values():
+                if link.progress is not None:
+                    found[f"{link.title} of {name}"] = link.progress + self._rests[link]
         return found
 
     def troubles(self) -> list[str]:
         """What concerns the gateway as a whole."""
-        return [f"not listening on {one.name}" for one in self.listeners if not one.listening]
+        return self.shared.troubles()
 
     async def run(self, stop: asyncio.Event) -> None:
         """Serve until `stop` is set; then release every lock, give the robots the fallbacks, and close."""
         clock.on_gap(self._after_gap)
         async with asyncio.TaskGroup() as group:
             self._group = group
-            for station in self.stations:
-                self._begin_station(station)
-            for listener in self.listeners:
-                self._begin(listener, partial(self._open, listener))
+            for runtime in self.runtimes:
+                self._begin_cell(runtime)
+            self._begin_shared()
             await stop.wait()
             self._group = None
             await self._close()
@@ -101,10 +93,10 @@ class Daemon:
 
     def _after_gap(self, gap: clock.Gap) -> None:
         """The process stood still; nothing that waited meanwhile has been served yet."""
-        for station in self.stations:
-            station.gap(gap.since, gap.until)
-        for listener in self.listeners:
-            listener.gap(gap.since, gap.until)
+        for runtime in self.runtimes:
+            runtime.gap(gap.since, gap.until)
+        for part in self.shared:
+            part.gap(gap.since, gap.until)
 
     # -- another mapping ---------------------------------------------------------------------------------------------
 
@@ -113,131 +105,103 @@ class Daemon:
         """Whether there is anything to swap: false before `run` and once it stops."""
         return self._group is not None
 
-    async def open_new(self, plans: Iterable[Plan]) -> list[ModbusListener]:
-        """Listeners for addresses that are new, open, but serving nobody yet. Raises ListenError, all closed again.
+    async def prepare(self, plans: Sequence[Plan]) -> AllPrepared:
+        """Have ready what these plans need besides what there is. Raises PrepareError, and nothing has changed."""
+        return await self.shared.prepare(plans)
 
-        One that must wait for the end of a present listener, of the same port, is left to `swap`.
-        """
-        wanted = {(unit.host, unit.port) for plan in plans if (unit := modbus_of(plan)) is not None}
-        present = {listener.address for listener in self.listeners}
-        ports = {port for _host, port in present - wanted}
-        opened: list[ModbusListener] = []
-        for host, port in sorted(wanted - present):
-            if port in ports:
-                continue
-            listener = ModbusListener(host, port, observe=_log_peer)
-            try:
-                await listener.start()
-            except ListenError:
-                await asyncio.gather(*(one.close() for one in opened))
-                raise
-            opened.append(listener)
-        return opened
-
-    def swap(self, plans: Sequence[Plan], now: float, opened: Iterable[ModbusListener] = ()) -> list[str]:
+    def swap(self, plans: Sequence[Plan], now: float, prepared: AllPrepared | None = None) -> list[str]:
         """Serve these plans instead, between two packages; cells are known by their names.
 
         Links whose settings did not change stay up. Returns the inputs that are gone and could not be given their
         release fallback, as `cell: name`.
         """
-        former = {station.plan.cell.name: station for station in self.stations}
+        former = {runtime.plan.cell.name: runtime for runtime in self.runtimes}
         successors: dict[Cell, Cell] = {}
         stranded: list[str] = []
-        self.listeners += opened
-        # Whatever happens on the way, afterwards the listeners serve the cells that there are.
+        if prepared is not None:
+            prepared.commit()
+        # Whatever happens on the way, afterwards the shared parts serve the cells that there are.
         try:
-            stations = [self._station_for(plan, former, now, successors, stranded) for plan in plans]
-            for station in former.values():
-                stranded += [f"{station.plan.cell.name}: {name}" for name in station.retire(now)]
-                for part in (station, *station.links):
+            runtimes = [self._runtime_for(plan, former, now, successors, stranded) for plan in plans]
+            for runtime in former.values():
+                stranded += [f"{runtime.plan.cell.name}: {name}" for name in runtime.retire(now)]
+                for part in (runtime, *runtime.links.values()):
                     self._end(part)
-            self.stations = stations
+            self.runtimes = runtimes
         finally:
-            self._serve(successors)
+            self._begin_shared()
+            self.shared.serve(self.runtimes, successors)
         return stranded
 
-    def _station_for(
+    def _runtime_for(
         self,
         plan: Plan,
-        former: dict[str, Station],
+        former: dict[str, CellRuntime],
         now: float,
         successors: dict[Cell, Cell],
         stranded: list[str],
-    ) -> Station:
-        station = former.pop(plan.cell.name, None)
-        if station is None:
-            station = Station(plan, self._state)
-            self._show(station.cell)
-            self._begin_station(station)
-        elif station.plan != plan:
-            stranded += self._replace(station, plan, now, successors)
-        return station
+    ) -> CellRuntime:
+        runtime = former.pop(plan.cell.name, None)
+        if runtime is None:
+            runtime = self._make(plan, now)
+            self._show(runtime.cell)
+            self._begin_cell(runtime)
+        elif runtime.plan != plan:
+            stranded += self._replace(runtime, plan, now, successors)
+        return runtime
 
-    def _replace(self, station: Station, plan: Plan, now: float, successors: dict[Cell, Cell]) -> list[str]:
-        cell, links = station.cell, station.links
-        stranded = station.succeed(plan, now)
-        self._show(station.cell)
-        station.cell.health.modbus_connections = 0
-        successors[cell] = station.cell
-        for link, former in zip_longest(station.links, links):
-            if link is not former:
-                ended = self._end(former) if former is not None else None
-                if link is not None:
-                    self._begin(link, partial(self._keep_running, link, link.run), ended)
+    def _replace(
+        self, runtime: CellRuntime, plan: Plan, now: float, successors: dict[Cell, Cell]
+    ) -> list[str]:
+        cell, former = runtime.cell, runtime.links
+        stranded = runtime.succeed(plan, now)
+        self._show(runtime.cell)
+        runtime.cell.health.modbus_connections = 0
+        successors[cell] = runtime.cell
+        ended = {
+            name: self._end(link) for name, link in former.items() if runtime.links.get(name) is not link
+        }
+        for name, link in runtime.links.items():
+            if link is not former.get(name):
+                self._begin(link, link.run, ended.get(name))
         return [f"{plan.cell.name}: {name}" for name in stranded]
 
     def _show(self, cell: Cell) -> None:
         for observer in self._observers:
             observer(cell)
 
-    def _serve(self, successors: Mapping[Cell, Cell]) -> None:
-        """Have a listener for every address of the stations' plans, and no other."""
-        units: dict[Address, list[tuple[ModbusPlan, Cell]]] = {}
-        for station in self.stations:
-            modbus = modbus_of(station.plan)
-            if modbus is not None:
-                units.setdefault((modbus.host, modbus.port), []).append((modbus, station.cell))
-        for listener in [one for one in self.listeners if one.address not in units]:
-            listener.serve((), successors)
-            self.listeners.remove(listener)
-            self._begin(listener, partial(listener.close, "no longer configured"), self._end(listener))
-        for listener in self.listeners:
-            listener.serve(units.pop(listener.address), successors)
-        for (host, port), served in units.items():
-            listener = ModbusListener(host, port, observe=_log_peer)
-            listener.serve(served)
-            self.listeners.append(listener)
-            self._begin(listener, partial(self._open, listener))
+    # -- tasks -------------------------------------------------------------------------------------------------------
 
-    def _begin_station(self, station: Station) -> None:
-        self._begin(station, partial(self._keep_running, station, partial(self._tick, station)))
-        for link in station.links:
-            self._begin(link, partial(self._keep_running, link, link.run))
+    def _make(self, plan: Plan, now: float) -> CellRuntime:
+        return CellRuntime(plan, self._state, now, self.shared.of)
 
-    async def _tick(self, station: Station) -> None:
-        while True:
-            adoption = station.cell.adoption
-            adoption.reachable = adoption.reachable or self._is_reachable(station)
-            station.cell.tick(clock.judged_now())
-            await asyncio.sleep(TICK)
+    def _begin_cell(self, runtime: CellRuntime) -> None:
+        self._begin(runtime, partial(_tick, runtime))
+        for link in runtime.links.values():
+            self._begin(link, link.run)
 
-    def _is_reachable(self, station: Station) -> bool:
-        """Whether a writer can reach the cell; one without a fieldbus waits for none."""
-        modbus = modbus_of(station.plan)
-        if modbus is None and station.can is None:
-            return True
-        served = modbus is not None and any(
-            listener.listening and listener.address == (modbus.host, modbus.port)
-            for listener in self.listeners
-        )
-        return served or station.is_on_bus
+    def _begin_shared(self) -> None:
+        for part in self.shared:
+            if part not in self._tasks:
+                self._begin(part, part.run)
 
     def _begin(
-        self, part: object, work: Callable[[], Awaitable[None]], former: asyncio.Task[None] | None = None
+        self,
+        part: CellRuntime | Link | SharedPart,
+        work: Callable[[], Awaitable[None]],
+        former: asyncio.Task[None] | None = None,
     ) -> None:
-        """Have the part's work done, once a former task has ended. Before `run` it is left to that."""
+        """Have the part's work done, once a former task has ended. Before `run` it is left to that.
+
+        Work that ends in an error is begun again, so that a defect in one cell never ends the process.
+        """
+
+        def progress() -> None:
+            self._rests[part] += 1
+
         if self._group is not None:
-            task = self._tasks[part] = self._group.create_task(_after(former, work))
+            running = partial(keep_running, work, log, RETRY_PERIOD, progress)
+            task = self._tasks[part] = self._group.create_task(_after(former, running))
             task.add_done_callback(lambda ended: self._forget(part, ended))
 
     def _forget(self, part: object, task: asyncio.Task[None]) -> None:
@@ -253,48 +217,24 @@ class Daemon:
             task.cancel()
         return task
 
-    async def _rest(self, part: object) -> None:
-        def turn() -> None:
-            self._rests[part] += 1
-
-        await turning(asyncio.sleep(RETRY_PERIOD), turn, RETRY_PERIOD)
-
-    async def _open(self, listener: ModbusListener) -> None:
-        """Open the listener; while that fails, say why once and try again."""
-        told = ""
-        while True:
-            try:
-                await listener.start()
-            except ListenError as error:
-                reason = error.strerror or str(error)
-                if reason != told:
-                    told = reason
-                    log.error(told, extra=fields(retry_s=RETRY_PERIOD))  # noqa: TRY400 - the text says it all
-                await self._rest(listener)
-            else:
-                log.info("listening for Modbus", extra=fields(listen=listener.name))
-                return
-
-    async def _keep_running(self, part: object, work: Callable[[], Awaitable[None]]) -> None:
-        """Start `work` again whenever it ends in an error, so that a defect in one cell never ends the process."""
-        while True:
-            try:
-                await work()
-            except Exception:
-                log.exception("internal error, starting again")
-                await self._rest(part)
-            else:
-                return
-
     async def _close(self) -> None:
         """First nobody writes any more, then the robots get what the policies declare, then the links close."""
-        await asyncio.gather(*(listener.close() for listener in self.listeners))
+        await self.shared.close()
         now = clock.now()
-        for station in self.stations:
-            station.cell.stop(now, "the gateway stops")
+        for runtime in self.runtimes:
+            runtime.cell.stop(now, "the gateway stops")
+        links = [link for runtime in self.runtimes for link in runtime.links.values()]
         with suppress(TimeoutError):
             async with asyncio.timeout(CLOSING_TIME):
-                await asyncio.gather(*(link.close() for station in self.stations for link in station.links))
+                await asyncio.gather(*(link.close() for link in links))
+
+
+async def _tick(runtime: CellRuntime) -> None:
+    while True:
+        adoption = runtime.cell.adoption
+        adoption.reachable = adoption.reachable or runtime.reachable
+        runtime.cell.tick(clock.judged_now())
+        await asyncio.sleep(TICK)
 
 
 async def _after(former: asyncio.Task[None] | None, work: Callable[[], Awaitable[None]]) -> None:
@@ -306,19 +246,3 @@ async def _after(former: asyncio.Task[None] | None, work: Callable[[], Awaitable
             await asyncio.wait((former,))
             raise
     await work()
-
-
-_PEER_LEVELS = {PeerEventKind.DENIED: logging.WARNING, PeerEventKind.FULL: logging.WARNING}
-
-
-def _log_peer(event: PeerEvent) -> None:
-    found: dict[str, object] = {
-        "peer": event.peer,
-        "writer": ",".join(event.writers),
-        "reason": event.reason,
-        "repeats": event.repeats,
-    }
-    level = _PEER_LEVELS.get(event.kind, logging.INFO)
-    log.log(
-        level, "Modbus client %s", event.kind.value, extra=fields(**{k: v for k, v in found.items() if v})
-    )

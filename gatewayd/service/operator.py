@@ -61,7 +61,7 @@ class Operated(Gateway, Protocol):
     def observe(self, observer: Callable[[Cell], None]) -> None:
         """Have `observer` called with every cell before anybody writes to it."""
 
-    def turns(self) -> Mapping[str, int]:
+    def progress(self) -> Mapping[str, int]:
         """A counter for each part of the gateway; 0: it has not begun."""
 
 
@@ -106,7 +106,7 @@ class Operation:
                 group.create_task(Endpoint(self._control, self.api, self._is_serving, self.reload).run())
 
     def _is_serving(self) -> bool:
-        return all(self._daemon.turns().values())
+        return all(self._daemon.progress().values())
 
     def _troubles(self) -> list[str]:
         trouble = self._file.trouble if self._file is not None else ""

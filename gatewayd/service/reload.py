@@ -15,21 +15,23 @@ from pathlib import Path
 from typing import Protocol
 
 from gatewayd.core.cell import Cell
-from gatewayd.links.modbus_server.listener import ListenError, ModbusListener
-from gatewayd.links.robot.runtime import RobotLink
+from gatewayd.links.contract import PrepareError
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
+from gatewayd.loop.retry import reason_of
 from gatewayd.mapping.compiled import Compiled
 from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.diff import Changes, as_text, compare, objections
+from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.compilation import Compilation, CompilationError
+from gatewayd.service.shared_parts import AllPrepared
 from gatewayd.service.startup import mapping_files, tell_findings
 
 __all__ = ["Outcome", "Reloader", "Result", "Swapping"]
 
 SETTLING_TIME = 0.5
-"""Seconds for which a swap waits for a robot link that has just claimed registers."""
+"""Seconds for which a swap waits for a link that is about to know more, a robot's that has just claimed registers."""
 _SHOWN = 3
 """Reasons that the one-line summary tells."""
 
@@ -45,7 +47,7 @@ class Result(Enum):
     REFUSED = "refused"
     """Unsafe now, and not forced."""
     FAILED = "failed"
-    """A file has errors or cannot be read, a listener cannot be opened, or a defect."""
+    """A file has errors or cannot be read, something shared cannot be had, or a defect."""
 
     @property
     def is_good(self) -> bool:
@@ -105,35 +107,21 @@ class Outcome:
         }
 
 
-class _Station(Protocol):
-    @property
-    def plan(self) -> Plan:
-        """What it runs."""
-
-    @property
-    def cell(self) -> Cell:
-        """Its state."""
-
-    @property
-    def robot(self) -> RobotLink:
-        """Its robot link."""
-
-
 class Swapping(Protocol):
     """What a reload needs of the daemon."""
 
     @property
-    def stations(self) -> Sequence[_Station]:
+    def runtimes(self) -> Sequence[CellRuntime]:
         """The cells that are served now."""
 
     @property
     def running(self) -> bool:
         """Whether there is anything to swap."""
 
-    async def open_new(self, plans: Sequence[Plan]) -> list[ModbusListener]:
-        """Open the listeners that are new. Raises ListenError."""
+    async def prepare(self, plans: Sequence[Plan]) -> AllPrepared:
+        """Have ready what these plans need besides what there is. Raises PrepareError."""
 
-    def swap(self, plans: Sequence[Plan], now: float, opened: Sequence[ModbusListener]) -> list[str]:
+    def swap(self, plans: Sequence[Plan], now: float, prepared: AllPrepared) -> list[str]:
         """Serve these plans instead; returns inputs left as they were."""
 
 
@@ -216,25 +204,25 @@ class Reloader:
         if objected:
             return Outcome(Result.REFUSED, objected)
         try:
-            opened = await self._daemon.open_new(plans)
-        except ListenError as error:
-            return Outcome(Result.FAILED, (error.strerror or str(error),))
+            prepared = await self._daemon.prepare(plans)
+        except PrepareError as error:
+            return Outcome(Result.FAILED, (reason_of(error),))
         await self._settle()
         # From here to the swap nothing waits: what is owned now is owned in the swap.
         objected = () if force else self._objections(plans, differences)
         if objected or not self._daemon.running:
-            await asyncio.gather(*(listener.close() for listener in opened))
+            await prepared.abort()
             if objected:
                 return Outcome(Result.REFUSED, objected)
             return Outcome(Result.FAILED, ("the gateway stops",))
         now = clock.now()
-        stranded = self._daemon.swap(plans, now, opened)
+        stranded = self._daemon.swap(plans, now, prepared)
         left = tuple(f"the robot keeps what it holds in {name}" for name in stranded)
         return Outcome(Result.APPLIED, left, swap=clock.now() - now)
 
     def _compare(self, plans: Sequence[Plan]) -> list[Changes | str]:
         """What differs, by cell; a cell that is new or gone in one sentence."""
-        running = {station.plan.cell.name: station.plan for station in self._daemon.stations}
+        running = {runtime.plan.cell.name: runtime.plan for runtime in self._daemon.runtimes}
         found: list[Changes | str] = []
         for plan in plans:
             former = running.pop(plan.cell.name, None)
@@ -248,21 +236,21 @@ class Reloader:
         return found
 
     def _objections(self, plans: Sequence[Plan], differences: Sequence[Changes | str]) -> tuple[str, ...]:
-        stations = {station.plan.cell.name: station for station in self._daemon.stations}
+        runtimes = {runtime.plan.cell.name: runtime for runtime in self._daemon.runtimes}
         found: list[str] = []
         for changes in differences:
             if isinstance(changes, Changes):
                 name = changes.old.cell.name
-                found += (f"{name}: {one}" for one in objections(changes, _owned(stations[name].cell)))
-        gone = stations.keys() - {plan.cell.name for plan in plans}
+                found += (f"{name}: {one}" for one in objections(changes, _owned(runtimes[name].cell)))
+        gone = runtimes.keys() - {plan.cell.name for plan in plans}
         found += (f"{name}: the whole cell would be gone" for name in sorted(gone))
         return tuple(found)
 
     async def _settle(self) -> None:
-        """Wait for links that have just claimed registers, so that their last fallbacks can still be sent."""
+        """Wait for links that are about to know more, so that last fallbacks can still be sent."""
         end = clock.now() + SETTLING_TIME
         while clock.now() < end and not all(  # noqa: ASYNC110
-            one.robot.settled for one in self._daemon.stations
+            link.settled for one in self._daemon.runtimes for link in one.links.values()
         ):
             await asyncio.sleep(0.002)
 

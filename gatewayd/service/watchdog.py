@@ -36,7 +36,7 @@ class Watched(Protocol):
     def cells(self) -> Sequence[Cell]:
         """The cells that are served now."""
 
-    def turns(self) -> Mapping[str, int]:
+    def progress(self) -> Mapping[str, int]:
         """A counter for each part that has to go on; 0: it has not begun."""
 
     def troubles(self) -> Sequence[str]:
@@ -77,15 +77,15 @@ class Service:
 
     def look(self, now: float) -> None:
         """Look at everything once and report."""
-        turns = self._daemon.turns()
-        late = self._liveness.late(turns, now)
+        counts = self._daemon.progress()
+        late = self._liveness.late(counts, now)
         for name in late:
             if name not in self.late:
                 log.error("a part of the gateway hangs", extra=fields(part=name))
         self.late = late
         if not self._ready:
-            self._ready = all(turns.values()) and self._notifier.ready()
-        if self._turned.all_of(turns):
+            self._ready = all(counts.values()) and self._notifier.ready()
+        if self._turned.all_of(counts):
             self._notifier.watchdog()
         self._report(now)
 

@@ -102,7 +102,7 @@ async def serve(
 
 
 async def _until_serving(daemon: Daemon) -> None:
-    while not all(daemon.turns().values()):  # noqa: ASYNC110 - parts count, they have no event to wait for
+    while not all(daemon.progress().values()):  # noqa: ASYNC110 - parts count, they have no event to wait for
         await asyncio.sleep(_LOOK)
 
 

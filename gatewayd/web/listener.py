@@ -18,7 +18,7 @@ from gatewayd.control.api import Api
 from gatewayd.control.endpoint import Reload
 from gatewayd.control.server import application
 from gatewayd.loop import clock
-from gatewayd.service.cell_runtime import Station
+from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.web import view
 from gatewayd.web.guard import GREATEST_BODY, MOST_CONNECTIONS, Doors, is_local_name, middleware
 from gatewayd.web.health import health, readiness
@@ -130,20 +130,20 @@ class StatusListener:
         return _json(view.overview(self._probes.daemon, __version__))
 
     async def _layout(self, request: web.Request) -> web.Response:
-        body = view.as_json(view.layout(self._station(request)))
+        body = view.as_json(view.layout(self._runtime(request)))
         return _packed(request, body, {"Content-Type": "application/json"})
 
     async def _state(self, request: web.Request) -> web.Response:
-        station = self._station(request)
+        runtime = self._runtime(request)
         text = request.query.get("since", "0")
         since = int(text) if text.isascii() and text.isdigit() and len(text) < 16 else 0
-        return _json(view.state(station, self._probes, since, clock.now()))
+        return _json(view.state(runtime, self._probes, since, clock.now()))
 
-    def _station(self, request: web.Request) -> Station:
+    def _runtime(self, request: web.Request) -> CellRuntime:
         name = request.match_info["cell"]
-        for station in self._probes.daemon.stations:
-            if station.cell.definition.name == name:
-                return station
+        for runtime in self._probes.daemon.runtimes:
+            if runtime.cell.definition.name == name:
+                return runtime
         raise web.HTTPNotFound(reason="there is no such cell")
 
 

@@ -6,11 +6,11 @@ prometheus-client is here.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 from prometheus_client import CollectorRegistry, ProcessCollector, generate_latest
 from prometheus_client.core import HistogramMetricFamily, Metric
@@ -23,7 +23,8 @@ from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
 from gatewayd.loop import clock
 from gatewayd.report.printable import printable
-from gatewayd.service.cell_runtime import Station
+from gatewayd.service.cell_runtime import CellRuntime
+from gatewayd.service.daemon import Daemon
 from gatewayd.web.health import readiness
 from gatewayd.web.histogram import Histogram
 from gatewayd.web.probes import Probes
@@ -240,17 +241,16 @@ class Exposition:
             "gatewayd_ready": [((), _LEVELS[ready])],
             "gatewayd_parts_hanging": [((), len(probes.late))],
             "gatewayd_troubles": [((), len(troubles))],
-            "gatewayd_modbus_up": [((one.name,), _LEVELS[one.listening]) for one in daemon.listeners],
-            "gatewayd_modbus_connections": [((one.name,), one.connections) for one in daemon.listeners],
+            **_listeners(daemon),
         }
         histograms: dict[str, list[tuple[tuple[str, ...], Histogram]]] = {
             "gatewayd_loop_lag_seconds": [((), probes.lag)],
             "gatewayd_package_to_image_seconds": [],
             "gatewayd_write_to_package_seconds": [],
         }
-        for station in daemon.stations:
-            name, probe = station.cell.definition.name, probes.of(station.cell)
-            for metric, found in _cell(station, now).items():
+        for runtime in daemon.runtimes:
+            name, probe = runtime.cell.definition.name, probes.of(runtime.cell)
+            for metric, found in _cell(runtime, now).items():
                 samples.setdefault(metric, []).extend(((name, *labels), value) for labels, value in found)
             for metric, counted in _counted(probe.events, probe.refusals).items():
                 samples.setdefault(metric, []).extend(((name, label), value) for label, value in counted)
@@ -263,8 +263,8 @@ class Exposition:
                 yield _family(info, samples[info.name])
 
 
-def _cell(station: Station, now: float) -> dict[str, list[_Sample]]:
-    cell = station.cell
+def _cell(runtime: CellRuntime, now: float) -> dict[str, list[_Sample]]:
+    cell = runtime.cell
     health, image = cell.health, cell.image
     state = cell.freshness.state
     up = state is Source.FRESH and cell.accepts_writes
@@ -294,7 +294,7 @@ def _cell(station: Station, now: float) -> dict[str, list[_Sample]]:
         "gatewayd_writes_accepted_total": [((), health.writes_accepted)],
         "gatewayd_writes_refused_total": [((), health.writes_refused)],
         **_owners(cell),
-        **_can(station),
+        **_can(runtime),
     }
 
 
@@ -311,15 +311,25 @@ def _owners(cell: Cell) -> dict[str, list[_Sample]]:
     }
 
 
-def _can(station: Station) -> dict[str, list[_Sample]]:
-    """A station without a CAN bus has no `can`, or None."""
-    node = getattr(getattr(station, "can", None), "node", None)
-    if node is None:
-        return {}
-    counters = [(one.name, getattr(node.counters, one.name)) for one in dataclasses.fields(node.counters)]
+def _listeners(daemon: Daemon) -> dict[str, list[_Sample]]:
+    found = {}
+    for runtime in daemon.runtimes:
+        if "modbus" in runtime.links:
+            figures: Any = runtime.links["modbus"].health().figures
+            found[str(figures["listen"])] = figures
     return {
-        "gatewayd_can_bus_state": [((), getattr(station.cell.health, "can_bus", 0))],
-        "gatewayd_can_total": [((name,), value) for name, value in counters if isinstance(value, int)],
+        "gatewayd_modbus_up": [((name,), _LEVELS[figures["listening"]]) for name, figures in found.items()],
+        "gatewayd_modbus_connections": [((name,), figures["connections"]) for name, figures in found.items()],
+    }
+
+
+def _can(runtime: CellRuntime) -> dict[str, list[_Sample]]:
+    if "canopen" not in runtime.links:
+        return {}
+    figures: Any = runtime.links["canopen"].health().figures
+    return {
+        "gatewayd_can_bus_state": [((), figures["bus_state"])],
+        "gatewayd_can_total": [((name,), value) for name, value in figures["counters"].items()],
     }
 
 

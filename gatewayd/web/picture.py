@@ -11,10 +11,11 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
+from gatewayd.links.contract import LinkHealth
 from gatewayd.report.format import counted, span
 from gatewayd.web.health import SOURCES
 
-__all__ = ["RECENT", "Level", "Node", "bus", "can_bus", "gateway", "robot", "writers"]
+__all__ = ["RECENT", "Level", "Node", "gateway", "link", "robot", "writers"]
 
 RECENT = 10.0
 """Seconds for which a refusal or a differing read-back colours the picture."""
@@ -110,32 +111,9 @@ def _recent(cell: Cell, kind: EventKind, now: float) -> str:
     return ""
 
 
-def bus(name: str, connections: int, *, listening: bool) -> Node:
-    """A Modbus listener."""
-    if not listening:
-        return Node(f"Modbus {name}", Level.BAD, "not listening, see the log")
-    return Node(f"Modbus {name}", Level.GOOD, f"listening, {counted(connections, 'connection')}")
-
-
-def can_bus(channel: str, state: int, node: int, nmt: str) -> Node:
-    """A CAN bus, by the state that the cell's health tells: 1 absent ... 6 active; and what our node on it is up to.
-
-    An active bus alone is not green: before NMT start no PDO goes either way. A node id above 127 is none (LSS).
-    """
-    level, words = _CAN_BUS.get(state, (Level.BAD, "in an unknown state"))
-    if level is Level.GOOD and nmt != "operational":
-        level, words = Level.WARN, f"{words}, but {nmt}: no PDOs until a master starts the node"
-    return Node(f"CAN {channel}", level, words, f"node {node if node <= 127 else 'without id'}, {nmt}")
-
-
-_CAN_BUS = {
-    1: (Level.BAD, "absent: no such interface"),
-    2: (Level.BAD, "down: the interface is not configured"),
-    3: (Level.BAD, "bus-off: cut off after too many errors"),
-    4: (Level.WARN, "error-passive: look at cable, termination and bit rate"),
-    5: (Level.WARN, "many errors: look at cable, termination and bit rate"),
-    6: (Level.GOOD, "active"),
-}
+def link(health: LinkHealth) -> Node:
+    """A link other than the robot's."""
+    return Node(health.name, Level[health.level.name], health.words, health.detail)
 
 
 def writers(cell: Cell, now: float) -> list[Node]:

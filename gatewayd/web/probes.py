@@ -1,6 +1,6 @@
 """What is measured while the status listener is configured: durations per hop, events by kind, lag of the loop.
 
-The hops are seen from listeners of the cell and its robot link, so nothing is measured, and nothing costs, without it.
+The hops are seen from listeners of the cell and its source, so nothing is measured, and nothing costs, without it.
 """
 
 from __future__ import annotations
@@ -9,30 +9,23 @@ import asyncio
 from collections import Counter
 from collections.abc import Callable, Iterable
 from itertools import islice
-from typing import Protocol
 
 from gatewayd.core.cell import Cell, Written
 from gatewayd.core.definition import Direction
 from gatewayd.core.events import Event, EventKind, EventRing
 from gatewayd.core.refusal import Reason
+from gatewayd.links.contract import SourceLink
 from gatewayd.loop import clock
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.liveness import Liveness
 from gatewayd.web.histogram import Histogram
 
-__all__ = ["LAG_PERIOD", "CellProbe", "Probes", "Sender"]
+__all__ = ["LAG_PERIOD", "CellProbe", "Probes"]
 
 LAG_PERIOD = 0.1
 """Seconds between two looks at the loop's lag."""
 _LOOKS_PER_ROUND = 5
 """Looks at the lag for each look at the daemon's cells and parts."""
-
-
-class Sender(Protocol):
-    """What a probe needs of a robot link."""
-
-    sent_listeners: list[Callable[[], None]]
-    """Called after packages went to the controller."""
 
 
 class CellProbe:
@@ -50,9 +43,9 @@ class CellProbe:
         self._written_at: float | None = None
         self._counted = 0
         self._cell: Cell | None = None
-        self._link: Sender | None = None
+        self._link: SourceLink | None = None
 
-    def attach(self, cell: Cell, link: Sender) -> None:
+    def attach(self, cell: Cell, link: SourceLink) -> None:
         """Follow this cell and link from now on. Events that the ring has and that were not counted yet are."""
         if cell is not self._cell:
             self._cell = cell
@@ -132,9 +125,9 @@ class Probes:
 
     def look(self, now: float) -> None:
         """Find the cells that are served now and the parts that hang."""
-        self.late = self._liveness.late(self.daemon.turns(), now)
-        for station in self.daemon.stations:
-            self.of(station.cell).attach(station.cell, station.robot)
+        self.late = self._liveness.late(self.daemon.progress(), now)
+        for runtime in self.daemon.runtimes:
+            self.of(runtime.cell).attach(runtime.cell, runtime.source)
         served = {cell.definition.name for cell in self.daemon.cells}
         for name in self._cells.keys() - served:
             del self._cells[name]

@@ -18,12 +18,13 @@ from gatewayd.core.definition import Direction, Fallback, Lock, Variable
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality
 from gatewayd.links.canopen_node.plan import canopen_of
-from gatewayd.links.modbus_server.listener import ModbusListener
+from gatewayd.links.contract import SourceLink
 from gatewayd.links.modbus_server.plan import Placement, modbus_of
 from gatewayd.links.robot.plan import robot_of
 from gatewayd.report.event_text import Happening
+from gatewayd.report.format import address
 from gatewayd.report.printable import json_text
-from gatewayd.service.cell_runtime import Station
+from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
 from gatewayd.web import picture
 from gatewayd.web.picture import Level, Node
@@ -77,21 +78,23 @@ def overview(daemon: Daemon, version: str) -> dict[str, object]:
     }
 
 
-def layout(station: Station) -> dict[str, object]:
+def layout(runtime: CellRuntime) -> dict[str, object]:
     """What the mapping fixes. It is the same as long as the fingerprint is."""
-    definition, modbus = station.cell.definition, modbus_of(station.plan)
+    definition, modbus = runtime.cell.definition, modbus_of(runtime.plan)
     places: dict[int, list[dict[str, object]]] = {}
     for one in modbus.placements if modbus is not None else ():
         places.setdefault(one.variable, []).append(_place(one))
-    for index, place in _objects(station).items():
+    for index, place in _objects(runtime).items():
         places.setdefault(index, []).append(place)
     return {
         "cell": definition.name,
-        "fingerprint": _fingerprint(station.cell),
-        "robot": f"{robot_of(station.plan).host}:{robot_of(station.plan).port}",
-        "modbus": None if modbus is None else {"listen": _listen(station), "unit": modbus.unit},
+        "fingerprint": _fingerprint(runtime.cell),
+        "robot": f"{robot_of(runtime.plan).host}:{robot_of(runtime.plan).port}",
+        "modbus": None
+        if modbus is None
+        else {"listen": address(modbus.host, modbus.port), "unit": modbus.unit},
         "writers": [{"name": one.name, "timeout": one.timeout} for one in definition.writers],
-        "locks": [_lock(one, station.cell) for one in definition.locks],
+        "locks": [_lock(one, runtime.cell) for one in definition.locks],
         "variables": [
             _variable(one, places.get(index, ())) for index, one in enumerate(definition.variables)
         ],
@@ -138,9 +141,9 @@ def _place(place: Placement) -> dict[str, object]:
     }
 
 
-def _objects(station: Station) -> dict[int, dict[str, object]]:
+def _objects(runtime: CellRuntime) -> dict[int, dict[str, object]]:
     """The CANopen side, in the form of a Modbus place: object, and COB-ID of the PDO that carries it."""
-    canopen = canopen_of(station.plan)
+    canopen = canopen_of(runtime.plan)
     if canopen is None:
         return {}
     cob_ids = {entry.variable: f"COB-ID 0x{pdo.cob_id:03X}" for pdo in canopen.pdos for entry in pdo.entries}
@@ -159,11 +162,11 @@ def _fallback(fallback: Fallback) -> str:
     return fallback.kind.value if fallback.value is None else json.dumps(fallback.value)
 
 
-def state(station: Station, probes: Probes, since: int, now: float) -> dict[str, object]:
+def state(runtime: CellRuntime, probes: Probes, since: int, now: float) -> dict[str, object]:
     """What there is at one moment; of the events those after the first `since`."""
-    cell = station.cell
+    cell = runtime.cell
     image, ownership, health = cell.image, cell.ownership, cell.health
-    nodes = _picture(station, probes, now)
+    nodes = _picture(runtime, probes, now)
     owned = [
         [lock, owner, _milliseconds(ownership.remaining(lock, now))]
         for lock, owner in enumerate(ownership.owners)
@@ -235,20 +238,14 @@ def _event(event: Event, cell: Cell, number: int, at: float, more: int) -> dict[
     }
 
 
-def _picture(station: Station, probes: Probes, now: float) -> dict[str, object]:
-    cell = station.cell
-    robot = picture.robot(
-        cell, f"{robot_of(station.plan).host}:{robot_of(station.plan).port}", station.robot.trouble, now
-    )
+def _picture(runtime: CellRuntime, probes: Probes, now: float) -> dict[str, object]:
+    cell = runtime.cell
+    source = runtime.source.health()
+    robot = picture.robot(cell, str(source.figures["address"]), "; ".join(source.problems), now)
     gateway = picture.gateway(cell, probes.late, probes.troubles(), now)
-    listener = _listener(station, probes.daemon)
-    buses = []
-    if listener is not None:
-        buses.append(picture.bus(listener.name, listener.connections, listening=listener.listening))
-    can, canopen = station.can, canopen_of(station.plan)
-    if can is not None and canopen is not None:
-        nmt = can.node.nmt.state.name.lower().replace("_", "-")
-        buses.append(picture.can_bus(canopen.channel, cell.health.can_bus, can.node.node_id, nmt))
+    buses = [
+        picture.link(link.health()) for link in runtime.links.values() if not isinstance(link, SourceLink)
+    ]
     writers = picture.writers(cell, now)
     levels = [one.level for one in (robot, gateway, *buses, *writers) if one.level is not Level.IDLE]
     return {
@@ -262,18 +259,6 @@ def _picture(station: Station, probes: Probes, now: float) -> dict[str, object]:
 
 def _node(node: Node) -> dict[str, object]:
     return {"name": node.name, "level": node.level.name.lower(), "words": node.words, "facts": node.facts}
-
-
-def _listener(station: Station, daemon: Daemon) -> ModbusListener | None:
-    name = _listen(station)
-    return next((one for one in daemon.listeners if one.name == name), None)
-
-
-def _listen(station: Station) -> str:
-    modbus = modbus_of(station.plan)
-    if modbus is None:
-        return ""
-    return f"[{modbus.host}]:{modbus.port}" if ":" in modbus.host else f"{modbus.host}:{modbus.port}"
 
 
 def _fingerprint(cell: Cell) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from gatewayd.control.api import Moment
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
+from gatewayd.links.contract import Link, LinkHealth
 from gatewayd.mapping.loader import load_together
 from gatewayd.mapping.plan import Plan
 
@@ -40,26 +41,29 @@ START, LIMIT, SPEED, PATH, CYCLES = range(5)
 
 
 @dataclass
-class ServedRobot:
+class ServedRobot(Link):
     """A link to a controller."""
 
     trouble: str = ""
 
+    def health(self) -> LinkHealth:
+        return LinkHealth(problems=(self.trouble,) if self.trouble else ())
+
 
 @dataclass
 class Served:
-    """A station."""
+    """A cell with its links."""
 
     plan: Plan
     cell: Cell
-    robot: ServedRobot = field(default_factory=ServedRobot)
+    source: ServedRobot = field(default_factory=ServedRobot)
 
 
 @dataclass
 class FixedGateway:
     """What `Api` asks of a daemon."""
 
-    stations: Sequence[Served]
+    runtimes: Sequence[Served]
     wrong: list[str] = field(default_factory=list)
 
     def troubles(self) -> Sequence[str]:

@@ -18,7 +18,7 @@ from gatewayd.core.requester import Requester
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.mapping.loader import load
 from gatewayd.report.summary import sentence
-from gatewayd.service.cell_runtime import Station
+from gatewayd.service.cell_runtime import CellRuntime
 from tests.control.served import CYCLES, LIMIT, SPEED, Served, at
 
 PLC, HMI = 0, 1
@@ -119,9 +119,9 @@ class TestProblems:
         assert problems(press.cell, 8.0) == ["robot not connected for 8 s"]
 
     def test_why_the_robot_cannot_be_reached(self, api: Api, press: Served) -> None:
-        """Cause and remedy, without the address that stands beside it."""
+        """Cause and remedy."""
         press.cell.robot_lost("gone", 1.0)
-        press.robot.trouble = "192.168.1.10:30004: connection refused: the robot is booting"
+        press.source.trouble = "connection refused: the robot is booting"
         (cell,) = api.status(at(8.0))["cells"]
         assert cell["problems"] == ["robot not connected for 8 s: connection refused: the robot is booting"]
 
@@ -186,12 +186,12 @@ def test_a_bus_that_does_not_carry_is_a_problem(tmp_path: Path) -> None:
     mapping = Path(__file__).parents[2] / "mappings" / "two-buses.yaml"
     plan = load(mapping.read_bytes(), mapping.name).plan
     assert plan is not None
-    station = Station(plan, tmp_path)
-    told = cell_view(station, 1.0)
+    runtime = CellRuntime(plan, tmp_path, 0.0)
+    told = cell_view(runtime, 1.0)
     assert told["canopen"].keys() == documented.CANOPEN.keys()
     assert (told["canopen"]["bus"], told["canopen"]["nmt_state"]) == ("absent", "initialising")
     assert "CAN bus absent" in told["problems"]
-    assert "CAN bus absent" in sentence([station.cell])
-    station.cell.health.can_bus = 6
-    assert not any("CAN" in problem for problem in problems(station.cell, 1.0))
-    assert "CAN" not in sentence([station.cell])
+    assert "CAN bus absent" in sentence([runtime.cell])
+    runtime.cell.health.can_bus = 6
+    assert not any("CAN" in problem for problem in problems(runtime.cell, 1.0))
+    assert "CAN" not in sentence([runtime.cell])

@@ -9,12 +9,12 @@ from contextlib import suppress
 import pytest
 
 from gatewayd.loop import progress as module
-from gatewayd.loop.progress import turning
+from gatewayd.loop.progress import wait_with_progress
 
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "TURN", 0.01)
+    monkeypatch.setattr(module, "STEP", 0.01)
     monkeypatch.setattr(module, "GRACE", 0.1)
 
 
@@ -28,13 +28,13 @@ class Counter:
 
 async def test_the_result_comes_through_and_turns_are_counted_meanwhile() -> None:
     turns = Counter()
-    assert await turning(asyncio.sleep(0.1, "done"), turns, 0.1) == "done"
+    assert await wait_with_progress(asyncio.sleep(0.1, "done"), turns, 0.1) == "done"
     assert 3 <= turns.count <= 11
 
 
 async def test_what_is_done_at_once_has_had_a_turn() -> None:
     turns = Counter()
-    await turning(asyncio.sleep(0), turns, 0)
+    await wait_with_progress(asyncio.sleep(0), turns, 0)
     assert turns.count == 1
 
 
@@ -43,12 +43,12 @@ async def test_an_error_comes_through() -> None:
         raise OSError("refused")
 
     with pytest.raises(OSError, match="refused"):
-        await turning(fail(), Counter(), 1)
+        await wait_with_progress(fail(), Counter(), 1)
 
 
 async def test_work_that_outlasts_its_limit_has_no_turns_any_more() -> None:
     turns = Counter()
-    waiting = asyncio.create_task(turning(asyncio.Event().wait(), turns, 0.05))
+    waiting = asyncio.create_task(wait_with_progress(asyncio.Event().wait(), turns, 0.05))
     await asyncio.sleep(0.3)
     seen = turns.count
     await asyncio.sleep(0.1)
@@ -68,7 +68,7 @@ async def test_a_cancellation_ends_the_work_first() -> None:
             await asyncio.sleep(0.02)
             ended.append("work")
 
-    waiting = asyncio.create_task(turning(work(), Counter(), 1))
+    waiting = asyncio.create_task(wait_with_progress(work(), Counter(), 1))
     await asyncio.sleep(0.02)
     waiting.cancel()
     with pytest.raises(asyncio.CancelledError):
@@ -83,7 +83,7 @@ async def test_an_error_that_comes_with_the_cancellation_is_nobodys(caplog: pyte
         finally:
             raise OSError("at the end")
 
-    waiting = asyncio.create_task(turning(work(), Counter(), 1))
+    waiting = asyncio.create_task(wait_with_progress(work(), Counter(), 1))
     await asyncio.sleep(0.02)
     waiting.cancel()
     with pytest.raises(asyncio.CancelledError):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gatewayd.core.health import CAN_BUS
+from gatewayd.canopen.bus import BusState
 from gatewayd.core.requester import Requester
+from gatewayd.links.canopen_node.runtime import CanLink
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
-from gatewayd.service.cell_runtime import Station
+from gatewayd.service.cell_runtime import CellRuntime
 
 TEXT = """\
 gatewayd: 1
@@ -36,49 +37,59 @@ def without_can() -> Plan:
     return loaded.plan
 
 
+def can_of(runtime: CellRuntime) -> CanLink:
+    link = runtime.links["canopen"]
+    assert isinstance(link, CanLink)
+    return link
+
+
 def test_a_cell_without_canopen_has_the_robot_alone(tmp_path: Path) -> None:
-    station = Station(without_can(), tmp_path)
-    assert station.can is None
-    assert station.links == (station.robot,)
+    runtime = CellRuntime(without_can(), tmp_path, 0.0)
+    assert runtime.links == {"robot": runtime.source}
 
 
 def test_a_cell_with_canopen_has_both_links(tmp_path: Path) -> None:
-    station = Station(plan(), tmp_path)
-    assert station.links == (station.robot, station.can)
+    runtime = CellRuntime(plan(), tmp_path, 0.0)
+    assert runtime.links == {"robot": runtime.source, "canopen": can_of(runtime)}
 
 
-def test_a_node_is_on_its_bus_while_that_carries_frames(tmp_path: Path) -> None:
-    station = Station(plan(), tmp_path)
+def test_a_cell_is_reachable_while_its_bus_carries_frames_and_always_without_a_fieldbus(
+    tmp_path: Path,
+) -> None:
+    runtime = CellRuntime(plan(), tmp_path, 0.0)
     found = {}
-    for state, name in enumerate(CAN_BUS):
-        station.cell.health.can_bus = state
-        found[name] = station.is_on_bus
-    assert {name for name, on in found.items() if on} == {"passive", "warning", "active"}
-    assert not Station(without_can(), tmp_path).is_on_bus
+    for state in BusState:
+        can_of(runtime).node.bus = state
+        found[state] = runtime.reachable
+    assert {state for state, on in found.items() if on} == {
+        BusState.PASSIVE,
+        BusState.WARNING,
+        BusState.ACTIVE,
+    }
+    assert CellRuntime(without_can(), tmp_path, 0.0).reachable
 
 
 def test_another_policy_goes_on_with_values_and_node(tmp_path: Path) -> None:
-    station = Station(plan(), tmp_path)
-    cell, can = station.cell, station.can
+    runtime = CellRuntime(plan(), tmp_path, 0.0)
+    cell, can = runtime.cell, can_of(runtime)
     cell.image.values[0] = 7
-    station.succeed(plan(stale="hold"), 1.0)
-    assert station.cell is not cell
-    assert station.cell.image.values[0] == 7
-    assert station.can is can
+    runtime.succeed(plan(stale="hold"), 1.0)
+    assert runtime.cell is not cell
+    assert runtime.cell.image.values[0] == 7
+    assert can_of(runtime) is can
     assert cell.listeners == []
 
 
 def test_other_objects_need_another_node(tmp_path: Path) -> None:
     """Its dictionary is that of one mapping: it boots, and who wrote on the former one is lost."""
-    station = Station(plan(), tmp_path)
-    can = station.can
-    station.cell.writer_connected(Requester(0), 0.5)
-    station.succeed(plan(placed="object"), 1.0)
-    assert station.can is not None
-    assert station.can is not can
+    runtime = CellRuntime(plan(), tmp_path, 0.0)
+    can = can_of(runtime)
+    runtime.cell.writer_connected(Requester(0), 0.5)
+    runtime.succeed(plan(placed="object"), 1.0)
+    assert can_of(runtime) is not can
 
 
 def test_canopen_can_be_taken_away(tmp_path: Path) -> None:
-    station = Station(plan(), tmp_path)
-    station.succeed(without_can(), 1.0)
-    assert station.can is None
+    runtime = CellRuntime(plan(), tmp_path, 0.0)
+    runtime.succeed(without_can(), 1.0)
+    assert runtime.links.keys() == {"robot"}

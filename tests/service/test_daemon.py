@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from gatewayd.core.freshness import Source
-from gatewayd.loop.progress import TURN
+from gatewayd.links.modbus_server.listener import ModbusListener
+from gatewayd.links.modbus_server.listeners import Listeners
+from gatewayd.loop.progress import STEP
 from gatewayd.mapping.loader import load_together
 from gatewayd.mapping.plan import Plan
 from gatewayd.service import daemon as daemon_module
@@ -47,6 +49,12 @@ def plans(*cells: tuple[int, int, int]) -> list[Plan]:
     return [one.plan for one in load_together(files) if one.plan is not None]
 
 
+def listeners(daemon: Daemon) -> list[ModbusListener]:
+    shared = daemon.shared.of("modbus")
+    assert isinstance(shared, Listeners)
+    return shared.listeners
+
+
 Running = Callable[[Daemon], AbstractAsyncContextManager[asyncio.Task[None]]]
 
 
@@ -76,15 +84,15 @@ async def until(condition: Callable[[], object]) -> None:
 
 def test_cells_share_a_listener_by_address() -> None:
     daemon = Daemon(plans((1, 31001, 1502), (2, 31002, 1502), (3, 31003, 1503)), STATE)
-    assert len(daemon.stations) == 3
-    assert [listener.name for listener in daemon.listeners] == ["127.0.0.1:1502", "127.0.0.1:1503"]
+    assert len(daemon.runtimes) == 3
+    assert [listener.name for listener in listeners(daemon)] == ["127.0.0.1:1502", "127.0.0.1:1503"]
 
 
 def test_a_cell_without_modbus_has_no_listener() -> None:
     text = "gatewayd: 1\ncell: a\nrobot: {host: 127.0.0.1}\nvariables: {x: {robot: output_int_register_0}}\n"
     (loaded,) = load_together([("a.yaml", text.encode())])
     assert loaded.plan is not None, loaded.diagnostics
-    assert Daemon([loaded.plan], STATE).listeners == []
+    assert list(Daemon([loaded.plan], STATE).shared) == []
 
 
 async def test_a_defect_in_one_cell_costs_neither_the_others_nor_the_process(
@@ -93,7 +101,7 @@ async def test_a_defect_in_one_cell_costs_neither_the_others_nor_the_process(
     """Whatever raises in the clock tick of a cell is logged; the next tick comes."""
     async with SimulatedController() as robot:
         daemon = Daemon(plans((1, robot.port, free_port()), (2, free_port(), free_port())), STATE)
-        good, bad = daemon.stations
+        good, bad = daemon.runtimes
 
         def fail(_now: float) -> None:
             raise RuntimeError("a defect")
@@ -115,7 +123,7 @@ async def test_a_cell_is_reachable_once_its_listener_listens(running: Running) -
         port = int(other.getsockname()[1])
         async with SimulatedController() as robot, SimulatedController() as another:
             daemon = Daemon(plans((1, robot.port, port), (2, another.port, free_port())), STATE)
-            waiting, served = (station.cell for station in daemon.stations)
+            waiting, served = (runtime.cell for runtime in daemon.runtimes)
             async with running(daemon):
                 await until(lambda: waiting.accepts_writes and served.adoption.reachable)
                 assert not waiting.adoption.reachable
@@ -136,8 +144,8 @@ async def test_a_link_that_ends_by_a_defect_is_started_again(
     monkeypatch.setattr(daemon_module, "RETRY_PERIOD", 0.1)
     async with SimulatedController() as robot:
         daemon = Daemon(plans((1, robot.port, free_port())), STATE)
-        (station,) = daemon.stations
-        original = station.cell.package_arrived
+        (runtime,) = daemon.runtimes
+        original = runtime.cell.package_arrived
         failures = 2
 
         def fail(timestamp: float | None, now: float, raw: float | None = None) -> bool:
@@ -147,10 +155,10 @@ async def test_a_link_that_ends_by_a_defect_is_started_again(
                 raise RuntimeError("a defect")
             return original(timestamp, now, raw)
 
-        monkeypatch.setattr(station.cell, "package_arrived", fail)
+        monkeypatch.setattr(runtime.cell, "package_arrived", fail)
         async with running(daemon):
-            await until(lambda: station.cell.freshness.state is Source.FRESH)
-            assert station.cell.accepts_writes
+            await until(lambda: runtime.cell.freshness.state is Source.FRESH)
+            assert runtime.cell.accepts_writes
     assert len([record for record in caplog.records if "internal error" in record.getMessage()]) == 2
 
 
@@ -164,19 +172,19 @@ async def test_a_link_that_rests_after_a_defect_turns_and_a_core_that_fails_does
 
     async with SimulatedController() as robot:
         daemon = Daemon(plans((1, robot.port, free_port())), STATE)
-        (station,) = daemon.stations
+        (runtime,) = daemon.runtimes
         turned = Turned()
         async with running(daemon):
-            await until(lambda: turned.all_of(daemon.turns()))
-            monkeypatch.setattr(station.cell, "package_arrived", fail)
+            await until(lambda: turned.all_of(daemon.progress()))
+            monkeypatch.setattr(runtime.cell, "package_arrived", fail)
             for _ in range(4):
-                await asyncio.sleep(4 * TURN)
-                assert turned.all_of(daemon.turns())
-            monkeypatch.setattr(station.cell, "tick", fail)
-            await asyncio.sleep(2 * TURN)
-            turned.all_of(daemon.turns())
-            await asyncio.sleep(4 * TURN)
-            assert not turned.all_of(daemon.turns())
+                await asyncio.sleep(4 * STEP)
+                assert turned.all_of(daemon.progress())
+            monkeypatch.setattr(runtime.cell, "tick", fail)
+            await asyncio.sleep(2 * STEP)
+            turned.all_of(daemon.progress())
+            await asyncio.sleep(4 * STEP)
+            assert not turned.all_of(daemon.progress())
 
 
 def test_an_observer_sees_every_cell_that_a_reload_brings_before_it_is_served() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from gatewayd.control.api import Moment
 from gatewayd.control.client import Client
-from gatewayd.control.views import StationView
+from gatewayd.control.views import RuntimeView
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.requester import Requester
@@ -19,7 +19,7 @@ from gatewayd.service.operator import JUST_NOW, Operation, Standstill
 
 
 class Gateway:
-    """A daemon with one cell that is in no station."""
+    """A daemon with one cell that is in no runtime."""
 
     def __init__(self) -> None:
         number = Variable(1, "number", Direction.INPUT, ValueKind.INT, "input_int_register_0", lock=0)
@@ -34,13 +34,13 @@ class Gateway:
         return [self.cell]
 
     @property
-    def stations(self) -> Sequence[StationView]:
+    def runtimes(self) -> Sequence[RuntimeView]:
         return ()
 
     def observe(self, observer: Callable[[Cell], None]) -> None:
         observer(self.cell)
 
-    def turns(self) -> Mapping[str, int]:
+    def progress(self) -> Mapping[str, int]:
         return {"core": 1}
 
     def troubles(self) -> Sequence[str]:

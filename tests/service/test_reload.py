@@ -18,11 +18,13 @@ from gatewayd.core.cell import Cell, Change
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.requester import Requester
+from gatewayd.links.modbus_server.listener import ModbusListener
+from gatewayd.links.modbus_server.listeners import Listeners
 from gatewayd.mapping.compiled import Compiled
 from gatewayd.mapping.worker import compile_files
 from gatewayd.service import reload as reload_module
 from gatewayd.service import startup as startup_module
-from gatewayd.service.cell_runtime import Station
+from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.compilation import Compilation
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.reload import Outcome, Reloader, Result
@@ -55,6 +57,12 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+def listeners(daemon: Daemon) -> list[ModbusListener]:
+    shared = daemon.shared.of("modbus")
+    assert isinstance(shared, Listeners)
+    return shared.listeners
 
 
 async def until(condition: Callable[[], object]) -> None:
@@ -90,12 +98,12 @@ class Rig:
         (self.directory / f"{name}.yaml").write_text(text + variables)
 
     @property
-    def station(self) -> Station:
-        return self.daemon.stations[0]
+    def runtime(self) -> CellRuntime:
+        return self.daemon.runtimes[0]
 
     @property
     def cell(self) -> Cell:
-        return self.station.cell
+        return self.runtime.cell
 
     def set(self, variable: str, value: float) -> None:
         names = [one.name for one in self.cell.definition.variables]
@@ -155,7 +163,7 @@ def rigged(tmp_path: Path) -> Rigged:
             stop = asyncio.Event()
             running = asyncio.create_task(rig.daemon.run(stop))
             try:
-                await until(lambda: rig.cell.accepts_writes and rig.daemon.listeners[0].listening)
+                await until(lambda: rig.cell.accepts_writes and listeners(rig.daemon)[0].listening)
                 yield rig
             finally:
                 stop.set()
@@ -186,11 +194,11 @@ async def test_a_new_place_for_a_known_field_keeps_every_link(rigged: Rigged) ->
         reader, writer = await asyncio.open_connection("127.0.0.1", rig.port)
         rig.set("number", 42)
         rig.write(VARIABLES + MORE)
-        link = rig.station.robot
+        link = rig.runtime.source
         outcome = await rig.reloader.reload()
         print(f"swap {outcome.swap * 1000:.2f} ms")
         assert outcome.text == "reloaded: press: 1 variable added"
-        assert rig.station.robot is link
+        assert rig.runtime.source is link
         assert rig.cell.health.sessions == 1
         assert rig.owners() == {"number": "plc"}
         assert rig.cell.writers.connections == [1, 0]
@@ -297,7 +305,7 @@ async def test_a_missing_or_empty_directory_changes_nothing(rigged: Rigged) -> N
         outcome = await rig.reloader.reload(force=True)
         assert outcome.result is Result.FAILED
         assert "no mapping file" in outcome.text
-        assert len(rig.daemon.stations) == 1
+        assert len(rig.daemon.runtimes) == 1
 
 
 async def test_cells_come_and_go_with_their_files(rigged: Rigged) -> None:
@@ -307,7 +315,7 @@ async def test_cells_come_and_go_with_their_files(rigged: Rigged) -> None:
         outcome = await rig.reloader.reload()
         assert outcome.text == "reloaded: stamp: new cell, 1 variables"
         assert rig.cell is first, "who did not change is not touched"
-        stamp = rig.daemon.stations[1]
+        stamp = rig.daemon.runtimes[1]
         await until(lambda: stamp.cell.freshness.state is Source.FRESH)
         await until(lambda: rig.robot.clients == 2)
         rig.set("real", 9.5)
@@ -317,7 +325,7 @@ async def test_cells_come_and_go_with_their_files(rigged: Rigged) -> None:
         assert outcome.result is Result.REFUSED
         assert "press: the whole cell would be gone" in outcome.text
         assert (await rig.reloader.reload(force=True)).result is Result.APPLIED
-        assert [station.plan.cell.name for station in rig.daemon.stations] == ["stamp"]
+        assert [runtime.plan.cell.name for runtime in rig.daemon.runtimes] == ["stamp"]
         await until(lambda: rig.robot.get("input_double_register_0") == -1.5)
         assert stamp.cell.health.sessions == 1
 
@@ -327,7 +335,7 @@ async def test_cells_are_checked_together(rigged: Rigged) -> None:
         rig.write("  count: {robot: output_int_register_5, modbus: 0}\n", name="stamp", unit=1)
         outcome = await rig.reloader.reload(force=True)
         assert "GW206" in outcome.text
-        assert len(rig.daemon.stations) == 1
+        assert len(rig.daemon.runtimes) == 1
 
 
 async def test_a_listener_moves(rigged: Rigged) -> None:
@@ -347,7 +355,7 @@ async def test_a_listener_moves(rigged: Rigged) -> None:
         assert await read(new_reader, new_writer, 100, 2) == b"\x00\x00\x00\x00"
         with pytest.raises(ConnectionError):
             await asyncio.open_connection("127.0.0.1", rig.port)
-        assert [listener.name for listener in rig.daemon.listeners] == [f"127.0.0.1:{port}"]
+        assert [listener.name for listener in listeners(rig.daemon)] == [f"127.0.0.1:{port}"]
         assert rig.cell.health.sessions == 1
         new_writer.close()
 
@@ -360,7 +368,7 @@ async def test_a_port_that_is_taken_changes_nothing(rigged: Rigged) -> None:
         assert outcome.result is Result.FAILED
         assert "cannot listen on" in outcome.text
         assert "another program listens there" in outcome.text
-        assert rig.daemon.listeners[0].address == ("127.0.0.1", rig.port)
+        assert listeners(rig.daemon)[0].address == ("127.0.0.1", rig.port)
 
 
 async def test_a_wildcard_takes_the_place_of_its_own_port(rigged: Rigged) -> None:
@@ -373,8 +381,8 @@ async def test_a_wildcard_takes_the_place_of_its_own_port(rigged: Rigged) -> Non
         )
         outcome = await rig.reloader.reload()
         assert outcome.result is Result.APPLIED, outcome.text
-        await until(lambda: rig.daemon.listeners[0].listening)
-        assert rig.daemon.listeners[0].address[0] == "0.0.0.0"
+        await until(lambda: listeners(rig.daemon)[0].listening)
+        assert listeners(rig.daemon)[0].address[0] == "0.0.0.0"
 
 
 async def test_a_writer_whose_peers_change_is_another_one(rigged: Rigged) -> None:
@@ -457,4 +465,5 @@ async def test_many_reloads_leave_no_tasks_behind(rigged: Rigged) -> None:
             rig.write(VARIABLES + (NEW_FIELD if number % 2 else MORE))
             assert (await rig.reloader.reload()).result is Result.APPLIED
             await until(lambda: rig.cell.accepts_writes)
-        await until(lambda: len(rig.daemon._tasks) == 2)
+        # Core, robot link and listeners.
+        await until(lambda: len(rig.daemon._tasks) == 3)

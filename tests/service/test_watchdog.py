@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from gatewayd.core.cell import Cell
-from gatewayd.loop.progress import TURN
+from gatewayd.loop.progress import STEP
 from gatewayd.mapping.loader import load_together
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.liveness import Turned
@@ -77,7 +77,7 @@ class Gateway:
         self.counts = {"core": 0, "robot": 1}
         self.wrong: list[str] = []
 
-    def turns(self) -> dict[str, int]:
+    def progress(self) -> dict[str, int]:
         return dict(self.counts)
 
     def troubles(self) -> list[str]:
@@ -161,7 +161,7 @@ async def test_a_defect_is_logged_once_and_feeds_nobody(
     def fail() -> dict[str, int]:
         raise RuntimeError("a defect")
 
-    monkeypatch.setattr(gateway, "turns", fail)
+    monkeypatch.setattr(gateway, "progress", fail)
     stop = asyncio.Event()
     task = asyncio.create_task(Service(notifier, gateway).run(stop))
     await asyncio.sleep(0.1)
@@ -224,12 +224,12 @@ async def test_every_part_of_a_real_daemon_turns_whatever_its_peers_do() -> None
             stop = asyncio.Event()
             tasks = [asyncio.create_task(gateway.run(stop)) for gateway in gateways]
             try:
-                await until(lambda: all(all(gateway.turns().values()) for gateway in gateways))
+                await until(lambda: all(all(gateway.progress().values()) for gateway in gateways))
                 turned = [Turned() for _ in gateways]
                 for _ in range(6):
-                    await asyncio.sleep(4 * TURN)
+                    await asyncio.sleep(4 * STEP)
                     assert all(
-                        one.all_of(gateway.turns()) for one, gateway in zip(turned, gateways, strict=True)
+                        one.all_of(gateway.progress()) for one, gateway in zip(turned, gateways, strict=True)
                     )
             finally:
                 stop.set()

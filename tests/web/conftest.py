@@ -13,7 +13,7 @@ from gatewayd.core.cell import Cell, Change
 from gatewayd.core.requester import Requester
 from gatewayd.mapping.loader import load
 from gatewayd.service.audit import Audit
-from gatewayd.service.cell_runtime import Station
+from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.listener import StatusListener
 from gatewayd.web.probes import Probes
@@ -28,9 +28,9 @@ def daemon() -> Daemon:
 
 
 @pytest.fixture
-def station(daemon: Daemon) -> Station:
+def runtime(daemon: Daemon) -> CellRuntime:
     """The robot is fresh; `plc` owns start and force_limit, `hmi` was refused `start`, `spare` is unavailable."""
-    found = daemon.stations[0]
+    found = daemon.runtimes[0]
     cell, now = found.cell, time.monotonic()
     cell.tick(now)
     cell.robot_connected(now, "controller 5.12")
@@ -46,13 +46,13 @@ def station(daemon: Daemon) -> Station:
 
 
 @pytest.fixture
-def cell(station: Station) -> Cell:
-    return station.cell
+def cell(runtime: CellRuntime) -> Cell:
+    return runtime.cell
 
 
 @pytest.fixture
-def probes(station: Station, daemon: Daemon) -> Probes:
-    assert station in daemon.stations
+def probes(runtime: CellRuntime, daemon: Daemon) -> Probes:
+    assert runtime in daemon.runtimes
     found = Probes(daemon)
     found.look(time.monotonic())
     return found

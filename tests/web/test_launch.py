@@ -58,7 +58,7 @@ async def test_an_address_in_use_is_said_once_and_tried_again(
     daemon: Daemon, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("gatewayd.web.launch.RETRY_PERIOD", 0.02)
-    monkeypatch.setattr(Daemon, "turns", lambda _self: {"core": 1})
+    monkeypatch.setattr(Daemon, "progress", lambda _self: {"core": 1})
     port = free_port()
     caplog.set_level("INFO")
     squatter = await asyncio.start_server(lambda _r, _w: None, HOST, port)

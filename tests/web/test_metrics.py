@@ -10,7 +10,8 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from gatewayd.core.cell import Cell
-from gatewayd.service.cell_runtime import Station
+from gatewayd.links.contract import Link, LinkHealth
+from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS, Exposition, Kind
 from gatewayd.web.probes import Probes
@@ -87,8 +88,8 @@ def test_a_lost_robot_ages(probes: Probes, cell: Cell) -> None:
     assert one(samples, "gatewayd_ready") == 0
 
 
-def test_what_never_came_is_infinitely_old(probes: Probes, station: Station) -> None:
-    station.cell = Cell(station.cell.definition)
+def test_what_never_came_is_infinitely_old(probes: Probes, runtime: CellRuntime) -> None:
+    runtime.cell = Cell(runtime.cell.definition)
     probes.look(time.monotonic())
     assert one(read(probes), "gatewayd_robot_age_seconds", cell="press") == math.inf
 
@@ -98,24 +99,15 @@ def test_the_local_operator_owns_under_a_name(probes: Probes, cell: Cell) -> Non
     assert one(read(probes), "gatewayd_locks_owned", cell="press", writer="operator") == 1
 
 
-def test_counters_of_a_can_node_are_told_by_name(probes: Probes, station: Station) -> None:
-    """The CANopen link is another station's attribute; a stand-in has what is read of it."""
+def test_counters_of_a_can_node_are_told_by_name(probes: Probes, runtime: CellRuntime) -> None:
+    class Node(Link):
+        def health(self) -> LinkHealth:
+            return LinkHealth(figures={"bus_state": 6, "counters": {"received": 5, "overruns": 1}})
 
-    @dataclasses.dataclass
-    class Counters:
-        received: int = 5
-        overruns: int = 1
-
-    class Node:
-        counters = Counters()
-
-    class Link:
-        node = Node()
-
-    station.can = Link()  # type: ignore[assignment]
+    runtime.links["canopen"] = Node()
     samples = read(probes)
     assert one(samples, "gatewayd_can_total", cell="press", counter="received") == 5
-    assert one(samples, "gatewayd_can_bus_state", cell="press") == 0
+    assert one(samples, "gatewayd_can_bus_state", cell="press") == 6
 
 
 def test_troubles_are_counted(daemon: Daemon) -> None:

@@ -10,7 +10,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
-from gatewayd.web.picture import RECENT, Level, bus, can_bus, gateway, robot, writers
+from gatewayd.web.picture import RECENT, Level, gateway, robot, writers
 from tests.web.press import CYCLES, HMI, LINE, PLC, SPARE
 
 ADDRESS = "10.0.0.1:30004"
@@ -61,25 +61,6 @@ def test_gateway_tells_the_worst_first(cell: Cell, now: float) -> None:
     assert gateway(cell, (), (), now).words == "read-back differs: int 0: 1, not 2"
     assert gateway(cell, ("core",), (), now).level is Level.BAD
     assert "forced" in gateway(cell, (), (), now + 2 * RECENT).words
-
-
-def test_a_bus_is_red_while_nobody_listens() -> None:
-    assert bus(":502", 1, listening=True).words == "listening, 1 connection"
-    assert bus(":502", 0, listening=False).level is Level.BAD
-
-
-def test_a_can_bus_is_green_only_when_active() -> None:
-    levels = [can_bus("can0", state, 16, "operational").level for state in range(1, 8)]
-    assert levels.index(Level.GOOD) == 5
-    assert levels.count(Level.GOOD) == 1
-
-
-def test_an_active_can_bus_is_yellow_until_a_master_starts_the_node() -> None:
-    node = can_bus("can0", 6, 16, "pre-operational")
-    assert (node.name, node.level, node.facts) == ("CAN can0", Level.WARN, "node 16, pre-operational")
-    assert node.words == "active, but pre-operational: no PDOs until a master starts the node"
-    assert can_bus("can0", 1, 255, "initialising").words == "absent: no such interface"
-    assert can_bus("can0", 1, 255, "initialising").facts == "node without id, initialising"
 
 
 def test_writers_by_their_last_deeds(cell: Cell, now: float) -> None:

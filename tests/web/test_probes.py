@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
 from contextlib import suppress
 
 from gatewayd.core.cell import Cell, Change
@@ -12,15 +11,16 @@ from gatewayd.core.definition import Direction
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
-from gatewayd.service.cell_runtime import Station
+from gatewayd.links.contract import SourceLink
+from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.probes import CellProbe, Probes
 from tests.web.press import PLC, START
 
 
-class Link:
+class Link(SourceLink):
     def __init__(self) -> None:
-        self.sent_listeners: list[Callable[[], None]] = []
+        self.sent_listeners = []
 
     def send(self) -> None:
         for listener in self.sent_listeners:
@@ -105,10 +105,10 @@ async def test_a_blocked_loop_shows_as_lag(probes: Probes) -> None:
     assert probes.lag.total > 0.1
 
 
-def test_a_part_that_stands_still_is_late(station: Station, daemon: Daemon) -> None:
+def test_a_part_that_stands_still_is_late(runtime: CellRuntime, daemon: Daemon) -> None:
     probes, now = Probes(daemon), time.monotonic()
     for step in range(4):
-        station.cell.health.heartbeat += 1
+        runtime.cell.health.heartbeat += 1
         probes.look(now + step / 2)
     assert "robot link of press" in probes.late
     assert "core of press" not in probes.late

@@ -6,11 +6,16 @@ from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.links.canopen_node.description import description
-from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.canopen_node.plan import CanopenPlan, by_name
 from gatewayd.links.contract import Description, LinkKind
 from gatewayd.mapping.plan import LinkPlan
 
-__all__ = ["KIND"]
+__all__ = ["BUS_STATES", "KIND", "NMT_STATES"]
+
+BUS_STATES = ("", "absent", "down", "bus-off", "passive", "warning", "active")
+"""What the status word `can_bus` means; 0: there is no CANopen."""
+NMT_STATES = {0: "initialising", 4: "stopped", 5: "operational", 127: "pre-operational"}
+"""What the status word `nmt_state` means."""
 
 
 class CanopenNode(LinkKind):
@@ -32,5 +37,12 @@ class CanopenNode(LinkKind):
         """Another bus, or another node on it, is not the one that a master has started."""
         return ("interface", "channel", "node")
 
+    def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
+        """The same node goes on where nothing that the bus can see is different."""
+        assert isinstance(old, CanopenPlan)
+        assert isinstance(new, CanopenPlan)
+        return by_name(old, before) == by_name(new, after)
+
 
 KIND = CanopenNode()
+"""What everybody may know of this kind of link."""

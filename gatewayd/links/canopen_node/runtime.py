@@ -10,6 +10,7 @@ import asyncio
 import logging
 import math
 from contextlib import suppress
+from dataclasses import asdict
 from datetime import datetime
 
 from gatewayd.canopen.bus import Bus, BusError, BusState
@@ -20,16 +21,20 @@ from gatewayd.canopen.lss import BIT_RATES
 from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.queue import Transmitter
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import CellDefinition, Direction
+from gatewayd.core.definition import Direction
+from gatewayd.links.canopen_node.declaration import BUS_STATES, NMT_STATES
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
-from gatewayd.links.canopen_node.plan import CanopenPlan, by_name
-from gatewayd.links.canopen_node.storage import Store
+from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.canopen_node.storage import JsonStore, Store
+from gatewayd.links.contract import Context, Level, Link, LinkHealth, LinkRuntime
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
-from gatewayd.loop.progress import turning
+from gatewayd.loop.progress import wait_with_progress
+from gatewayd.loop.retry import until_done
+from gatewayd.mapping.plan import LinkPlan
 
-__all__ = ["CORE_TIME", "LOSS_INTERVAL", "RETRY", "CanLink"]
+__all__ = ["CORE_TIME", "LOSS_INTERVAL", "RETRY", "RUNTIME", "CanLink"]
 
 CORE_TIME = 0.5
 """Seconds without a count of the core's heartbeat after which the core counts as stuck."""
@@ -43,8 +48,10 @@ CLOCK_STEP = 1.0
 log = logging.getLogger("gatewayd.canopen")
 
 
-class CanLink(Observer):
+class CanLink(Link, Observer):
     """Keeps `cell` on its CAN bus while `run` runs."""
+
+    title = "CAN link"
 
     def __init__(self, plan: CanopenPlan, cell: Cell, store: Store) -> None:
         self._plan = plan
@@ -69,8 +76,7 @@ class CanLink(Observer):
         self._other_bit_rate: int | None = None
         self._switch = (0, 0.0)
         self._switching = asyncio.Event()
-        self.turns = 0
-        """Counts while the link's task goes on, whatever the bus does."""
+        self._progress = 0
         # The kernel's interfaces are set by whoever administers them; python-can opens its own with a bit rate.
         self._bit_rates = (
             () if plan.interface == "socketcan" else tuple(rate for rate in BIT_RATES if rate is not None)
@@ -79,6 +85,42 @@ class CanLink(Observer):
         self.node = self._new_node()
         cell.listeners.append(self._on_image)
         cell.health.can_bus = BusState.ABSENT + 1
+
+    @property
+    def progress(self) -> int:
+        """Counts while the link's task goes on, whatever the bus does."""
+        return self._progress
+
+    @property
+    def reachable(self) -> bool:
+        """While the bus carries frames."""
+        return self.node.bus.carries
+
+    def health(self) -> LinkHealth:
+        """How the bus is, and what the node on it is up to.
+
+        An active bus alone is not well: before NMT start no PDO goes either way. A node-ID above 127 is none (LSS).
+        """
+        bus, nmt = self.node.bus, NMT_STATES[self.node.nmt.state]
+        level, words = _BUS_WORDS[bus]
+        if level is Level.GOOD and nmt != "operational":
+            level, words = Level.WARN, f"{words}, but {nmt}: no PDOs until a master starts the node"
+        number = self.node.node_id
+        return LinkHealth(
+            f"CAN {self._plan.channel}",
+            level,
+            words,
+            f"node {number if number <= 127 else 'without id'}, {nmt}",
+            () if bus is BusState.ACTIVE else (f"CAN bus {BUS_STATES[bus + 1]}",),
+            {
+                "channel": f"{self._plan.interface}:{self._plan.channel}",
+                "node": self._plan.node,
+                "bus": BUS_STATES[bus + 1],
+                "bus_state": bus + 1,
+                "nmt_state": nmt,
+                "counters": asdict(self.node.counters),
+            },
+        )
 
     async def run(self) -> None:
         """Stay on the bus until cancelled. May be run again: for the node the bus was away meanwhile."""
@@ -91,20 +133,21 @@ class CanLink(Observer):
                 self.node.start(now)
             self._schedule(now)
             while True:
-                await self._turn_until(math.inf)
+                await self._wait_until(math.inf)
                 self._switching.clear()
                 bit_rate, silence = self._switch
-                await self._turn_until(clock.now() + silence)
+                await self._wait_until(clock.now() + silence)
                 await self._open(bit_rate)
         finally:
             self._leave()
 
-    def fits(self, plan: CanopenPlan, definition: CellDefinition) -> bool:
-        """Whether the same node can go on with another plan: nothing that the bus can see is different."""
-        return by_name(self._plan, self._cell.definition) == by_name(plan, definition)
+    def release(self, now: float) -> None:
+        """Another node takes the place of this one: who wrote by it is lost."""
+        self.node.lose_writers("the new mapping needs another node", now)
 
-    def rebind(self, plan: CanopenPlan, cell: Cell, now: float) -> None:
-        """Go on, unnoticed by the bus, with the cell that succeeded the present one; only where `fits` says so."""
+    def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
+        """Go on, unnoticed by the bus, with the cell that succeeded the present one."""
+        assert isinstance(plan, CanopenPlan)
         former = self.node
         self._plan, self._cell = plan, cell
         self.node = self._new_node()
@@ -222,34 +265,33 @@ class CanLink(Observer):
             bit_rates=self._bit_rates,
         )
 
-    def _turn(self) -> None:
-        self.turns += 1
+    def _count(self) -> None:
+        self._progress += 1
 
-    async def _turn_until(self, moment: float) -> None:
+    async def _wait_until(self, moment: float) -> None:
         """Wait for that moment, or for a switch of the bit rate, and count meanwhile."""
         rest = moment - clock.now()
         # Not wait_for: Python 3.11's can swallow a cancellation that comes with the time-out.
         with suppress(TimeoutError):
             async with asyncio.timeout(None if rest == math.inf else rest):
-                await turning(self._switching.wait(), self._turn, math.inf)
+                await wait_with_progress(self._switching.wait(), self._count, math.inf)
 
     async def _open(self, bit_rate: int) -> None:
-        """Open the bus; a set-up that cannot work is told once and tried again, in case it is repaired."""
-        told = ""
-        while True:
-            bus = make_bus(self._plan.interface, self._plan.channel, bit_rate, self)
+        """Open the bus; a set-up that cannot work is tried again, in case it is repaired."""
+
+        async def attempt() -> None:
+            bus = self._bus = make_bus(self._plan.interface, self._plan.channel, bit_rate, self)
             bus.set_filters(self.node.cob_ids(), self.node.remote_ids())
-            self._bus = bus
             try:
-                await turning(bus.open(), self._turn, math.inf)
-            except BusError as error:
+                await wait_with_progress(bus.open(), self._count, math.inf)
+            except BusError:
                 self._bus = None
-                if str(error) != told:
-                    told = str(error)
-                    log.error("%s", told, extra=fields(**self._names(), retry_s=RETRY))  # noqa: TRY400 - the text says it all
-                await turning(asyncio.sleep(RETRY), self._turn, RETRY)
-            else:
-                return
+                raise
+
+        def report(error: Exception) -> None:
+            log.error("%s", error, extra=fields(**self._names(), retry_s=RETRY))
+
+        await until_done(attempt, BusError, report, RETRY, self._count)
 
     def _compare_bit_rates(self) -> None:
         """The kernel's interface is what it is; `check` has computed the load with what the mapping says."""
@@ -334,3 +376,26 @@ class CanLink(Observer):
             "bus": f"{self._plan.interface}:{self._plan.channel}",
             "node": self._plan.node,
         }
+
+
+_BUS_WORDS = {
+    BusState.ABSENT: (Level.BAD, "absent: no such interface"),
+    BusState.DOWN: (Level.BAD, "down: the interface is not configured"),
+    BusState.BUS_OFF: (Level.BAD, "bus-off: cut off after too many errors"),
+    BusState.PASSIVE: (Level.WARN, "error-passive: look at cable, termination and bit rate"),
+    BusState.WARNING: (Level.WARN, "many errors: look at cable, termination and bit rate"),
+    BusState.ACTIVE: (Level.GOOD, "active"),
+}
+
+
+class CanopenRuntime(LinkRuntime):
+    """Nodes, each with a file of what its master had it store."""
+
+    def make(self, plan: LinkPlan, cell: Cell, context: Context) -> CanLink:
+        """A node, which boots when its link runs."""
+        assert isinstance(plan, CanopenPlan)
+        return CanLink(plan, cell, JsonStore(context.state / f"{cell.definition.name}.canopen.json"))
+
+
+RUNTIME = CanopenRuntime()
+"""What the daemon needs of this kind of link."""

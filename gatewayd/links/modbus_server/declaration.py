@@ -18,6 +18,7 @@ class ModbusServer(LinkKind):
 
     key = "modbus"
     title = "Modbus TCP server"
+    usual = True
     place = "list of its places: `area`, `address` from 0, `bit` or null, `notation` (4xxxxx form)"
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
@@ -29,5 +30,10 @@ class ModbusServer(LinkKind):
         """Clients of another listener or unit connect anew."""
         return ("listen", "unit")
 
+    def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
+        """A unit always goes on; if it moves to another listener, its clients have to follow."""
+        return True
+
 
 KIND = ModbusServer()
+"""What everybody may know of this kind of link."""

@@ -18,7 +18,7 @@ from gatewayd.core.definition import Direction, Value, Variable
 from gatewayd.links.robot.transfer import InputTransfer
 from gatewayd.rtde.companions import COMPANIONS
 
-__all__ = ["DOMAINS", "STAGE", "Actuation", "Driven", "Key", "Stage", "wanted_inputs", "wanted_outputs"]
+__all__ = ["DOMAINS", "STAGE", "Actuation", "Driven", "Key", "Stage", "all_inputs", "all_outputs"]
 
 STAGE = 0.01
 """Least seconds for which a fallback goes out with its mask set, and never less than two control cycles."""
@@ -34,14 +34,16 @@ Key = tuple[str, int | None]
 _DIGITAL_LINES = {"standard_digital_output": 8, "configurable_digital_output": 8, "tool_digital_output": 2}
 
 
-def wanted_outputs(variables: Sequence[Variable]) -> tuple[str, ...]:
-    """Outputs to subscribe besides the mapped ones, so that the inputs among `variables` can act as they are meant."""
-    return (DOMAINS,) if any(_type_of(variable) for variable in variables) else ()
+def all_outputs(mapped: Sequence[str], variables: Sequence[Variable]) -> tuple[str, ...]:
+    """Outputs to subscribe: the `mapped` ones, and what the inputs among `variables` need to act as they are meant."""
+    domains = (DOMAINS,) if any(_type_of(variable) for variable in variables) else ()
+    return tuple(dict.fromkeys((*mapped, *domains)))
 
 
-def wanted_inputs(variables: Sequence[Variable]) -> tuple[str, ...]:
-    """Inputs to claim besides the mapped ones."""
-    return tuple(dict.fromkeys(kind for variable in variables if (kind := _type_of(variable)) is not None))
+def all_inputs(mapped: Sequence[str], variables: Sequence[Variable]) -> tuple[str, ...]:
+    """Inputs to claim: the `mapped` ones and their companions."""
+    types = (kind for variable in variables if (kind := _type_of(variable)) is not None)
+    return tuple(dict.fromkeys((*mapped, *types)))
 
 
 def _type_of(variable: Variable) -> str | None:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.links.contract import Description, LinkKind
+from gatewayd.links.robot.companions import all_inputs, all_outputs
 from gatewayd.links.robot.description import description
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.mapping.plan import LinkPlan
@@ -18,6 +19,19 @@ class Robot(LinkKind):
 
     key = "robot"
     title = "Universal Robots controller"
+    usual = True
+
+    def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
+        """The session goes on where its settings and claimed inputs are the same, and all outputs are subscribed."""
+        assert isinstance(old, RobotPlan)
+        assert isinstance(new, RobotPlan)
+        return (
+            _session_of(old) == _session_of(new)
+            and set(all_inputs(old.inputs, before.variables)) == set(all_inputs(new.inputs, after.variables))
+            and set(all_outputs(new.outputs, after.variables)).issubset(
+                all_outputs(old.outputs, before.variables)
+            )
+        )
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
         """The session with the controller."""
@@ -29,4 +43,12 @@ class Robot(LinkKind):
         return ("host", "port")
 
 
+def _session_of(plan: RobotPlan) -> tuple[object, ...]:
+    """The settings that a session is made with."""
+    watchdog = plan.watchdog
+    fed = (watchdog.field, watchdog.frequency) if watchdog is not None else None
+    return plan.host, plan.port, plan.frequency, plan.verify, fed
+
+
 KIND = Robot()
+"""What everybody may know of this kind of link."""

@@ -10,26 +10,29 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, FallbackKind, Value
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
+from gatewayd.links.contract import Context, Level, LinkHealth, LinkRuntime, SourceLink
 from gatewayd.links.robot.availability import unavailable
-from gatewayd.links.robot.companions import Driven, wanted_inputs, wanted_outputs
+from gatewayd.links.robot.companions import Driven, all_inputs, all_outputs
 from gatewayd.links.robot.inputs import ClaimedInputs
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.links.robot.readback import Package
 from gatewayd.links.robot.transfer import OutputTransfer
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
+from gatewayd.mapping.plan import LinkPlan
+from gatewayd.report.format import address
 from gatewayd.rtde.claims import WATCHDOG_KEY
 from gatewayd.rtde.client import ClientSettings, Loss, LossReason, RtdeClient, Session
 from gatewayd.rtde.messages import TextMessage
 
-__all__ = ["LAST_WORDS", "LOSS_INTERVAL", "RobotLink"]
+__all__ = ["LAST_WORDS", "LOSS_INTERVAL", "RUNTIME", "RobotLink"]
 
 LOSS_INTERVAL = 60.0
 """Seconds after which a connection that still fails for the same reason is told again."""
@@ -43,22 +46,22 @@ _FEED_LIMIT = 1 << 31
 log = logging.getLogger("gatewayd.robot")
 
 
-class RobotLink:
+class RobotLink(SourceLink):
     """Keeps `cell` and its controller in step while `run` runs."""
+
+    title = "robot link"
 
     def __init__(self, plan: RobotPlan, cell: Cell, former: RobotLink | None = None) -> None:
         """With a `former` link the counters go on; its `run` must have ended before this one's begins."""
         self._plan = plan
         self._cell = cell
         watchdog, variables = plan.watchdog, cell.definition.variables
-        self._outputs_wanted = _united(plan.outputs, wanted_outputs(variables))
-        self._inputs_wanted = _united(plan.inputs, wanted_inputs(variables))
         self._client = RtdeClient(
             ClientSettings(
                 plan.host,
                 plan.port,
-                outputs=self._outputs_wanted,
-                inputs=self._inputs_wanted,
+                outputs=all_outputs(plan.outputs, variables),
+                inputs=all_inputs(plan.inputs, variables),
                 watchdog=watchdog.field if watchdog is not None else None,
                 frequency=plan.frequency,
                 read_back=plan.verify,
@@ -88,17 +91,21 @@ class RobotLink:
         self._feeds = 0
         self._loss_told: tuple[str, float] = ("", -math.inf)
         self._closing = False
-        self.sent_listeners: list[Callable[[], None]] = []
-        """Called after packages went to the controller. They must not raise."""
+        self.sent_listeners = []
         cell.listeners.append(self._on_change)
 
-    @property
-    def trouble(self) -> str:
-        """Why there was no session at the last attempt; empty since the last one began."""
-        return self._loss_told[0]
+    def health(self) -> LinkHealth:
+        """The session; how fresh what it brings is, the cell knows."""
+        where = address(self._plan.host, self._plan.port)
+        trouble = self._loss_told[0].removeprefix(f"{self._plan.host}:{self._plan.port}: ")
+        figures = {"address": where, "trouble": trouble}
+        if self._client.session is not None:
+            return LinkHealth("Robot", Level.GOOD, "connected", where, figures=figures)
+        problems = (trouble,) if trouble else ()
+        return LinkHealth("Robot", Level.BAD, "not connected", trouble or where, problems, figures)
 
     @property
-    def turns(self) -> int:
+    def progress(self) -> int:
         """Moves several times a second while `run` works, whatever the controller does."""
         return self._client.statistics.turns
 
@@ -177,14 +184,12 @@ class RobotLink:
         """False between the claim of registers and the package that tells what they hold."""
         return self._session is None
 
-    def rebind(self, plan: RobotPlan, cell: Cell, now: float) -> bool:
+    def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
         """Go on with another plan and the successor of the cell, by the session that is there, at once.
 
-        False, and nothing has happened, if the plan needs another session: other settings, other inputs to claim, or
-        outputs that are not subscribed. Inputs that are new take over what the controller was last given.
+        Inputs that are new take over what the controller was last given.
         """
-        if not self._serves(plan, cell):
-            return False
+        assert isinstance(plan, RobotPlan)
         self.flush(now)
         if self._on_change in self._cell.listeners:
             self._cell.listeners.remove(self._on_change)
@@ -192,7 +197,7 @@ class RobotLink:
         cell.listeners.append(self._on_change)
         session = self._agreed
         if session is None:
-            return True
+            return
         variables = cell.definition.variables
         reasons = unavailable(session, variables)
         self._outputs = OutputTransfer(variables, self._slots, reasons)
@@ -205,16 +210,6 @@ class RobotLink:
             cell.adopt(
                 {index: value for index, value in held.items() if quality[index] is Quality.NEVER}, now
             )
-        return True
-
-    def _serves(self, plan: RobotPlan, cell: Cell) -> bool:
-        """Whether the session of the present plan is one for that plan and cell too."""
-        variables = cell.definition.variables
-        return (
-            _session_of(plan) == _session_of(self._plan)
-            and set(self._inputs_wanted) == {*plan.inputs, *wanted_inputs(variables)}
-            and {*plan.outputs, *wanted_outputs(variables)}.issubset(self._outputs_wanted)
-        )
 
     # -- called by the client ----------------------------------------------------------------------------------------
 
@@ -417,12 +412,18 @@ class RobotLink:
         return all(cell.writers.alive[writer] for writer in watchdog.requires)
 
 
-def _session_of(plan: RobotPlan) -> tuple[object, ...]:
-    """The settings that a session is made with."""
-    watchdog = plan.watchdog
-    fed = (watchdog.field, watchdog.frequency) if watchdog is not None else None
-    return plan.host, plan.port, plan.frequency, plan.verify, fed
+class RobotRuntime(LinkRuntime):
+    """Links to controllers."""
+
+    def make(self, plan: LinkPlan, cell: Cell, context: Context) -> RobotLink:
+        """A link; what a former one counted and drove goes on."""
+        assert isinstance(plan, RobotPlan)
+        former = context.former
+        if not isinstance(former, RobotLink):
+            return RobotLink(plan, cell)
+        cell.robot_lost("the new mapping needs another session", context.now)
+        return RobotLink(plan, cell, former)
 
 
-def _united(names: tuple[str, ...], more: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys((*names, *more)))
+RUNTIME = RobotRuntime()
+"""What the daemon needs of this kind of link."""

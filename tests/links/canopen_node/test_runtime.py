@@ -21,9 +21,11 @@ from gatewayd.canopen.pythoncan import PythonCanBus
 from gatewayd.core.cell import Cell
 from gatewayd.core.succession import succeed
 from gatewayd.links.canopen_node import runtime as link_module
+from gatewayd.links.canopen_node.declaration import KIND
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import LOSS_INTERVAL, CanLink
 from gatewayd.links.canopen_node.storage import MemoryStore
+from gatewayd.links.contract import Level
 from gatewayd.loop import clock
 from tests.links.canopen_node.conformance.bench import compiled
 from tests.links.canopen_node.recorder import until
@@ -223,7 +225,7 @@ async def test_another_cell_takes_over_unnoticed_by_the_bus(station: Station) ->
         station.cell = succeed(former, former.definition, now).cell
         former.listeners.clear()
         plan = station.link.node.plan
-        assert station.link.fits(plan, station.cell.definition)
+        assert KIND.fits(plan, plan, former.definition, station.cell.definition)
         station.forget()
         station.link.rebind(plan, station.cell, now)
         await until(lambda: len(station.frames(HEARTBEAT)) > 2)
@@ -243,7 +245,8 @@ async def test_another_cell_takes_over_unnoticed_by_the_bus(station: Station) ->
 
 def test_a_node_with_another_heartbeat_is_another_node(station: Station) -> None:
     plan = station.link.node.plan
-    assert not station.link.fits(replace(plan, heartbeat=11), station.cell.definition)
+    definition = station.cell.definition
+    assert not KIND.fits(plan, replace(plan, heartbeat=11), definition, definition)
 
 
 async def test_what_waited_through_a_gap_is_read_before_anything_else_and_only_that(station: Station) -> None:
@@ -347,3 +350,25 @@ async def test_a_bus_that_was_stuck_for_seconds_gets_nothing_old(station: Statio
         assert len(first[HEARTBEAT]) <= 2
         assert [int.from_bytes(data[:2], "little") for data in first[0x085]] == [0x8110]
         assert first[0x285] == [b"\x63" + bytes(7)]
+
+
+def test_a_can_bus_is_well_only_when_active(station: Station) -> None:
+    node = station.link.node
+    node.nmt.state = NmtState.OPERATIONAL
+    found = {}
+    for node.bus in BusState:
+        found[node.bus] = station.link.health()
+    assert [state for state, health in found.items() if health.level is Level.GOOD] == [BusState.ACTIVE]
+    assert [state for state, health in found.items() if not health.problems] == [BusState.ACTIVE]
+    assert found[BusState.BUS_OFF].problems == ("CAN bus bus-off",)
+
+
+def test_an_active_can_bus_is_not_well_until_a_master_starts_the_node(station: Station) -> None:
+    node, plan = station.link.node, station.link.node.plan
+    node.bus, node.nmt.state = BusState.ACTIVE, NmtState.PRE_OPERATIONAL
+    health = station.link.health()
+    assert (health.name, health.level) == (f"CAN {plan.channel}", Level.WARN)
+    assert health.detail == f"node {plan.node}, pre-operational"
+    assert health.words == "active, but pre-operational: no PDOs until a master starts the node"
+    node.bus = BusState.ABSENT
+    assert station.link.health().words == "absent: no such interface"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from gatewayd.core.definition import Direction, Value, ValueKind, Variable
-from gatewayd.links.robot.companions import Actuation, Driven, Key, Stage, wanted_inputs, wanted_outputs
+from gatewayd.links.robot.companions import Actuation, Driven, Key, Stage, all_inputs, all_outputs
 from gatewayd.links.robot.transfer import InputTransfer
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
@@ -43,9 +43,9 @@ class Bench:
 
 
 def test_the_domain_is_subscribed_and_the_type_claimed_for_analog_outputs_alone() -> None:
-    assert wanted_outputs((OUT, SELECT)) == wanted_inputs((OUT, SELECT)) == ()
-    assert wanted_outputs((RATIO, MASK)) == ("analog_io_types",)
-    assert wanted_inputs((RATIO, MASK)) == ("standard_analog_output_type",)
+    assert all_outputs(("a",), (OUT, SELECT)) == all_inputs(("a",), (OUT, SELECT)) == ("a",)
+    assert all_outputs((), (RATIO, MASK)) == ("analog_io_types",)
+    assert all_inputs((), (RATIO, MASK)) == ("standard_analog_output_type",)
 
 
 def test_an_unmapped_type_is_the_domain_that_the_controller_is_in() -> None:

@@ -13,6 +13,7 @@ from gatewayd.core.definition import CellDefinition
 from gatewayd.core.freshness import Source
 from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
+from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.plan import robot_of
 from gatewayd.simulator.server import SimulatedController
 from tests.links.robot.rig import HMI, PLC, Rig, linked, plan_for, rigged
@@ -145,7 +146,8 @@ async def mapping_removes_the_writer(rig: Rig, _until: Until) -> None:
     rig.cell, old = succeed(rig.cell, replace(definition, locks=locks), now).cell, rig.cell
     rig.link.flush(now)
     old.listeners.clear()
-    assert rig.link.rebind(rig.link._plan, rig.cell, now)
+    assert KIND.fits(rig.link._plan, rig.link._plan, old.definition, rig.cell.definition)
+    rig.link.rebind(rig.link._plan, rig.cell, now)
 
 
 async def mapping_removes_the_variables(rig: Rig, until: Until) -> None:
@@ -156,7 +158,7 @@ async def mapping_removes_the_variables(rig: Rig, until: Until) -> None:
     rig.cell, old = succeed(rig.cell, plan.cell, now).cell, rig.cell
     rig.link.flush(now)
     old.listeners.clear()
-    assert not rig.link.rebind(robot_of(plan), rig.cell, now)
+    assert not KIND.fits(rig.link._plan, robot_of(plan), old.definition, rig.cell.definition)
     rig.task.cancel()
     await until(rig.task.done)
 

@@ -19,6 +19,7 @@ from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
 from gatewayd.core.succession import succeed
 from gatewayd.links.robot import readback as readback_module
+from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.plan import robot_of
 from gatewayd.rtde.catalogue import SoftwareVersion
 from gatewayd.simulator.server import SimulatedController
@@ -331,11 +332,12 @@ async def test_the_watchdog_is_fed_for_living_writers_only(rigged: Rigged, until
 def rebound(rig: Rig, variables: str, options: str = "") -> Cell | None:
     """The cell that went on with these variables, by the same link; None if that takes another session."""
     plan = plan_for(rig.robot.port, variables, options)
+    if not KIND.fits(rig.link._plan, robot_of(plan), rig.cell.definition, plan.cell):
+        return None
     now = time.monotonic()
     new = succeed(rig.cell, plan.cell, now).cell
     rig.link.flush(now)
-    if not rig.link.rebind(robot_of(plan), new, now):
-        return None
+    rig.link.rebind(robot_of(plan), new, now)
     rig.cell = new
     return new
 
