@@ -27,7 +27,7 @@ from gatewayd.canopen.cob_ids import BASIC_FRAME
 from gatewayd.canopen.errors import ErrorClass, ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.supervised import SupervisedBus
-from gatewayd.canopen.supervision import LOOK, Event
+from gatewayd.canopen.supervision import LOOK, BusSignal
 from gatewayd.loop import clock
 from gatewayd.loop.threads import aside
 
@@ -224,7 +224,9 @@ class PythonCanBus(SupervisedBus):
                 self._lose(error)
                 return
             self._feed(
-                Event.OFF if off else Event.UP, now, f"{self._name} is {'off the bus' if off else 'up'}"
+                BusSignal.OFF if off else BusSignal.UP,
+                now,
+                f"{self._name} is {'off the bus' if off else 'up'}",
             )
 
     @property
@@ -236,7 +238,7 @@ class PythonCanBus(SupervisedBus):
         now = clock.now()
         self._release(broken=True)
         self._supervisor.failed(now)
-        self._feed(Event.GONE, now, f"{self._name}: {error}")
+        self._feed(BusSignal.GONE, now, f"{self._name}: {error}")
 
     # The interface
 
@@ -253,7 +255,7 @@ class PythonCanBus(SupervisedBus):
         try:
             bus = await aside(self._make, f"open {self._name}", can.BusABC.shutdown)
         except (can.CanInitializationError, can.CanOperationError, OSError) as error:
-            self._feed(Event.GONE, clock.now(), f"{self._name} cannot be opened: {error}")
+            self._feed(BusSignal.GONE, clock.now(), f"{self._name} cannot be opened: {error}")
             return
         self._bus = bus
         self._supervisor.opened()
@@ -268,7 +270,7 @@ class PythonCanBus(SupervisedBus):
         self._ask = ASK
         read = self._readable if self._descriptor >= 0 else self._look_for_frames
         self._reading = self._loop.call_soon(read)
-        self._feed(Event.UP, clock.now(), f"{self._name} is open")
+        self._feed(BusSignal.UP, clock.now(), f"{self._name} is open")
 
     def _make(self) -> can.BusABC:
         try:

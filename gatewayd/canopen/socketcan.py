@@ -17,7 +17,7 @@ from gatewayd.canopen.errors import ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.interface import ControllerState, Interface, InterfaceReader
 from gatewayd.canopen.supervised import SupervisedBus
-from gatewayd.canopen.supervision import LOOK, Event, event_of_errno
+from gatewayd.canopen.supervision import LOOK, BusSignal, event_of_errno
 from gatewayd.loop import clock
 
 __all__ = ["RECEIVE_BUFFER", "SEND_BUFFER", "SocketCanBus", "filters", "pack", "seen"]
@@ -51,12 +51,12 @@ _new_frame = tuple.__new__
 """A Frame without the detour over its keyword arguments: a third of the cost of a received frame."""
 
 _CONTROLLER = {
-    ControllerState.ACTIVE: Event.ACTIVE,
-    ControllerState.WARNING: Event.WARNING,
-    ControllerState.PASSIVE: Event.PASSIVE,
-    ControllerState.BUS_OFF: Event.OFF,
-    ControllerState.STOPPED: Event.DOWN,
-    ControllerState.SLEEPING: Event.DOWN,
+    ControllerState.ACTIVE: BusSignal.ACTIVE,
+    ControllerState.WARNING: BusSignal.WARNING,
+    ControllerState.PASSIVE: BusSignal.PASSIVE,
+    ControllerState.BUS_OFF: BusSignal.OFF,
+    ControllerState.STOPPED: BusSignal.DOWN,
+    ControllerState.SLEEPING: BusSignal.DOWN,
 }
 
 
@@ -76,15 +76,15 @@ def filters(can_ids: Iterable[int], remote_ids: Iterable[int]) -> bytes:
     return b"".join(wanted)
 
 
-def seen(interface: Interface | None) -> Event:
+def seen(interface: Interface | None) -> BusSignal:
     """What a look at the interface means."""
     if interface is None:
-        return Event.GONE
+        return BusSignal.GONE
     if not interface.up:
-        return Event.DOWN
+        return BusSignal.DOWN
     if not interface.carrier:
-        return Event.OFF
-    return Event.UP if interface.controller is None else _CONTROLLER[interface.controller]
+        return BusSignal.OFF
+    return BusSignal.UP if interface.controller is None else _CONTROLLER[interface.controller]
 
 
 class SocketCanBus(SupervisedBus):
@@ -214,8 +214,10 @@ class SocketCanBus(SupervisedBus):
     def _failed(self, error: OSError) -> None:
         """A send or receive failed: believe it, and look at once, for the reason may be gone already."""
         now = clock.now()
-        self._feed(event_of_errno(error.errno or 0) or Event.GONE, now, f"{self._channel}: {error.strerror}")
-        if event_of_errno(error.errno or 0) is not Event.DOWN:
+        self._feed(
+            event_of_errno(error.errno or 0) or BusSignal.GONE, now, f"{self._channel}: {error.strerror}"
+        )
+        if event_of_errno(error.errno or 0) is not BusSignal.DOWN:
             self._release()
 
     def _look(self) -> None:
@@ -270,7 +272,7 @@ class SocketCanBus(SupervisedBus):
             self._socket = self._make_socket()
         except OSError as error:
             self._supervisor.failed(now)
-            self._feed(Event.GONE, now, f"{self._channel} cannot be opened: {error.strerror}")
+            self._feed(BusSignal.GONE, now, f"{self._channel} cannot be opened: {error.strerror}")
             return False
         self._supervisor.opened()
         self._index = found.index

@@ -6,7 +6,7 @@ import asyncio
 
 from gatewayd.canopen.bus import BusCounters, BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame
-from gatewayd.canopen.supervision import Event, Supervisor, event_of_error
+from gatewayd.canopen.supervision import BusSignal, Supervisor, event_of_error
 from gatewayd.loop import clock
 
 __all__ = ["LAG", "ROOM_RETRY", "SupervisedBus"]
@@ -50,7 +50,7 @@ class SupervisedBus:
         """Bytes that were taken and have not gone out; 0 where nobody knows."""
         return 0
 
-    def _feed(self, event: Event, now: float, reason: str) -> None:
+    def _feed(self, event: BusSignal, now: float, reason: str) -> None:
         """Judge an event, and tell of the state if it is another one now."""
         if not self._supervisor.feed(event, now):
             return

@@ -12,9 +12,9 @@ __all__ = [
     "BUFFER_SIZE",
     "GREATEST_FRAME",
     "HEADER_SIZE",
-    "Frame",
     "FrameBuffer",
     "FramingError",
+    "ModbusFrame",
     "encode",
     "split",
 ]
@@ -38,7 +38,7 @@ class FramingError(ValueError):
     """Bytes that are no Modbus frame. Where the next one begins cannot be known: the connection must be closed."""
 
 
-class Frame(NamedTuple):
+class ModbusFrame(NamedTuple):
     """One request as it came in."""
 
     transaction: int
@@ -53,7 +53,7 @@ def encode(transaction: int, unit: int, pdu: bytes) -> bytes:
     return _HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu
 
 
-def split(data: bytearray, start: int, end: int) -> Frame | None:
+def split(data: bytearray, start: int, end: int) -> ModbusFrame | None:
     """The frame that begins at `start`, or None if it is not complete at `end`.
 
     Raises FramingError as soon as the protocol id or the length is known to be wrong.
@@ -69,7 +69,7 @@ def split(data: bytearray, start: int, end: int) -> Frame | None:
     behind = start + _PREFIX + length
     if behind > end:
         return None
-    return Frame(
+    return ModbusFrame(
         data[start] << 8 | data[start + 1], data[start + 6], bytes(data[start + HEADER_SIZE : behind]), behind
     )
 

@@ -20,7 +20,7 @@ from gatewayd.rtde.messages import (
     TextLevel,
     TextMessage,
 )
-from gatewayd.rtde.negotiation import TIMESTAMP, Event, Negotiation, Session, Wishes
+from gatewayd.rtde.negotiation import TIMESTAMP, Negotiation, Notice, Session, Wishes
 from gatewayd.rtde.pace import Pace, Statistics
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.types import DataType
@@ -331,12 +331,12 @@ class Connection(asyncio.Protocol):
         self._probe = None
         self._guarded(lambda: self._handler.probed(math.inf))
 
-    _EVENTS: ClassVar[dict[Event, Callable[[Connection], None]]] = {
-        Event.STARTED: _started,
-        Event.INPUTS_CHANGED: _inputs_changed,
-        Event.PAUSED: _pause_answered,
-        Event.RESUMED: _pause_answered,
-        Event.PROBED: _probe_answered,
+    _EVENTS: ClassVar[dict[Notice, Callable[[Connection], None]]] = {
+        Notice.STARTED: _started,
+        Notice.INPUTS_CHANGED: _inputs_changed,
+        Notice.PAUSED: _pause_answered,
+        Notice.RESUMED: _pause_answered,
+        Notice.PROBED: _probe_answered,
     }
 
     # sending

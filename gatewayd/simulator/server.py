@@ -18,8 +18,8 @@ from gatewayd.rtde.messages import TextLevel
 from gatewayd.rtde.types import DEFAULT_PORT
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import DroppedError, Faults, Mangler
-from gatewayd.simulator.line import Line
-from gatewayd.simulator.session import Session
+from gatewayd.simulator.line import OutgoingLine
+from gatewayd.simulator.session import SimulatorSession
 from gatewayd.simulator.store import Scalar
 
 __all__ = ["DEFAULT_PORT", "MAKE_UP", "MOST_CONNECTIONS", "SimulatedController"]
@@ -240,9 +240,11 @@ class _Connection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.Transport", transport)
         self._socket = cast("socket.socket", transport.get_extra_info("socket"))
-        self._line = Line(self._transport, self._server.faults)
+        self._line = OutgoingLine(self._transport, self._server.faults)
         peer = transport.get_extra_info("peername") or ("?", 0)
-        self._session = Session(self._server.controller, f"client {self._number} ({peer[0]}:{peer[1]})")
+        self._session = SimulatorSession(
+            self._server.controller, f"client {self._number} ({peer[0]}:{peer[1]})"
+        )
         if not self._server.enter(self._number, self):
             self.abort("too many connections")
             return

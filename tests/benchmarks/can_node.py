@@ -20,7 +20,7 @@ import canopen
 from can.interfaces.socketcan import socketcan as stock_socketcan
 
 from gatewayd.canopen.socketcan import SocketCanBus
-from gatewayd.canopen.supervision import Event
+from gatewayd.canopen.supervision import BusSignal
 from gatewayd.core.cell import Cell
 from gatewayd.links.canopen_node import runtime as link_module
 from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
@@ -67,7 +67,7 @@ class PairBus(SocketCanBus):
         self._pair.setblocking(False)
         self._socket = self._pair
         self._loop.add_reader(self._pair, self._readable)
-        self._feed(Event.ACTIVE, time.monotonic(), "a pair of sockets")
+        self._feed(BusSignal.ACTIVE, time.monotonic(), "a pair of sockets")
 
     def set_filters(self, can_ids: Any, remote_ids: Any = ()) -> None:
         """The other end sends what this one listens to."""

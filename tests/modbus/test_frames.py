@@ -5,9 +5,9 @@ import pytest
 from gatewayd.modbus.frames import (
     BUFFER_SIZE,
     GREATEST_FRAME,
-    Frame,
     FrameBuffer,
     FramingError,
+    ModbusFrame,
     encode,
     split,
 )
@@ -20,8 +20,8 @@ def test_encodes_the_example_of_the_messaging_guide() -> None:
 
 
 def test_splits_a_frame_off() -> None:
-    assert split(bytearray(READ + READ), 0, 24) == Frame(0x1501, 0xFF, READ[7:], 12)
-    assert split(bytearray(READ + READ), 12, 24) == Frame(0x1501, 0xFF, READ[7:], 24)
+    assert split(bytearray(READ + READ), 0, 24) == ModbusFrame(0x1501, 0xFF, READ[7:], 12)
+    assert split(bytearray(READ + READ), 12, 24) == ModbusFrame(0x1501, 0xFF, READ[7:], 24)
 
 
 @pytest.mark.parametrize("end", range(len(READ)))

@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from gatewayd.core.definition import Value
-from gatewayd.links.robot.transfer import InputTransfer, Part, Slots
+from gatewayd.links.robot.transfer import FieldPart, InputTransfer, Slots
 
 __all__ = ["VERIFY_AFTER", "Finding", "Package", "ReadBack", "same"]
 
@@ -149,7 +149,7 @@ class ReadBack:
         """Seconds for which what was sent before may still be read back."""
         return max(VERIFY_AFTER, _ROUND_TRIPS * self.round_trip) + package.lag
 
-    def _in_flight(self, parts: Iterable[Part]) -> None:
+    def _in_flight(self, parts: Iterable[FieldPart]) -> None:
         for part in parts:
             self._since.pop(part.variable, None)
 
@@ -196,7 +196,7 @@ def same(left: Sequence[Value], right: Sequence[Value]) -> bool:
     )
 
 
-def _put(part: Part, values: list[Value], value: Value) -> None:
+def _put(part: FieldPart, values: list[Value], value: Value) -> None:
     if part.mask is None:
         values[part.offset] = value
     else:

@@ -12,14 +12,14 @@ from itertools import pairwise
 
 from gatewayd.core.definition import Direction, Value, Variable
 
-__all__ = ["InputTransfer", "OutputTransfer", "Part", "Slots"]
+__all__ = ["FieldPart", "InputTransfer", "OutputTransfer", "Slots"]
 
 Slots = Mapping[str, slice]
 """Where each field of a recipe lies in its flat tuple."""
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class FieldPart:
     """What one variable is in the values of its field."""
 
     variable: int
@@ -91,7 +91,7 @@ class InputTransfer:
         ]
         self.members = tuple(index for index, _variable in wanted)
         """Indices of the variables that the recipe carries."""
-        self.parts: dict[str, tuple[Part, ...]] = {
+        self.parts: dict[str, tuple[FieldPart, ...]] = {
             name: tuple(_part(index, variable) for index, variable in wanted if variable.field == name)
             for name in self.fields
         }
@@ -139,8 +139,8 @@ class InputTransfer:
         return int(self.slots[variable.field].start) + (variable.element or 0)
 
 
-def _part(index: int, variable: Variable) -> Part:
-    return Part(index, variable.element or 0, None if variable.bit is None else 1 << variable.bit)
+def _part(index: int, variable: Variable) -> FieldPart:
+    return FieldPart(index, variable.element or 0, None if variable.bit is None else 1 << variable.bit)
 
 
 def _runs(pairs: Sequence[tuple[int, int]]) -> Iterable[tuple[slice, slice]]:
