@@ -200,7 +200,7 @@ LIBRARIES: dict[str, set[str]] = {
         "mapping",
     },
     "pydantic_core": {"mapping"},
-    "pymodbus": {"demo.plc", "links.modbus_server.listener"},
+    "pymodbus": {"demo.plc"},
     "rich": {"cli", "demo", "report.table"},
     "ruamel": {"mapping.source"},
 }
@@ -218,6 +218,7 @@ IMPURE = {
     "control.endpoint": "has the socket",
     "control.server": "speaks HTTP",
     "links.canopen_node.runtime": "a link at work",
+    "links.modbus_server.connection": "a protocol of asyncio",
     "links.modbus_server.listener": "has the sockets",
     "links.modbus_server.listeners": "opens listeners",
     "links.modbus_server.polling": "has the sockets",
