@@ -1,9 +1,9 @@
 """Every other interface of python-can on the loop: virtual, slcan, udp_multicast, vendors' adapters.
 
-Opening may take seconds, and is done aside; apart from that there is no thread of ours. Where the interface has a file
-descriptor the loop watches it; where it has none it is asked for frames every millisecond while there is traffic, more
-seldom when there is none. What python-can's configuration file says (`~/.canrc`, `/etc/can.conf`) holds for what the
-mapping does not say, so a vendor's own options have a place.
+Opening may take seconds, and is done in a daemon thread; apart from that there is no thread of ours. Where the
+interface has a file descriptor the loop watches it; where it has none it is asked for frames every millisecond while
+there is traffic, more seldom when there is none. What python-can's configuration file says (`~/.canrc`,
+`/etc/can.conf`) holds for what the mapping does not say, so a vendor's own options have a place.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.supervised import SupervisedBus
 from gatewayd.canopen.supervision import LOOK, BusSignal
 from gatewayd.loop import clock
-from gatewayd.loop.threads import aside
+from gatewayd.loop.threads import in_daemon_thread
 
 __all__ = ["ASK", "ASK_LIMIT", "PythonCanBus"]
 
@@ -253,7 +253,7 @@ class PythonCanBus(SupervisedBus):
         assert self._loop is not None
         self._supervisor.failed(clock.now())  # until it is known better
         try:
-            bus = await aside(self._make, f"open {self._name}", can.BusABC.shutdown)
+            bus = await in_daemon_thread(self._make, f"open {self._name}", can.BusABC.shutdown)
         except (can.CanInitializationError, can.CanOperationError, OSError) as error:
             self._feed(BusSignal.GONE, clock.now(), f"{self._name} cannot be opened: {error}")
             return

@@ -21,7 +21,7 @@ from gatewayd.control.endpoint import Reload
 from gatewayd.control.views import Json
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
-from gatewayd.loop.threads import aside
+from gatewayd.loop.threads import in_daemon_thread
 from gatewayd.report.printable import json_text
 
 __all__ = ["ALIVE_PERIOD", "FOLLOWERS", "GREATEST_BODY", "application", "serving"]
@@ -223,7 +223,7 @@ async def _who(request: web.Request) -> str:
     raw = sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER_CREDENTIALS.size)
     _pid, user, _group = _PEER_CREDENTIALS.unpack(raw)
     # The user database may be on the network, and asyncio's own threads would be waited for at the gateway's end.
-    return f"by {await aside(lambda: _user_name(user), 'user name')}"
+    return f"by {await in_daemon_thread(lambda: _user_name(user), 'user name')}"
 
 
 @lru_cache(maxsize=32)

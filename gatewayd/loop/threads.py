@@ -12,12 +12,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TypeVar
 
-__all__ = ["aside"]
+__all__ = ["in_daemon_thread"]
 
 _Result = TypeVar("_Result")
 
 
-async def aside(
+async def in_daemon_thread(
     work: Callable[[], _Result], name: str, unwanted: Callable[[_Result], object] = lambda _result: None
 ) -> _Result:
     """The result of `work`, or what it raises. `name` is the thread's.

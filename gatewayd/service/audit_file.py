@@ -1,7 +1,8 @@
 """The audit's file: JSON lines, rotated by size, written by a thread of its own so that no disk ever stops the gateway.
 
 A full disk, a directory without permission, a file that somebody moved away: the gateway serves on. The trouble is
-told once, lines wait in a bounded queue, writing is tried again, and the file counts what had to be dropped meanwhile.
+reported once, lines wait in a bounded queue, writing is tried again, and the file counts what had to be dropped
+meanwhile.
 """
 
 from __future__ import annotations
@@ -9,16 +10,17 @@ from __future__ import annotations
 import json
 import logging
 import os
-import threading
-from collections import deque
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from gatewayd.logs.records import fields
+from gatewayd.loop.lines import LineThread
+from gatewayd.loop.retry import Failure, reason_of
 
-__all__ = ["GREATEST_SIZE", "KEPT", "QUEUE", "RETRY", "AuditFile"]
+__all__ = ["KEPT", "MAX_SIZE", "QUEUE", "RETRY", "AuditFile"]
 
-GREATEST_SIZE = 16 * 1024 * 1024
+MAX_SIZE = 16 * 1024 * 1024
 """Bytes after which the file becomes FILE.1, FILE.1 becomes FILE.2 and so on."""
 KEPT = 5
 """Former files that are kept."""
@@ -36,77 +38,59 @@ log = logging.getLogger("gatewayd.audit")
 class AuditFile:
     """Appends lines to `path`. `write` never blocks and never raises; everything else happens in the thread."""
 
-    def __init__(
-        self, path: Path, greatest: int = GREATEST_SIZE, kept: int = KEPT, retry: float = RETRY
-    ) -> None:
+    def __init__(self, path: Path, limit: int = MAX_SIZE, kept: int = KEPT, retry: float = RETRY) -> None:
         self.path = path
-        self.dropped = 0
-        """Lines lost since the start."""
-        self.trouble = ""
-        """Why the file cannot be written now; empty while it can."""
-        self._greatest = greatest
+        self._failure = Failure(self._report)
+        self._limit = limit
         self._kept = kept
-        self._retry = retry
-        self._waiting: deque[str] = deque()
-        self._told = 0
+        self._counted = 0
         """Dropped lines that the file counts already."""
-        self._wake = threading.Event()
-        self._closing = threading.Event()
         self._descriptor = -1
         self._size = 0
-        self._thread = threading.Thread(target=self._run, name="audit file", daemon=True)
-        self._thread.start()
+        # A directory that is missing is reported at the start, not at the first write of the week.
+        self._lines = LineThread("audit file", QUEUE, self._write, gather=_GATHER, retry=retry)
+        self._lines.start()
+
+    @property
+    def dropped(self) -> int:
+        """Lines lost since the start."""
+        return self._lines.dropped
+
+    @property
+    def trouble(self) -> str:
+        """Why the file cannot be written now; empty while it can."""
+        return self._failure.reason
 
     def write(self, line: str) -> None:
         """Queue one line; the oldest ones are kept and this one is dropped if the queue is full."""
-        if len(self._waiting) >= QUEUE:
-            self.dropped += 1
-            return
-        self._waiting.append(line)
-        self._wake.set()
+        self._lines.put(line)
 
     def close(self, patience: float = 0.5) -> None:
         """Write what waits, for `patience` seconds at most."""
-        self._closing.set()
-        self._wake.set()
-        self._thread.join(patience)
+        self._lines.close(patience)
 
     # -- the thread ----------------------------------------------------------------------------------------------
 
-    def _run(self) -> None:
-        # A directory that is missing is told at the start, not at the first write of the week.
-        self._wake.set()
-        while not self._closing.is_set():
-            self._wake.wait()
-            self._closing.wait(_GATHER)
-            self._wake.clear()
-            if not self._flush() and not self._closing.wait(self._retry):
-                self._wake.set()
-        self._flush()
-        self._let_go()
-
-    def _flush(self) -> bool:
-        """Write all that waits; whether that went well."""
-        waiting, untold = self._waiting, self.dropped - self._told
-        lines = [waiting[position] for position in range(len(waiting))]
-        if untold:
-            lines.append(json.dumps({"what": "records dropped", "times": untold}))
+    def _write(self, lines: Sequence[str]) -> bool:
+        """Write these lines and how many are missing before them; whether that went well."""
+        pending = self.dropped - self._counted
+        if pending:
+            lines = [*lines, json.dumps({"what": "records dropped", "times": pending})]
         data = "".join(line + "\n" for line in lines).encode()
-        if not data and (self._descriptor >= 0 or self._closing.is_set()):
+        if not data and (self._descriptor >= 0 or self._lines.closing):
             return True
         try:
             self._open()
             self._append(data)
         except OSError as error:
             self._let_go()
-            self._complain(error.strerror or str(error))
+            self._failure.failed(error)
             return False
-        for _ in range(len(lines) - bool(untold)):
-            waiting.popleft()
-        self._told += untold
-        if self.trouble:
-            self.trouble = ""
-            log.info("the audit file can be written again", extra=fields(file=str(self.path), dropped=untold))
+        self._counted += pending
+        if self._failure.worked():
+            log.info(
+                "the audit file can be written again", extra=fields(file=str(self.path), dropped=pending)
+            )
         return True
 
     def _open(self) -> None:
@@ -117,7 +101,7 @@ class AuditFile:
                     self._let_go()
             if self._descriptor >= 0 and not self.path.exists():
                 self._let_go()
-        if self._descriptor >= 0 and self._size >= self._greatest:
+        if self._descriptor >= 0 and self._size >= self._limit:
             self._let_go()
             self._rotate()
         if self._descriptor < 0:
@@ -151,9 +135,8 @@ class AuditFile:
             with suppress(OSError):
                 os.close(descriptor)
 
-    def _complain(self, reason: str) -> None:
-        if reason != self.trouble:
-            self.trouble = reason
-            log.error(
-                "cannot write the audit file, serving on", extra=fields(file=str(self.path), reason=reason)
-            )
+    def _report(self, error: Exception) -> None:
+        log.error(
+            "cannot write the audit file, serving on",
+            extra=fields(file=str(self.path), reason=reason_of(error)),
+        )

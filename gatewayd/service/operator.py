@@ -13,6 +13,7 @@ from gatewayd.control.api import Api, Gateway
 from gatewayd.control.endpoint import Endpoint, Reload
 from gatewayd.core.cell import Cell
 from gatewayd.loop import clock
+from gatewayd.loop.retry import keep_running
 from gatewayd.service.audit import Audit
 from gatewayd.service.audit_file import AuditFile
 
@@ -89,12 +90,7 @@ class Operation:
     async def run(self) -> None:
         """Run until cancelled; then write what is still to be written."""
         try:
-            while True:
-                try:
-                    await self._run()
-                except Exception:
-                    log.exception("internal error, starting again")
-                    await asyncio.sleep(RETRY_PERIOD)
+            await keep_running(self._run, log, RETRY_PERIOD)
         finally:
             if self._file is not None:
                 self._file.close()

@@ -15,16 +15,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gatewayd.logs.records import fields
+from gatewayd.loop.retry import keep_running, reason_of, until_done
+from gatewayd.report.format import address
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.probes import Probes
 
 if TYPE_CHECKING:
     from gatewayd.control.api import Api
     from gatewayd.control.endpoint import Reload
+    from gatewayd.web.listener import StatusListener
 
-__all__ = ["LEAST_TOKEN", "RETRY_PERIOD", "Settings", "SettingsError", "parse_address", "read_token", "serve"]
+__all__ = ["MIN_TOKEN", "RETRY_PERIOD", "Settings", "SettingsError", "parse_address", "read_token", "serve"]
 
-LEAST_TOKEN = 16
+MIN_TOKEN = 16
 """Characters that a token must have."""
 RETRY_PERIOD = 2.0
 _LOOK = 0.05
@@ -39,8 +42,8 @@ class SettingsError(ValueError):
 class Settings:
     """Where to listen and what to ask for. Raises SettingsError."""
 
-    def __init__(self, address: str, token_file: Path | None = None) -> None:
-        self.host, self.port = parse_address(address)
+    def __init__(self, text: str, token_file: Path | None = None) -> None:
+        self.host, self.port = parse_address(text)
         self.token = read_token(token_file) if token_file is not None else None
 
 
@@ -70,9 +73,9 @@ def read_token(path: Path) -> str:
         raise SettingsError(f"{path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise SettingsError(f"{path}: no text") from error
-    if len(text) < LEAST_TOKEN or not text.isascii() or not text.isprintable() or " " in text:
+    if len(text) < MIN_TOKEN or not text.isascii() or not text.isprintable() or " " in text:
         raise SettingsError(
-            f"{path}: a token is one word of at least {LEAST_TOKEN} characters; make one: "
+            f"{path}: a token is one word of at least {MIN_TOKEN} characters; make one: "
             f"head -c 24 /dev/urandom | base64 > {path}"
         )
     return text
@@ -89,12 +92,12 @@ async def serve(
     measuring = asyncio.create_task(probes.run())
     try:
         await _until_serving(daemon)
-        while True:
-            try:
-                await _listen(settings, probes, api)
-            except Exception:
-                log.exception("internal error, starting the status listener again")
-            await asyncio.sleep(RETRY_PERIOD)
+        await keep_running(
+            lambda: _listen(settings, probes, api),
+            log,
+            RETRY_PERIOD,
+            what="internal error, starting the status listener again",
+        )
     finally:
         measuring.cancel()
         with suppress(asyncio.CancelledError):
@@ -108,24 +111,27 @@ async def _until_serving(daemon: Daemon) -> None:
 
 async def _listen(settings: Settings, probes: Probes, api: tuple[Api, Reload | None] | None) -> None:
     module = await asyncio.to_thread(import_module, "gatewayd.web.listener")
-    told = ""
-    name = f"[{settings.host}]" if ":" in settings.host else settings.host
-    while True:
-        listener = module.StatusListener(settings.host, settings.port, probes, settings.token, api)
-        try:
-            await listener.start()
-        except OSError as error:
-            reason = error.strerror or str(error)
-            if reason != told:
-                told = reason
-                log.error(  # noqa: TRY400 - the text says it all
-                    "cannot listen for status requests",
-                    extra=fields(listen=f"{name}:{settings.port}", reason=reason, retry_s=RETRY_PERIOD),
-                )
-            await asyncio.sleep(RETRY_PERIOD)
-            continue
-        log.info("status page", extra=fields(url=f"http://{name}:{listener.port}/"))
-        try:
-            await asyncio.get_running_loop().create_future()
-        finally:
-            await listener.close()
+
+    async def attempt() -> StatusListener:
+        listener: StatusListener = module.StatusListener(
+            settings.host, settings.port, probes, settings.token, api
+        )
+        await listener.start()
+        return listener
+
+    def report(error: Exception) -> None:
+        log.error(
+            "cannot listen for status requests",
+            extra=fields(
+                listen=address(settings.host, settings.port),
+                reason=reason_of(error),
+                retry_s=RETRY_PERIOD,
+            ),
+        )
+
+    listener = await until_done(attempt, OSError, report, RETRY_PERIOD)
+    log.info("status page", extra=fields(url=f"http://{address(settings.host, listener.port)}/"))
+    try:
+        await asyncio.get_running_loop().create_future()
+    finally:
+        await listener.close()

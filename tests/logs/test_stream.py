@@ -75,7 +75,7 @@ def test_a_reader_that_stops_holds_up_nobody(pipe: Pipe) -> None:
     assert time.monotonic() - begin < 2
     assert 89 <= stream.lost <= 91
     os.read(reading, 1 << 20)
-    stream._thread.join(10)
+    stream._lines._thread.join(10)
 
 
 @pytest.mark.usefixtures("_root")
@@ -104,4 +104,4 @@ def test_a_reader_that_is_gone_costs_its_lines_alone(pipe: Pipe) -> None:
     stream = LogStream(writing)
     stream.write("to nobody\n")
     stream.close(10)
-    assert not stream._thread.is_alive()
+    assert not stream._lines._thread.is_alive()

@@ -9,7 +9,7 @@ from contextlib import suppress
 
 import pytest
 
-from gatewayd.loop.threads import aside
+from gatewayd.loop.threads import in_daemon_thread
 
 
 async def test_the_result_comes_back_and_the_loop_goes_on_meanwhile() -> None:
@@ -19,7 +19,7 @@ async def test_the_result_comes_back_and_the_loop_goes_on_meanwhile() -> None:
         go.wait(10)
         return threading.current_thread().name
 
-    waiting = asyncio.create_task(aside(work, "slow"))
+    waiting = asyncio.create_task(in_daemon_thread(work, "slow"))
     for _ in range(3):
         await asyncio.sleep(0.01)
     assert not waiting.done()
@@ -32,7 +32,7 @@ async def test_an_error_comes_back() -> None:
         raise OSError("no such adapter")
 
     with pytest.raises(OSError, match="no such adapter"):
-        await aside(fail, "fails")
+        await in_daemon_thread(fail, "fails")
 
 
 async def test_what_comes_too_late_is_given_back() -> None:
@@ -47,7 +47,7 @@ async def test_what_comes_too_late_is_given_back() -> None:
         unwanted.append(result)
         given.set()
 
-    waiting = asyncio.create_task(aside(work, "slow", close))
+    waiting = asyncio.create_task(in_daemon_thread(work, "slow", close))
     await asyncio.sleep(0.01)
     waiting.cancel()
     with suppress(asyncio.CancelledError):
@@ -66,7 +66,7 @@ async def test_an_error_that_comes_too_late_is_nobodys() -> None:
         go.wait(10)
         raise OSError("too late")
 
-    waiting = asyncio.create_task(aside(work, "slow"))
+    waiting = asyncio.create_task(in_daemon_thread(work, "slow"))
     await asyncio.sleep(0.01)
     waiting.cancel()
     with suppress(asyncio.CancelledError):
@@ -81,7 +81,7 @@ def test_the_end_of_the_loop_waits_for_nobody() -> None:
     async def main() -> None:
         with suppress(TimeoutError):
             async with asyncio.timeout(0.05):
-                await aside(lambda: go.wait(10), "hangs", lambda _result: given.set())
+                await in_daemon_thread(lambda: go.wait(10), "hangs", lambda _result: given.set())
 
     begin = time.monotonic()
     asyncio.run(main())

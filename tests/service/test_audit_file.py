@@ -21,8 +21,8 @@ Opened = Callable[..., AuditFile]
 def opened(tmp_path: Path) -> Iterator[Opened]:
     files: list[AuditFile] = []
 
-    def make(path: Path | None = None, greatest: int = 1000, kept: int = 2) -> AuditFile:
-        files.append(AuditFile(path or tmp_path / "audit.jsonl", greatest, kept, retry=0.02))
+    def make(path: Path | None = None, limit: int = 1000, kept: int = 2) -> AuditFile:
+        files.append(AuditFile(path or tmp_path / "audit.jsonl", limit, kept, retry=0.02))
         return files[-1]
 
     yield make
@@ -109,7 +109,7 @@ def test_it_goes_on_when_the_directory_comes_and_counts_what_was_lost(
     opened: Opened, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(auditfile, "QUEUE", 3)
-    one = opened(tmp_path / "missing" / "audit.jsonl", greatest=10**6)
+    one = opened(tmp_path / "missing" / "audit.jsonl", limit=10**6)
     for number in range(10):
         one.write(str(number))
     until(lambda: bool(one.trouble))
