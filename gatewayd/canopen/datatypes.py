@@ -48,6 +48,12 @@ class CanType(Enum):
         """Whether values are floating-point numbers."""
         return self in (CanType.REAL32, CanType.REAL64)
 
+    @property
+    def bounds(self) -> tuple[int, int]:
+        """Least and greatest number of an integer type."""
+        signed = self.char.islower()
+        return -(1 << self.bits - 1) if signed else 0, (1 << self.bits - signed) - 1
+
     def pack(self, value: Value) -> bytes:
         """Little-endian bytes of a number. OverflowError or struct.error if the type cannot hold it."""
         assert self._struct is not None

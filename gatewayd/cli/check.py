@@ -189,7 +189,7 @@ def _explain(name: str) -> str:
         )
     rule = rule_of(name)
     if rule is None:
-        from gatewayd.mapping.rules.wording import did_you_mean
+        from gatewayd.report.wording import did_you_mean
 
         known = [*(rule.id for rule in rules), *(rule.slug for rule in rules)]
         hint = did_you_mean(name, known, "`gatewayd check --explain all` lists them")

@@ -118,7 +118,7 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
     console = Console(width=None if known else PIPE_WIDTH, markup=False, highlight=False)
     console.print(printable(_heading(plan)), style="bold")
     console.print(_table(entries, wide=console.width >= _WIDE))
-    if loaded.cell.canopen is not None:
+    if canopen_of(plan) is not None:
         console.print(_pdo_table(loaded))
         for line in _loads(loaded):
             console.print(line, soft_wrap=True)
@@ -143,22 +143,17 @@ def _heading(plan: Plan) -> str:
 
 
 def _notes(loaded: Loaded, plan: Plan, *, shortened: bool) -> list[str]:
+    from gatewayd.links.registry import languages
+
     notes = []
     for part, writer in zip(loaded.cell.document.writers.values(), plan.cell.writers, strict=True):
-        spec = part.spec
-        known = [
-            str(network.network_address) if network.num_addresses == 1 else str(network)
-            for network in spec.modbus
-        ]
-        if spec.canopen is not None:
-            services = "RPDO and SDO" if spec.canopen == "any" else spec.canopen.upper()
-            known.append(services if spec.node is None else f"{services}, heartbeat of node {spec.node}")
-        peers = ", ".join(known)
-        silence = writer.timeout if writer.timeout is not None else spec.heartbeat
+        known = [name for language in languages() for name in language.names(part.spec)]
+        silences = [writer.timeout, *(language.silence(part.spec) for language in languages())]
+        silence = next((silence for silence in silences if silence is not None), None)
         watch = "no timeout" if silence is None else f"lost after {silence:.6g}s of silence"
         watch += " (only writes count)" if writer.counts_writes else ""
         watch += f", keeps what it owns for {writer.grace:.6g}s without a connection" if writer.grace else ""
-        notes.append(f"writer {writer.name}: {peers}, {watch}")
+        notes.append(f"writer {writer.name}: {', '.join(known)}, {watch}")
     notes.append("-> towards the robot, <- from the robot; addresses from 0; bit 0 is the least significant")
     if plan.cell.locks and plan.cell.adopt_for is not None and not plan.cell.clear_on_connect:
         notes.append(
@@ -228,7 +223,7 @@ def _pdo_table(loaded: Loaded) -> Table:
 
     from gatewayd.core.definition import Direction
     from gatewayd.links.canopen_node.pdo_table import pdo_rows
-    from gatewayd.mapping.rules.wording import seconds
+    from gatewayd.report.wording import seconds
 
     table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False)
     for title in _PDO_COLUMNS:

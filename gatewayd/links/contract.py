@@ -15,12 +15,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from gatewayd.core.cell import Cell
-from gatewayd.core.definition import CellDefinition
-from gatewayd.core.status import StatusField
-from gatewayd.mapping.plan import LinkPlan, Plan
+if TYPE_CHECKING:
+    # A check, which has no use for a running cell, imports this module.
+    from gatewayd.core.cell import Cell
+    from gatewayd.core.definition import CellDefinition
+    from gatewayd.core.status import StatusField
+    from gatewayd.mapping.plan import LinkPlan, Plan
 
 __all__ = [
     "Context",

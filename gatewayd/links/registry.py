@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from gatewayd.links.contract import LinkKind, LinkRuntime
 
 if TYPE_CHECKING:
-    from gatewayd.links.language import LinkLanguage
+    from gatewayd.links.language import DefiningLanguage, LinkLanguage
 
-__all__ = ["LINK_KINDS", "kind_of", "kinds", "language_of", "languages", "runtime_of"]
+__all__ = ["LINK_KINDS", "definer", "kind_of", "kinds", "language_of", "languages", "runtime_of"]
 
 LINK_KINDS = (
     "gatewayd.links.robot",
@@ -41,9 +41,17 @@ def language_of(key: str) -> LinkLanguage:
     return language
 
 
+@cache
 def languages() -> tuple[LinkLanguage, ...]:
     """What all kinds add to the mapping language, in order."""
     return tuple(language_of(kind.key) for kind in kinds())
+
+
+@cache
+def definer() -> DefiningLanguage:
+    """What the one kind that defines variables adds to the mapping language."""
+    (found,) = (language for language in languages() if language.defines)
+    return cast("DefiningLanguage", found)
 
 
 @cache

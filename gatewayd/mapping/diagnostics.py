@@ -127,7 +127,7 @@ def declare(
     summary: str,
     severity: Severity = Severity.ERROR,
     *,
-    home: str = "gatewayd.mapping.rules",
+    home: str = "gatewayd.mapping.syntax",
 ) -> Rule:
     """Enter a rule into the catalogue. Raises ValueError for a malformed or a used id or slug."""
     if not _ID.fullmatch(rule_id) or not _SLUG.fullmatch(slug):

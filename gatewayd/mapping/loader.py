@@ -11,9 +11,10 @@ from pathlib import Path
 
 from gatewayd.mapping.compile import compile_plan
 from gatewayd.mapping.diagnostics import Diagnostic, Severity
-from gatewayd.mapping.document import read_document
-from gatewayd.mapping.expand import ExpandedCell, expand
+from gatewayd.mapping.expand import expand
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.plan import Plan
+from gatewayd.mapping.reader import read_document
 from gatewayd.mapping.rules.run import check_cell, check_plant
 from gatewayd.mapping.source import MAXIMUM_BYTES, parse
 

@@ -16,7 +16,11 @@ __all__ = ["LinkPlan", "Plan"]
 
 
 class LinkPlan:
-    """One link of a cell, compiled: a frozen dataclass of the link's own that fits into a pickle."""
+    """One link of a cell, compiled: a frozen dataclass of the link's own that fits into a pickle.
+
+    All of its fields count for the fingerprint but those at their default; a part that has a `meaning` (JSON's types)
+    counts with that.
+    """
 
     __slots__ = ()
 

@@ -25,8 +25,8 @@ from ruamel.yaml.events import (
 )
 from ruamel.yaml.reader import ReaderError
 
+from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule
-from gatewayd.mapping.rules import syntax
 
 __all__ = [
     "MAXIMUM_BYTES",

@@ -93,6 +93,11 @@ class Codec:
     for another number of bytes than `2 * words`.
     """
 
+    @property
+    def meaning(self) -> list[object]:
+        """What a mapping says of it; the rest follows from the variable."""
+        return [self.type, self.order, self.scale, self.offset]
+
     def __reduce__(self) -> tuple[Callable[..., Codec], tuple[object, ...]]:
         """Between processes it travels as what it was made of: its functions cannot."""
         return _compiled, (self.type, self.order, self.kind, (self.scale, self.offset), self.struct_code)

@@ -11,13 +11,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from gatewayd.core.definition import Direction, Fallback
+from gatewayd.links.canopen_node.expand import node_of
 from gatewayd.links.canopen_node.pdo_table import as_document, load_by_bit_rate, object_place, pdo_rows
+from gatewayd.links.modbus_server.expand import ExpandedPlacement, placements_of
 from gatewayd.links.modbus_server.plan import modbus_of
-from gatewayd.mapping.expand import ConcretePlacement, ConcreteVariable, ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.plan import Plan
-from gatewayd.mapping.rules.wording import cob, seconds
 from gatewayd.modbus.areas import AREA_NAMES
 from gatewayd.report.printable import json_text, printable
+from gatewayd.report.wording import cob, seconds
 
 __all__ = [
     "COLUMNS",
@@ -98,26 +100,26 @@ COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
 
 def rows(cell: ExpandedCell) -> tuple[Row, ...]:
     """The table of a cell without errors, in file order."""
-    placed: dict[int, list[ConcretePlacement]] = {}
-    for placement in cell.placements:
+    placed: dict[int, list[ExpandedPlacement]] = {}
+    for placement in placements_of(cell):
         placed.setdefault(placement.variable.index, []).append(placement)
     on_can = _canopen(cell)
     found: list[Row] = []
     for variable in cell.variables:
-        places: Sequence[ConcretePlacement | None] = placed.get(variable.index) or [None]
+        places: Sequence[ExpandedPlacement | None] = placed.get(variable.index) or [None]
         found.extend(_row(cell, variable, place, on_can.get(variable.index, {})) for place in places)
     return tuple(found)
 
 
 def _canopen(cell: ExpandedCell) -> dict[int, dict[str, Any]]:
     """What the CANopen columns hold, by variable."""
-    if cell.canopen is None:
+    node = node_of(cell)
+    if node is None:
         return {}
     columns: dict[int, dict[str, Any]] = {
-        one.variable: {"object": object_place(one), "can_type": one.plan.type.name}
-        for one in cell.canopen.objects
+        one.variable: {"object": object_place(one), "can_type": one.plan.type.name} for one in node.objects
     }
-    for pdo in cell.canopen.pdos:
+    for pdo in node.pdos:
         assert pdo.slot.cob_id is not None
         for bit, one in pdo.offsets:
             columns[one.variable] |= {"pdo": pdo.label, "cob_id": cob(pdo.slot.cob_id), "pdo_bit": bit}
@@ -139,8 +141,8 @@ def by_line(cell: ExpandedCell) -> tuple[tuple[Row, Row], ...]:
 
 def _row(
     cell: ExpandedCell,
-    variable: ConcreteVariable,
-    place: ConcretePlacement | None,
+    variable: ExpandedVariable,
+    place: ExpandedPlacement | None,
     canopen: dict[str, Any],
 ) -> Row:
     spec = variable.spec
@@ -241,9 +243,10 @@ def as_markdown(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
 
 def _markdown_pdos(cell: ExpandedCell) -> Iterator[str]:
     """The PDO table, where there is a node."""
-    if cell.canopen is None:
+    node = node_of(cell)
+    if node is None:
         return
-    spec = cell.canopen.part.spec
+    spec = node.part.spec
     yield from ("", f"## PDOs of node {spec.node} on {spec.channel} ({spec.bitrate} bit/s)", "")
     head = (
         "PDO",

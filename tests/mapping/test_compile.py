@@ -21,9 +21,9 @@ from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, 
 from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan, robot_of
 from gatewayd.mapping.compile import compile_plan
-from gatewayd.mapping.document import read_document
 from gatewayd.mapping.expand import expand
 from gatewayd.mapping.plan import Plan
+from gatewayd.mapping.reader import read_document
 from gatewayd.mapping.source import parse
 from gatewayd.modbus.areas import Area
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.mapping import diagnostics
+from gatewayd.mapping import diagnostics, syntax
 from gatewayd.mapping.diagnostics import Position, Related, Severity, rule_of
-from gatewayd.mapping.rules import syntax
 
 
 def test_position_reads_as_editors_follow_it() -> None:

@@ -10,17 +10,17 @@ from pydantic import BaseModel, ValidationError
 from gatewayd.core.definition import Fallback
 from gatewayd.links.modbus_server.sections import Modbus, PlacementSpec
 from gatewayd.links.robot.sections import Robot, Watchdog
-from gatewayd.mapping import model
-from gatewayd.modbus.areas import Area
+from gatewayd.mapping.language import FILE, VARIABLE, WRITER
+from gatewayd.mapping.model import Group
 
 SECTIONS = [
-    model.MappingFile,
+    FILE,
     Robot,
     Watchdog,
     Modbus,
-    model.WriterSpec,
-    model.Group,
-    model.VariableSpec,
+    WRITER,
+    Group,
+    VARIABLE,
     PlacementSpec,
 ]
 
@@ -38,43 +38,6 @@ def test_unknown_keys_are_refused(section: type[BaseModel]) -> None:
     assert any(error["type"] == "extra_forbidden" for error in caught.value.errors())
 
 
-def placements(value: Any) -> list[tuple[Area, int, int | None]]:
-    spec = model.VariableSpec.model_validate({"robot": "x", "modbus": value})
-    return [(placed.area, placed.address, placed.bit) for placed in spec.modbus]
-
-
-def test_placements_have_short_forms() -> None:
-    """A number, a text, a table, or a list of these."""
-    assert placements(100) == [(Area.HOLDING, 100, None)]
-    assert placements("100.10") == [(Area.HOLDING, 100, 10)]
-    assert placements({"input": 7}) == [(Area.INPUT, 7, None)]
-    assert placements(["0.3", {"coil": 3}, {"discrete": 4}]) == [
-        (Area.HOLDING, 0, 3),
-        (Area.COIL, 3, None),
-        (Area.DISCRETE, 4, None),
-    ]
-
-
-@pytest.mark.parametrize(
-    "value",
-    [
-        {},
-        {"type": "int16"},
-        {"holding": 1, "coil": 1},
-        {"coil": "1.3"},
-        {"discrete": "1.0"},
-        None,
-        True,
-        [[1]],
-    ],
-)
-def test_placement_names_exactly_one_area(value: Any) -> None:
-    """Coils and discrete inputs are bits already."""
-    with pytest.raises(ValidationError) as caught:
-        placements(value)
-    assert {error["type"] for error in caught.value.errors()} <= {"bad-address", "wrong-type"}
-
-
 @pytest.mark.parametrize(
     "section, value",
     [
@@ -87,11 +50,11 @@ def test_placement_names_exactly_one_area(value: Any) -> None:
         (Modbus, {"unit": 0}),
         (Modbus, {"unit": 248}),
         (Modbus, {"connections": 0}),
-        (model.VariableSpec, {"robot": "x", "limits": [0]}),
-        (model.VariableSpec, {"robot": "x", "limits": [0, 1, 2]}),
-        (model.VariableSpec, {"robot": "x", "deadband": -1}),
-        (model.VariableSpec, {"robot": "x", "unit": 5}),
-        (model.VariableSpec, {"robot": "x", "owner": []}),
+        (VARIABLE, {"robot": "x", "limits": [0]}),
+        (VARIABLE, {"robot": "x", "limits": [0, 1, 2]}),
+        (VARIABLE, {"robot": "x", "deadband": -1}),
+        (VARIABLE, {"robot": "x", "unit": 5}),
+        (VARIABLE, {"robot": "x", "owner": []}),
     ],
 )
 def test_values_out_of_their_range_are_refused(section: type[BaseModel], value: Any) -> None:
@@ -106,7 +69,7 @@ def test_defaults_are_the_documented_ones() -> None:
     modbus = Modbus()
     assert (str(modbus.listen), modbus.unit, modbus.allow, modbus.connections) == ("127.0.0.1:502", 1, (), 32)
     assert (modbus.idle_timeout, modbus.gaps, modbus.order) == (60.0, "refuse", "ABCD")
-    variable = model.VariableSpec.model_validate({"robot": "x"})
+    variable = VARIABLE.model_validate({"robot": "x"})
     assert (variable.on_release, variable.on_stale, variable.clamp) == (Fallback(), Fallback(), False)
 
 

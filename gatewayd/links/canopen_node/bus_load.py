@@ -6,7 +6,7 @@ their greatest rate:
 
 - synchronous: each SYNC, or every n-th; without a known period one SYNC for each package of the robot;
 - event-driven with an inhibit time: one after the other at that distance;
-- event-driven without one: with each package of the robot, which neither tells nor takes values more often; the event
+- event-driven without one: with each package of the robot, which neither reports nor takes values more often; the event
   timer may add some.
 """
 
@@ -18,11 +18,9 @@ from math import ceil
 from typing import Final
 
 from gatewayd.core.definition import Direction
-from gatewayd.links.canopen_node.expand import CanopenCell, ConcretePdo
-from gatewayd.links.robot.sections import Robot
-from gatewayd.mapping.expand import ExpandedCell
-from gatewayd.mapping.model import WriterSpec
-from gatewayd.rtde.catalogue import Series
+from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo
+from gatewayd.links.canopen_node.sections import CanopenWriter
+from gatewayd.mapping.expanded import ExpandedCell
 
 __all__ = [
     "BIT_RATES",
@@ -34,7 +32,6 @@ __all__ = [
     "bus_shares",
     "frame_bits",
     "load",
-    "package_rate",
     "pdo_bits",
     "pdo_rate",
     "station_of",
@@ -53,7 +50,6 @@ _STUFFED: Final = 34
 """Bits of a frame that are stuffed, without the data: start, identifier, control, CRC (ISO 11898-1)."""
 _OVERHEAD: Final = 47
 """Bits of a frame without data and stuff bits, with the three of the interframe space."""
-_LEAST_FREQUENCY: Final = 0.001
 _HEARTBEATS_PER_TIMEOUT: Final = 2
 
 
@@ -84,34 +80,21 @@ class Station:
     node: CanopenCell
     rate: float
     """Packages of the robot per second at most."""
-    writers: tuple[WriterSpec, ...]
+    writers: tuple[CanopenWriter, ...]
 
 
 def station_of(cell: ExpandedCell, node: CanopenCell) -> Station:
     """What a cell means for the bus that its node is on."""
-    robot = cell.document.robot.spec if cell.document.robot is not None else Robot(host="unknown")
-    writers = tuple(part.spec for part in cell.document.writers.values())
-    return Station(node, package_rate(robot), writers)
+    writers = tuple(part.spec.by(CanopenWriter) for part in cell.document.writers.values())
+    return Station(node, cell.settings.rate, writers)
 
 
-def package_rate(robot: Robot) -> float:
-    """The greatest number of packages per second that the controller may send; 500 where nothing is known."""
-    base = max(series.base_rate for series in Series)
-    if robot.series is not None:
-        base = Series.from_word(robot.series).base_rate
-    if robot.frequency == 0:
-        return float(base)
-    frequency = max(robot.frequency, _LEAST_FREQUENCY)
-    # The controller divides its base rate by a whole number, which makes it somewhat faster than asked for.
-    return frequency if robot.series is None else base / max(int(base / frequency), 1)
-
-
-def pdo_bits(pdo: ConcretePdo) -> int:
+def pdo_bits(pdo: ExpandedPdo) -> int:
     """Greatest length of its frame, in bits."""
     return frame_bits(ceil(min(pdo.bits, 64) / 8))
 
 
-def pdo_rate(pdo: ConcretePdo, rate: float, sync_period: float | None) -> float:
+def pdo_rate(pdo: ExpandedPdo, rate: float, sync_period: float | None) -> float:
     """Frames per second in the worst case; `rate` is that of the robot's packages."""
     if pdo.transmission < FIRST_EVENT_TYPE:
         syncs = rate if sync_period is None else 1 / sync_period

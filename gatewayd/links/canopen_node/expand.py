@@ -21,51 +21,45 @@ from gatewayd.links.canopen_node.pdo_layout import (
     split_into_pdos,
 )
 from gatewayd.links.canopen_node.plan import ObjectPlan
-from gatewayd.links.canopen_node.sections import AUTO, NO_PDO, Canopen, CanopenPlace, PdoDefaults, PdoSpec
+from gatewayd.links.canopen_node.sections import (
+    AUTO,
+    NO_PDO,
+    Canopen,
+    CanopenPlace,
+    CanopenPlaces,
+    PdoDefaults,
+    PdoSpec,
+)
 from gatewayd.links.canopen_node.status_words import StatusWord, field_word, quality_word
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Part
-from gatewayd.rtde.types import DataType
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedLink, ExpandedVariable
 
 __all__ = [
-    "Candidate",
     "CanopenCell",
-    "ConcretePdo",
+    "ExpandedPdo",
     "MappedObject",
     "MemberProblem",
     "Misnamed",
     "default_type",
     "expand_canopen",
+    "node_of",
+    "place_of",
 ]
 
-_DEFAULT_TYPES: Final = {
-    DataType.BOOL: CanType.BOOLEAN,
-    DataType.UINT8: CanType.UNSIGNED8,
-    DataType.UINT32: CanType.UNSIGNED32,
-    DataType.UINT64: CanType.UNSIGNED64,
-    DataType.INT32: CanType.INTEGER32,
-}
+_INTEGERS: Final = (
+    CanType.UNSIGNED8,
+    CanType.UNSIGNED16,
+    CanType.UNSIGNED32,
+    CanType.UNSIGNED64,
+    CanType.INTEGER8,
+    CanType.INTEGER16,
+    CanType.INTEGER32,
+    CanType.INTEGER64,
+)
+"""Types that a whole number gets where the file names none: the first that holds the robot's."""
 _MANY: Final = 2048
-"""So many variables that a PDO does not get are enough to be told."""
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """A variable as the layout sees it."""
-
-    index: int
-    """Position among the variables of the cell."""
-    line: str
-    """Name of its line."""
-    name: str
-    """Its own: `start`, `recipe[3]`."""
-    member: int | None
-    """Index within the family of its line; None for a single variable."""
-    direction: Direction
-    type: DataType
-    kind: ValueKind
-    place: CanopenPlace | None
-    """What its line says of CANopen."""
+"""So many variables that a PDO does not get are enough to be reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +78,7 @@ class MappedObject:
 
 
 @dataclass(frozen=True, slots=True)
-class ConcretePdo:
+class ExpandedPdo:
     """One PDO: what it is called on the bus, what it carries and when."""
 
     name: str
@@ -164,17 +158,22 @@ class Misnamed:
 
 
 @dataclass(frozen=True, slots=True)
-class CanopenCell:
+class CanopenCell(ExpandedLink):
     """One node, expanded."""
 
     part: Part[Canopen]
     objects: tuple[MappedObject, ...]
     """By variable."""
-    pdos: tuple[ConcretePdo, ...]
+    pdos: tuple[ExpandedPdo, ...]
     """RPDOs, then TPDOs, each by number."""
     empty: tuple[str, ...]
     """PDOs of the file that carry nothing."""
     misnamed: tuple[Misnamed, ...]
+
+    @property
+    def carried(self) -> frozenset[int]:
+        """Indices of the variables that PDOs carry."""
+        return frozenset(entry.variable for pdo in self.pdos for entry in pdo.entries)
 
     @property
     def is_complete(self) -> bool:
@@ -187,7 +186,7 @@ class CanopenCell:
         )
 
 
-def _is_whole(pdo: ConcretePdo) -> bool:
+def _is_whole(pdo: ExpandedPdo) -> bool:
     return (
         pdo.slot.cob_id is not None
         and pdo.slot.number <= PDO_NUMBERS
@@ -196,26 +195,39 @@ def _is_whole(pdo: ConcretePdo) -> bool:
     )
 
 
-def default_type(data_type: DataType, real: str) -> CanType:
+def node_of(cell: ExpandedCell) -> CanopenCell | None:
+    """The node of a cell; None where it has none."""
+    return cell.link(CanopenCell)
+
+
+def default_type(variable: ExpandedVariable, real: str) -> CanType:
     """The type of a variable that names none; `real` is the type of reals."""
-    return _DEFAULT_TYPES[data_type] if data_type in _DEFAULT_TYPES else CanType[real]
+    if variable.low is None or variable.high is None:
+        return CanType.BOOLEAN if variable.kind is ValueKind.BOOL else CanType[real]
+    low, high = variable.low, variable.high
+    return next(one for one in _INTEGERS if one.bounds[0] <= low and high <= one.bounds[1])
 
 
-def expand_canopen(part: Part[Canopen], candidates: Sequence[Candidate]) -> CanopenCell:
+def place_of(variable: ExpandedVariable) -> CanopenPlace | None:
+    """What the line of a variable says of CANopen."""
+    return variable.spec.by(CanopenPlaces).canopen
+
+
+def expand_canopen(part: Part[Canopen], variables: Sequence[ExpandedVariable]) -> CanopenCell:
     """Lay the node out. Never raises."""
-    layout = _Layout(part, candidates)
+    layout = _Layout(part, variables)
     layout.name_members()
     layout.place()
     return layout.finished()
 
 
 class _Layout:
-    def __init__(self, part: Part[Canopen], candidates: Sequence[Candidate]) -> None:
+    def __init__(self, part: Part[Canopen], variables: Sequence[ExpandedVariable]) -> None:
         self.part = part
-        self.candidates = candidates
-        self._lines: dict[str, list[Candidate]] = {}
-        for candidate in candidates:
-            self._lines.setdefault(candidate.line, []).append(candidate)
+        self.variables = variables
+        self._lines: dict[str, list[ExpandedVariable]] = {}
+        for variable in variables:
+            self._lines.setdefault(variable.part.name, []).append(variable)
         self._misnamed: list[Misnamed] = []
         self._of: dict[int, str] = {}
         """Variable -> the PDO that it is in."""
@@ -235,12 +247,13 @@ class _Layout:
                 if found is None:
                     self._misnamed.append(Misnamed(name, member.text, MemberProblem.UNKNOWN, position))
                     continue
-                for candidate in found:
-                    self._enter(name, member.text, candidate, position)
-        for candidate in self.candidates:
-            wanted = candidate.place.pdo if candidate.place is not None else NO_PDO
-            if wanted in self._members and self._of.get(candidate.index) != wanted:
-                self._enter(wanted, candidate.line, candidate, None)
+                for variable in found:
+                    self._enter(name, member.text, variable, position)
+        for variable in self.variables:
+            place = place_of(variable)
+            wanted = place.pdo if place is not None else NO_PDO
+            if wanted in self._members and self._of.get(variable.index) != wanted:
+                self._enter(wanted, variable.part.name, variable, None)
 
     def _name_status(self, name: str, pdo: PdoSpec) -> None:
         for number, member in enumerate(pdo.status):
@@ -254,19 +267,19 @@ class _Layout:
             else:
                 self._status[name] += (quality_word(one.index, one.name) for one in found)
 
-    def _find(self, name: str, members: range | None) -> list[Candidate] | None:
+    def _find(self, name: str, members: range | None) -> list[ExpandedVariable] | None:
         family = self._lines.get(name)
         if family is None or members is None:
             return family
         if len(members) > len(family):
             return None
-        by_member = {candidate.member: candidate for candidate in family}
+        by_member = {variable.member: variable for variable in family}
         found = [by_member[number] for number in members if number in by_member]
         return found if len(found) == len(members) else None
 
-    def _enter(self, pdo: str, text: str, candidate: Candidate, position: Position | None) -> None:
-        index, other = candidate.index, self._of.get(candidate.index)
-        place = candidate.place
+    def _enter(self, pdo: str, text: str, variable: ExpandedVariable, position: Position | None) -> None:
+        index, other = variable.index, self._of.get(variable.index)
+        place = place_of(variable)
         if other is not None:
             self._misnamed.append(Misnamed(pdo, text, MemberProblem.TAKEN, position, index, other))
         elif place is not None and place.pdo == NO_PDO:
@@ -278,18 +291,19 @@ class _Layout:
     def place(self) -> None:
         """Give every variable that is on CANopen its object."""
         real = self.part.spec.pdo.real
-        chosen: list[tuple[Candidate, CanType, bool]] = []
-        for candidate in self.candidates:
-            if candidate.place is None and candidate.index not in self._of:
+        chosen: list[tuple[ExpandedVariable, CanType, bool]] = []
+        for variable in self.variables:
+            place = place_of(variable)
+            if place is None and variable.index not in self._of:
                 continue
-            plain = default_type(candidate.type, real)
-            named = candidate.place.type if candidate.place is not None else None
+            plain = default_type(variable, real)
+            named = place.type if place is not None else None
             can_type = CanType[named] if named is not None else plain
-            fits = _fits(candidate.kind, can_type)
-            chosen.append((candidate, can_type if fits else plain, fits))
+            fits = _fits(variable.kind, can_type)
+            chosen.append((variable, can_type if fits else plain, fits))
         placed = place_objects((one.index, one.direction, can_type) for one, can_type, _ in chosen)
-        for (candidate, _, fits), plan in zip(chosen, placed, strict=True):
-            self._objects[candidate.index] = MappedObject(plan, candidate.direction, fits)
+        for (variable, _, fits), plan in zip(chosen, placed, strict=True):
+            self._objects[variable.index] = MappedObject(plan, variable.direction, fits)
 
     def finished(self) -> CanopenCell:
         """The whole node."""
@@ -302,7 +316,7 @@ class _Layout:
             tuple(self._misnamed),
         )
 
-    def _direction(self, direction: Direction) -> list[ConcretePdo]:
+    def _direction(self, direction: Direction) -> list[ExpandedPdo]:
         named = [
             (name, tuple(self._objects[index] for index in self._members[name]))
             for name in self._members
@@ -310,9 +324,9 @@ class _Layout:
         ]
         automatic = [
             self._objects[one.index].plan
-            for one in self.candidates
-            if one.direction is direction and one.place is not None and one.place.pdo == AUTO
-            if one.index not in self._of
+            for one in self.variables
+            if one.direction is direction and one.index not in self._of
+            if (place := place_of(one)) is not None and place.pdo == AUTO
         ]
         contents: list[tuple[str, tuple[MappedObject, ...]]] = [
             *named,
@@ -341,16 +355,16 @@ class _Layout:
         if self._status[name]:
             return Direction.OUTPUT
         members = self._members[name]
-        return self.candidates[members[0]].direction if members else None
+        return self.variables[members[0]].direction if members else None
 
     def _pdo(
         self, name: str, direction: Direction, slot: Slot, entries: tuple[MappedObject, ...]
-    ) -> ConcretePdo:
+    ) -> ExpandedPdo:
         defaults = self.part.spec.pdo
         spec: PdoSpec | PdoDefaults = self.part.spec.pdos[name] if name else defaults
         timer = "event" if direction is Direction.OUTPUT else "deadline"
         position = self.part.key_at("pdos", name) if name else self.part.key
-        return ConcretePdo(
+        return ExpandedPdo(
             name,
             position,
             direction,

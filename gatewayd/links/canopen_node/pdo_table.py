@@ -14,9 +14,9 @@ from gatewayd.links.canopen_node.bus_load import (
     pdo_rate,
     station_of,
 )
-from gatewayd.links.canopen_node.expand import ConcretePdo, MappedObject
+from gatewayd.links.canopen_node.expand import ExpandedPdo, MappedObject, node_of
 from gatewayd.links.canopen_node.status_words import StatusWord
-from gatewayd.mapping.expand import ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell
 
 __all__ = [
     "PdoRow",
@@ -82,7 +82,7 @@ def transmission_words(transmission: int) -> str:
 
 def pdo_rows(cell: ExpandedCell) -> tuple[PdoRow, ...]:
     """The PDOs of a cell without errors: those towards the robot, then those from it; none without a node."""
-    node = cell.canopen
+    node = node_of(cell)
     if node is None:
         return ()
     station = station_of(cell, node)
@@ -108,27 +108,29 @@ def pdo_rows(cell: ExpandedCell) -> tuple[PdoRow, ...]:
 
 def by_sdo_only(cell: ExpandedCell) -> tuple[str, ...]:
     """Variables that are objects and in no PDO, each with its place: `recipe[3] 2020h:04`."""
-    if cell.canopen is None:
+    node = node_of(cell)
+    if node is None:
         return ()
-    carried = {entry.variable for pdo in cell.canopen.pdos for entry in pdo.entries}
+    carried = {entry.variable for pdo in node.pdos for entry in pdo.entries}
     return tuple(
         f"{cell.variables[one.variable].name} {object_place(one)}"
-        for one in cell.canopen.objects
+        for one in node.objects
         if one.variable not in carried
     )
 
 
 def load_by_bit_rate(cell: ExpandedCell) -> dict[int, float]:
     """The share of the bus that this cell alone can take, by bit-rate; empty without a node."""
-    if cell.canopen is None:
+    node = node_of(cell)
+    if node is None:
         return {}
-    shares = bus_shares([station_of(cell, cell.canopen)])
+    shares = bus_shares([station_of(cell, node)])
     return {bit_rate: load(shares, bit_rate) for bit_rate in BIT_RATES}
 
 
 def as_document(cell: ExpandedCell) -> dict[str, Any] | None:
     """The node for JSON: `interface`, `channel`, `bitrate`, `node`, `pdos` and `load`; None without one."""
-    node = cell.canopen
+    node = node_of(cell)
     if node is None:
         return None
     spec = node.part.spec
@@ -174,7 +176,7 @@ def as_document(cell: ExpandedCell) -> dict[str, Any] | None:
     }
 
 
-def _runs(cell: ExpandedCell, pdo: ConcretePdo) -> tuple[Run, ...]:
+def _runs(cell: ExpandedCell, pdo: ExpandedPdo) -> tuple[Run, ...]:
     groups: list[list[tuple[int, MappedObject]]] = []
     for bit, one in pdo.offsets:
         if groups and _follows(cell, groups[-1][-1][1], one):

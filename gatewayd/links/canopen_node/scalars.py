@@ -1,6 +1,6 @@
 """The small languages of the CANopen part of a mapping: COB-IDs, timers, transmission types, members of PDOs.
 
-As `scalars`: what cannot be read raises `PydanticCustomError` with the rule that it breaks.
+As `gatewayd.mapping.scalars`: what cannot be read raises `PydanticCustomError` with the rule that it breaks.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import Annotated, Final, Literal
 from pydantic import BeforeValidator, Field, InstanceOf
 
 from gatewayd.links.canopen_node.status_words import FIELD_NAMES
-from gatewayd.mapping.rules import syntax
+from gatewayd.mapping import syntax
+from gatewayd.mapping.diagnostics import declare
 from gatewayd.mapping.scalars import (
     OPTIONAL_DURATION_SCHEMA,
     one_or_many,
@@ -25,6 +26,7 @@ from gatewayd.mapping.scalars import (
 )
 
 __all__ = [
+    "BAD_COB_ID",
     "EVENT",
     "CobId",
     "CobIdRanges",
@@ -40,8 +42,15 @@ __all__ = [
 EVENT: Final = 254
 """Transmission type of `event`: manufacturer-specific, since the node has no device profile."""
 
+BAD_COB_ID = declare(
+    "GW121",
+    "bad-cob-id",
+    "a COB-ID that cannot be read",
+    home="gatewayd.links.canopen_node.rules",
+)
+
 _COB_ID = re.compile(r"0x([0-9A-Fa-f]+)")
-_GREATEST_COB_ID: Final = 0x7FF
+_MAX_COB_ID: Final = 0x7FF
 _MEMBER = re.compile(
     r"(?P<name>[A-Za-z][A-Za-z0-9_]*)(?:\[(?P<first>[0-9]{1,4})(?:\.\.(?P<last>[0-9]{1,4}))?\])?"
 )
@@ -49,8 +58,8 @@ _WHOLE = re.compile(r"0|[1-9][0-9]{0,8}")
 _TRANSMISSIONS: Final = {"event": EVENT, "sync": 1}
 _LAST_SYNCHRONOUS: Final = 240
 _EVENT_DRIVEN: Final = (254, 255)
-_MOST_RANGES: Final = 256
-_MOST_MEMBERS: Final = 64
+_MAX_RANGES: Final = 256
+_MAX_MEMBERS: Final = 64
 """Entries of a PDO."""
 
 
@@ -99,11 +108,11 @@ def _cob_id(value: object) -> int:
     text = scalar(value, "a COB-ID", hint)
     match = _COB_ID.fullmatch(text)
     if match is None:
-        if text.isascii() and text.isdigit() and int(text) <= _GREATEST_COB_ID:
+        if text.isascii() and text.isdigit() and int(text) <= _MAX_COB_ID:
             hint = f"COB-IDs are hexadecimal here: 0x{int(text):03X}, or 0x{text} if {text} was meant so"
-        refuse(syntax.BAD_COB_ID, f"`{text}` is not a COB-ID", hint)
+        refuse(BAD_COB_ID, f"`{text}` is not a COB-ID", hint)
     number = int(match[1], 16)
-    if number > _GREATEST_COB_ID:
+    if number > _MAX_COB_ID:
         refuse(syntax.OUT_OF_RANGE, f"the COB-ID {text} is greater than 0x7FF", hint)
     return number
 
@@ -116,7 +125,7 @@ def _cob_id_range(value: object) -> range:
     low = _cob_id(first)
     high = _cob_id(last) if dots else low
     if high < low:
-        refuse(syntax.BAD_COB_ID, f"the range `{first}..{last}` runs backwards", f"write {last}..{first}")
+        refuse(BAD_COB_ID, f"the range `{first}..{last}` runs backwards", f"write {last}..{first}")
     return range(low, high + 1)
 
 
@@ -136,7 +145,7 @@ CobIdRanges = Annotated[
         ...,
     ],
     BeforeValidator(one_or_many, json_schema_input_type=_COB_IDS_SCHEMA | list[_COB_IDS_SCHEMA]),
-    Field(strict=False, max_length=_MOST_RANGES),
+    Field(strict=False, max_length=_MAX_RANGES),
 ]
 """Identifiers and ranges of them, or a single one."""
 
@@ -196,7 +205,7 @@ Members = Annotated[
         Annotated[InstanceOf[Member], BeforeValidator(_member, json_schema_input_type=_MEMBER_SCHEMA)], ...
     ],
     BeforeValidator(one_or_many, json_schema_input_type=_MEMBER_SCHEMA | list[_MEMBER_SCHEMA]),
-    Field(strict=False, max_length=_MOST_MEMBERS),
+    Field(strict=False, max_length=_MAX_MEMBERS),
 ]
 """Variables by name, or a single one."""
 
@@ -251,6 +260,6 @@ StatusMembers = Annotated[
         ...,
     ],
     BeforeValidator(one_or_many, json_schema_input_type=_STATUS_SCHEMA | list[_STATUS_SCHEMA]),
-    Field(strict=False, max_length=_MOST_MEMBERS),
+    Field(strict=False, max_length=_MAX_MEMBERS),
 ]
 """Words of the status block by name, or a single one."""

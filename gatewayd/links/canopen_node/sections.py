@@ -16,7 +16,7 @@ from gatewayd.links.canopen_node.scalars import (
     StatusMembers,
     Transmission,
 )
-from gatewayd.mapping.rules import syntax
+from gatewayd.mapping import syntax
 from gatewayd.mapping.scalars import Duration, Name, Whole, refuse
 from gatewayd.mapping.section import Section
 
@@ -25,11 +25,12 @@ __all__ = [
     "NO_PDO",
     "Canopen",
     "CanopenPlace",
+    "CanopenPlaces",
+    "CanopenWriter",
     "CobIdPool",
     "NumberType",
     "PdoDefaults",
     "PdoSpec",
-    "Place",
     "RealType",
     "Sync",
 ]
@@ -189,8 +190,41 @@ def _place(value: Any) -> Any:
     return refuse(syntax.BAD_CHOICE, "`canopen` of a variable is neither auto nor object nor a table", hint)
 
 
-Place = Annotated[
-    CanopenPlace,
-    BeforeValidator(_place, json_schema_input_type=Literal["auto", "object"] | CanopenPlace),
-]
-"""`auto`, `object`, or a table."""
+class CanopenPlaces(Section):
+    """What a variable has by CANopen."""
+
+    canopen: (
+        Annotated[
+            CanopenPlace,
+            BeforeValidator(_place, json_schema_input_type=Literal["auto", "object"] | CanopenPlace),
+        ]
+        | None
+    ) = Field(
+        default=None, description="auto, object (no PDO), or {pdo: NAME, type: ...}; default: not on CANopen"
+    )
+
+
+class CanopenWriter(Section):
+    """What a writer has by CANopen."""
+
+    canopen: Literal["rpdo", "sdo", "any"] | None = Field(
+        default=None, description="services of the CANopen node by which it writes: rpdo, sdo, or any (both)"
+    )
+    node: Whole | None = Field(
+        default=None, ge=1, le=127, description="node-ID whose heartbeat tells whether it lives (CANopen)"
+    )
+    heartbeat: MillisecondTime = Field(
+        default=None,
+        description="time without a heartbeat of `node`, from the writer's first sign on, after which it is lost "
+        "and writes nothing by CANopen until it is heard",
+    )
+
+    @property
+    def by_rpdo(self) -> bool:
+        """Whether RPDOs are this writer's."""
+        return self.canopen in ("rpdo", "any")
+
+    @property
+    def by_sdo(self) -> bool:
+        """Whether SDO requests are this writer's."""
+        return self.canopen in ("sdo", "any")

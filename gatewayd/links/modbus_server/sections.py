@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
-from gatewayd.mapping.rules import syntax
+from gatewayd.links.modbus_server.scalars import BAD_ADDRESS, Address
+from gatewayd.mapping import syntax
 from gatewayd.mapping.scalars import (
-    Address,
     Endpoint,
     Listen,
     Networks,
@@ -20,7 +20,7 @@ from gatewayd.mapping.scalars import (
 from gatewayd.mapping.section import Section
 from gatewayd.modbus.areas import Area
 
-__all__ = ["Modbus", "NumberType", "PlacementSpec", "WordOrder", "modbus_places"]
+__all__ = ["Modbus", "ModbusPlaces", "ModbusWriter", "NumberType", "PlacementSpec", "WordOrder"]
 
 NumberType = Literal[
     "bool", "bit", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"
@@ -81,13 +81,13 @@ class PlacementSpec(Section):
             found = "none" if not given else " and ".join(given)
             message = f"a placement names exactly one of holding, input, coil and discrete; found {found}"
             refuse(
-                syntax.BAD_ADDRESS,
+                BAD_ADDRESS,
                 message,
                 "write for example {holding: 100}; several placements make a list",
             )
         if self.area.of_bits and self.bit is not None:
             message = f"a {given[0]} address has no bits"
-            refuse(syntax.BAD_ADDRESS, message, f"write {{{given[0]}: N}} with a whole number")
+            refuse(BAD_ADDRESS, message, f"write {{{given[0]}: N}} with a whole number")
         return self
 
     @property
@@ -118,7 +118,7 @@ class PlacementSpec(Section):
 _AREAS = {"holding": Area.HOLDING, "input": Area.INPUT, "coil": Area.COIL, "discrete": Area.DISCRETE}
 
 
-def modbus_places(value: Any) -> Any:
+def _places(value: Any) -> Any:
     """Bring the short forms into one: `100`, `0.3`, `{coil: 5}`, or a list of them."""
     items = value if isinstance(value, (list, tuple)) else [value]
     return [
@@ -134,3 +134,27 @@ def _present(item: Any) -> Any:
             "write a register (100), a bit (100.3) or {coil: 5}",
         )
     return item
+
+
+class ModbusPlaces(Section):
+    """What a variable has by Modbus."""
+
+    modbus: Annotated[
+        tuple[PlacementSpec, ...],
+        BeforeValidator(
+            _places,
+            json_schema_input_type=float | str | PlacementSpec | list[float | str | PlacementSpec],
+        ),
+        Field(strict=False),
+    ] = Field(
+        default=(),
+        description="address from 0 (100), bit of a register (100.3), {area: address, type: ...}, or a list of these",
+    )
+
+
+class ModbusWriter(Section):
+    """What a writer has by Modbus."""
+
+    modbus: Networks = Field(
+        default=(), description="address or network of the Modbus client, or a list of them"
+    )

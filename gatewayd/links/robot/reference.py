@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Final
 
-from gatewayd.mapping.scalars import Reference
+from gatewayd.links.robot.scalars import Reference
+from gatewayd.mapping.expanded import UndefinedError
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, REGISTERS, Field, bit_word
 from gatewayd.rtde.types import DataType
 
@@ -55,7 +56,7 @@ class Target:
     element: int | None = None
 
 
-class UnresolvedReference(Exception):
+class UnresolvedReference(UndefinedError):
     """A reference names nothing known: `name` is the field or the first missing register, `limit` what there is."""
 
     def __init__(self, problem: ReferenceProblem, name: str, limit: int | None = None) -> None:

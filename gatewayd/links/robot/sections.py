@@ -6,11 +6,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from gatewayd.mapping.scalars import Duration, Host, Name, Names, OptionalDuration, Real, Version, Whole
+from gatewayd.links.robot.scalars import RobotReference, Version
+from gatewayd.mapping.scalars import Duration, Host, Name, Names, OptionalDuration, Real, Whole
 from gatewayd.mapping.section import Section
 from gatewayd.rtde.types import DEFAULT_PORT
 
-__all__ = ["ADOPT_FOR", "Robot", "Watchdog"]
+__all__ = ["ADOPT_FOR", "Robot", "RobotPlace", "RobotValidity", "Watchdog"]
 
 ADOPT_FOR = 10.0
 """Seconds that an adopted input waits for an owner where the file says nothing."""
@@ -65,3 +66,20 @@ class Robot(Section):
         description="running: the output registers (`output_*`) are good only while the robot program runs",
     )
     watchdog: Watchdog | None = Field(default=None, description="register that is fed while all is well")
+
+
+class RobotPlace(Section):
+    """What a variable is in the robot."""
+
+    robot: RobotReference = Field(
+        description="RTDE field, 'field[element]', field.bit, or a range of registers such as output_int_register_0..23"
+    )
+
+
+class RobotValidity(Section):
+    """When a variable of the robot is good."""
+
+    valid: Literal["running"] | None = Field(
+        default=None,
+        description="outputs: running makes it good only while the robot program runs; default: always",
+    )

@@ -17,7 +17,7 @@ __all__ = ["catalogue", "complete", "explanation"]
 
 def complete() -> tuple[Rule, ...]:
     """Every rule by id."""
-    assert run.FAMILY_MODULES
+    assert run.RULE_MODULES
     return all_rules()
 
 

@@ -6,16 +6,15 @@ import re
 from collections.abc import Iterator
 
 from gatewayd.core.definition import Direction, FallbackKind, ValueKind
-from gatewayd.links.robot.rules.fields import LEAST_RATE
-from gatewayd.mapping.compile import package_period
+from gatewayd.links.registry import languages
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
-from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import number, seconds
+from gatewayd.mapping.rules.writers import is_supervised
+from gatewayd.report.wording import number
 
 __all__ = ["silent_motion"]
 
-_MOTION_FIELDS = ("speed_slider_fraction",)
 _MOTION_WORDS = frozenset(
     {
         "drive",
@@ -78,13 +77,11 @@ def fallback_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                     if isinstance(fallback.value, bool)
                     else number(fallback.value)
                 )
-                message = (
-                    f"`{variable.part.name}` ({variable.target}, {variable.type.word}) cannot be {shown}"
-                )
+                message = f"`{variable.part.name}` ({variable.target}, {variable.type}) cannot be {shown}"
                 yield rule.at(variable.at(key), message, hint=f"write {expected}")
 
 
-def _mismatch(variable: ConcreteVariable, value: float) -> str | None:
+def _mismatch(variable: ExpandedVariable, value: float) -> str | None:
     """What should stand in the place of `value`; None where it fits."""
     if variable.kind is ValueKind.BOOL:
         return None if value in (0, 1) else "true or false"
@@ -130,20 +127,20 @@ def unsupervised_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.position, message, hint=hint, related=related)
 
 
-def silent_motion(cell: ExpandedCell) -> Iterator[tuple[ConcreteVariable, str]]:
+def silent_motion(cell: ExpandedCell) -> Iterator[tuple[ExpandedVariable, str]]:
     """Motion commands that no lease bounds, and the first owner that could be lost unnoticed."""
     for variable in _lines(cell):
         if variable.lock is None or not _is_motion(variable):
             continue
         lock = cell.locks[variable.lock]
-        silent = [name for name in lock.owners if not cell.document.writers[name].spec.is_supervised]
+        silent = [name for name in lock.owners if not is_supervised(cell.document.writers[name].spec)]
         if lock.lease is None and silent:
             yield variable, silent[0]
 
 
-def _is_motion(variable: ConcreteVariable) -> bool:
+def _is_motion(variable: ExpandedVariable) -> bool:
     words = {word.lower() for word in _WORD.findall(variable.part.name)}
-    return variable.field.name in _MOTION_FIELDS or not words.isdisjoint(_MOTION_WORDS)
+    return variable.moves or not words.isdisjoint(_MOTION_WORDS)
 
 
 @cell_rule(
@@ -153,6 +150,7 @@ def _is_motion(variable: ConcreteVariable) -> bool:
 )
 def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Policies that belong to the other direction."""
+    policies = {key: what for one in languages() for key, what in one.output_policies.items()}
     for variable in _lines(cell):
         is_input = variable.direction is Direction.INPUT
         key, other = ("on_stale", "on_release") if is_input else ("on_release", "on_stale")
@@ -162,30 +160,10 @@ def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
                 f"`{key}` never acts on it"
             )
             yield rule.at(variable.part.key_at(key), message, hint=f"write `{other}`, or remove `{key}`")
-        if is_input and "valid" in variable.spec.model_fields_set:
-            message = f"`{variable.part.name}` is an input ({variable.target}); `valid` never acts on it"
-            hint = "remove `valid`: it says when an output is good"
-            yield rule.at(variable.part.key_at("valid"), message, hint=hint)
-
-
-@cell_rule(
-    "GW607",
-    "stale-too-soon",
-    "stale_after shorter than the time between two packages",
-)
-def stale_too_soon(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`stale_after` below the package period."""
-    robot = cell.document.robot
-    if robot is None or robot.spec.stale_after is None or 0 < robot.spec.frequency < LEAST_RATE:
-        return
-    period = package_period(robot.spec)
-    if robot.spec.stale_after < period:
-        message = (
-            f"stale_after {seconds(robot.spec.stale_after)} is shorter than the {seconds(period)} "
-            f"between two packages"
-        )
-        hint = f"leave it out, or write at least {seconds(2 * period)}"
-        yield rule.at(robot.at("stale_after"), message, hint=hint)
+        for key, what in policies.items():
+            if is_input and key in variable.spec.model_fields_set:
+                message = f"`{variable.part.name}` is an input ({variable.target}); `{key}` never acts on it"
+                yield rule.at(variable.part.key_at(key), message, hint=f"remove `{key}`: {what}")
 
 
 @cell_rule(
@@ -283,7 +261,7 @@ def clamp_without_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
             yield rule.at(variable.part.key_at("clamp"), message, hint=hint)
 
 
-def _lines(cell: ExpandedCell) -> Iterator[ConcreteVariable]:
+def _lines(cell: ExpandedCell) -> Iterator[ExpandedVariable]:
     """The first variable of each line: those of a family are alike in all that these rules judge."""
     for variable in cell.variables:
         if not variable.member:

@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from gatewayd.core.definition import Direction
-from gatewayd.links.modbus_server.plan import Network
+from gatewayd.links.registry import definer, languages
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.document import Document, Part
-from gatewayd.mapping.expand import ConcreteLock, ConcreteVariable, ExpandedCell
-from gatewayd.mapping.model import ANY, Group, VariableSpec, WriterSpec
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock
+from gatewayd.mapping.model import ANY, Group, VariableSpec
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import did_you_mean, seconds
+from gatewayd.mapping.rules.writers import is_supervised
+from gatewayd.report.wording import did_you_mean, seconds
 
 __all__ = ["endless_locks"]
 
-_LEAST_LEASE = 0.1
+_MIN_LEASE = 0.1
 _RESERVED = (ANY, "free", "gateway", "operator", "robot", "undeclared")
 _POLICY = ("owner", "lease", "takeover")
 
@@ -33,8 +34,10 @@ def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     if inputs:
         more = f" and {len(inputs) - 1} more input{'s' if len(inputs) > 2 else ''}" if len(inputs) > 1 else ""
         message = f"nobody can write `{inputs[0].name}`{more}: the file declares no writers"
-        on_can = cell.document.modbus is None and cell.canopen is not None
-        known_by = "canopen: rpdo, node: 1, heartbeat: 1s" if on_can else "modbus: 192.168.1.20, timeout: 1s"
+        having = [language for language in languages() if language.writer_keys is not None]
+        here = [language for language in having if language.key in cell.document.sections]
+        example = (here or having)[0]
+        known_by = f"{example.writer_example}, {example.supervision_example or 'timeout: 1s'}"
         hint = f"add `writers: {{plc: {{{known_by}}}}}`"
         yield rule.at(inputs[0].position, message, hint=hint)
 
@@ -47,17 +50,18 @@ def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 def unknown_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Names of owners and required writers that are not declared."""
     known = cell.document.declared("writers")
-    if not known and cell.document.robot is None:
+    if not known and definer().key not in cell.document.sections:
         return
     for name, position, role in _named_writers(cell.document):
         if name != ANY and name not in known:
             hint = did_you_mean(name, known, f"add `{name}` to the section `writers`")
             yield rule.at(position, f"{role} `{name}` is not among the writers", hint=hint)
-    robot = cell.document.robot
-    if robot is not None and robot.spec.watchdog is not None and ANY in (robot.spec.watchdog.requires or ()):
-        hint = "name the writers, or leave `requires` out"
-        message = f"a watchdog cannot require `{ANY}`"
-        yield rule.at(robot.at("watchdog", "requires"), message, hint=hint)
+    for language in languages():
+        for named in language.names_writers(cell.document):
+            if named.name == ANY and named.no_any and named.whole is not None:
+                hint = "name the writers, or leave `requires` out"
+                yield rule.at(named.whole, named.no_any, hint=hint)
+                break
 
 
 @cell_rule(
@@ -76,56 +80,6 @@ def writer_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 message = f"`{name}` is named twice among the owners of `{part.name}`"
                 hint = "remove one of the two"
                 yield rule.at(part.at("owner", index), message, hint=hint, related=related)
-
-
-@cell_rule(
-    "GW504",
-    "same-peer",
-    "two writers with the same address",
-)
-def same_peer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Equal networks of one or of two writers."""
-    first: dict[Network, tuple[Part[WriterSpec], Position]] = {}
-    for writer, network, position in _peers(cell.document):
-        if network not in first:
-            first[network] = writer, position
-            continue
-        other, place = first[network]
-        whom = "the writer itself" if other is writer else f"the writer `{other.name}`"
-        message = f"{_shown(network)} of the writer `{writer.name}` already stands for {whom}"
-        related = (Related(place, f"{_shown(network)} first used here"),)
-        hint = "give each writer its own address, or make one writer of the two"
-        yield rule.at(position, message, hint=hint, related=related)
-
-
-@cell_rule(
-    "GW505",
-    "overlapping-peers",
-    "the network of one writer holds the address of another",
-    Severity.WARNING,
-)
-def overlapping_peers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Networks of one writer inside those of another."""
-    holders: dict[Network, tuple[Part[WriterSpec], Position]] = {}
-    peers = list(_peers(cell.document))
-    for writer, network, position in peers:
-        holders.setdefault(network, (writer, position))
-    lengths = sorted({network.prefixlen for network in holders}, reverse=True)
-    for writer, network, position in peers:
-        for length in lengths:
-            if length >= network.prefixlen:
-                continue
-            holder = holders.get(network.supernet(new_prefix=length))
-            if holder is not None and holder[0] is not writer:
-                wide = network.supernet(new_prefix=length)
-                message = (
-                    f"{_shown(network)} of the writer `{writer.name}` lies in {wide} of `{holder[0].name}`; "
-                    f"it counts as `{writer.name}`"
-                )
-                related = (Related(holder[1], f"{wide} of `{holder[0].name}`"),)
-                hint = "write networks that do not overlap"
-                yield rule.at(position, message, hint=hint, related=related)
-                break
 
 
 @cell_rule(
@@ -180,11 +134,11 @@ def short_lease(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if lock.lease is None:
             continue
         place = _lease_place(cell, lock)
-        if lock.lease < _LEAST_LEASE:
+        if lock.lease < _MIN_LEASE:
             message = (
                 f"a lease of {seconds(lock.lease)} for `{lock.name}` ends with every hiccup of the network"
             )
-            yield rule.at(place, message, hint=f"use at least {seconds(_LEAST_LEASE)}, better 1s")
+            yield rule.at(place, message, hint=f"use at least {seconds(_MIN_LEASE)}, better 1s")
             continue
         for name in lock.owners:
             writer = cell.document.writers[name]
@@ -287,25 +241,8 @@ def owner_of_output(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         for key in (*_POLICY, "group"):
             if key in variable.spec.model_fields_set:
                 message = f"`{variable.part.name}` comes from the robot ({variable.target}) and has `{key}`"
-                hint = f"remove `{key}`, or map an input such as {_counterpart(variable)}"
+                hint = f"remove `{key}`, or map an input such as {variable.counterpart}"
                 yield rule.at(variable.part.key_at(key), message, hint=hint)
-
-
-_COUNTERPARTS = {
-    "actual_digital_output_bits": "standard_digital_output (with its mask)",
-    "actual_configurable_digital_output_bits": "configurable_digital_output (with its mask)",
-    "standard_analog_output0": "standard_analog_output_0 (with its mask)",
-    "standard_analog_output1": "standard_analog_output_1 (with its mask)",
-    "target_speed_fraction": "speed_slider_fraction (with its mask)",
-}
-"""Outputs that are often taken for the input of nearly the same name."""
-
-
-def _counterpart(variable: ConcreteVariable) -> str:
-    field, target = variable.field.name, variable.target
-    if target.startswith("output_"):
-        return f"input_{target.removeprefix('output_')}"
-    return _COUNTERPARTS.get(field, "input_int_register_0")
 
 
 @cell_rule(
@@ -323,10 +260,10 @@ def endless_lock(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(_lease_place(cell, lock), message, hint=hint, related=related)
 
 
-def endless_locks(cell: ExpandedCell) -> Iterator[tuple[ConcreteLock, str]]:
+def endless_locks(cell: ExpandedCell) -> Iterator[tuple[ExpandedLock, str]]:
     """Shared locks without a lease, one of each line, and the first owner that could keep them unnoticed."""
     for lock in _distinct(cell.locks):
-        silent = [name for name in lock.owners if not cell.document.writers[name].spec.is_supervised]
+        silent = [name for name in lock.owners if not is_supervised(cell.document.writers[name].spec)]
         if len(lock.owners) > 1 and lock.lease is None and silent:
             yield lock, silent[0]
 
@@ -371,16 +308,9 @@ def _named_writers(document: Document) -> Iterator[tuple[str, Position, str]]:
     for part in _owned(document):
         for index, name in enumerate(part.spec.owner or ()):
             yield name, part.at("owner", index), f"the owner of `{part.name}`,"
-    robot = document.robot
-    if robot is not None and robot.spec.watchdog is not None:
-        for index, name in enumerate(robot.spec.watchdog.requires or ()):
-            yield name, robot.at("watchdog", "requires", index), "the writer that the watchdog requires,"
-
-
-def _peers(document: Document) -> Iterator[tuple[Part[WriterSpec], Network, Position]]:
-    for writer in document.writers.values():
-        for index, network in enumerate(writer.spec.modbus):
-            yield writer, network, writer.at("modbus", index)
+    for language in languages():
+        for named in language.names_writers(document):
+            yield named.name, named.position, named.role
 
 
 def _is_whole(cell: ExpandedCell) -> bool:
@@ -388,7 +318,7 @@ def _is_whole(cell: ExpandedCell) -> bool:
     return len(cell.document.declared("variables")) == len(cell.document.variables)
 
 
-def _distinct(locks: Iterable[ConcreteLock]) -> Iterator[ConcreteLock]:
+def _distinct(locks: Iterable[ExpandedLock]) -> Iterator[ExpandedLock]:
     """One lock of each line: those of a family are alike."""
     seen: set[Position] = set()
     for lock in locks:
@@ -397,10 +327,6 @@ def _distinct(locks: Iterable[ConcreteLock]) -> Iterator[ConcreteLock]:
             yield lock
 
 
-def _lease_place(cell: ExpandedCell, lock: ConcreteLock) -> Position:
+def _lease_place(cell: ExpandedCell, lock: ExpandedLock) -> Position:
     part = lock.group if lock.group is not None else cell.variables[lock.members[0]].part
     return part.at("lease") if "lease" in part.spec.model_fields_set else lock.position
-
-
-def _shown(network: Network) -> str:
-    return str(network.network_address) if network.num_addresses == 1 else str(network)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Final, TypeAlias
 
 from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity, declare
-from gatewayd.mapping.expand import ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell
 
 __all__ = ["CELL_CHECKS", "PLANT_CHECKS", "CellCheck", "PlantCheck", "cell_rule", "plant_rule"]
 

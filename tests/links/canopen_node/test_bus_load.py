@@ -13,10 +13,10 @@ from gatewayd.links.canopen_node.bus_load import (
     bus_shares,
     frame_bits,
     load,
-    package_rate,
     station_of,
 )
-from gatewayd.links.robot.sections import Robot
+from gatewayd.links.canopen_node.expand import CanopenCell, node_of
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.loader import load as load_file
 from gatewayd.mapping.loader import load_together
 
@@ -41,10 +41,15 @@ variables:
 """
 
 
+def the_node(cell: ExpandedCell) -> CanopenCell:
+    node = node_of(cell)
+    assert node is not None
+    return node
+
+
 def station(text: str) -> Station:
     cell = load_file(text.encode(), "cell.yaml").cell
-    assert cell.canopen is not None
-    return station_of(cell, cell.canopen)
+    return station_of(cell, the_node(cell))
 
 
 def shares(text: str) -> dict[str, Share]:
@@ -177,7 +182,7 @@ def test_cells_on_one_bus_share_sync_and_watched_heartbeats() -> None:
     text = ONE.format(canopen="  sync: {period: 10ms}", robot="output_int_register_0")
     other = text.replace("cell: one", "cell: two").replace("node: 16", "node: 17").replace("1.10", "1.11")
     cells = [one.cell for one in load_together([("a", text.encode()), ("b", other.encode())])]
-    stations = [station_of(cell, cell.canopen) for cell in cells if cell.canopen is not None]
+    stations = [station_of(cell, the_node(cell)) for cell in cells]
     what = [share.what for share in bus_shares(stations)]
     assert sorted(what) == sorted(
         [
@@ -189,21 +194,6 @@ def test_cells_on_one_bus_share_sync_and_watched_heartbeats() -> None:
             "node 1: heartbeat",
         ]
     )
-
-
-@pytest.mark.parametrize(
-    "robot, packages",
-    [
-        ({}, 500),
-        ({"series": "cb3"}, 125),
-        ({"series": "e", "frequency": 125.0}, 125),
-        ({"series": "e", "frequency": 200.0}, 250),
-        ({"frequency": 60.0}, 60),
-        ({"frequency": 1e-320}, 0.001),
-    ],
-)
-def test_packages_per_second_at_most(robot: dict[str, object], packages: float) -> None:
-    assert package_rate(Robot.model_validate({"host": "r", **robot})) == pytest.approx(packages)
 
 
 def test_bit_rates_are_those_of_cia_301() -> None:
@@ -225,6 +215,5 @@ canopen:
 variables: {a: {robot: robot_mode}}
 """
     cell = load_file(text.encode(), "c.yaml").cell
-    assert cell.canopen is not None
-    (share,) = bus_shares([station_of(cell, cell.canopen)])
+    (share,) = bus_shares([station_of(cell, the_node(cell))])
     assert (share.what, share.bits, share.rate) == ("node 16: TPDO 1 (state)", frame_bits(8), 10)

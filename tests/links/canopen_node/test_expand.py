@@ -6,9 +6,10 @@ import time
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction
-from gatewayd.links.canopen_node.expand import CanopenCell, ConcretePdo, MemberProblem
-from gatewayd.mapping.document import read_document
-from gatewayd.mapping.expand import ExpandedCell, expand
+from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo, MemberProblem, node_of
+from gatewayd.mapping.expand import expand
+from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.mapping.reader import read_document
 from gatewayd.mapping.source import parse
 
 HEAD = """\
@@ -32,12 +33,12 @@ def expanded(canopen: str, variables: str) -> ExpandedCell:
 
 
 def node(canopen: str, variables: str) -> CanopenCell:
-    found = expanded(canopen, variables).canopen
+    found = node_of(expanded(canopen, variables))
     assert found is not None
     return found
 
 
-def pdo(found: CanopenCell, name: str) -> ConcretePdo:
+def pdo(found: CanopenCell, name: str) -> ExpandedPdo:
     return next(one for one in found.pdos if one.name == name)
 
 

@@ -13,7 +13,7 @@ from gatewayd.links.canopen_node.pdo_table import (
     pdo_rows,
     transmission_words,
 )
-from gatewayd.mapping.expand import ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.loader import load
 from gatewayd.report.table import rows
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.links.canopen_node.sections import Canopen, CanopenPlace
+from gatewayd.links.canopen_node.sections import Canopen, CanopenPlace, CanopenPlaces
 from gatewayd.mapping.diagnostics import Diagnostic
-from gatewayd.mapping.document import Document, read_document
+from gatewayd.mapping.document import Document
+from gatewayd.mapping.reader import read_document
+from gatewayd.mapping.rules.writers import is_supervised
 from gatewayd.mapping.source import parse
 
 HEAD = "gatewayd: 1\ncell: c\nrobot: {host: r}\nvariables: {}\n"
@@ -19,8 +21,9 @@ def read(text: str) -> tuple[Document, tuple[Diagnostic, ...]]:
 def section(text: str) -> Canopen:
     document, findings = read(f"canopen: {{channel: can0, bitrate: 500000, node: 16{text}}}")
     assert findings == ()
-    assert document.canopen is not None
-    return document.canopen.spec
+    part = document.part(Canopen)
+    assert part is not None
+    return part.spec
 
 
 def test_defaults() -> None:
@@ -73,7 +76,7 @@ def test_a_variable_says_where_it_is(text: str, place: CanopenPlace) -> None:
         parse(f"{HEAD.removesuffix('variables: {}' + chr(10))}{text}".encode(), "f")
     )
     assert findings == ()
-    assert document.variables["a"].spec.canopen == place
+    assert document.variables["a"].spec.by(CanopenPlaces).canopen == place
 
 
 @pytest.mark.parametrize(
@@ -135,7 +138,7 @@ def test_supervision_of_a_writer() -> None:
         "writers: {a: {canopen: rpdo}, b: {canopen: rpdo, node: 1, heartbeat: 1s}, c: {canopen: any, timeout: 1s},"
         " d: {canopen: sdo, modbus: 10.0.0.1, node: 1, heartbeat: 1s}}"
     )[0].writers
-    assert {name: part.spec.is_supervised for name, part in writers.items()} == {
+    assert {name: is_supervised(part.spec) for name, part in writers.items()} == {
         "a": False,
         "b": True,
         "c": True,

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from gatewayd.links.robot.reference import ReferenceProblem, UnresolvedReference, resolve
-from gatewayd.mapping.scalars import Reference, RobotReference
+from gatewayd.links.robot.scalars import Reference, RobotReference
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
 
 READER: TypeAdapter[Reference] = TypeAdapter(RobotReference)

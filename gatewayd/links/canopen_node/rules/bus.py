@@ -18,12 +18,12 @@ from gatewayd.links.canopen_node.bus_load import (
     pdo_bits,
     station_of,
 )
-from gatewayd.links.canopen_node.expand import CanopenCell
+from gatewayd.links.canopen_node.expand import CanopenCell, node_of
 from gatewayd.links.canopen_node.rules.pdos import cob_id_place
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
-from gatewayd.mapping.expand import ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import plant_rule
-from gatewayd.mapping.rules.wording import cob
+from gatewayd.report.wording import cob
 
 __all__: list[str] = []
 
@@ -139,7 +139,7 @@ def bus_load_too_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Dia
 def _loaded(
     rule: Rule, cells: Sequence[ExpandedCell], is_meant: Callable[[float], bool]
 ) -> Iterator[Diagnostic]:
-    by_node = {id(cell.canopen): cell for cell in cells}
+    by_node = {id(node_of(cell)): cell for cell in cells}
     for nodes in _buses(cells):
         bus = [station_of(by_node[id(node)], node) for node in nodes]
         shares = bus_shares(bus)
@@ -176,8 +176,8 @@ def _remedy(bus: Sequence[Station], shares: Sequence[Share], bit_rate: int) -> s
 def _buses(cells: Sequence[ExpandedCell]) -> Iterator[list[CanopenCell]]:
     """The nodes on each bus, in the order of the files."""
     buses: dict[tuple[str, str], list[CanopenCell]] = {}
-    for cell in cells:
-        if cell.canopen is not None:
-            spec = cell.canopen.part.spec
-            buses.setdefault((spec.interface, spec.channel), []).append(cell.canopen)
+    for node in map(node_of, cells):
+        if node is not None:
+            spec = node.part.spec
+            buses.setdefault((spec.interface, spec.channel), []).append(node)
     yield from buses.values()

@@ -7,18 +7,20 @@ from collections.abc import Iterator
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction, ValueKind
 from gatewayd.links.canopen_node.bus_load import BIT_RATES, FIRST_EVENT_TYPE
-from gatewayd.links.canopen_node.expand import MappedObject
+from gatewayd.links.canopen_node.expand import MappedObject, node_of, place_of
+from gatewayd.links.canopen_node.sections import Canopen, CanopenPlaces, CanopenWriter
+from gatewayd.links.registry import languages
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
-from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.model import WriterSpec
-from gatewayd.mapping.rules.conversion import GROWING, range_of
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import number, one_and_more, seconds
+from gatewayd.mapping.rules.writers import known_by, ways_of
+from gatewayd.report.wording import number, one_and_more, seconds
 
 __all__: list[str] = []
 
 _REAL32_DIGITS = 2**24
-_MODBUS, _RPDO, _SDO = "Modbus", "RPDO", "SDO"
+_RPDO = "RPDO"
 
 
 @cell_rule(
@@ -32,12 +34,12 @@ def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         return
     hint = "add `canopen: {channel: can0, bitrate: 500000, node: 16}`"
     for part in cell.document.variables.values():
-        if part.spec.canopen is not None:
+        if part.spec.by(CanopenPlaces).canopen is not None:
             message = f"`{part.name}` is on CANopen, but the file has no section `canopen`"
             yield rule.at(part.key_at("canopen"), message, hint=hint)
             return
     for writer in cell.document.writers.values():
-        if writer.spec.canopen is not None:
+        if writer.spec.by(CanopenWriter).canopen is not None:
             message = f"the writer `{writer.name}` is on CANopen, but the file has no section `canopen`"
             yield rule.at(writer.key_at("canopen"), message, hint=hint)
             return
@@ -51,16 +53,14 @@ def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 def canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Types of another kind."""
     for variable, one in _lines(cell):
-        if not one.fits and variable.spec.canopen is not None:
-            message = (
-                f"`{variable.part.name}` ({variable.target}, {variable.type.word}) cannot be "
-                f"{variable.spec.canopen.type}"
-            )
+        place = place_of(variable)
+        if not one.fits and place is not None:
+            message = f"`{variable.part.name}` ({variable.target}, {variable.type}) cannot be {place.type}"
             hint = f"write {_suited(variable)}, or leave `type` out"
             yield rule.at(variable.at("canopen", "type"), message, hint=hint)
 
 
-def _suited(variable: ConcreteVariable) -> str:
+def _suited(variable: ExpandedVariable) -> str:
     if variable.kind is ValueKind.BOOL:
         return "BOOLEAN"
     return "REAL64 or REAL32" if variable.kind is ValueKind.FLOAT else "an INTEGER or UNSIGNED type"
@@ -75,12 +75,12 @@ def _suited(variable: ConcreteVariable) -> str:
 def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Reals that are REAL32 without their line saying so, and those for which it is never enough."""
     for variable, one in _lines(cell):
-        place = variable.spec.canopen
+        place = place_of(variable)
         if one.plan.type is not CanType.REAL32 or variable.kind is not ValueKind.FLOAT:
             continue
         limits = variable.spec.limits
         coarse = limits is not None and max(-limits[0], limits[1]) > _REAL32_DIGITS
-        if variable.field.name in GROWING or coarse:
+        if variable.grows or coarse:
             message = f"`{variable.part.name}` needs more digits than a REAL32 has"
             yield rule.at(_type_place(variable), message, hint="write `canopen: {type: REAL64}`")
         elif place is None or place.type is None:
@@ -98,10 +98,10 @@ def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 def narrow_canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Integer outputs in types that do not hold their range."""
     for variable, one in _lines(cell):
-        bounds = range_of(variable)
+        bounds = variable.range
         if variable.direction is Direction.INPUT or bounds is None or not one.fits:
             continue
-        low, high = _reach(one.plan.type)
+        low, high = one.plan.type.bounds
         if bounds[0] < low or bounds[1] > high:
             message = (
                 f"`{variable.part.name}` can be {number(bounds[0])} to {number(bounds[1])}, "
@@ -111,12 +111,6 @@ def narrow_canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_type_place(variable), message, hint=hint)
 
 
-def _reach(can_type: CanType) -> tuple[int, int]:
-    if can_type.name.startswith("UNSIGNED"):
-        return 0, (1 << can_type.bits) - 1
-    return -(1 << can_type.bits - 1), (1 << can_type.bits - 1) - 1
-
-
 @cell_rule(
     "GW420",
     "watched-itself",
@@ -124,14 +118,13 @@ def _reach(can_type: CanType) -> tuple[int, int]:
 )
 def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers with the node-ID of the cell."""
-    canopen = cell.document.canopen
+    canopen = cell.document.part(Canopen)
     if canopen is None:
         return
     for writer in cell.document.writers.values():
-        if writer.spec.node == canopen.spec.node:
-            message = (
-                f"the writer `{writer.name}` has the node-ID {writer.spec.node}, which is this cell's own"
-            )
+        node = writer.spec.by(CanopenWriter).node
+        if node == canopen.spec.node:
+            message = f"the writer `{writer.name}` has the node-ID {node}, which is this cell's own"
             related = (Related(canopen.at("node"), f"this cell is node {canopen.spec.node}"),)
             hint = "write the node-ID of the master, often 1 or 127"
             yield rule.at(writer.at("node"), message, hint=hint, related=related)
@@ -144,7 +137,7 @@ def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def unknown_bit_rate(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Bit-rates outside the list."""
-    canopen = cell.document.canopen
+    canopen = cell.document.part(Canopen)
     if canopen is None or canopen.spec.bitrate in BIT_RATES:
         return
     rate = canopen.spec.bitrate
@@ -161,15 +154,16 @@ def unknown_bit_rate(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def idle_canopen_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers whose service carries no input."""
-    node = cell.canopen
+    node = node_of(cell)
     if node is None or len(cell.document.declared("variables")) > len(cell.document.variables):
         return
     by_sdo = any(one.direction is Direction.INPUT for one in node.objects)
     by_rpdo = any(entry.direction is Direction.INPUT for pdo in node.pdos for entry in pdo.entries)
     for writer in cell.document.writers.values():
-        if (writer.spec.canopen == "rpdo" and not by_rpdo) or (writer.spec.by_sdo and not by_sdo):
+        spec = writer.spec.by(CanopenWriter)
+        if (spec.canopen == "rpdo" and not by_rpdo) or (spec.by_sdo and not by_sdo):
             what = "in a PDO" if by_sdo else "on CANopen"
-            message = f"`{writer.name}` writes by {writer.spec.canopen}, and no variable towards the robot is {what}"
+            message = f"`{writer.name}` writes by {spec.canopen}, and no variable towards the robot is {what}"
             hint = "write `canopen: auto` at its variables, or remove `canopen` here"
             yield rule.at(writer.at("canopen"), message, hint=hint)
 
@@ -183,13 +177,12 @@ def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Inputs in RPDOs that no RPDO writer owns, and inputs without any common way."""
     if not cell.document.writers:
         return
-    in_pdos = _in_pdos(cell)
     for variable in _inputs(cell):
         owners = _owners(cell, variable)
-        ways = _ways(variable, in_pdos)
+        ways = _ways(variable, cell)
         if not owners or not ways:
             continue
-        reach = set().union(*(_of_writer(writer) for _, writer in owners))
+        reach = frozenset().union(*(ways_of(writer) for _, writer in owners))
         names = one_and_more([name for name, _ in owners])
         if _RPDO in ways and _RPDO not in reach:
             message = f"`{variable.part.name}` is in an RPDO, and its owner {names} does not write by RPDO"
@@ -212,55 +205,39 @@ def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def owner_elsewhere(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Named owners without a common way, where another one has one."""
-    in_pdos = _in_pdos(cell)
     reported: set[Position] = set()
     for variable in _inputs(cell):
         assert variable.lock is not None
         lock = cell.locks[variable.lock]
-        ways = _ways(variable, in_pdos)
+        ways = _ways(variable, cell)
         owners = _owners(cell, variable)
-        if lock.is_any or not ways or not any(ways & _of_writer(writer) for _, writer in owners):
+        if lock.is_any or not ways or not any(ways & ways_of(writer) for _, writer in owners):
             continue
         for name, writer in owners:
-            if not ways & _of_writer(writer) and lock.position not in reported:
+            if not ways & ways_of(writer) and lock.position not in reported:
                 reported.add(lock.position)
                 message = (
-                    f"the owner `{name}` writes by {' and '.join(sorted(_of_writer(writer)))}, "
+                    f"the owner `{name}` writes by {' and '.join(sorted(ways_of(writer)))}, "
                     f"`{variable.part.name}` can be written by {' and '.join(sorted(ways))} only"
                 )
                 hint = f"put `{variable.part.name}` where `{name}` writes, or remove that owner"
                 yield rule.at(lock.position, message, hint=hint)
 
 
-def _of_writer(writer: WriterSpec) -> set[str]:
-    ways = ((_MODBUS, bool(writer.modbus)), (_RPDO, writer.by_rpdo), (_SDO, writer.by_sdo))
-    return {way for way, has in ways if has}
+def _ways(variable: ExpandedVariable, cell: ExpandedCell) -> frozenset[str]:
+    return frozenset().union(*(language.ways_of_variable(variable, cell) for language in languages()))
 
 
-def _ways(variable: ConcreteVariable, in_pdos: set[int]) -> set[str]:
-    in_pdo = variable.index in in_pdos
-    ways = (
-        (_MODBUS, bool(variable.spec.modbus)),
-        (_RPDO, in_pdo),
-        (_SDO, in_pdo or variable.spec.canopen is not None),
-    )
-    return {way for way, has in ways if has}
-
-
-def _owners(cell: ExpandedCell, variable: ConcreteVariable) -> list[tuple[str, WriterSpec]]:
+def _owners(cell: ExpandedCell, variable: ExpandedVariable) -> list[tuple[str, WriterSpec]]:
     if variable.lock is None:
         return []
     return [(name, cell.document.writers[name].spec) for name in cell.locks[variable.lock].owners]
 
 
-def _in_pdos(cell: ExpandedCell) -> set[int]:
-    pdos = cell.canopen.pdos if cell.canopen is not None else ()
-    return {entry.variable for pdo in pdos for entry in pdo.entries}
-
-
-def _inputs(cell: ExpandedCell) -> Iterator[ConcreteVariable]:
+def _inputs(cell: ExpandedCell) -> Iterator[ExpandedVariable]:
     """The first input of each line that has an owner, on a cell with a node."""
-    if cell.canopen is None:
+    node = node_of(cell)
+    if node is None:
         return
     for variable in cell.variables:
         if variable.direction is Direction.INPUT and variable.lock is not None and not variable.member:
@@ -274,12 +251,12 @@ def _inputs(cell: ExpandedCell) -> Iterator[ConcreteVariable]:
 )
 def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Second writers by RPDO, and by SDO."""
-    writers = cell.document.writers.values()
+    writers = [(writer, writer.spec.by(CanopenWriter)) for writer in cell.document.writers.values()]
     for service in ("by_rpdo", "by_sdo"):
-        found = [writer for writer in writers if getattr(writer.spec, service)]
-        for other in found[1:]:
-            first = found[0]
-            if service == "by_sdo" and other.spec.by_rpdo and first.spec.by_rpdo:
+        found = [(writer, spec) for writer, spec in writers if getattr(spec, service)]
+        for other, spec in found[1:]:
+            first, former = found[0]
+            if service == "by_sdo" and spec.by_rpdo and former.by_rpdo:
                 continue
             message = f"`{other.name}` writes by {service[3:].upper()} too, like `{first.name}`"
             related = (Related(first.at("canopen"), f"`{first.name}` is here"),)
@@ -295,10 +272,11 @@ def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`node` without `heartbeat` and the other way round, and either without `canopen`."""
     for writer in cell.document.writers.values():
-        given = [key for key in ("node", "heartbeat") if getattr(writer.spec, key) is not None]
+        spec = writer.spec.by(CanopenWriter)
+        given = [key for key in ("node", "heartbeat") if getattr(spec, key) is not None]
         if not given:
             continue
-        if writer.spec.canopen is None:
+        if spec.canopen is None:
             message = f"the writer `{writer.name}` has `{given[0]}`, but does not write by CANopen"
             hint = f"add `canopen: rpdo`, or remove `{given[0]}`"
             yield rule.at(writer.key_at(given[0]), message, hint=hint)
@@ -321,35 +299,36 @@ def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def timeout_of_silence(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`timeout` of RPDO writers without a heartbeat where no RPDO has to come."""
-    if cell.canopen is None:
+    node = node_of(cell)
+    if node is None:
         return
-    received = [pdo for pdo in cell.canopen.pdos if pdo.direction is Direction.INPUT]
+    received = [pdo for pdo in node.pdos if pdo.direction is Direction.INPUT]
     if not received or any(pdo.event is not None or pdo.transmission < FIRST_EVENT_TYPE for pdo in received):
         return
     for writer in cell.document.writers.values():
-        spec = writer.spec
-        if spec.by_rpdo and not spec.modbus and spec.timeout is not None and spec.heartbeat is None:
-            message = (
-                f"`{writer.name}` is lost after {seconds(spec.timeout)} without a PDO, and none has to come"
-            )
+        timeout, spec = writer.spec.timeout, writer.spec.by(CanopenWriter)
+        only_here = len(known_by(writer.spec)) == 1
+        if spec.by_rpdo and only_here and timeout is not None and spec.heartbeat is None:
+            message = f"`{writer.name}` is lost after {seconds(timeout)} without a PDO, and none has to come"
             hint = "write `node: 1, heartbeat: 1s` in place of `timeout`, or give the PDOs a `deadline`"
             yield rule.at(writer.at("timeout"), message, hint=hint)
 
 
-def _lines(cell: ExpandedCell) -> Iterator[tuple[ConcreteVariable, MappedObject]]:
+def _lines(cell: ExpandedCell) -> Iterator[tuple[ExpandedVariable, MappedObject]]:
     """The first variable of each line that is an object, with the object."""
+    node = node_of(cell)
     seen: set[str] = set()
-    for one in cell.canopen.objects if cell.canopen is not None else ():
+    for one in node.objects if node is not None else ():
         variable = cell.variables[one.variable]
         if variable.part.name not in seen:
             seen.add(variable.part.name)
             yield variable, one
 
 
-def _canopen_place(variable: ConcreteVariable) -> Position:
-    return variable.part.at("canopen") if variable.spec.canopen is not None else variable.position
+def _canopen_place(variable: ExpandedVariable) -> Position:
+    return variable.part.at("canopen") if place_of(variable) is not None else variable.position
 
 
-def _type_place(variable: ConcreteVariable) -> Position:
+def _type_place(variable: ExpandedVariable) -> Position:
     """Place of the type where it is written, else of what stands for it."""
-    return variable.part.at("canopen", "type") if variable.spec.canopen is not None else variable.position
+    return variable.part.at("canopen", "type") if place_of(variable) is not None else variable.position

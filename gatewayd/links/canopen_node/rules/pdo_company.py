@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gatewayd.core.definition import Direction, FallbackKind
-from gatewayd.links.canopen_node.expand import ConcretePdo
+from gatewayd.links.canopen_node.expand import ExpandedPdo, node_of
+from gatewayd.links.canopen_node.sections import CanopenWriter
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
-from gatewayd.mapping.expand import ConcreteLock, ConcreteVariable, ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule
 
 __all__: list[str] = []
@@ -67,19 +68,20 @@ def contended_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(shared.position, message, hint=hint, related=related)
 
 
-def _locked(cell: ExpandedCell, pdo: ConcretePdo) -> Iterator[tuple[ConcreteVariable, ConcreteLock]]:
+def _locked(cell: ExpandedCell, pdo: ExpandedPdo) -> Iterator[tuple[ExpandedVariable, ExpandedLock]]:
     for entry in pdo.entries:
         variable = cell.variables[entry.variable]
         if variable.lock is not None:
             yield variable, cell.locks[variable.lock]
 
 
-def _is_contended(cell: ExpandedCell, lock: ConcreteLock) -> bool:
+def _is_contended(cell: ExpandedCell, lock: ExpandedLock) -> bool:
     """Whether a writer that does not write by RPDO may own it."""
-    return any(not cell.document.writers[name].spec.by_rpdo for name in lock.owners)
+    return any(not cell.document.writers[name].spec.by(CanopenWriter).by_rpdo for name in lock.owners)
 
 
-def _pdos(cell: ExpandedCell, direction: Direction) -> Iterator[ConcretePdo]:
-    for pdo in cell.canopen.pdos if cell.canopen is not None else ():
+def _pdos(cell: ExpandedCell, direction: Direction) -> Iterator[ExpandedPdo]:
+    node = node_of(cell)
+    for pdo in node.pdos if node is not None else ():
         if pdo.direction is direction and all(entry.direction is direction for entry in pdo.entries):
             yield pdo

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gatewayd.links.canopen_node.expand import MemberProblem, Misnamed
-from gatewayd.links.canopen_node.sections import AUTO, NO_PDO, PdoSpec
+from gatewayd.links.canopen_node.expand import MemberProblem, Misnamed, node_of
+from gatewayd.links.canopen_node.sections import AUTO, NO_PDO, CanopenPlaces, PdoSpec
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule
-from gatewayd.mapping.expand import ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import did_you_mean
+from gatewayd.report.wording import did_you_mean
 
 __all__: list[str] = []
 
@@ -21,11 +21,12 @@ __all__: list[str] = []
 )
 def unknown_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Names of PDOs at variables."""
-    if cell.canopen is None:
+    node = node_of(cell)
+    if node is None:
         return
-    known = cell.canopen.part.spec.pdos
+    known = node.part.spec.pdos
     for part in cell.document.variables.values():
-        place = part.spec.canopen
+        place = part.spec.by(CanopenPlaces).canopen
         if place is not None and place.pdo not in known and place.pdo not in (AUTO, NO_PDO):
             hint = did_you_mean(
                 place.pdo, known, f"add `{place.pdo}` to `pdos` of the section `canopen`, or write auto"
@@ -63,16 +64,17 @@ def variable_in_two_pdos(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
 )
 def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """PDOs of the file without variables."""
-    if cell.canopen is None or len(cell.document.declared("variables")) > len(cell.document.variables):
+    node = node_of(cell)
+    if node is None or len(cell.document.declared("variables")) > len(cell.document.variables):
         return
-    broken = {wrong.pdo for wrong in cell.canopen.misnamed}
+    broken = {wrong.pdo for wrong in node.misnamed}
     unresolved = {missing.part.name for missing in cell.unresolved}
-    for name in cell.canopen.empty:
-        if name in broken or unresolved & set(_named(cell.canopen.part.spec.pdos[name])):
+    for name in node.empty:
+        if name in broken or unresolved & set(_named(node.part.spec.pdos[name])):
             continue
         message = f"no variable is in the PDO `{name}`"
         hint = "name its `variables`, or remove it"
-        yield rule.at(cell.canopen.part.key_at("pdos", name), message, hint=hint)
+        yield rule.at(node.part.key_at("pdos", name), message, hint=hint)
 
 
 @cell_rule(
@@ -109,8 +111,9 @@ def _named(pdo: PdoSpec) -> Iterator[str]:
 
 def _once(cell: ExpandedCell, *problems: MemberProblem) -> Iterator[Misnamed]:
     """The first of each name in each PDO."""
+    node = node_of(cell)
     seen: set[tuple[str, str]] = set()
-    for wrong in cell.canopen.misnamed if cell.canopen is not None else ():
+    for wrong in node.misnamed if node is not None else ():
         if wrong.problem in problems and (wrong.pdo, wrong.text) not in seen:
             seen.add((wrong.pdo, wrong.text))
             yield wrong

@@ -9,12 +9,12 @@ from gatewayd.canopen.cob_ids import Function, is_restricted
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction
 from gatewayd.links.canopen_node.bus_load import FIRST_EVENT_TYPE, pdo_bits
-from gatewayd.links.canopen_node.expand import CanopenCell, ConcretePdo
+from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo, node_of
 from gatewayd.links.canopen_node.pdo_layout import PDO_BITS, PDO_NUMBERS
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
-from gatewayd.mapping.expand import ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import cob, number, seconds
+from gatewayd.report.wording import cob, number, seconds
 
 __all__ = ["cob_id_place"]
 
@@ -93,7 +93,7 @@ class _Use:
 )
 def cob_id_clash(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """COB-IDs of PDOs and of SYNC that are used already."""
-    node = cell.canopen
+    node = node_of(cell)
     if node is None:
         return
     used = {use.cob_id: use for use in _services(node)}
@@ -134,7 +134,7 @@ def _services(node: CanopenCell) -> Iterator[_Use]:
 )
 def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Restricted COB-IDs of SYNC and PDOs, and in the declared ranges."""
-    node = cell.canopen
+    node = node_of(cell)
     if node is None:
         return
     spec, part = node.part.spec, node.part
@@ -162,7 +162,7 @@ def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def too_few_cob_ids(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """How many are missing in each direction, and which would do."""
-    node = cell.canopen
+    node = node_of(cell)
     if node is None:
         return
     used = {pdo.slot.cob_id for pdo in node.pdos if pdo.slot.cob_id is not None}
@@ -216,20 +216,21 @@ def _spans(cob_ids: list[int]) -> str:
 )
 def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`event` at RPDOs, `deadline` at TPDOs, `sync_start` where no SYNC counts."""
+    node = node_of(cell)
     for pdo in _pdos(cell):
-        assert cell.canopen is not None
+        assert node is not None
         receives = pdo.direction is Direction.INPUT
-        written = cell.canopen.part.spec.pdos[pdo.name].model_fields_set
+        written = node.part.spec.pdos[pdo.name].model_fields_set
         wrong, right = ("event", "deadline") if receives else ("deadline", "event")
         if wrong in written:
             message = f"the PDO `{pdo.name}` goes {_WORDS[pdo.direction]} and has `{wrong}`"
             if not receives:
                 message = f"the PDO `{pdo.name}` comes {_WORDS[pdo.direction]} and has `{wrong}`"
-            place = cell.canopen.part.key_at("pdos", pdo.name, wrong)
+            place = node.part.key_at("pdos", pdo.name, wrong)
             yield rule.at(place, message, hint=f"write `{right}`, or remove it")
         if "sync_start" in written and (receives or not 0 < pdo.transmission < FIRST_EVENT_TYPE):
             message = f"the PDO `{pdo.name}` has `sync_start` and is not sent with every n-th SYNC"
-            place = cell.canopen.part.key_at("pdos", pdo.name, "sync_start")
+            place = node.part.key_at("pdos", pdo.name, "sync_start")
             yield rule.at(place, message, hint="remove `sync_start`, or write `transmission: sync`")
 
 
@@ -241,7 +242,7 @@ def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
 )
 def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first synchronous PDO of a node without a period."""
-    node = cell.canopen
+    node = node_of(cell)
     if node is None or node.part.spec.sync.period is not None:
         return
     pdo = next((pdo for pdo in node.pdos if pdo.transmission < FIRST_EVENT_TYPE), None)
@@ -258,7 +259,7 @@ def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def producer_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`producer: true` alone."""
-    node = cell.canopen
+    node = node_of(cell)
     if node is not None and node.part.spec.sync.producer and node.part.spec.sync.period is None:
         message = f"node {node.part.spec.node} is to produce SYNC without a period"
         yield rule.at(node.part.at("sync", "producer"), message, hint="add `period: 10ms` to `sync`")
@@ -272,7 +273,7 @@ def producer_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
 )
 def inhibit_below_frame_time(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Inhibit times without effect."""
-    node = cell.canopen
+    node = node_of(cell)
     if node is None:
         return
     reported: set[Position] = set()
@@ -298,7 +299,7 @@ def inhibit_below_frame_time(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnos
 )
 def event_below_inhibit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Event timers that the inhibit time always delays."""
-    node = cell.canopen
+    node = node_of(cell)
     if node is None:
         return
     reported: set[Position] = set()
@@ -318,7 +319,7 @@ def event_below_inhibit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(place, message, hint=hint)
 
 
-def cob_id_place(node: CanopenCell, pdo: ConcretePdo) -> Position:
+def cob_id_place(node: CanopenCell, pdo: ExpandedPdo) -> Position:
     """Where the file gives a PDO its COB-ID: at the PDO, among the declared ones, or by the node-ID."""
     if pdo.name and node.part.spec.pdos[pdo.name].cob_id is not None:
         return node.part.at("pdos", pdo.name, "cob_id")
@@ -331,20 +332,21 @@ def cob_id_place(node: CanopenCell, pdo: ConcretePdo) -> Position:
     return node.part.key
 
 
-def _key_place(node: CanopenCell, pdo: ConcretePdo, key: str) -> Position:
+def _key_place(node: CanopenCell, pdo: ExpandedPdo, key: str) -> Position:
     """Where a key of a PDO is written: at the PDO, or among the defaults."""
     if pdo.name and key in node.part.spec.pdos[pdo.name].model_fields_set:
         return node.part.at("pdos", pdo.name, key)
     return node.part.at("pdo", key)
 
 
-def _pdos(cell: ExpandedCell) -> Iterator[ConcretePdo]:
+def _pdos(cell: ExpandedCell) -> Iterator[ExpandedPdo]:
     """The PDOs of the file; those of the automatic layout have none of these mistakes."""
-    if cell.canopen is not None:
-        yield from (pdo for pdo in cell.canopen.pdos if pdo.name)
+    node = node_of(cell)
+    if node is not None:
+        yield from (pdo for pdo in node.pdos if pdo.name)
 
 
-def _contents(cell: ExpandedCell, pdo: ConcretePdo) -> Iterator[tuple[str, int]]:
+def _contents(cell: ExpandedCell, pdo: ExpandedPdo) -> Iterator[tuple[str, int]]:
     """The name of everything in a PDO, and the bit after it."""
     for offset, word in pdo.status_offsets:
         yield word.name, offset + word.type.bits

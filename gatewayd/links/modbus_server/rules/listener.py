@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from ipaddress import ip_address, ip_network
 
 from gatewayd.links.modbus_server.plan import Network
-from gatewayd.links.modbus_server.sections import Modbus
+from gatewayd.links.modbus_server.sections import Modbus, ModbusWriter
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.document import Part
-from gatewayd.mapping.expand import ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 
 __all__: list[str] = []
@@ -89,15 +89,17 @@ def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Dia
 )
 def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers without a network that `allow` reaches."""
-    modbus = cell.document.modbus
+    modbus = cell.document.part(Modbus)
     if modbus is None or not modbus.spec.allow:
         return
     for writer in cell.document.writers.values():
-        if writer.spec.modbus and not any(_meet(peer, modbus.spec.allow) for peer in writer.spec.modbus):
-            shown = ", ".join(map(_shown, writer.spec.modbus[:3]))
+        if writer.spec.by(ModbusWriter).modbus and not any(
+            _meet(peer, modbus.spec.allow) for peer in writer.spec.by(ModbusWriter).modbus
+        ):
+            shown = ", ".join(map(_shown, writer.spec.by(ModbusWriter).modbus[:3]))
             message = f"the access list of the listener shuts the writer `{writer.name}` ({shown}) out"
             related = (Related(modbus.at("allow"), "the access list is here"),)
-            hint = f"add {_shown(writer.spec.modbus[0])} to `allow`"
+            hint = f"add {_shown(writer.spec.by(ModbusWriter).modbus[0])} to `allow`"
             yield rule.at(writer.at("modbus"), message, hint=hint, related=related)
 
 
@@ -109,7 +111,7 @@ def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Wildcard listeners without `allow`."""
-    modbus = cell.document.modbus
+    modbus = cell.document.part(Modbus)
     if modbus is not None and not modbus.spec.allow and ip_address(modbus.spec.listen.host).is_unspecified:
         message = f"{modbus.spec.listen} serves every network of this machine, and there is no access list"
         hint = "add `allow: [192.168.1.0/24]` with the networks that may connect"
@@ -124,7 +126,7 @@ def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def foreign_port(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Low ports other than Modbus's own."""
-    modbus = cell.document.modbus
+    modbus = cell.document.part(Modbus)
     if modbus is None:
         return
     port = modbus.spec.listen.port
@@ -141,12 +143,14 @@ def foreign_port(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Loopback listeners with writers from outside."""
-    modbus = cell.document.modbus
+    modbus = cell.document.part(Modbus)
     if modbus is None or not ip_address(modbus.spec.listen.host).is_loopback:
         return
     for writer in cell.document.writers.values():
-        if writer.spec.modbus and not any(_meet(peer, _LOOPBACK) for peer in writer.spec.modbus):
-            shown = _shown(writer.spec.modbus[0])
+        if writer.spec.by(ModbusWriter).modbus and not any(
+            _meet(peer, _LOOPBACK) for peer in writer.spec.by(ModbusWriter).modbus
+        ):
+            shown = _shown(writer.spec.by(ModbusWriter).modbus[0])
             message = (
                 f"the writer `{writer.name}` ({shown}) cannot reach {modbus.spec.listen}, "
                 "which only this machine can"
@@ -158,8 +162,9 @@ def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
 
 def _listeners(cells: Sequence[ExpandedCell]) -> Iterator[tuple[ExpandedCell, Part[Modbus]]]:
     for cell in cells:
-        if cell.document.modbus is not None:
-            yield cell, cell.document.modbus
+        modbus = cell.document.part(Modbus)
+        if modbus is not None:
+            yield cell, modbus
 
 
 def _clash(one: str, other: str) -> bool:

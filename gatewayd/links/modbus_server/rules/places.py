@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from itertools import groupby
 
 from gatewayd.core.definition import Direction
+from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProblem, placements_of
+from gatewayd.links.modbus_server.rules.wording import AREA_WORDS, first_of_each_line, where
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
-from gatewayd.mapping.expand import ConcretePlacement, ExpandedCell, PlacementProblem
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import AREA_WORDS, first_of_each_line, where
 from gatewayd.modbus.areas import Area
 
 __all__ = ["FIRST_STATUS_REGISTER"]
@@ -36,7 +37,7 @@ _KEYS = {Area.HOLDING: "holding", Area.INPUT: "input", Area.COIL: "coil", Area.D
 )
 def beyond_last_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Placements that do not fit below the end of their area."""
-    beyond = [item for item in cell.placements if item.problem is PlacementProblem.BEYOND_END]
+    beyond = [item for item in placements_of(cell) if item.problem is PlacementProblem.BEYOND_END]
     for placement in first_of_each_line(beyond):
         last = placement.address + placement.words - 1
         message = (
@@ -56,7 +57,7 @@ def status_block(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Register placements at 60000 and above."""
     inside = [
         item
-        for item in cell.placements
+        for item in placements_of(cell)
         if not item.area.of_bits and item.problem is None and item.addresses[-1] >= FIRST_STATUS_REGISTER
     ]
     for placement in first_of_each_line(inside):
@@ -74,7 +75,7 @@ def status_block(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def traditional_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Written addresses in the range of the traditional notation of their area."""
-    for placement in first_of_each_line(cell.placements):
+    for placement in first_of_each_line(placements_of(cell)):
         address = placement.spec.address
         if address in _TRADITIONAL.get(placement.area, ()):
             meant = address - _TRADITIONAL[placement.area].start
@@ -95,11 +96,11 @@ def traditional_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def number_in_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Numbers in coils, discrete inputs and single bits."""
-    wrong = [item for item in cell.placements if item.problem is PlacementProblem.NUMBER_IN_BIT]
+    wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.NUMBER_IN_BIT]
     for placement in first_of_each_line(wrong):
         variable = placement.variable
         message = (
-            f"`{variable.name}` is a number ({variable.field.name}, {variable.type.word}) "
+            f"`{variable.name}` is a number ({variable.field}, {variable.type}) "
             f"and cannot lie in {where(placement)}"
         )
         area = "holding" if placement.area in (Area.COIL, Area.HOLDING) else "input"
@@ -114,7 +115,7 @@ def number_in_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def input_in_read_only_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Inputs all of whose placements are read-only."""
-    for _, group in groupby(cell.placements, key=lambda item: item.variable.part.name):
+    for _, group in groupby(placements_of(cell), key=lambda item: item.variable.part.name):
         placements = list(group)
         first = placements[0]
         if first.variable.direction is Direction.INPUT and all(
@@ -135,7 +136,7 @@ def input_in_read_only_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
 )
 def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Type `bit` without a bit number."""
-    wrong = [item for item in cell.placements if item.problem is PlacementProblem.BIT_WITHOUT_PLACE]
+    wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.BIT_WITHOUT_PLACE]
     for placement in first_of_each_line(wrong):
         message = f"`{placement.variable.name}` has the type bit, but {where(placement)} is a whole register"
         hint = f"write the bit, {_KEYS[placement.area]}: {placement.address}.0, or type: bool"
@@ -149,7 +150,7 @@ def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def type_of_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Number types at single bits."""
-    wrong = [item for item in cell.placements if item.problem is PlacementProblem.TYPE_IN_BIT]
+    wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.TYPE_IN_BIT]
     for placement in first_of_each_line(wrong):
         message = f"`{placement.variable.name}` has the type {placement.spec.type} at {where(placement)}"
         yield rule.at(placement.position, message, hint="leave `type` out")
@@ -165,7 +166,7 @@ def split_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Values across multiples of 125 registers from the start of their block, 123 for writing."""
     reported: set[tuple[str, int]] = set()
     for area in (Area.HOLDING, Area.INPUT):
-        placed = [item for item in cell.placements if item.area is area and item.problem is None]
+        placed = [item for item in placements_of(cell) if item.area is area and item.problem is None]
         writable = [
             item
             for item in placed
@@ -185,7 +186,7 @@ def split_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 yield rule.at(placement.position, message, hint=hint)
 
 
-def _cut(placements: list[ConcretePlacement], limit: int) -> Iterator[tuple[ConcretePlacement, int, int]]:
+def _cut(placements: list[ExpandedPlacement], limit: int) -> Iterator[tuple[ExpandedPlacement, int, int]]:
     """Placements that a boundary cuts, with the start of their block and the boundary."""
     start = end = -1
     for placement in sorted(placements, key=lambda item: item.address):
@@ -204,8 +205,8 @@ def _cut(placements: list[ConcretePlacement], limit: int) -> Iterator[tuple[Conc
 )
 def mixed_directions(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Holding registers with input bits and output bits."""
-    packed = [item for item in cell.placements if item.bit is not None and item.area is Area.HOLDING]
-    first: dict[int, ConcretePlacement] = {}
+    packed = [item for item in placements_of(cell) if item.bit is not None and item.area is Area.HOLDING]
+    first: dict[int, ExpandedPlacement] = {}
     reported: set[tuple[str, str]] = set()
     for placement in packed:
         other = first.setdefault(placement.address, placement)
@@ -222,7 +223,7 @@ def mixed_directions(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(placement.position, message, hint=hint, related=related)
 
 
-def _register(placement: ConcretePlacement) -> str:
+def _register(placement: ExpandedPlacement) -> str:
     return f"{AREA_WORDS[placement.area]} {placement.address} ({placement.area.notation(placement.address)})"
 
 
@@ -266,15 +267,15 @@ def bit_in_number(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 def _overlaps(
     cell: ExpandedCell, *, mixed: bool
-) -> Iterator[tuple[ConcretePlacement, ConcretePlacement, int]]:
+) -> Iterator[tuple[ExpandedPlacement, ExpandedPlacement, int]]:
     """Pairs of lines that overlap: first placement of the later line, what it meets, and how many do.
 
     A sweep over sorted places, so that a thousand variables cost no more than their sorting.
     """
-    pairs: dict[tuple[str, int, str, int], list[tuple[ConcretePlacement, ConcretePlacement]]] = {}
+    pairs: dict[tuple[str, int, str, int], list[tuple[ExpandedPlacement, ExpandedPlacement]]] = {}
     for area in Area:
-        placed = [item for item in cell.placements if item.area is area and item.problem is None]
-        reach: ConcretePlacement | None = None
+        placed = [item for item in placements_of(cell) if item.area is area and item.problem is None]
+        reach: ExpandedPlacement | None = None
         for placement in sorted(placed, key=_span):
             if reach is not None and _span(placement)[0] < _span(reach)[1]:
                 earlier, later = sorted((reach, placement), key=_order)
@@ -288,11 +289,11 @@ def _overlaps(
         yield later, earlier, len(found)
 
 
-def _line(placement: ConcretePlacement) -> tuple[str, int]:
+def _line(placement: ExpandedPlacement) -> tuple[str, int]:
     return placement.variable.part.name, id(placement.spec)
 
 
-def _span(placement: ConcretePlacement) -> tuple[int, int]:
+def _span(placement: ExpandedPlacement) -> tuple[int, int]:
     """First bit and the bit after the last, counting sixteen to an address."""
     start = placement.address * 16
     if placement.bit is not None:
@@ -300,14 +301,14 @@ def _span(placement: ConcretePlacement) -> tuple[int, int]:
     return start, start + placement.words * 16
 
 
-def _order(placement: ConcretePlacement) -> tuple[int, int]:
+def _order(placement: ExpandedPlacement) -> tuple[int, int]:
     return placement.position.line, placement.position.column
 
 
-def _room(cell: ExpandedCell, placement: ConcretePlacement) -> str:
+def _room(cell: ExpandedCell, placement: ExpandedPlacement) -> str:
     """Remedy for an overlap: the next addresses of the area where the whole line fits."""
     area = placement.area
-    here = [item for item in cell.placements if item.area is area and item.problem is None]
+    here = [item for item in placements_of(cell) if item.area is area and item.problem is None]
     line = [item for item in here if _line(item) == _line(placement)]
     start = min(item.address for item in line)
     length = max(item.addresses[-1] for item in line) + 1 - start
@@ -336,27 +337,10 @@ def _first(addresses: range) -> int:
 )
 def no_modbus_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Placements without a listener."""
-    if not cell.placements or cell.document.has("modbus"):
+    placements = placements_of(cell)
+    if not placements or cell.document.has("modbus"):
         return
-    first = cell.placements[0]
+    first = placements[0]
     message = f"`{first.variable.name}` has a Modbus address, but the file has no section `modbus`"
     hint = "add `modbus: {listen: 127.0.0.1:1502}`"
     yield rule.at(first.position, message, hint=hint)
-
-
-@cell_rule(
-    "GW221",
-    "unmapped-variable",
-    "a variable that no fieldbus can see",
-    Severity.WARNING,
-)
-def unmapped_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Lines without a placement and without an object."""
-    canopen = cell.document.canopen
-    pdos = canopen.spec.pdos.values() if canopen is not None else ()
-    listed = {member.name for pdo in pdos for member in pdo.variables}
-    for part in cell.document.variables.values():
-        if not part.spec.modbus and part.spec.canopen is None and part.name not in listed:
-            message = f"`{part.name}` ({part.spec.robot}) has no address on any fieldbus"
-            hint = "add `modbus: N` or `canopen: auto`, or remove the line"
-            yield rule.at(part.key, message, hint=hint)

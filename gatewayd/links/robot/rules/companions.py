@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from gatewayd.core.definition import Direction
+from gatewayd.links.robot.rules.controller import unresolved
 from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
-from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.rtde.companions import Companions, companions
 
@@ -63,21 +64,21 @@ def _domain(needs: Companions) -> str | None:
 
 def _without(
     cell: ExpandedCell, companion_of: Callable[[Companions], str | None]
-) -> Iterator[tuple[ConcreteVariable, str, int]]:
+) -> Iterator[tuple[ExpandedVariable, str, int]]:
     """The first input of each line whose companion is not mapped in its bit; with the companion and that bit.
 
     A whole word of outputs has its companion where any bit of it is mapped: which outputs it sets may be chosen there.
     """
     mapped = _mapped(cell)
     # What is missing may be meant by a line that could not be read; that line has its own finding.
-    broken = {item.name for item in cell.unresolved}
+    broken = {error.name for _, error in unresolved(cell)}
     if len(cell.document.declared("variables")) != len(cell.document.variables):
         return
     seen: set[tuple[str, str]] = set()
     for variable in cell.variables:
-        needs = companions(variable.field.name)
+        needs = companions(variable.field)
         companion = companion_of(needs) if needs is not None else None
-        key = variable.part.name, variable.field.name
+        key = variable.part.name, variable.field
         if needs is None or companion is None or companion in broken or key in seen:
             continue
         wanted = variable.bit if needs.bit is None else needs.bit
@@ -93,5 +94,5 @@ def _mapped(cell: ExpandedCell) -> dict[str, set[int | None]]:
     found: dict[str, set[int | None]] = {}
     for variable in cell.variables:
         if variable.direction is Direction.INPUT:
-            found.setdefault(variable.field.name, set()).add(variable.bit)
+            found.setdefault(variable.field, set()).add(variable.bit)
     return found

@@ -6,38 +6,20 @@ from collections.abc import Iterator
 from math import isclose, isfinite
 
 from gatewayd.core.definition import Direction, ValueKind
+from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProblem, placements_of
+from gatewayd.links.modbus_server.rules.wording import first_of_each_line, where
+from gatewayd.links.modbus_server.sections import ModbusPlaces
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule, Severity
-from gatewayd.mapping.expand import ConcretePlacement, ConcreteVariable, ExpandedCell, PlacementProblem
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import first_of_each_line, number, where
 from gatewayd.modbus.codec import TYPES, Codec
+from gatewayd.report.wording import number
 
-__all__ = ["GROWING", "range_of"]
+__all__: list[str] = []
 
 _FLOAT_DIGITS = {"float32": 1 << 24, "float64": 1 << 53}
 """Integers up to here survive in a real of the type."""
-_LEAST_STEPS = 10
-_KNOWN_RANGES = {
-    "robot_mode": (-1, 255),
-    "joint_mode": (0, 255),
-    "safety_mode": (0, 255),
-    "safety_status": (0, 255),
-    "runtime_state": (0, 255),
-    "tool_mode": (0, 255),
-    "time_scale_source": (-1, 255),
-    "robot_status_bits": (0, 0xF),
-    "safety_status_bits": (0, 0xFFF),
-    "analog_io_types": (0, 0xF),
-    "tool_analog_input_types": (0, 0xF),
-    "tool_output_voltage": (0, 24),
-    "actual_digital_input_bits": (0, 0x3FFFF),
-    "actual_digital_output_bits": (0, 0x3FFFF),
-    "actual_configurable_digital_input_bits": (0, 0xFF),
-    "actual_configurable_digital_output_bits": (0, 0xFF),
-}
-"""Values that fields take in truth, where that is much less than their type holds."""
-GROWING = ("timestamp",)
-"""Fields that grow for ever."""
+_MIN_STEPS = 10
 
 
 @cell_rule(
@@ -49,7 +31,7 @@ GROWING = ("timestamp",)
 def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Growing reals in a float32."""
     for placement in _numbers(cell):
-        if placement.type == "float32" and placement.variable.field.name in GROWING:
+        if placement.type == "float32" and placement.variable.grows:
             message = (
                 f"`{placement.variable.name}` grows for ever, and float32 at {where(placement)} loses its end"
             )
@@ -89,7 +71,7 @@ def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Integer outputs in types that do not hold their range."""
     for placement in _numbers(cell):
         variable = placement.variable
-        bounds = range_of(variable)
+        bounds = variable.range
         if variable.direction is Direction.INPUT or variable.kind is not ValueKind.INT or bounds is None:
             continue
         low, high = _reach(placement)
@@ -124,7 +106,7 @@ def coarse_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         ):
             continue
         steps = (limits[1] - limits[0]) / abs(placement.scale)
-        if steps < _LEAST_STEPS:
+        if steps < _MIN_STEPS:
             message = (
                 f"the scale {number(placement.scale)} leaves {number(int(steps) + 1)} values of "
                 f"`{placement.variable.name}` between {number(limits[0])} and {number(limits[1])}"
@@ -176,7 +158,7 @@ def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def scale_of_zero(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Scales of zero."""
-    zero = [item for item in cell.placements if item.problem is PlacementProblem.SCALE_OF_ZERO]
+    zero = [item for item in placements_of(cell) if item.problem is PlacementProblem.SCALE_OF_ZERO]
     for placement in first_of_each_line(zero):
         message = f"`{placement.variable.name}` has the scale 0"
         yield rule.at(_key(placement, "scale"), message, hint="leave `scale` out, or write for example 0.1")
@@ -189,7 +171,7 @@ def scale_of_zero(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 )
 def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Number conversions of bits."""
-    for placement in first_of_each_line(cell.placements):
+    for placement in first_of_each_line(placements_of(cell)):
         spec = placement.spec
         keys = [key for key in ("scale", "offset") if getattr(spec, key) is not None]
         whole = placement.codec is not None and placement.variable.kind is ValueKind.BOOL and keys
@@ -241,7 +223,7 @@ def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Integers in reals with fewer digits."""
     for placement in _numbers(cell):
         variable, digits = placement.variable, _FLOAT_DIGITS.get(placement.type)
-        bounds = range_of(variable)
+        bounds = variable.range
         if variable.kind is not ValueKind.INT or digits is None or bounds is None:
             continue
         if max(-bounds[0], bounds[1]) > digits:
@@ -264,7 +246,9 @@ def number_as_bool(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for placement in _numbers(cell):
         variable = placement.variable
         if placement.type == "bool" and variable.kind is not ValueKind.BOOL:
-            message = f"`{variable.name}` is a number ({variable.type.word}), bool at {where(placement)} shows 0 or 1"
+            message = (
+                f"`{variable.name}` is a number ({variable.type}), bool at {where(placement)} shows 0 or 1"
+            )
             hint = f"use a number type, or map one bit, `{variable.target}.N`"
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
@@ -297,30 +281,23 @@ def _round_trip(codec: Codec, value: float) -> float | None:
     return None if shown is None or not isfinite(shown) else float(shown)
 
 
-def _numbers(cell: ExpandedCell) -> Iterator[ConcretePlacement]:
+def _numbers(cell: ExpandedCell) -> Iterator[ExpandedPlacement]:
     """The first of each line that lies in whole registers and has a codec."""
-    return (item for item in first_of_each_line(cell.placements) if item.codec is not None)
+    return (item for item in first_of_each_line(placements_of(cell)) if item.codec is not None)
 
 
-def range_of(variable: ConcreteVariable) -> tuple[float, float] | None:
-    """What an integer can be: its limits, what the field is known to take, or its type; None for other kinds."""
-    if variable.low is None or variable.high is None:
-        return None
-    if variable.spec.limits is not None:
-        return variable.spec.limits
-    return _KNOWN_RANGES.get(variable.field.name, (variable.low, variable.high))
-
-
-def _reach(placement: ConcretePlacement) -> tuple[float, float]:
+def _reach(placement: ExpandedPlacement) -> tuple[float, float]:
     """Least and greatest robot value that the register can express."""
     form = TYPES[placement.type]
     ends = (form.low * placement.scale + placement.offset, form.high * placement.scale + placement.offset)
     return min(ends), max(ends)
 
 
-def _key(placement: ConcretePlacement, key: str) -> Position:
+def _key(placement: ExpandedPlacement, key: str) -> Position:
     """Place of a key of the placement where it was written, else of its address."""
     if getattr(placement.spec, key) is None:
         return placement.position
-    index = next(i for i, spec in enumerate(placement.variable.spec.modbus) if spec is placement.spec)
+    index = next(
+        i for i, spec in enumerate(placement.variable.spec.by(ModbusPlaces).modbus) if spec is placement.spec
+    )
     return placement.variable.at("modbus", index, key)

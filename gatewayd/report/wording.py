@@ -1,43 +1,18 @@
-"""How findings name addresses, numbers and lists of things, so that every rule says it alike."""
+"""How findings and tables name numbers and lists of things, so that all of them say it alike."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Sequence
-
-from gatewayd.mapping.expand import ConcretePlacement
-from gatewayd.modbus.areas import Area
+from collections.abc import Iterable, Sequence
 
 __all__ = [
-    "AREA_WORDS",
     "cob",
     "did_you_mean",
-    "first_of_each_line",
     "names_and_more",
     "number",
     "one_and_more",
     "seconds",
-    "where",
 ]
-
-AREA_WORDS = {
-    Area.HOLDING: "holding register",
-    Area.INPUT: "input register",
-    Area.COIL: "coil",
-    Area.DISCRETE: "discrete input",
-}
-"""What one address of an area is called."""
-
-
-def where(placement: ConcretePlacement) -> str:
-    """Where it lies, both ways of counting: `holding registers 100 to 103 (400101 to 400104)`."""
-    word = AREA_WORDS[placement.area]
-    if placement.bit is not None:
-        return f"bit {placement.bit} of {word} {placement.address} ({placement.notation})"
-    if placement.words == 1:
-        return f"{word} {placement.address} ({placement.notation})"
-    last = placement.address + placement.words - 1
-    return f"{word}s {placement.address} to {last} ({placement.notation} to {placement.area.notation(last)})"
 
 
 def number(value: float) -> str:
@@ -75,13 +50,3 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
     same = [one for one in names if one.casefold() == name.casefold()]
     close = same or difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"did you mean `{close[0]}`?" if close else otherwise
-
-
-def first_of_each_line(placements: Iterable[ConcretePlacement]) -> Iterator[ConcretePlacement]:
-    """Of a family on one line only the first: one mistake is one finding."""
-    seen: set[tuple[str, int]] = set()
-    for placement in placements:
-        key = placement.variable.part.name, id(placement.spec)
-        if key not in seen:
-            seen.add(key)
-            yield placement

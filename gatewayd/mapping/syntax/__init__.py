@@ -1,4 +1,4 @@
-"""Rules GW1xx: the text, its structure and its numbers. Declared here, found by the loader."""
+"""Rules GW1xx: the text, its structure and its numbers. Found by the readers of text and parts (`source`, `reader`)."""
 
 from __future__ import annotations
 
@@ -6,15 +6,12 @@ from gatewayd.mapping.diagnostics import declare
 
 __all__ = [
     "ALIAS",
-    "BAD_ADDRESS",
     "BAD_CHOICE",
-    "BAD_COB_ID",
     "BAD_DURATION",
     "BAD_NAME",
     "BAD_NETWORK",
     "BAD_NUMBER",
     "BAD_RANGE",
-    "BAD_REFERENCE",
     "DUPLICATE_KEY",
     "EMPTY",
     "FORMAT_VERSION",
@@ -99,20 +96,10 @@ BAD_CHOICE = declare(
     "bad-choice",
     "a word that is not among the choices",
 )
-BAD_ADDRESS = declare(
-    "GW115",
-    "bad-address",
-    "a Modbus address that cannot be read",
-)
 OUT_OF_RANGE = declare(
     "GW116",
     "out-of-range",
     "a number outside the range of its key",
-)
-BAD_REFERENCE = declare(
-    "GW117",
-    "bad-robot-reference",
-    "a `robot:` reference that cannot be read",
 )
 BAD_NETWORK = declare(
     "GW118",
@@ -123,11 +110,6 @@ NOT_UTF8 = declare(
     "GW120",
     "not-utf8",
     "the file is not UTF-8 text",
-)
-BAD_COB_ID = declare(
-    "GW121",
-    "bad-cob-id",
-    "a COB-ID that cannot be read",
 )
 BAD_RANGE = declare(
     "GW122",
