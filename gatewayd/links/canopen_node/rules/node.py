@@ -9,12 +9,11 @@ from gatewayd.core.definition import Direction, ValueKind
 from gatewayd.links.canopen_node.bus_load import BIT_RATES, FIRST_EVENT_TYPE
 from gatewayd.links.canopen_node.expand import MappedObject, node_of, place_of
 from gatewayd.links.canopen_node.sections import Canopen, CanopenPlaces, CanopenWriter
-from gatewayd.links.registry import languages
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.model import WriterSpec
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.writers import known_by, ways_of
+from gatewayd.mapping.rules.writers import known_by, ways_of, ways_of_variable
 from gatewayd.report.wording import number, one_and_more, seconds
 
 __all__: list[str] = []
@@ -179,7 +178,7 @@ def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         return
     for variable in _inputs(cell):
         owners = _owners(cell, variable)
-        ways = _ways(variable, cell)
+        ways = ways_of_variable(variable, cell)
         if not owners or not ways:
             continue
         reach = frozenset().union(*(ways_of(writer) for _, writer in owners))
@@ -209,7 +208,7 @@ def owner_elsewhere(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for variable in _inputs(cell):
         assert variable.lock is not None
         lock = cell.locks[variable.lock]
-        ways = _ways(variable, cell)
+        ways = ways_of_variable(variable, cell)
         owners = _owners(cell, variable)
         if lock.is_any or not ways or not any(ways & ways_of(writer) for _, writer in owners):
             continue
@@ -222,10 +221,6 @@ def owner_elsewhere(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 )
                 hint = f"put `{variable.part.name}` where `{name}` writes, or remove that owner"
                 yield rule.at(lock.position, message, hint=hint)
-
-
-def _ways(variable: ExpandedVariable, cell: ExpandedCell) -> frozenset[str]:
-    return frozenset().union(*(language.ways_of_variable(variable, cell) for language in languages()))
 
 
 def _owners(cell: ExpandedCell, variable: ExpandedVariable) -> list[tuple[str, WriterSpec]]:

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 from gatewayd.core.definition import Direction
-from gatewayd.links.registry import languages
 from gatewayd.links.robot.definition import field_of
 from gatewayd.links.robot.reference import ReferenceProblem, UnresolvedReference
 from gatewayd.links.robot.rules.controller import controller, unresolved, watchdog_field
@@ -14,6 +13,7 @@ from gatewayd.links.robot.sections import Robot, RobotPlace
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
+from gatewayd.mapping.rules.writers import more_places
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, REGISTERS, Series, SoftwareVersion, suggest
 
 __all__: list[str] = []
@@ -168,8 +168,8 @@ def input_mapped_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         reported.add((earlier.part.name, variable.part.name))
         message = f"`{variable.name}` writes {variable.target}, as `{earlier.name}` does ({earlier.target})"
         related = (Related(earlier.at("robot"), f"`{earlier.name}`, first used here"),)
-        lists = [more for language in languages() if (more := language.more_places(earlier))]
-        hint = "map it once" + (f"; more places for it make a list: {lists[0]}" if lists else "")
+        more = more_places(earlier)
+        hint = "map it once" + (f"; more places for it make a list: {more}" if more else "")
         yield rule.at(variable.at("robot"), message, hint=hint, related=related)
 
 
