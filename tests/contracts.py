@@ -23,7 +23,6 @@ from click.testing import CliRunner
 
 from gatewayd.cli import COMMANDS
 from gatewayd.cli import command as root_command
-from gatewayd.control import documented
 from gatewayd.control.server import application
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Fallback, Lock, ValueKind, Variable, Writer
@@ -40,6 +39,7 @@ from gatewayd.mapping.diagnostics import Diagnostic, Rule
 from gatewayd.mapping.loader import load_together
 from gatewayd.mapping.rules import catalogue
 from gatewayd.mapping.schema import mapping_schema
+from gatewayd.report.schema import documented
 from gatewayd.web.listener import StatusListener
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS
 
@@ -296,7 +296,7 @@ def control() -> object:
     anything = MagicMock()
     listener = StatusListener("127.0.0.1", 0, anything, api=(anything, None))
     return {
-        "fields": {name: list(getattr(documented, name)) for name in documented.__all__},
+        "fields": {name.upper(): list(fields) for name, fields in documented().items()},
         "socket": sorted(_routes(application(anything, None))),
         "listener": sorted(_routes(listener._app)),
     }

@@ -16,10 +16,8 @@ from typing import Any, Protocol
 
 from gatewayd import __version__
 from gatewayd.control.views import (
-    Json,
-    RuntimeView,
+    Declarations,
     cell_view,
-    declared_view,
     event_view,
     lock_view,
     record_view,
@@ -27,7 +25,8 @@ from gatewayd.control.views import (
 )
 from gatewayd.core.definition import Value, ValueKind
 from gatewayd.core.refusal import Reason, Refusal
-from gatewayd.mapping.plan import Plan
+from gatewayd.report.schema import EventMessage, Json, LockStatus, Status, VersionInfo
+from gatewayd.report.verdict import ServedCell
 from gatewayd.service.audit import Audit, Record, utc
 
 __all__ = ["API_VERSION", "LONGEST_FORCE", "STALE_ACT", "Api", "ApiError", "Cursor", "Gateway", "Moment"]
@@ -58,7 +57,7 @@ class Gateway(Protocol):
     """What the interface needs to know of the daemon."""
 
     @property
-    def runtimes(self) -> Sequence[RuntimeView]:
+    def runtimes(self) -> Sequence[ServedCell]:
         """The cells that are served now."""
 
     def troubles(self) -> Sequence[str]:
@@ -99,30 +98,29 @@ class Api:
         self._gateway = gateway
         self._audit = audit
         self._notes = notes
-        self._declared: dict[str, tuple[Plan, tuple[Json, ...]]] = {}
-        """What the mappings say of their variables, by cell: worked out once for each plan."""
+        self._declarations = Declarations()
 
     # -- questions -----------------------------------------------------------------------------------------------
 
-    def version(self) -> Json:
+    def version(self) -> VersionInfo:
         """Versions of the interface and of the program."""
-        return {"api": API_VERSION, "version": __version__, "pid": os.getpid()}
+        return VersionInfo(api=API_VERSION, version=__version__, pid=os.getpid())
 
-    def status(self, moment: Moment) -> Json:
+    def status(self, moment: Moment) -> Status:
         """Everything at a glance."""
         runtimes = self._gateway.runtimes
-        cells = [cell_view(runtime, moment.now) for runtime in runtimes]
+        cells = [cell_view(runtime, self._declarations.of(runtime.plan), moment.now) for runtime in runtimes]
         troubles = [*self._notes(), *self._gateway.troubles()]
         troubles += [f"{cell['name']}: {problem}" for cell in cells for problem in cell["problems"]]
         started = min((runtime.cell.health.started for runtime in runtimes), default=math.inf)
-        return {
+        return Status(
             **self.version(),
-            "time": utc(moment.wall),
-            "uptime": round(max(0.0, moment.now - started), 3) if math.isfinite(started) else 0.0,
-            "healthy": not troubles,
-            "problems": troubles,
-            "cells": cells,
-        }
+            time=utc(moment.wall),
+            uptime=round(max(0.0, moment.now - started), 3) if math.isfinite(started) else 0.0,
+            healthy=not troubles,
+            problems=troubles,
+            cells=cells,
+        )
 
     def variables(self, query: Mapping[str, str], moment: Moment) -> Json:
         """All variables; `cell` and `name` (with * and ?) choose some."""
@@ -161,12 +159,12 @@ class Api:
             "events": [event for _time, event in found[max(0, len(found) - limit) :]],
         }
 
-    def new_events(self, cursor: Cursor, query: Mapping[str, str], moment: Moment) -> list[Json]:
+    def new_events(self, cursor: Cursor, query: Mapping[str, str], moment: Moment) -> list[EventMessage]:
         """What happened since the cursor was used last, and move it. A fresh cursor begins now.
 
         The ring is the only buffer: who asks too seldom misses what it has forgotten, and sees it by `seq`.
         """
-        found: list[tuple[float, Json]] = []
+        found: list[tuple[float, EventMessage]] = []
         for runtime in self._runtimes(query.get("cell")):
             ring, name = runtime.cell.events, runtime.cell.definition.name
             read = cursor.read.get(name, ring.count)
@@ -198,14 +196,14 @@ class Api:
                 503, "stood_still", f"the gateway stood still for {seconds:.1f} s; repeat the command"
             )
 
-    def take(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
+    def take(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> LockStatus:
         """Take a lock; `for` seconds, or until it is released. The lock as it is then."""
         runtime, lock = self._lock(name, body)
         seconds = _seconds(body, required=False)
         runtime.cell.operator.take_lock(lock, moment.now, moment.now + seconds, who)
         return lock_view(runtime.cell, lock, moment.now)
 
-    def release(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
+    def release(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> LockStatus:
         """Release a lock, whoever holds it. The lock as it is then."""
         runtime, lock = self._lock(name, body)
         if not runtime.cell.operator.free_lock(lock, moment.now, who):
@@ -233,7 +231,7 @@ class Api:
 
     # -- inside --------------------------------------------------------------------------------------------------
 
-    def _runtimes(self, cell: str | None) -> Sequence[RuntimeView]:
+    def _runtimes(self, cell: str | None) -> Sequence[ServedCell]:
         if cell is None:
             return self._gateway.runtimes
         found = [one for one in self._gateway.runtimes if one.cell.definition.name == cell]
@@ -242,15 +240,11 @@ class Api:
             raise ApiError(404, "no_such_cell", f"there is no cell {cell}; there is {names}")
         return found
 
-    def _view(self, runtime: RuntimeView, index: int, moment: Moment) -> Json:
-        plan = runtime.plan
-        plan_then, declared = self._declared.get(plan.cell.name, (None, ()))
-        if plan_then is not plan:
-            declared = declared_view(plan)
-            self._declared[plan.cell.name] = plan, declared
-        return variable_view(declared[index], runtime.cell, index, moment.now)
+    def _view(self, runtime: ServedCell, index: int, moment: Moment) -> Json:
+        declared = self._declarations.of(runtime.plan).variables[index]
+        return variable_view(declared, runtime.cell, index, moment.now)
 
-    def _variable(self, name: str, body: Mapping[str, Any]) -> tuple[RuntimeView, int]:
+    def _variable(self, name: str, body: Mapping[str, Any]) -> tuple[ServedCell, int]:
         found = [
             (runtime, index)
             for runtime in self._runtimes(_text(body, "cell"))
@@ -259,7 +253,7 @@ class Api:
         ]
         return _only(found, "variable", name)
 
-    def _lock(self, name: str, body: Mapping[str, Any]) -> tuple[RuntimeView, int]:
+    def _lock(self, name: str, body: Mapping[str, Any]) -> tuple[ServedCell, int]:
         """By the lock's own name, or by that of a variable that it guards."""
         found = []
         for runtime in self._runtimes(_text(body, "cell")):
@@ -279,7 +273,7 @@ _CODES = {
 }
 
 
-def _why(refusal: Refusal, runtime: RuntimeView) -> str:
+def _why(refusal: Refusal, runtime: ServedCell) -> str:
     limits = (
         runtime.cell.definition.variables[refusal.variable].limits if refusal.variable is not None else None
     )
@@ -288,7 +282,7 @@ def _why(refusal: Refusal, runtime: RuntimeView) -> str:
     return refusal.reason.text
 
 
-def _only(found: list[tuple[RuntimeView, int]], what: str, name: str) -> tuple[RuntimeView, int]:
+def _only(found: list[tuple[ServedCell, int]], what: str, name: str) -> tuple[ServedCell, int]:
     if not found:
         raise ApiError(404, f"no_such_{what}", f"there is no {what} {name}")
     if len(found) > 1:
@@ -297,7 +291,7 @@ def _only(found: list[tuple[RuntimeView, int]], what: str, name: str) -> tuple[R
     return found[0]
 
 
-def _events(runtime: RuntimeView, after: int, moment: Moment) -> Iterator[tuple[float, Json]]:
+def _events(runtime: ServedCell, after: int, moment: Moment) -> Iterator[tuple[float, EventMessage]]:
     """The events that the ring still has, with sequence numbers beyond `after`."""
     ring, cell = runtime.cell.events, runtime.cell
     for seq, event in enumerate(ring, ring.count - len(ring) + 1):
@@ -306,10 +300,10 @@ def _events(runtime: RuntimeView, after: int, moment: Moment) -> Iterator[tuple[
 
 
 def _is_wanted(record: Record, query: Mapping[str, str]) -> bool:
-    told = record.happening
+    event = record.event
     return all(
         query.get(name, its) == its
-        for name, its in (("cell", record.cell), ("variable", told.variable), ("writer", told.writer))
+        for name, its in (("cell", record.cell), ("variable", event.variable), ("writer", event.writer))
     )
 
 

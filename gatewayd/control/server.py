@@ -9,7 +9,7 @@ import pwd
 import socket
 import struct
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from functools import lru_cache
 from typing import Any
@@ -18,7 +18,6 @@ from aiohttp import web
 
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
-from gatewayd.control.views import Json
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.loop.threads import in_daemon_thread
@@ -43,8 +42,8 @@ _PEER_CREDENTIALS = struct.Struct("iII")
 log = logging.getLogger("gatewayd.control")
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
-_Act = Callable[[str, Mapping[str, Any], str, Moment], Json]
-_Question = Callable[[Mapping[str, str], Moment], Json]
+_Act = Callable[[str, Mapping[str, Any], str, Moment], Mapping[str, object]]
+_Question = Callable[[Mapping[str, str], Moment], Mapping[str, object]]
 
 
 @asynccontextmanager
@@ -70,9 +69,13 @@ def application(api: Api, reload: Reload | None) -> web.Application:
     for name, question in (("variables", api.variables), ("locks", api.locks), ("audit", api.audit)):
         found.router.add_get(f"/v1/{name}", routes.answer(question))
     found.router.add_get("/v1/events", routes.events)
-    for name, act in (("locks/{name}/take", api.take), ("locks/{name}/release", api.release)):
-        found.router.add_post(f"/v1/{name}", routes.act(act))
-    for name, act in (("variables/{name}/force", api.force), ("variables/{name}/unforce", api.unforce)):
+    acts: dict[str, _Act] = {
+        "locks/{name}/take": api.take,
+        "locks/{name}/release": api.release,
+        "variables/{name}/force": api.force,
+        "variables/{name}/unforce": api.unforce,
+    }
+    for name, act in acts.items():
         found.router.add_post(f"/v1/{name}", routes.act(act))
     found.router.add_post("/v1/reload", routes.reload)
     return found
@@ -155,7 +158,9 @@ class _Routes:
         finally:
             self._followers -= 1
 
-    async def _follow(self, request: web.Request, cursor: Cursor, found: list[Json]) -> web.StreamResponse:
+    async def _follow(
+        self, request: web.Request, cursor: Cursor, found: Sequence[Mapping[str, object]]
+    ) -> web.StreamResponse:
         response = web.StreamResponse(
             headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"}
         )
@@ -184,11 +189,11 @@ def _moment() -> Moment:
     return Moment(clock.now(), time.time())
 
 
-def _line(event: Json) -> str:
+def _line(event: Mapping[str, object]) -> str:
     return json_text(json.dumps(event, ensure_ascii=False, separators=(",", ":"))) + "\n"
 
 
-def _json(value: Json, status: int = 200) -> web.Response:
+def _json(value: Mapping[str, object], status: int = 200) -> web.Response:
     headers = {"Cache-Control": "no-store"}
     return web.Response(text=_line(value), status=status, content_type="application/json", headers=headers)
 

@@ -9,24 +9,14 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from gatewayd.core.image import Quality
 from gatewayd.demo.snapshot import Line, Snapshot
+from gatewayd.report.words import QUALITY_COLOURS
 
 __all__ = ["Poke", "commands", "plain", "screen"]
 
 Poke = tuple[str, str]
 """What a command shows, and the command."""
 
-_QUALITY_STYLES = {
-    Quality.GOOD: "green",
-    Quality.STALE: "yellow",
-    Quality.UNAVAILABLE: "red",
-    Quality.NEVER: "dim",
-    Quality.FORCED: "magenta",
-    Quality.DIFFERS: "red",
-    Quality.OUT_OF_RANGE: "yellow",
-    Quality.NOT_RUNNING: "yellow",
-}
 _WIDE = 98
 """Columns of a terminal that has room for the CANopen side too."""
 _SPACIOUS = 115
@@ -89,7 +79,7 @@ def plain(shot: Snapshot) -> str:
         f"{line.age:>7}  {_owner(line)}".rstrip()
         for line in shot.lines
     ]
-    return "\n".join([links, *lines, *(f"  {one.clock} {one.text}" for one in shot.happenings[-3:]), ""])
+    return "\n".join([links, *lines, *(f"  {event.clock} {event.text}" for event in shot.events[-3:]), ""])
 
 
 def _links(shot: Snapshot, *, wide: bool) -> Text:
@@ -152,7 +142,7 @@ def _cells(line: Line, *, changed: bool, wide: bool, spacious: bool) -> Iterator
         yield Text(line.object)
         yield Text(line.cob_id or ("SDO" if line.object else ""), "dim")
     yield Text(line.value, "bold yellow" if changed and line.row.name != "tool_height" else "bold")
-    yield Text(line.quality.name.lower(), _QUALITY_STYLES[line.quality])
+    yield Text(line.quality.name.lower(), QUALITY_COLOURS[line.quality])
     yield Text(line.age, "dim")
     if line.refused:
         yield Text(line.refused, "bold red")
@@ -168,12 +158,10 @@ def _owner(line: Line) -> str:
 
 def _events(shot: Snapshot, count: int) -> Iterator[Text]:
     """`count` lines, empty ones above, so that the picture keeps its height."""
-    latest = (
-        shot.happenings[len(shot.happenings) - count :] if count < len(shot.happenings) else shot.happenings
-    )
-    for one in latest:
-        text = Text(f" {one.clock} ", "dim", no_wrap=True, overflow="ellipsis")
-        yield text.append(one.text, "bold red" if one.bad else "default")
+    latest = shot.events[max(0, len(shot.events) - count) :]
+    for event in latest:
+        text = Text(f" {event.clock} ", "dim", no_wrap=True, overflow="ellipsis")
+        yield text.append(event.text, "bold red" if event.bad else "default")
     yield from (Text("") for _ in range(count - len(latest)))
 
 

@@ -81,8 +81,6 @@ class Description:
     """By index of the variable."""
     writers: Mapping[int, str] = field(default_factory=dict)
     """How the writer with this index is known."""
-    headline: str = ""
-    """How the link is called in the picture: `Modbus 127.0.0.1:502`, `CAN can0`."""
     address: str = ""
     """Where it is, in one piece: `127.0.0.1:502 unit 1`."""
     fields: Mapping[str, object] = field(default_factory=dict)

@@ -1,6 +1,6 @@
-"""Values, times and counts in figures for people: the same in commands, sentences, status page and demonstration.
+"""Values, times and counts in figures for people: the same in commands, texts of events, status page and demonstration.
 
-What programs read is told elsewhere, with every digit.
+What programs read has every digit, and comes from elsewhere.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from gatewayd.core.cell import Cell, Written
 from gatewayd.core.definition import Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.loop import clock
-from gatewayd.report.event_text import ACCEPTED, Happening
+from gatewayd.report.event_text import ACCEPTED, EventRecord
 from gatewayd.report.printable import json_text
 
 __all__ = ["CAPACITY", "KINDS", "MERGED", "Audit", "Record", "plain_value", "utc"]
@@ -57,12 +57,12 @@ class Record:
     monotonic: float
     """Seconds of the gateway's own clock, which no time server moves; equal for all changes of one request."""
     cell: str
-    happening: Happening
+    event: EventRecord
     """Of merged changes `old` is of the first, `new` and both times are of the last."""
 
     def as_json(self) -> dict[str, object]:
         """Plain values for JSON; what does not apply is left out."""
-        told = self.happening
+        told = self.event
         found: dict[str, object | None] = {
             "time": utc(self.wall),
             "monotonic": round(self.monotonic, 6),
@@ -230,7 +230,7 @@ class _Watch:
         if event.variable is not None and event.variable in self._series:
             # In their order: what was written before a fallback or a force is told before it.
             self._tell(event.variable, self._series.pop(event.variable), event.time)
-        told = Happening.of(event, definition)
+        told = EventRecord.of(event, definition)
         self._audit.append(Record(self._audit.wall(), event.time, definition.name, told))
 
     def _tell(self, index: int, one: _Series, now: float) -> None:
@@ -238,7 +238,7 @@ class _Watch:
             return
         definition = self.cell.definition
         variable = definition.variables[index]
-        told = Happening(
+        told = EventRecord(
             ACCEPTED,
             definition.writer_name(one.writer),
             variable.name,

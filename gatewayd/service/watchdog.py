@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Protocol
 
-from gatewayd.core.cell import Cell
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
-from gatewayd.report.summary import sentence
+from gatewayd.report.summary import summary
+from gatewayd.report.verdict import ServedCell, verdict_of
 from gatewayd.service.liveness import Liveness, Turned
 from gatewayd.service.systemd import Notifier
 
@@ -24,7 +24,7 @@ __all__ = ["PERIOD", "STATUS_PERIOD", "Service", "Watched"]
 PERIOD = 0.5
 """Seconds between two looks; a quarter of the watchdog's time where that is less."""
 STATUS_PERIOD = 5.0
-"""Seconds after which a sentence whose numbers alone have changed is told again."""
+"""Seconds after which a summary whose numbers alone have changed is sent again."""
 
 log = logging.getLogger("gatewayd.service")
 
@@ -33,7 +33,7 @@ class Watched(Protocol):
     """What a service needs to know of the daemon."""
 
     @property
-    def cells(self) -> Sequence[Cell]:
+    def runtimes(self) -> Sequence[ServedCell]:
         """The cells that are served now."""
 
     def progress(self) -> Mapping[str, int]:
@@ -55,8 +55,8 @@ class Service:
         self._liveness = Liveness()
         self._turned = Turned()
         self._ready = False
-        self._told = ""
-        self._told_at = 0.0
+        self._reported = ""
+        self._reported_at = 0.0
         self._failed = ""
 
     async def run(self, stop: asyncio.Event) -> None:
@@ -96,25 +96,26 @@ class Service:
     def reload_ended(self, notes: Sequence[str] = ()) -> None:
         """Tell that the reload is over; `notes` is what came of it and is to be seen until the next one."""
         self.notes = tuple(notes)
-        self._told = self._sentence()
-        self._notifier.ready(self._told)
+        self._reported = self._summary(clock.now())
+        self._notifier.ready(self._reported)
 
     def _report(self, now: float) -> None:
-        text = self._sentence()
-        if text == self._told:
+        text = self._summary(now)
+        if text == self._reported:
             return
-        if _words(text) != _words(self._told) or now - self._told_at >= STATUS_PERIOD:
-            self._told, self._told_at = text, now
+        if _words(text) != _words(self._reported) or now - self._reported_at >= STATUS_PERIOD:
+            self._reported, self._reported_at = text, now
             self._notifier.status(text)
 
-    def _sentence(self) -> str:
+    def _summary(self, now: float) -> str:
         hanging = (f"hangs: {name}" for name in self.late)
-        return sentence(self._daemon.cells, [*hanging, *self.notes, *self._daemon.troubles()])
+        cells = [(served.cell, verdict_of(served, now)) for served in self._daemon.runtimes]
+        return summary(cells, [*hanging, *self.notes, *self._daemon.troubles()])
 
 
 _WITHOUT_RATES = str.maketrans("", "", "0123456789")
 
 
 def _words(text: str) -> str:
-    """The sentence without its numbers: a rate that wavers is no news, a robot that is lost is."""
+    """The summary without its numbers: a rate that wavers is no news, a robot that is lost is."""
     return text.translate(_WITHOUT_RATES)

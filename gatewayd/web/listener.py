@@ -119,8 +119,8 @@ class StatusListener:
         return _json(told, status=200 if healthy else 503)
 
     async def _readyz(self, _request: web.Request) -> web.Response:
-        daemon = self._probes.daemon
-        ready, told = readiness(daemon.cells, self._probes.late, self._probes.troubles())
+        probes = self._probes
+        ready, told = readiness(probes.verdicts(clock.now()), probes.late, probes.troubles())
         return _json(told, status=200 if ready else 503)
 
     async def _metrics(self, request: web.Request) -> web.Response:

@@ -235,7 +235,7 @@ class Exposition:
         now = clock.now()
         daemon, probes = self._probes.daemon, self._probes
         troubles = probes.troubles()
-        ready, _ = readiness(daemon.cells, probes.late, troubles)
+        ready, _ = readiness(probes.verdicts(now), probes.late, troubles)
         samples: dict[str, list[_Sample]] = {
             "gatewayd_info": [((self._version,), 1)],
             "gatewayd_ready": [((), _LEVELS[ready])],

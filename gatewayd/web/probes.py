@@ -16,6 +16,7 @@ from gatewayd.core.events import Event, EventKind, EventRing
 from gatewayd.core.refusal import Reason
 from gatewayd.links.contract import SourceLink
 from gatewayd.loop import clock
+from gatewayd.report.verdict import Verdict, verdict_of
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.liveness import Liveness
 from gatewayd.web.histogram import Histogram
@@ -113,6 +114,10 @@ class Probes:
     def troubles(self) -> list[str]:
         """What concerns the gateway as a whole."""
         return [*self._notes(), *self.daemon.troubles()]
+
+    def verdicts(self, now: float) -> dict[str, Verdict]:
+        """How each cell is, by name."""
+        return {runtime.cell.definition.name: verdict_of(runtime, now) for runtime in self.daemon.runtimes}
 
     async def run(self) -> None:
         """Measure until cancelled."""

@@ -8,26 +8,20 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Iterable
 from itertools import groupby, islice
 from typing import Any
 
-from gatewayd.control.views import robot_name
+from gatewayd.control.views import Declared, declare
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import Direction, Fallback, Lock, Variable
+from gatewayd.core.definition import Lock
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality
-from gatewayd.links.canopen_node.plan import canopen_of
-from gatewayd.links.contract import SourceLink
-from gatewayd.links.modbus_server.plan import Placement, modbus_of
-from gatewayd.links.robot.plan import robot_of
-from gatewayd.report.event_text import Happening
-from gatewayd.report.format import address
+from gatewayd.links.registry import kinds
+from gatewayd.report.event_text import EventRecord
 from gatewayd.report.printable import json_text
+from gatewayd.report.verdict import Part, gateway_part, verdict_of
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
-from gatewayd.web import picture
-from gatewayd.web.picture import Level, Node
 from gatewayd.web.probes import Probes
 
 __all__ = ["EVENTS", "as_json", "layout", "overview", "state"]
@@ -48,7 +42,9 @@ _IN_RUNS = frozenset(
         EventKind.FOLLOWED,
     }
 )
-"""Kinds of events that befall many variables in one moment."""
+"""Kinds of events that happen to many variables in one moment."""
+_DECLARED = ("number", "name", "direction", "kind", "robot", "limits", "unit", "comment")
+"""What the page has of a variable's declaration as it is."""
 
 
 def as_json(document: object) -> bytes:
@@ -80,24 +76,20 @@ def overview(daemon: Daemon, version: str) -> dict[str, object]:
 
 def layout(runtime: CellRuntime) -> dict[str, object]:
     """What the mapping fixes. It is the same as long as the fingerprint is."""
-    definition, modbus = runtime.cell.definition, modbus_of(runtime.plan)
-    places: dict[int, list[dict[str, object]]] = {}
-    for one in modbus.placements if modbus is not None else ():
-        places.setdefault(one.variable, []).append(_place(one))
-    for index, place in _objects(runtime).items():
-        places.setdefault(index, []).append(place)
+    definition, declared = runtime.cell.definition, declare(runtime.plan)
+    links = {
+        name: link.fields
+        for name, link in declared.links.items()
+        if runtime.links[name] is not runtime.source
+    }
     return {
         "cell": definition.name,
         "fingerprint": _fingerprint(runtime.cell),
-        "robot": f"{robot_of(runtime.plan).host}:{robot_of(runtime.plan).port}",
-        "modbus": None
-        if modbus is None
-        else {"listen": address(modbus.host, modbus.port), "unit": modbus.unit},
-        "writers": [{"name": one.name, "timeout": one.timeout} for one in definition.writers],
-        "locks": [_lock(one, runtime.cell) for one in definition.locks],
-        "variables": [
-            _variable(one, places.get(index, ())) for index, one in enumerate(definition.variables)
-        ],
+        **{kind.key: links.get(kind.key) for kind in kinds()},
+        "robot": next(link.address for name, link in declared.links.items() if name not in links),
+        "writers": [{"name": writer.name, "timeout": writer.timeout} for writer in definition.writers],
+        "locks": [_lock(lock, runtime.cell) for lock in definition.locks],
+        "variables": [_variable(runtime.cell, declared, index) for index in range(len(definition.variables))],
     }
 
 
@@ -112,54 +104,20 @@ def _lock(lock: Lock, cell: Cell) -> dict[str, object]:
     }
 
 
-def _variable(variable: Variable, places: Iterable[dict[str, object]]) -> dict[str, object]:
-    limits = variable.limits
-    is_input = variable.direction is Direction.INPUT
+def _variable(cell: Cell, declared: Declared, index: int) -> dict[str, object]:
+    """As the control interface has it; places of all links in one list, and the lock by its number."""
+    found = declared.variables[index]
+    fallback = found["fallback"]
     return {
-        "number": variable.number,
-        "name": variable.name,
-        "direction": variable.direction.value,
-        "kind": variable.kind.name.lower(),
-        "robot": robot_name(variable),
-        "places": list(places),
-        "lock": variable.lock,
-        "limits": None if limits is None else [limits.low, limits.high],
-        "fallback": _fallback(variable.on_release if is_input else variable.on_stale),
-        "unit": variable.unit,
-        "comment": variable.comment,
+        **{name: found[name] for name in _DECLARED},
+        "places": [
+            {"area": place.area, "address": place.address, "notation": place.notation, "type": place.type}
+            for link in declared.links.values()
+            for place in link.places.get(index, ())
+        ],
+        "lock": cell.definition.variables[index].lock,
+        "fallback": fallback if isinstance(fallback, str) else json.dumps(fallback),
     }
-
-
-def _place(place: Placement) -> dict[str, object]:
-    """Protocol address from 0 and 4xxxxx form, each with the bit where there is one."""
-    bit = "" if place.bit is None else f".{place.bit}"
-    return {
-        "area": place.area.name.lower(),
-        "address": f"{place.address}{bit}",
-        "notation": place.area.notation(place.address) + bit,
-        "type": "bit" if place.codec is None else f"{place.codec.type} {place.codec.order}".strip(),
-    }
-
-
-def _objects(runtime: CellRuntime) -> dict[int, dict[str, object]]:
-    """The CANopen side, in the form of a Modbus place: object, and COB-ID of the PDO that carries it."""
-    canopen = canopen_of(runtime.plan)
-    if canopen is None:
-        return {}
-    cob_ids = {entry.variable: f"COB-ID 0x{pdo.cob_id:03X}" for pdo in canopen.pdos for entry in pdo.entries}
-    return {
-        one.variable: {
-            "area": "object",
-            "address": f"{one.index:04X}h:{one.subindex:02X}",
-            "notation": cob_ids.get(one.variable, "by SDO"),
-            "type": one.type.name,
-        }
-        for one in canopen.objects
-    }
-
-
-def _fallback(fallback: Fallback) -> str:
-    return fallback.kind.value if fallback.value is None else json.dumps(fallback.value)
 
 
 def state(runtime: CellRuntime, probes: Probes, since: int, now: float) -> dict[str, object]:
@@ -227,38 +185,31 @@ def _deed(numbered: tuple[int, Event]) -> tuple[object, ...]:
 
 
 def _event(event: Event, cell: Cell, number: int, at: float, more: int) -> dict[str, object]:
-    told = Happening.of(event, cell.definition).of_several(more)
+    record = EventRecord.of(event, cell.definition).of_several(more)
     return {
         "number": number,
         "time": round(at, 3),
-        "kind": told.what,
-        "bad": told.bad,
-        "text": told.sentence(),
+        "kind": record.what,
+        "bad": record.bad,
+        "text": record.text(),
         "variable": event.variable,
     }
 
 
 def _picture(runtime: CellRuntime, probes: Probes, now: float) -> dict[str, object]:
-    cell = runtime.cell
-    source = runtime.source.health()
-    robot = picture.robot(cell, str(source.figures["address"]), "; ".join(source.problems), now)
-    gateway = picture.gateway(cell, probes.late, probes.troubles(), now)
-    buses = [
-        picture.link(link.health()) for link in runtime.links.values() if not isinstance(link, SourceLink)
-    ]
-    writers = picture.writers(cell, now)
-    levels = [one.level for one in (robot, gateway, *buses, *writers) if one.level is not Level.IDLE]
+    verdict = verdict_of(runtime, now)
+    gateway = gateway_part(verdict, probes.late, probes.troubles())
     return {
-        "level": max(levels).name.lower(),
-        "robot": _node(robot),
+        "level": max(verdict.level, gateway.level).name.lower(),
+        "robot": _node(verdict.robot),
         "gateway": _node(gateway),
-        "buses": list(map(_node, buses)),
-        "writers": list(map(_node, writers)),
+        "buses": list(map(_node, verdict.links.values())),
+        "writers": list(map(_node, verdict.writers)),
     }
 
 
-def _node(node: Node) -> dict[str, object]:
-    return {"name": node.name, "level": node.level.name.lower(), "words": node.words, "facts": node.facts}
+def _node(part: Part) -> dict[str, object]:
+    return {"name": part.name, "level": part.level.name.lower(), "words": part.words, "facts": part.detail}
 
 
 def _fingerprint(cell: Cell) -> str:

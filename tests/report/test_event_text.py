@@ -11,7 +11,7 @@ from gatewayd.core.definition import OPERATOR
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
 from gatewayd.core.succession import succeed
-from gatewayd.report.event_text import ACCEPTED, BAD, Happening
+from gatewayd.report.event_text import ACCEPTED, BAD, EventRecord
 from tests.control.served import CYCLES, LIMIT, Served, bring_up, plan
 
 PLC, HMI = 0, 1
@@ -96,13 +96,13 @@ def cell() -> Cell:
     ],
 )
 def test_an_event_is_one_sentence(cell: Cell, event: Event, text: str) -> None:
-    assert Happening.of(event, cell.definition).sentence() == text
+    assert EventRecord.of(event, cell.definition).text() == text
 
 
 def test_an_accepted_write_is_one_too() -> None:
-    accepted = Happening(ACCEPTED, "plc", "x", "N", old=1, new=2)
-    assert accepted.sentence() == "plc wrote x: 1 -> 2 N"
-    assert replace(accepted, times=5).sentence() == "plc wrote x: 1 -> 2 N (5 changes)"
+    accepted = EventRecord(ACCEPTED, "plc", "x", "N", old=1, new=2)
+    assert accepted.text() == "plc wrote x: 1 -> 2 N"
+    assert replace(accepted, times=5).text() == "plc wrote x: 1 -> 2 N (5 changes)"
 
 
 @pytest.mark.parametrize(
@@ -117,19 +117,19 @@ def test_an_accepted_write_is_one_too() -> None:
     ],
 )
 def test_what_befell_several_at_once_is_one_sentence(cell: Cell, event: Event, text: str) -> None:
-    assert Happening.of(event, cell.definition).of_several(3).sentence() == text
+    assert EventRecord.of(event, cell.definition).of_several(3).text() == text
 
 
 def test_a_refusal_may_say_how() -> None:
-    refused = Happening(
+    refused = EventRecord(
         EventKind.REFUSED.value, "hmi", "x", new=7, holder="plc", reason="held by another owner"
     )
-    assert refused.sentence("refused with 06") == "hmi wrote x = 7: refused with 06, held by plc"
+    assert refused.text("refused with 06") == "hmi wrote x = 7: refused with 06, held by plc"
 
 
 @pytest.mark.parametrize("kind", EventKind)
 def test_every_kind_has_a_sentence_even_without_any_name(cell: Cell, kind: EventKind) -> None:
-    sentence = Happening.of(Event(0, kind), cell.definition).sentence()
+    sentence = EventRecord.of(Event(0, kind), cell.definition).text()
     assert sentence
     assert "None" not in sentence
     assert "{" not in sentence
@@ -140,12 +140,12 @@ def test_names_that_a_reload_has_removed_are_still_told() -> None:
     bring_up(served.cell, 0.0)
     served.cell.set_availability([CYCLES], False, "in use", 1.0)
     after = succeed(served.cell, plan(extra="parts").cell, 2.0).cell
-    told = [Happening.of(event, after.definition).sentence() for event in after.events]
+    told = [EventRecord.of(event, after.definition).text() for event in after.events]
     assert "register unavailable: in use, variable cycles, since removed" in told
 
 
 def test_only_what_somebody_should_look_at_is_bad(cell: Cell) -> None:
-    assert {kind for kind in EventKind if Happening.of(Event(0, kind), cell.definition).bad} == {
+    assert {kind for kind in EventKind if EventRecord.of(Event(0, kind), cell.definition).bad} == {
         EventKind.ROBOT_LOST,
         EventKind.STALE,
         EventKind.UNAVAILABLE,
@@ -161,7 +161,7 @@ def test_only_what_somebody_should_look_at_is_bad(cell: Cell) -> None:
 
 def test_several_at_one_moment_are_told_without_values(cell: Cell) -> None:
     def told(kind: EventKind) -> str:
-        return Happening.of(Event(0, kind, LIMIT, old=1.0, new=2.0), cell.definition).of_several(3).sentence()
+        return EventRecord.of(Event(0, kind, LIMIT, old=1.0, new=2.0), cell.definition).of_several(3).text()
 
     assert told(EventKind.READ_BACK_DIFFERS) == "read-back of limit and 3 more differs"
     assert told(EventKind.FOLLOWED) == "limit and 3 more follow the robot"

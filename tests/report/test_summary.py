@@ -1,13 +1,22 @@
-"""The sentence of `systemctl status`."""
+"""What `systemctl status` shows."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import pytest
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
+from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
-from gatewayd.report.summary import sentence
+from gatewayd.links.contract import LinkHealth
+from gatewayd.report.summary import summary
+from gatewayd.report.verdict import judge
+
+
+def sentence(cells: Sequence[Cell], troubles: Sequence[str] = (), now: float = 2.0) -> str:
+    return summary([(cell, judge(cell, LinkHealth(), {}, now)) for cell in cells], troubles)
 
 
 def cell(name: str = "press-3", *, writers: int = 2) -> Cell:
@@ -53,11 +62,11 @@ def test_a_good_cell() -> None:
     "condition, words",
     [
         ("lost", "robot not connected"),
-        ("waiting", "robot connected but sends no data yet"),
-        ("silent", "robot silent"),
-        ("frozen", "robot frozen, its clock stands still"),
-        ("not adopted", "robot fresh, its inputs not adopted yet"),
-        ("unavailable", "robot fresh at 500 Hz, 1 variable unavailable"),
+        ("waiting", "robot connected, but it sends no data yet"),
+        ("silent", "robot silent for 1 s"),
+        ("frozen", "robot frozen, its clock stands still for 1 s"),
+        ("not adopted", "robot fresh, the robot's inputs are not adopted yet, nothing can be written"),
+        ("unavailable", "robot fresh at 500 Hz, 1 of 2 variables unavailable: cycles"),
     ],
 )
 def test_what_is_wrong_with_a_robot(condition: str, words: str) -> None:
@@ -107,9 +116,21 @@ def test_no_cell() -> None:
 
 def test_what_the_robot_holds_is_told() -> None:
     one = all_well()
-    one.health.differing, one.health.unadopted = 1, 2
+    one.image.quality[0] = Quality.DIFFERS
+    one.delivery.unread.add(0)
     assert sentence([one, all_well("weld")]).startswith(
-        "press-3: robot fresh at 500 Hz, 2 inputs not known, 1 input different in the robot, 2 of 2 writers"
+        "press-3: robot fresh at 500 Hz, what the robot holds is not known for 1 input: part, "
+        "1 of 2 variables different in the robot: part, 2 of 2 writers"
     )
     many = [one, *(all_well(f"cell-{number}") for number in range(5))]
     assert "the other 5 cells well" in sentence(many), "it is no good cell"
+
+
+def test_a_writer_that_has_not_come_is_no_trouble_and_one_that_is_lost_is() -> None:
+    one = fresh(cell())
+    assert sentence([all_well("a"), one]).startswith("a: robot fresh"), "in the order of the cells"
+    one.writer_connected(Requester(0), 1.0)
+    one.writer_disconnected(Requester(0), 1.0, "closed")
+    assert sentence([all_well("a"), one]).startswith(
+        "press-3: robot fresh at 500 Hz, writer w0 lost for 1 s, 0 of 2"
+    )

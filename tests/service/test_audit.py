@@ -12,7 +12,7 @@ import pytest
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.requester import Requester
-from gatewayd.report.event_text import ACCEPTED, Happening
+from gatewayd.report.event_text import ACCEPTED, EventRecord
 from gatewayd.service.audit import MERGED, Audit, Record, plain_value, utc
 
 NUMBER, REAL = 0, 1
@@ -56,8 +56,8 @@ def audit(cell: Cell, lines: list[str]) -> Audit:
     return audit
 
 
-def happened(audit: Audit) -> list[Happening]:
-    return [record.happening for record in audit]
+def happened(audit: Audit) -> list[EventRecord]:
+    return [record.event for record in audit]
 
 
 def written(audit: Audit) -> list[tuple[str | None, object, object, int]]:
@@ -112,7 +112,7 @@ def test_the_time_of_merged_changes_is_that_of_the_last(cell: Cell, audit: Audit
         assert cell.write(Requester(PLC), [Change(NUMBER, value)], now) is None
     audit.tick(1.0 + MERGED)
     last = list(audit)[-1]
-    assert (last.monotonic, last.happening.times) == (1.4, 2)
+    assert (last.monotonic, last.event.times) == (1.4, 2)
     assert last.wall == pytest.approx(WALL - (MERGED - 0.4))
 
 
@@ -175,7 +175,7 @@ def test_the_ring_is_bounded(cell: Cell) -> None:
 @pytest.mark.parametrize("value, plain", [(math.nan, "nan"), (-math.inf, "-inf"), (1.5, 1.5), (True, True)])
 def test_values_are_plain_json(value: float, plain: object) -> None:
     assert plain_value(value) == plain
-    record = Record(WALL, 1.0, "press", Happening(ACCEPTED, new=value))
+    record = Record(WALL, 1.0, "press", EventRecord(ACCEPTED, new=value))
     assert json.loads(json.dumps(record.as_json(), allow_nan=False))["new"] == plain
 
 

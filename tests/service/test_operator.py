@@ -10,11 +10,11 @@ import pytest
 
 from gatewayd.control.api import Moment
 from gatewayd.control.client import Client
-from gatewayd.control.views import RuntimeView
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.requester import Requester
 from gatewayd.loop import clock
+from gatewayd.report.verdict import ServedCell
 from gatewayd.service.operator import JUST_NOW, Operation, Standstill
 
 
@@ -34,7 +34,7 @@ class Gateway:
         return [self.cell]
 
     @property
-    def runtimes(self) -> Sequence[RuntimeView]:
+    def runtimes(self) -> Sequence[ServedCell]:
         return ()
 
     def observe(self, observer: Callable[[Cell], None]) -> None:

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.core.cell import Cell
 from gatewayd.loop.progress import STEP
 from gatewayd.mapping.loader import load_together
+from gatewayd.report.verdict import ServedCell
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.liveness import Turned
 from gatewayd.service.systemd import Notifier
@@ -73,7 +73,7 @@ class Gateway:
     """A daemon as a service sees it."""
 
     def __init__(self) -> None:
-        self.cells: list[Cell] = []
+        self.runtimes: list[ServedCell] = []
         self.counts = {"core": 0, "robot": 1}
         self.wrong: list[str] = []
 

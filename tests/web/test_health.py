@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from gatewayd.core.cell import Cell
-from gatewayd.core.freshness import Source
-from gatewayd.web.health import SOURCES, health, readiness
+from gatewayd.links.contract import LinkHealth
+from gatewayd.report.verdict import Verdict, judge
+from gatewayd.web.health import health, readiness
+
+
+def verdicts(cell: Cell) -> dict[str, Verdict]:
+    return {cell.definition.name: judge(cell, LinkHealth(), {}, 1.0)}
 
 
 def test_healthy_while_everything_turns() -> None:
@@ -13,31 +18,30 @@ def test_healthy_while_everything_turns() -> None:
 
 
 def test_ready_with_a_fresh_and_writable_robot(cell: Cell) -> None:
-    ready, told = readiness([cell], (), ())
+    ready, told = readiness(verdicts(cell), (), ())
     assert ready
     assert told == {"ready": True, "reasons": [], "cells": {"press": {"ready": True, "reasons": []}}}
 
 
 def test_not_ready_without_the_robot_and_why(cell: Cell) -> None:
     cell.robot_lost("cable", 1.0)
-    ready, told = readiness([cell], (), ())
+    ready, told = readiness(verdicts(cell), (), ())
     assert not ready
-    assert told["cells"] == {"press": {"ready": False, "reasons": ["robot not connected"]}}
+    assert told["cells"] == {"press": {"ready": False, "reasons": ["robot not connected for 0 s"]}}
 
 
 def test_not_ready_before_the_inputs_are_adopted(cell: Cell) -> None:
     cell.robot_connected(1.0)
     cell.package_arrived(5.0, 1.0)
-    assert readiness([cell], (), ())[1]["cells"] == {
-        "press": {"ready": False, "reasons": ["the robot's inputs are not adopted yet"]}
+    assert readiness(verdicts(cell), (), ())[1]["cells"] == {
+        "press": {
+            "ready": False,
+            "reasons": ["the robot's inputs are not adopted yet, nothing can be written"],
+        }
     }
 
 
 def test_not_ready_with_a_part_that_hangs_or_a_listener_that_is_away(cell: Cell) -> None:
-    ready, told = readiness([cell], ("core of press",), ["not listening on :502", ""])
+    ready, told = readiness(verdicts(cell), ("core of press",), ["not listening on :502", ""])
     assert not ready
     assert told["reasons"] == ["hangs: core of press", "not listening on :502"]
-
-
-def test_every_state_of_the_robot_has_words() -> None:
-    assert set(SOURCES) == set(Source)

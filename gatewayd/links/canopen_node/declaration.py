@@ -23,6 +23,12 @@ class CanopenNode(LinkKind):
 
     key = "canopen"
     title = "CANopen node"
+    fields = {  # noqa: RUF012 - never changed
+        "channel": "interface:channel of the bus",
+        "node": "node-ID of the mapping",
+        "bus": "`absent`, `down`, `bus-off`, `passive`, `warning` or `active`",
+        "nmt_state": "`initialising`, `stopped`, `pre-operational` or `operational`",
+    }
     place = (
         "null, or `object` (2010h:01), `type`, and `cob_id` of the PDO that carries it, null for SDO alone"
     )

@@ -33,7 +33,6 @@ def description(plan: CanopenPlan, cell: CellDefinition) -> Description:
             "sdo_writer": _writer(plan.sdo_writer, cell),
         },
         places=places,
-        headline=f"CAN {plan.channel}",
         address=channel,
         fields={"channel": channel, "node": plan.node},
     )

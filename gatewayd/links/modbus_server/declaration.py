@@ -19,6 +19,11 @@ class ModbusServer(LinkKind):
     key = "modbus"
     title = "Modbus TCP server"
     usual = True
+    fields = {  # noqa: RUF012 - never changed
+        "listen": "host:port of the listener",
+        "unit": "unit id",
+        "connections": "open connections of the listener",
+    }
     place = "list of its places: `area`, `address` from 0, `bit` or null, `notation` (4xxxxx form)"
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:

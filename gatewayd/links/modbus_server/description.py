@@ -5,7 +5,7 @@ from __future__ import annotations
 from gatewayd.links.contract import Description, Place
 from gatewayd.links.modbus_server.plan import ModbusPlan, Network, Placement
 from gatewayd.modbus.areas import AREA_NAMES
-from gatewayd.report.format import exact, seconds
+from gatewayd.report.format import address, exact, seconds
 
 __all__ = ["description"]
 
@@ -18,8 +18,7 @@ def description(plan: ModbusPlan) -> Description:
     networks: dict[int, list[str]] = {}
     for network, writer in plan.writers:
         networks.setdefault(writer, []).append(_network(network))
-    host = f"[{plan.host}]" if ":" in plan.host else plan.host
-    listen = f"{host}:{plan.port}"
+    listen = address(plan.host, plan.port)
     return Description(
         settings={
             "listen": listen,
@@ -31,7 +30,6 @@ def description(plan: ModbusPlan) -> Description:
         },
         places=places,
         writers={writer: ", ".join(its) for writer, its in networks.items()},
-        headline=f"Modbus {listen}",
         address=f"{listen} unit {plan.unit}",
         fields={"listen": listen, "unit": plan.unit},
     )
@@ -41,11 +39,11 @@ def _place(placement: Placement) -> Place:
     """`holding 100 (400101) int32`, `holding 0.3 (400001.3)`, `coil 5 (000006)`."""
     bit = "" if placement.bit is None else f".{placement.bit}"
     area = AREA_NAMES[placement.area]
-    address = f"{placement.address}{bit}"
+    within = f"{placement.address}{bit}"
     notation = f"{placement.area.notation(placement.address)}{bit}"
     codec = placement.codec
     return Place(
-        text=f"{area} {address} ({notation}){_encoding(placement)}",
+        text=f"{area} {within} ({notation}){_encoding(placement)}",
         fields={
             "area": area,
             "address": placement.address,
@@ -53,7 +51,7 @@ def _place(placement: Placement) -> Place:
             "notation": notation,
         },
         area=area,
-        address=address,
+        address=within,
         notation=notation,
         type="bit" if codec is None else f"{codec.type} {codec.order}".strip(),
     )

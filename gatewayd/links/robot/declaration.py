@@ -20,6 +20,23 @@ class Robot(LinkKind):
     key = "robot"
     title = "Universal Robots controller"
     usual = True
+    fields = {  # noqa: RUF012 - never changed
+        "address": "host:port of the controller",
+        "state": "`lost`, `waiting`, `fresh`, `silent`, `frozen` or `late`",
+        "writable": "connected, and its inputs were adopted",
+        "age": "seconds since the last package that told anything new, or null",
+        "frequency": "packages per second, measured",
+        "packages": "packages received",
+        "skipped": "packages that the controller left out",
+        "late": "packages that came late",
+        "sessions": "sessions with the controller; the first one is no reconnect",
+        "mismatches": "inputs whose read-back differed from what was written",
+        "lag": "seconds by which the newest package is later than the quickest ones were",
+        "unadopted": "inputs whose content in the robot is not known",
+        "differing": "inputs for which the robot holds something else than it was given",
+        "adoption": "seconds until adopted inputs without an owner fall back; 0: none will",
+        "watchdog": "whether the robot's watchdog is fed, or null without one",
+    }
 
     def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
         """The session goes on where its settings and claimed inputs are the same, and all outputs are subscribed."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from gatewayd.core.definition import CellDefinition
 from gatewayd.links.contract import Description
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
-from gatewayd.report.format import exact, seconds
+from gatewayd.report.format import address, exact, seconds
 
 __all__ = ["description"]
 
@@ -25,9 +25,8 @@ def description(plan: RobotPlan, cell: CellDefinition) -> Description:
             "subscribed": " ".join(sorted(plan.outputs)),
             "claimed": " ".join(sorted(plan.inputs)),
         },
-        headline="Robot",
-        address=(address := f"{plan.host}:{plan.port}"),
-        fields={"address": address},
+        address=address(plan.host, plan.port),
+        fields={"address": address(plan.host, plan.port)},
     )
 
 

@@ -98,11 +98,14 @@ class RobotLink(SourceLink):
         """The session; how fresh what it brings is, the cell knows."""
         where = address(self._plan.host, self._plan.port)
         trouble = self._loss_told[0].removeprefix(f"{self._plan.host}:{self._plan.port}: ")
-        figures = {"address": where, "trouble": trouble}
+        figures = {"address": where, "trouble": trouble, "watchdog": self._watchdog_fed()}
         if self._client.session is not None:
             return LinkHealth("Robot", Level.GOOD, "connected", where, figures=figures)
         problems = (trouble,) if trouble else ()
         return LinkHealth("Robot", Level.BAD, "not connected", trouble or where, problems, figures)
+
+    def _watchdog_fed(self) -> bool | None:
+        return None if self._plan.watchdog is None else self._cell.health.watchdog_fed
 
     @property
     def progress(self) -> int:

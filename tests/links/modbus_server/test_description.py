@@ -22,7 +22,7 @@ def test_places_writers_and_address() -> None:
     plan = load(TEXT.encode(), "cell.yaml").plan
     assert plan is not None
     found = kind_of("modbus").describe(plan.the(ModbusPlan), plan.cell)
-    assert (found.headline, found.address) == ("Modbus [::1]:1502", "[::1]:1502 unit 7")
+    assert found.address == "[::1]:1502 unit 7"
     assert found.fields == {"listen": "[::1]:1502", "unit": 7}
     assert found.writers == {0: "::1, fe80::/64"}
     bit, coil = found.places[0]
