@@ -138,6 +138,6 @@ def _print(locks: list[dict[str, Any]]) -> None:
 
 
 def _members(lock: Mapping[str, Any]) -> str:
-    shown = lock["members"][:5]
-    more = len(lock["members"]) - len(shown)
-    return ", ".join(shown) + (f" and {more} more" if more else "")
+    from gatewayd.report.format import listed
+
+    return listed(lock["members"], 5)

@@ -6,8 +6,9 @@ What programs read has every digit, and comes from elsewhere.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-__all__ = ["address", "age", "counted", "exact", "seconds", "span", "value"]
+__all__ = ["address", "age", "counted", "exact", "listed", "seconds", "span", "value"]
 
 _DIGITS = 3
 
@@ -64,3 +65,9 @@ def counted(count: int, noun: str) -> str:
 def address(host: str, port: int) -> str:
     """`127.0.0.1:502`, `[::1]:502`."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """`a, b, c and 3 more`: the first `most` by name."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")

@@ -18,7 +18,7 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.links.contract import Level, Link, LinkHealth
 from gatewayd.mapping.plan import Plan
-from gatewayd.report.format import counted, span
+from gatewayd.report.format import counted, listed, span
 from gatewayd.report.words import SOURCE_LEVELS, SOURCES
 
 __all__ = ["RECENT", "Part", "ServedCell", "Verdict", "gateway_part", "judge", "verdict_of"]
@@ -26,7 +26,7 @@ __all__ = ["RECENT", "Part", "ServedCell", "Verdict", "gateway_part", "judge", "
 RECENT = 10.0
 """Seconds for which a refusal or a differing read-back colours its part."""
 _LISTED = 3
-"""Names listed one by one."""
+"""Names listed by name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +159,7 @@ def _held_by_robot(cell: Cell) -> Iterator[_Finding]:
     """What it does not tell, or has not as it was given."""
     unread = [cell.definition.variables[index].name for index in sorted(cell.delivery.unread)]
     if unread:
-        text = f"what the robot holds is not known for {counted(len(unread), 'input')}: {_listed(unread)}"
+        text = f"what the robot holds is not known for {counted(len(unread), 'input')}: {listed(unread, _LISTED)}"
         yield _Finding(Level.WARN, text)
     yield from _with_quality(cell, Quality.UNAVAILABLE, Level.WARN, "unavailable")
     yield from _with_quality(cell, Quality.DIFFERS, Level.BAD, "different in the robot")
@@ -179,11 +179,11 @@ def _of_gateway(cell: Cell, now: float) -> Iterator[_Finding]:
     yield from _with_quality(cell, Quality.OUT_OF_RANGE, Level.WARN, words)
     if cell.forcing.forces:
         names = sorted(cell.definition.variables[index].name for index in cell.forcing.forces)
-        yield _Finding(Level.WARN, f"forced by the local operator: {_listed(names)}")
+        yield _Finding(Level.WARN, f"forced by the local operator: {listed(names, _LISTED)}")
     held = cell.ownership.held_by(OPERATOR)
     if held:
         names = [cell.definition.locks[lock].name for lock in held]
-        yield _Finding(Level.WARN, f"locks held by the local operator: {_listed(names)}")
+        yield _Finding(Level.WARN, f"locks held by the local operator: {listed(names, _LISTED)}")
     differs = _recent(cell, EventKind.READ_BACK_DIFFERS, now)
     if differs:
         yield _Finding(Level.WARN, f"read-back differs: {differs}", passing=True)
@@ -253,13 +253,8 @@ def _with_quality(cell: Cell, quality: Quality, level: Level, words: str) -> Ite
             for variable, its in zip(cell.definition.variables, qualities, strict=True)
             if its is quality
         ]
-        yield _Finding(level, f"{count} of {len(qualities)} variables {words}: {_listed(names)}")
+        yield _Finding(level, f"{count} of {len(qualities)} variables {words}: {listed(names, _LISTED)}")
 
 
 def _since(duration: float) -> str:
     return f" for {span(duration)}" if math.isfinite(duration) else ""
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = len(names) - _LISTED
-    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from gatewayd.report.format import age, counted, span, value
+from gatewayd.report.format import age, counted, exact, listed, seconds, span, value
 
 
 @pytest.mark.parametrize(
@@ -42,3 +42,13 @@ def test_spans_have_two_units_at_most(seconds: float, text: str) -> None:
 
 def test_nouns_agree_with_their_count() -> None:
     assert [counted(count, "lock") for count in (0, 1, 2)] == ["no locks", "1 lock", "2 locks"]
+
+
+def test_many_names_are_a_few_and_a_number() -> None:
+    assert listed(["a", "b"], 3) == "a, b"
+    assert listed(list("abcde"), 3) == "a, b, c and 2 more"
+
+
+def test_numbers_of_mappings_keep_every_digit() -> None:
+    assert (exact(0.1), exact(5.0), exact(1e-7)) == ("0.1", "5", "1e-07")
+    assert (seconds(2.0), seconds(None)) == ("2 s", "")
