@@ -15,6 +15,7 @@ from tests.soak.browser import COMPLAINT
 from tests.soak.cell import FIELDS, FIELDS_OF, command, journal, mapping
 from tests.soak.journal import entries
 from tests.soak.look import Look
+from tests.soak.starvation import Starvation
 from tests.soak.truth import NOT_CONNECTED, Record, misheld, unheard
 
 __all__ = ["PATIENCE", "WRITERS", "Rig"]
@@ -39,12 +40,14 @@ class Rig:
         self.look = Look(self.control, self.status)
         self.record = Record()
         self.witness = Witness(HOST, self._robot, FIELDS)
+        self.starvation = Starvation(self._pids, self.record.stops)
         try:
             self.write_mapping("plain")
             self.simulator = self.start_simulator()
             self.witness.start()
             self.bus = self.start_bus()
             self.daemon = self._start_daemon()
+            self.starvation.start()
             for name in _CLIENTS:
                 self.start_client(name)
             wait_for(lambda: not self.look.ills() and self.look.page(), "everything to be well", PATIENCE)
@@ -102,12 +105,14 @@ class Rig:
     def lies(self) -> list[str]:
         """What the robot held and should not have, or should have held and did not; the witness stops."""
         self.witness.stop()
+        self.starvation.stop()
         found: list[str] = []
         noted = [entry for name in WRITERS for entry in entries(journal(self.directory, name))]
         for field in FIELDS:
             changes = self.witness.changes[field]
             of_field = sorted(entry for entry in noted if entry.field == field)
             found += misheld(field, changes, of_field, self.record)
+        stops = sorted(self.record.stops, key=lambda stop: stop.begin)
         lost = sorted(entry.time for entry in noted if entry.outcome == NOT_CONNECTED)
         for name in WRITERS:
             for field in FIELDS_OF[name]:
@@ -117,14 +122,15 @@ class Rig:
                     self.witness.changes[field],
                     mine,
                     self.witness.watching,
-                    self.record.stops,
+                    stops,
                     lost=lost,
                 )
         return found
 
     def close(self) -> None:
-        if self.witness.is_alive():
-            self.witness.stop()
+        for watcher in (self.witness, self.starvation):
+            if watcher.is_alive():
+                watcher.stop()
         for process in self._everything:
             with suppress(ProcessLookupError):
                 process.signal(signal.SIGCONT)
@@ -136,6 +142,10 @@ class Rig:
         daemon = Daemon(self._log("daemon"), self.mapping, *places, *page)
         self._everything.append(daemon)
         return daemon
+
+    def _pids(self) -> list[int]:
+        """Of the processes between a writer and the robot."""
+        return [process.pid for process in (self.daemon, self.simulator)]
 
     def _log(self, name: str) -> Path:
         return self.directory / f"{next(self._numbers)}-{name}.log"

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import itertools
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from tests.e2e.processes import wait_for
 from tests.e2e.witness import Change
 from tests.soak.faults import FAULTS, ROUND
 from tests.soak.journal import SENT, Entry, Journal, entries
 from tests.soak.look import torn
 from tests.soak.run import kinds, soak
+from tests.soak.starvation import Starvation
 from tests.soak.truth import FALLBACK, Period, Record, Stop, misheld, unheard
 from tests.soak.verdict import MEMORY_BOUND, THREADS_BOUND, Measured, Sample
 
@@ -145,6 +149,31 @@ def test_what_went_into_a_breaking_connection_is_no_lie(lost: float, count: int)
     written = [sent(10.0, 7), Entry(10.01, A, 7, 0)]
     changes = [Change(9.5, 6, 0.0)]
     assert len(list(unheard(A, changes, written, lambda _since, _until: True, lost=[lost]))) == count
+
+
+def test_a_write_that_was_being_served_when_the_gateway_was_stopped_comes_late() -> None:
+    """It did not wait: it had been taken already (docs/explanation/promises.md)."""
+    late, written = Change(16.2, 7, 0.0), [sent(10.0, 7)]
+    assert not list(misheld(A, [late], written, Record(stops=[Stop(10.001, 16.19)])))
+    assert list(misheld(A, [late], written, Record(stops=[Stop(9.9, 16.19)])))
+    assert list(misheld(A, [late], written, Record(stops=[Stop(10.001, 12.0)])))
+
+
+def test_a_process_that_does_not_get_the_processor_stands_still() -> None:
+    core = str(min(os.sched_getaffinity(0)))
+    burning = ["taskset", "-c", core, sys.executable, "-c", "while True: pass"]
+    burners = [subprocess.Popen(burning) for _ in range(3)]
+    stops: list[Stop] = []
+    watcher = Starvation(lambda: [burners[0].pid], stops)
+    watcher.start()
+    try:
+        wait_for(lambda: bool(stops), "two processes on one core to keep a third waiting")
+    finally:
+        watcher.stop()
+        for burner in burners:
+            burner.kill()
+            burner.wait()
+    assert all(stop.end > stop.begin for stop in stops)
 
 
 def test_lies_are_told_but_not_all_of_them() -> None:

@@ -71,6 +71,7 @@ def misheld(name: str, changes: Sequence[Change], entries: Sequence[Entry], reco
         if entry.outcome == SENT:
             sent.setdefault(entry.value, []).append(entry.time)
     pauses = [one for one in record.pauses if name in one.fields]
+    stops = sorted(record.stops, key=lambda stop: stop.begin)
     for change in changes:
         if change.value == FALLBACK or _granted(name, change, record):
             continue
@@ -83,8 +84,20 @@ def misheld(name: str, changes: Sequence[Change], entries: Sequence[Entry], reco
         excused = sum(
             max(0.0, min(one.end, change.time) - max(one.begin, moments[place - 1])) for one in pauses
         )
+        excused += _stopped_in_the_act(moments[place - 1], stops)
         if took - change.blind - excused > LATELY:
             yield f"{name} got {change.value} {took:.1f} s after it was written"
+
+
+def _stopped_in_the_act(sent: float, stops: Sequence[Stop]) -> float:
+    """Seconds for which the gateway was stopped while it served what had just been sent."""
+    return sum(stop.end - stop.begin for stop in _begun(stops, sent - _CYCLES, sent + _CYCLES))
+
+
+def _begun(stops: Sequence[Stop], since: float, until: float) -> Sequence[Stop]:
+    """Those that began in this time, of stops in order."""
+    first = bisect.bisect_left(stops, since, key=lambda stop: stop.begin)
+    return stops[first : bisect.bisect_right(stops, until, key=lambda stop: stop.begin)]
 
 
 def _granted(name: str, change: Change, record: Record) -> bool:
@@ -128,8 +141,8 @@ def unheard(
             seen = changes[first:last]
             overtaken = any(change.time - change.blind < entry.time + _CYCLES for change in seen)
             overtaken |= any(
-                begun <= stop.begin <= entry.time + _CYCLES and _replaced(changes, times, stop)
-                for stop in stops
+                _replaced(changes, times, stop)
+                for stop in _begun(stops, begun - _CYCLES, entry.time + _CYCLES)
             )
             if held != entry.value and not overtaken and all(one.value != entry.value for one in seen):
                 yield f"{name} never held {entry.value}, acknowledged at {entry.time:.3f}"
