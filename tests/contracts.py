@@ -317,7 +317,8 @@ def commands() -> object:
         assert command is not None
         found[name] = command
         if isinstance(command, click.Group):
-            found |= {f"{name} {inner}": one for inner, one in command.commands.items()}
+            inner = {one: command.get_command(context, one) for one in command.list_commands(context)}
+            found |= {f"{name} {one}": made for one, made in inner.items() if made is not None}
     return {f"gatewayd {name}".strip(): _command(command) for name, command in found.items()}
 
 

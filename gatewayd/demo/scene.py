@@ -21,7 +21,8 @@ from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
 from gatewayd.links.robot.plan import robot_of
 from gatewayd.loop import clock
 from gatewayd.mapping.loader import load
-from gatewayd.report.table import Row, rows
+from gatewayd.report.layout import Row
+from gatewayd.report.table import rows
 from gatewayd.service.daemon import Daemon
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import parse

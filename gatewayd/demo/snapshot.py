@@ -15,7 +15,7 @@ from gatewayd.core.refusal import Reason
 from gatewayd.demo.scene import Scene
 from gatewayd.report.event_text import BAD, UNDECLARED_PEER, EventRecord
 from gatewayd.report.format import age, value
-from gatewayd.report.table import Row
+from gatewayd.report.layout import Row
 from gatewayd.report.words import SOURCES
 
 __all__ = [
@@ -205,9 +205,9 @@ def _line(cell: Cell, row: Row, can_writer: int | None, now: float) -> Line:
             lease = f"{left:.1f} s" if left < math.inf else ""
     return Line(
         row=row,
-        address=f"{row.address}" if row.bit is None else f"{row.address}.{row.bit}",
-        object=row.object,
-        cob_id=row.cob_id,
+        address=f"{row['address']}" if row["bit"] is None else f"{row['address']}.{row['bit']}",
+        object=row["object"],
+        cob_id=row["cob_id"],
         value=value(cell.image.values[index], row.unit),
         quality=cell.image.quality[index],
         age=age(cell.image.age(index, now)),

@@ -73,8 +73,8 @@ def plain(shot: Snapshot) -> str:
         f"line {shot.rpdos} RPDOs, {shot.line_verified} values verified, {shot.emergencies} EMCY"
     )
     lines = [
-        f"  {'->' if line.row.direction == 'input' else '<-'} {line.row.name:<12} {line.row.robot:<25} "
-        f"{line.address:>6} {line.row.notation:<9} {line.object:<8} {line.cob_id:<5}"
+        f"  {'->' if line.row.direction == 'input' else '<-'} {line.row.name:<12} {line.row['robot']:<25} "
+        f"{line.address:>6} {line.row['notation']:<9} {line.object:<8} {line.cob_id:<5}"
         f"{line.value:>9}  {line.quality.name.lower():<12}"
         f"{line.age:>7}  {_owner(line)}".rstrip()
         for line in shot.lines
@@ -134,10 +134,10 @@ def _cells(line: Line, *, changed: bool, wide: bool, spacious: bool) -> Iterator
     towards = line.row.direction == "input"
     colour = "cyan" if towards else "green"
     yield Text(" → " if towards else " ← ", f"bold {colour}").append(line.row.name, "bold default")
-    yield Text(line.row.robot, colour)
+    yield Text(line.row["robot"], colour)
     yield Text(line.address)
     if spacious:
-        yield Text(line.row.notation, "dim")
+        yield Text(line.row["notation"], "dim")
     if wide:
         yield Text(line.object)
         yield Text(line.cob_id or ("SDO" if line.object else ""), "dim")

@@ -59,6 +59,10 @@ class LinkLanguage:
     """Keys that a writer has by this kind; the one called `key` says how it is known."""
     rules: ClassVar[tuple[str, ...]] = ()
     """Modules whose import enters the kind's rules."""
+    tables: ClassVar[str] = ""
+    """Module with `TABLES`, the kind's `LinkTables`, for `show`."""
+    exports: ClassVar[str] = ""
+    """Module with `EXPORTS`, a tuple of `Export`."""
 
     # -- findings about its sections ---------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
@@ -9,9 +10,21 @@ from typing import TYPE_CHECKING, cast
 from gatewayd.links.contract import LinkKind, LinkRuntime
 
 if TYPE_CHECKING:
+    from gatewayd.links.exports import Export
     from gatewayd.links.language import DefiningLanguage, LinkLanguage
+    from gatewayd.links.tables import LinkTables
 
-__all__ = ["LINK_KINDS", "definer", "kind_of", "kinds", "language_of", "languages", "runtime_of"]
+__all__ = [
+    "LINK_KINDS",
+    "definer",
+    "exports",
+    "kind_of",
+    "kinds",
+    "language_of",
+    "languages",
+    "runtime_of",
+    "tables",
+]
 
 LINK_KINDS = (
     "gatewayd.links.robot",
@@ -52,6 +65,19 @@ def definer() -> DefiningLanguage:
     """What the one kind that defines variables adds to the mapping language."""
     (found,) = (language for language in languages() if language.defines)
     return cast("DefiningLanguage", found)
+
+
+@cache
+def tables() -> tuple[LinkTables, ...]:
+    """What all kinds show of a mapping, in order."""
+    return tuple(import_module(language.tables).TABLES for language in languages() if language.tables)
+
+
+@cache
+def exports() -> Mapping[str, Export]:
+    """What all kinds write for other tools, by name."""
+    modules = [import_module(language.exports) for language in languages() if language.exports]
+    return {export.name: export for module in modules for export in module.EXPORTS}
 
 
 @cache

@@ -1,33 +1,29 @@
-"""The register table of a cell: what lies where, who may write it, and what is seen when a side is lost."""
+"""The table of a cell: what lies where, who may write it, and what is seen when a side is lost.
+
+The kinds of links say where variables lie, and have columns and tables of their own.
+"""
 
 from __future__ import annotations
 
 import csv
-import dataclasses
 import io
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final
 
 from gatewayd.core.definition import Direction, Fallback
-from gatewayd.links.canopen_node.expand import node_of
-from gatewayd.links.canopen_node.pdo_table import as_document, load_by_bit_rate, object_place, pdo_rows
-from gatewayd.links.modbus_server.expand import ExpandedPlacement, placements_of
-from gatewayd.links.modbus_server.plan import modbus_of
+from gatewayd.links.registry import languages, tables
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.plan import Plan
-from gatewayd.modbus.areas import AREA_NAMES
+from gatewayd.report.layout import Column, Row, arranged
 from gatewayd.report.printable import json_text, printable
-from gatewayd.report.wording import cob, seconds
 
 __all__ = [
-    "COLUMNS",
-    "Row",
     "as_csv",
     "as_json",
     "as_markdown",
     "by_line",
+    "columns",
     "formula",
     "limits",
     "lost",
@@ -35,144 +31,75 @@ __all__ = [
     "rows",
 ]
 
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One variable at one place; a variable with several places has several rows, one with none has one."""
-
-    number: int
-    """As the status block counts the variable, from 1."""
-    name: str
-    direction: str
-    """`input` (fieldbus to robot) or `output` (robot to fieldbus)."""
-    robot: str
-    """What it is in the robot: `input_bit_register_5`, `actual_TCP_pose[0]`."""
-    area: str
-    """`holding`, `input`, `coil`, `discrete`; empty for a variable without a place."""
-    address: int | None
-    """Protocol address from 0."""
-    bit: int | None
-    """Bit of the register, 0 the least significant."""
-    notation: str
-    """The 4xxxxx form, with the bit where there is one."""
-    words: int
-    """Addresses covered."""
-    type: str
-    order: str
-    """Byte order; empty for bits."""
-    scale: float | None
-    """Robot value = raw * scale + offset; None for bits."""
-    offset: float | None
-    unit: str
-    low: float | None
-    """Limits in the robot's unit; None where there are none."""
-    high: float | None
-    clamp: bool
-    owner: str
-    """Writers by priority, `plc > hmi` where the first takes over, else `plc, hmi`; `any`; empty for outputs."""
-    lease: float | None
-    """Seconds; None for no lease."""
-    takeover: bool
-    group: str
-    on_release: str
-    """Inputs: what the robot is given when the owner is lost."""
-    on_stale: str
-    """Outputs: what the fieldbus sees when the robot stops telling."""
-    comment: str
-    object: str = ""
-    """CANopen object, `2000h:01`; empty where there is none."""
-    can_type: str = ""
-    """Its CiA 301 type."""
-    pdo: str = ""
-    """PDO that carries it, `TPDO 3`; empty where none does."""
-    cob_id: str = ""
-    """COB-ID of the PDO, `0x190`."""
-    pdo_bit: int | None = None
-    """Where it begins in the PDO, 0 the least significant bit of the first byte."""
-    whole: bool = False
-    """Whether its group is taken over only by writing all of it."""
-    valid: str = ""
-    """`running`: good only while the robot program runs; empty: always."""
+_COLUMNS: Final = tuple(
+    Column(name)
+    for name in (
+        "number", "name", "direction", "unit", "low", "high", "clamp", "owner", "lease", "takeover", "group",
+        "on_release", "on_stale", "comment", "whole", "valid",
+    )
+)  # fmt: skip
+_PAGE: Final = tuple(
+    Column(name) for name in ("no.", "name", "direction", "value", "limits", "owner", "when lost", "comment")
+)
 
 
-COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
+def columns() -> tuple[str, ...]:
+    """Names of the columns in CSV and JSON."""
+    further = (column for link in tables() for column in link.columns)
+    return tuple(column.name for column in arranged(_COLUMNS, further))
 
 
 def rows(cell: ExpandedCell) -> tuple[Row, ...]:
     """The table of a cell without errors, in file order."""
-    placed: dict[int, list[ExpandedPlacement]] = {}
-    for placement in placements_of(cell):
-        placed.setdefault(placement.variable.index, []).append(placement)
-    on_can = _canopen(cell)
-    found: list[Row] = []
-    for variable in cell.variables:
-        places: Sequence[ExpandedPlacement | None] = placed.get(variable.index) or [None]
-        found.extend(_row(cell, variable, place, on_can.get(variable.index, {})) for place in places)
-    return tuple(found)
+    links = [link.rows(cell) for link in tables()]
+    empty = {column.name: column.empty for link in tables() for column in link.columns}
+    return tuple(
+        _row(cell, variable, {**empty, **place})
+        for variable in cell.variables
+        for place in _places([link.get(variable.index, ()) for link in links])
+    )
 
 
-def _canopen(cell: ExpandedCell) -> dict[int, dict[str, Any]]:
-    """What the CANopen columns hold, by variable."""
-    node = node_of(cell)
-    if node is None:
-        return {}
-    columns: dict[int, dict[str, Any]] = {
-        one.variable: {"object": object_place(one), "can_type": one.plan.type.name} for one in node.objects
-    }
-    for pdo in node.pdos:
-        assert pdo.slot.cob_id is not None
-        for bit, one in pdo.offsets:
-            columns[one.variable] |= {"pdo": pdo.label, "cob_id": cob(pdo.slot.cob_id), "pdo_bit": bit}
-    return columns
+def _places(links: Sequence[Sequence[Mapping[str, object]]]) -> Iterator[Mapping[str, object]]:
+    """The places of one variable side by side, as many as the link with the most has."""
+    for number in range(max(1, *map(len, links))):
+        yield {
+            name: value
+            for places in links
+            if places
+            for name, value in places[min(number, len(places) - 1)].items()
+        }
 
 
 def by_line(cell: ExpandedCell) -> tuple[tuple[Row, Row], ...]:
     """The table with one entry for each line of the file and place: its first and its last row."""
     ends: dict[tuple[str, int], tuple[Row, Row]] = {}
     placed: dict[int, int] = {}
-    variables = {variable.index + 1: variable for variable in cell.variables}
     for row in rows(cell):
         place = placed[row.number] = placed.get(row.number, -1) + 1
-        key = variables[row.number].part.name, place
+        key = cell.variables[row.number - 1].part.name, place
         first, _ = ends.setdefault(key, (row, row))
         ends[key] = first, row
     return tuple(ends.values())
 
 
-def _row(
-    cell: ExpandedCell,
-    variable: ExpandedVariable,
-    place: ExpandedPlacement | None,
-    canopen: dict[str, Any],
-) -> Row:
+def _row(cell: ExpandedCell, variable: ExpandedVariable, places: Mapping[str, object]) -> Row:
     spec = variable.spec
     lock = cell.locks[variable.lock] if variable.lock is not None else None
-    is_number = place is not None and place.codec is not None
     low, high = spec.limits if spec.limits is not None else (None, None)
     is_input = variable.direction is Direction.INPUT
+    owner = ""
+    if lock is not None:
+        owner = "any" if lock.is_any else (" > " if lock.takeover else ", ").join(lock.owners)
     return Row(
         number=variable.index + 1,
         name=variable.name,
         direction=variable.direction.value,
-        robot=variable.target,
-        area=AREA_NAMES[place.area] if place is not None else "",
-        address=place.address if place is not None else None,
-        bit=place.bit if place is not None else None,
-        notation=place.notation if place is not None else "",
-        words=place.words if place is not None else 0,
-        type=place.type if place is not None else "",
-        order=place.order if place is not None and is_number else "",
-        scale=place.scale if place is not None and is_number else None,
-        offset=place.offset if place is not None and is_number else None,
         unit=spec.unit,
         low=low,
         high=high,
         clamp=spec.clamp,
-        owner=""
-        if lock is None
-        else "any"
-        if lock.is_any
-        else (" > " if lock.takeover else ", ").join(lock.owners),
+        owner=owner,
         lease=lock.lease if lock is not None else None,
         takeover=lock is not None and lock.takeover,
         group=lock.name if lock is not None and lock.group is not None else "",
@@ -181,7 +108,7 @@ def _row(
         comment=spec.comment,
         whole=lock is not None and lock.whole,
         valid="running" if variable.valid_running else "",
-        **canopen,
+        places=places,
     )
 
 
@@ -195,116 +122,83 @@ def as_csv(table: Sequence[Row]) -> str:
     """Comma separated values with a head line; what does not apply is empty, truth is true or false."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows([_plain(getattr(row, column)) for column in COLUMNS] for row in table)
+    head = columns()
+    writer.writerow(head)
+    writer.writerows([_plain(row[column]) for column in head] for row in table)
     return text.getvalue()
 
 
 def as_json(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
-    """One JSON document: `version`, `cell`, `fingerprint`, `modbus` and `canopen` (each may be null), `variables`.
+    """One JSON document: `version`, `cell`, `fingerprint`, one key for each kind of link (null: the cell has none),
+    `variables`.
 
     `variables` is a list of rows, `canopen` has the PDO table and the load of the bus by bit-rate.
 
     Keys are only ever added within a version.
     """
-    modbus = modbus_of(plan)
+    defining = {language.key for language in languages() if language.defines}
     document = {
         "version": 1,
         "cell": plan.cell.name,
         "fingerprint": f"{plan.cell.fingerprint:08X}",
-        "modbus": None if modbus is None else {"host": modbus.host, "port": modbus.port, "unit": modbus.unit},
-        "canopen": as_document(cell),
-        "variables": [dataclasses.asdict(row) for row in table],
+        **{
+            link.key: link.document(plan, cell) if link.key in plan.links else None
+            for link in tables()
+            if link.key not in defining
+        },
+        "variables": [{column: row[column] for column in columns()} for row in table],
     }
     return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
 
 def as_markdown(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
-    """A Markdown page with the columns that a PLC programmer needs; the PDO table after it."""
+    """A Markdown page with the columns that a PLC programmer needs; the tables of the links after it."""
+    here = [link for link in tables() if link.key in plan.links]
     lines = [f"# Registers of {plan.cell.name}", ""]
-    modbus = modbus_of(plan)
-    if modbus is not None:
-        lines += [
-            (
-                f"Modbus TCP, port {modbus.port}, unit {modbus.unit}. Fingerprint of the mapping: "
-                f"{plan.cell.fingerprint:08X}."
-            ),
-            "",
-        ]
-    head = (
-        "no.", "name", "direction", "robot", "area", "address from 0", "4xxxxx", "type", "value", "limits",
-        "owner", "when lost", "comment",
-    )  # fmt: skip
-    lines += ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    lines.extend("| " + " | ".join(map(_cell, _markdown(row))) + " |" for row in table)
-    lines.extend(_markdown_pdos(cell))
+    introductions = [text for link in here if (text := link.introduction(plan))]
+    if introductions:
+        fingerprint = f"Fingerprint of the mapping: {plan.cell.fingerprint:08X}."
+        lines += [" ".join((*introductions, fingerprint)), ""]
+    further = (column for link in tables() for column in (link.columns if link.page is None else link.page))
+    head = [column.name for column in arranged(_PAGE, further)]
+    lines += _markdown(head, (_on_page(row, head) for row in table))
+    for link in here:
+        further_table = link.page_table(cell)
+        if further_table is not None:
+            texts = [
+                [cell if isinstance(cell, str) else cell[0] for cell in row] for row in further_table.rows
+            ]
+            lines += ["", f"## {further_table.title}", "", *_markdown(further_table.head, texts)]
+            lines += ["", *further_table.notes] if further_table.notes else []
     return "\n".join(lines) + "\n"
 
 
-def _markdown_pdos(cell: ExpandedCell) -> Iterator[str]:
-    """The PDO table, where there is a node."""
-    node = node_of(cell)
-    if node is None:
-        return
-    spec = node.part.spec
-    yield from ("", f"## PDOs of node {spec.node} on {spec.channel} ({spec.bitrate} bit/s)", "")
-    head = (
-        "PDO",
-        "COB-ID",
-        "transmission",
-        "inhibit",
-        "event or deadline",
-        "bit",
-        "variable",
-        "object",
-        "type",
-    )
+def _markdown(head: Sequence[str], table: Iterable[Sequence[str]]) -> Iterator[str]:
     yield from ("| " + " | ".join(head) + " |", "|" + "---|" * len(head))
-    for row in pdo_rows(cell):
-        times = [seconds(time) if time is not None else "" for time in (row.inhibit, row.event)]
-        for run in row.runs:
-            texts = (
-                row.pdo,
-                row.cob_id,
-                row.transmission,
-                *times,
-                str(run.bit),
-                run.names,
-                run.objects,
-                run.type,
-            )
-            yield "| " + " | ".join(map(_cell, texts)) + " |"
-    shares = ", ".join(f"{rate // 1000}k {share:.0%}" for rate, share in load_by_bit_rate(cell).items())
-    yield from ("", f"Worst-case load of the bus by bit-rate: {shares}.")
+    for texts in table:
+        yield "| " + " | ".join(map(_cell, texts)) + " |"
 
 
-def _markdown(row: Row) -> tuple[str, ...]:
-    place = "" if row.address is None else str(row.address) + ("" if row.bit is None else f".{row.bit}")
-    return (
-        str(row.number),
-        row.name,
-        row.direction,
-        row.robot,
-        row.area,
-        place,
-        row.notation,
-        f"{row.type} {row.order}".strip(),
-        formula(row),
-        limits(row),
-        policy(row),
-        lost(row),
-        row.comment,
-    )
+def _on_page(row: Row, head: Sequence[str]) -> Sequence[str]:
+    texts = {
+        "no.": str(row.number),
+        "name": row.name,
+        "direction": row.direction,
+        "value": formula(row),
+        "limits": limits(row),
+        "owner": policy(row),
+        "when lost": lost(row),
+        "comment": row.comment,
+    }
+    for link in tables():
+        texts = {**link.on_page(row), **texts}
+    return [texts.get(name, "") for name in head]
 
 
 def formula(row: Row) -> str:
     """How the raw number becomes the robot's value, with its unit: `raw * 0.1 N`; the unit alone for 1:1."""
-    text = ""
-    if row.scale not in (None, 1):
-        text = f"raw * {row.scale:.10g}"
-    if row.offset:
-        text = f"{text or 'raw'} {'+' if row.offset > 0 else '-'} {abs(row.offset):.10g}"
-    return f"{text} {row.unit}".strip()
+    conversions = (link.conversion(row) for link in tables())
+    return f"{next(filter(None, conversions), '')} {row.unit}".strip()
 
 
 def limits(row: Row) -> str:

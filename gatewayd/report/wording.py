@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 __all__ = [
     "cob",
     "did_you_mean",
+    "family",
     "names_and_more",
     "number",
     "one_and_more",
@@ -50,3 +51,12 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
     same = [one for one in names if one.casefold() == name.casefold()]
     close = same or difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"did you mean `{close[0]}`?" if close else otherwise
+
+
+def family(first: str, last: str) -> str:
+    """`recipe[0..23]` for `recipe[0]` and `recipe[23]`: what both begin and end with is said once."""
+    if first == last:
+        return first
+    head = first.rstrip("0123456789]")
+    tail = "]" if first.endswith("]") else ""
+    return f"{first.removesuffix(tail)}..{last[len(head) :]}" if last.startswith(head) else f"{first}..{last}"

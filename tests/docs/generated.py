@@ -164,7 +164,7 @@ def command_names() -> list[str]:
         command = import_module(f"gatewayd.cli.{name}").command
         names.append(name)
         if isinstance(command, click.Group):
-            names += [f"{name} {inner}" for inner in command.commands]
+            names += [f"{name} {inner}" for inner in command.list_commands(click.Context(command))]
     return names
 
 

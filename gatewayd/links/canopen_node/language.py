@@ -51,6 +51,8 @@ class CanopenLanguage(LinkLanguage):
         f"gatewayd.links.canopen_node.rules.{name}"
         for name in ("node", "pdos", "pdo_members", "pdo_company", "bus")
     )
+    tables = "gatewayd.links.canopen_node.tables"
+    exports = "gatewayd.links.canopen_node.exports"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
         (VariableSpec, "canopen"): CanopenPlace,
         (Canopen, "sync"): Sync,

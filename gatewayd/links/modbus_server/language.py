@@ -61,6 +61,7 @@ class ModbusLanguage(LinkLanguage):
         f"gatewayd.links.modbus_server.rules.{name}"
         for name in ("places", "listener", "peers", "sharing", "conversion")
     )
+    tables = "gatewayd.links.modbus_server.tables"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
         (VariableSpec, "modbus"): PlacementSpec
     }

@@ -40,6 +40,8 @@ class RobotLanguage(DefiningLanguage):
     rules = ("gatewayd.links.robot.rules.fields", "gatewayd.links.robot.rules.companions",
              "gatewayd.links.robot.rules.watchdog", "gatewayd.links.robot.rules.rates",
              "gatewayd.links.robot.rules.validity")  # fmt: skip
+    tables = "gatewayd.links.robot.tables"
+    exports = "gatewayd.links.robot.urscript"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {(Robot, "watchdog"): Watchdog}
     articles: ClassVar[Mapping[type[Section], str]] = {Robot: "the section `robot`", Watchdog: "the watchdog"}
     telling_keys = ("host", "frequency", "port", "series", "version", "adopt_for", "valid")

@@ -82,7 +82,7 @@ def test_document_has_every_bit(cell: ExpandedCell) -> None:
 def test_the_register_table_names_object_and_pdo(cell: ExpandedCell) -> None:
     by_name = {row.name: row for row in rows(cell)}
     torque = by_name["torque"]
-    assert (torque.object, torque.can_type, torque.pdo, torque.cob_id, torque.pdo_bit) == (
+    assert (torque["object"], torque["can_type"], torque["pdo"], torque["cob_id"], torque["pdo_bit"]) == (
         "2430h:02",
         "REAL32",
         "TPDO 3 (forces)",
@@ -90,7 +90,7 @@ def test_the_register_table_names_object_and_pdo(cell: ExpandedCell) -> None:
         32,
     )
     part = by_name["part_number"]
-    assert (part.object, part.pdo, part.cob_id, part.pdo_bit) == ("2010h:01", "", "", None)
+    assert (part["object"], part["pdo"], part["cob_id"], part["pdo_bit"]) == ("2010h:01", "", "", None)
 
 
 @pytest.mark.parametrize(
