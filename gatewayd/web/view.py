@@ -111,8 +111,14 @@ def _variable(cell: Cell, declared: Declared, index: int) -> dict[str, object]:
     return {
         **{name: found[name] for name in _DECLARED},
         "places": [
-            {"area": place.area, "address": place.address, "notation": place.notation, "type": place.type}
-            for link in declared.links.values()
+            {
+                "link": name,
+                "area": place.area,
+                "address": place.address,
+                "notation": place.notation,
+                "type": place.type,
+            }
+            for name, link in declared.links.items()
             for place in link.places.get(index, ())
         ],
         "lock": cell.definition.variables[index].lock,

@@ -31,7 +31,8 @@ def test_overview_names_the_cells(daemon: Daemon) -> None:
 def test_layout_has_both_addresses_of_every_place(runtime: CellRuntime) -> None:
     found = json.loads(as_json(layout(runtime)))
     start, force_limit, spare, cycles = found["variables"][:4]
-    assert start["places"] == [{"area": "holding", "address": "0.3", "notation": "400001.3", "type": "bit"}]
+    place = {"link": "modbus", "area": "holding", "address": "0.3", "notation": "400001.3", "type": "bit"}
+    assert start["places"] == [place]
     assert [(one["address"], one["notation"]) for one in cycles["places"]] == [
         ("110", "400111"),
         ("8", "300009"),
@@ -54,7 +55,7 @@ def test_layout_has_both_addresses_of_every_place(runtime: CellRuntime) -> None:
 def test_a_place_without_a_bit_has_none_in_its_addresses(tmp_path: Path) -> None:
     (door,) = [one for one in plan().cell.variables if one.name == "door"]
     found = json.loads(as_json(layout(CellRuntime(plan(), tmp_path, 0.0))))["variables"][door.number - 1]
-    place = {"area": "discrete", "address": "64", "notation": "100065", "type": "bit"}
+    place = {"link": "modbus", "area": "discrete", "address": "64", "notation": "100065", "type": "bit"}
     assert (found["name"], found["places"]) == ("door", [place])
 
 

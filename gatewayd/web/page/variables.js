@@ -64,9 +64,9 @@ export class Variables {
     this.seen.clear();
     this.open = null;
     const table = byId("rows").parentElement;
-    const has = (test) => layout.variables.some((one) => one.places.some(test));
-    table.classList.toggle("no-modbus", !has((place) => !isObject(place)));
-    table.classList.toggle("no-canopen", !has(isObject));
+    for (const link of ["modbus", "canopen"]) {
+      table.classList.toggle(`no-${link}`, !layout.variables.some((variable) => placesOn(link, variable).length));
+    }
     table.classList.toggle("units", layout.variables.some((one) => one.unit));
     this.rows = layout.variables.map((variable) => new Row(variable, (row) => this.toggle(row)));
     byId("rows").replaceChildren(...this.rows.map((row) => row.element));
@@ -144,7 +144,7 @@ class Row {
     this.canvas.setAttribute("aria-hidden", "true");
     this.quality = make("span", "quality");
     this.holder = make("span", "owner");
-    const modbus = variable.places.filter((place) => !isObject(place)), objects = variable.places.filter(isObject);
+    const modbus = placesOn("modbus", variable), objects = placesOn("canopen", variable);
     const cells = [
       ["name", this.button, make("span", "robot muted", `${variable.direction === "input" ? "→" : "←"}\u00a0${variable.robot}`)],
       ["value right", this.value, make("span", "unit muted", variable.unit)],
@@ -203,8 +203,8 @@ class Row {
   }
 }
 
-function isObject(place) {
-  return place.area === "object";
+function placesOn(link, variable) {
+  return variable.places.filter((place) => place.link === link);
 }
 
 function areaOf(place) {
@@ -213,15 +213,17 @@ function areaOf(place) {
 
 function factsOf(variable, layout) {
   const lock = variable.lock === null ? null : layout.locks[variable.lock];
-  const modbus = variable.places.filter((one) => !isObject(one)), objects = variable.places.filter(isObject);
+  const modbus = placesOn("modbus", variable), objects = placesOn("canopen", variable);
+  const others = variable.places.filter((place) => !modbus.includes(place) && !objects.includes(place));
   const input = variable.direction === "input";
   return [
     ["about", variable.comment],
     ["number", `${variable.number} (status block)`],
     ["direction", input ? "input: fieldbus to robot" : "output: robot to fieldbus"],
     ["robot", variable.robot],
-    ["Modbus", modbus.map((one) => `${one.area} ${one.address} = ${one.notation}, ${one.type}`).join("; ")],
-    ["CANopen", objects.map((one) => `object ${one.address}, ${one.type}, ${one.notation}`).join("; ")],
+    ["Modbus", modbus.map((place) => `${place.area} ${place.address} = ${place.notation}, ${place.type}`).join("; ")],
+    ["CANopen", objects.map((place) => `object ${place.address}, ${place.type}, ${place.notation}`).join("; ")],
+    ...others.map((place) => [place.link, `${place.area} ${place.address}, ${place.type}, ${place.notation}`]),
     ["limits", variable.limits ? `${variable.limits.join(" to ")} ${variable.unit}`.trim() : ""],
     [input ? "owner lost" : "robot lost", variable.fallback],
     ["may own", lock ? lock.owners.join(lock.takeover ? " before " : ", ") || "nobody" : ""],
