@@ -63,7 +63,7 @@ def command(context: click.Context, old: str, new: str, form: str) -> None:
 
 
 def _load(file: str) -> Plan | None:
-    """The plan; None after its findings were told."""
+    """The plan; None after its findings were printed."""
     import sys
     from pathlib import Path
 

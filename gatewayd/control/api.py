@@ -29,15 +29,15 @@ from gatewayd.report.schema import EventMessage, Json, LockStatus, Status, Versi
 from gatewayd.report.verdict import ServedCell
 from gatewayd.service.audit import Audit, Record, utc
 
-__all__ = ["API_VERSION", "LONGEST_FORCE", "STALE_ACT", "Api", "ApiError", "Cursor", "Gateway", "Moment"]
+__all__ = ["API_VERSION", "MAX_FORCE", "STALE_ACT", "Api", "ApiError", "Cursor", "Gateway", "Moment"]
 
 API_VERSION = 1
 STALE_ACT = 0.5
 """Seconds that an act of the operator may have waited while the gateway stood still."""
-LONGEST_FORCE = 24 * 3600.0
+MAX_FORCE = 24 * 3600.0
 """Seconds that a force may last at most; it can be renewed."""
-_GREATEST = sys.float_info.max
-_MOST = 1000
+_MAX_VALUE = sys.float_info.max
+_MAX_ANSWER = 1000
 """Events or records in one answer."""
 
 
@@ -148,12 +148,12 @@ class Api:
 
     def events(self, query: Mapping[str, str], moment: Moment) -> Json:
         """The last events, oldest first; `cell`, `limit` (100), and `after` with a sequence number of that cell."""
-        limit, after = _count(query, "limit", 100), _count(query, "after", 0, greatest=2**53)
+        limit, after = _count(query, "limit", 100), _count(query, "after", 0, most=2**53)
         runtimes = self._runtimes(query.get("cell"))
         if after and len(runtimes) > 1:
             raise ApiError(400, "bad_query", "`after` counts the events of one cell: say which with `cell`")
-        found = [one for runtime in runtimes for one in _events(runtime, after, moment)]
-        found.sort(key=lambda one: (one[0], one[1]["seq"]))
+        found = [numbered for runtime in runtimes for numbered in _events(runtime, after, moment)]
+        found.sort(key=lambda numbered: (numbered[0], numbered[1]["seq"]))
         return {
             "time": utc(moment.wall),
             "events": [event for _time, event in found[max(0, len(found) - limit) :]],
@@ -171,7 +171,7 @@ class Api:
             if read != ring.count:
                 found += _events(runtime, read if read < ring.count else 0, moment)
             cursor.read[name] = ring.count
-        found.sort(key=lambda one: (one[0], one[1]["seq"]))
+        found.sort(key=lambda numbered: (numbered[0], numbered[1]["seq"]))
         return [event for _time, event in found]
 
     def audit(self, query: Mapping[str, str], moment: Moment) -> Json:
@@ -234,9 +234,9 @@ class Api:
     def _runtimes(self, cell: str | None) -> Sequence[ServedCell]:
         if cell is None:
             return self._gateway.runtimes
-        found = [one for one in self._gateway.runtimes if one.cell.definition.name == cell]
+        found = [runtime for runtime in self._gateway.runtimes if runtime.cell.definition.name == cell]
         if not found:
-            names = ", ".join(one.cell.definition.name for one in self._gateway.runtimes)
+            names = ", ".join(runtime.cell.definition.name for runtime in self._gateway.runtimes)
             raise ApiError(404, "no_such_cell", f"there is no cell {cell}; there is {names}")
         return found
 
@@ -259,7 +259,9 @@ class Api:
         for runtime in self._runtimes(_text(body, "cell")):
             definition = runtime.cell.definition
             named = next((index for index, lock in enumerate(definition.locks) if lock.name == name), None)
-            guarding = next((one.lock for one in definition.variables if one.name == name), None)
+            guarding = next(
+                (variable.lock for variable in definition.variables if variable.name == name), None
+            )
             lock = named if named is not None else guarding
             if lock is not None:
                 found.append((runtime, lock))
@@ -307,12 +309,12 @@ def _is_wanted(record: Record, query: Mapping[str, str]) -> bool:
     )
 
 
-def _count(query: Mapping[str, str], name: str, default: int, greatest: int = _MOST) -> int:
+def _count(query: Mapping[str, str], name: str, default: int, most: int = _MAX_ANSWER) -> int:
     text = query.get(name)
     if text is None:
         return default
-    if not (text.isascii() and text.isdigit()) or len(text) > 16 or int(text) > greatest:
-        raise ApiError(400, "bad_query", f"`{name}` must be a whole number from 0 to {greatest}")
+    if not (text.isascii() and text.isdigit()) or len(text) > 16 or int(text) > most:
+        raise ApiError(400, "bad_query", f"`{name}` must be a whole number from 0 to {most}")
     return int(text)
 
 
@@ -327,10 +329,8 @@ def _seconds(body: Mapping[str, Any], *, required: bool) -> float:
     value = body.get("for")
     if value is None and not required:
         return math.inf
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= LONGEST_FORCE:
-        raise ApiError(
-            400, "bad_request", f"`for` must be seconds, more than 0 and at most {LONGEST_FORCE:.0f}"
-        )
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= MAX_FORCE:
+        raise ApiError(400, "bad_request", f"`for` must be seconds, more than 0 and at most {MAX_FORCE:.0f}")
     return float(value)
 
 
@@ -338,7 +338,7 @@ def _value(kind: ValueKind, value: object) -> Value:
     """The JSON value as one of the variable's kind: true is 1 for a bit only, 3.0 is 3 for an integer."""
     if kind is ValueKind.BOOL and value in (False, True):
         return bool(value)
-    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _GREATEST:
+    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _MAX_VALUE:
         if kind is ValueKind.FLOAT:
             return float(value)
         if kind is ValueKind.INT and value == int(value):

@@ -45,7 +45,7 @@ class Reloaded(Protocol):
         """0 if what runs now is what the files say."""
 
     def as_object(self) -> Mapping[str, Any]:
-        """What is told to whoever asked for it."""
+        """What whoever asked for it reads."""
 
 
 Reload = Callable[[bool], Awaitable[Reloaded]]

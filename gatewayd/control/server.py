@@ -23,9 +23,9 @@ from gatewayd.loop import clock
 from gatewayd.loop.threads import in_daemon_thread
 from gatewayd.report.printable import json_text
 
-__all__ = ["ALIVE_PERIOD", "FOLLOWERS", "GREATEST_BODY", "application", "serving"]
+__all__ = ["ALIVE_PERIOD", "FOLLOWERS", "MAX_BODY", "application", "serving"]
 
-GREATEST_BODY = 64 * 1024
+MAX_BODY = 64 * 1024
 """Bytes of a request's body."""
 REQUESTS = 64
 """Requests under way at one time, those that follow events included."""
@@ -63,7 +63,7 @@ async def serving(listening: socket.socket, api: Api, reload: Reload | None) -> 
 def application(api: Api, reload: Reload | None) -> web.Application:
     """The routes."""
     routes = _Routes(api, reload)
-    found = web.Application(client_max_size=GREATEST_BODY, middlewares=[routes.guard])
+    found = web.Application(client_max_size=MAX_BODY, middlewares=[routes.guard])
     found.router.add_get("/v1/version", routes.version)
     found.router.add_get("/v1/status", routes.status)
     for name, question in (("variables", api.variables), ("locks", api.locks), ("audit", api.audit)):
@@ -166,7 +166,7 @@ class _Routes:
         )
         await response.prepare(request)
         sent_at = clock.now()
-        # A follower that is gone, or that leaves too much unread, is told nothing more.
+        # A follower that is gone, or that leaves too much unread, gets nothing more.
         with suppress(ConnectionError, TimeoutError):
             while True:
                 if found or clock.now() - sent_at >= ALIVE_PERIOD:
@@ -181,7 +181,7 @@ class _Routes:
 _HTTP_ERRORS = {
     404: ApiError(404, "no_such_path", "there is nothing at this path"),
     405: ApiError(405, "wrong_method", "this path has another method"),
-    413: ApiError(413, "too_large", f"a request has {GREATEST_BODY} bytes at most"),
+    413: ApiError(413, "too_large", f"a request has {MAX_BODY} bytes at most"),
 }
 
 

@@ -123,7 +123,7 @@ def cell_view(served: ServedCell, declared: Declared, now: float) -> Json:
         problems=list(verdict.problems),
         links=[_link(name, verdict, declared.links[name]) for name in declared.links],
         writers=[_writer(cell, index, now) for index in range(len(definition.writers))],
-        variables={"total": len(quality)} | {one.name.lower(): quality.count(one) for one in Quality},
+        variables={"total": len(quality)} | {its.name.lower(): quality.count(its) for its in Quality},
         locks={
             "total": len(owners),
             "owned": len(owners) - owners.count(None),

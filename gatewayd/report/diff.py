@@ -1,6 +1,6 @@
 """What a new mapping changes of a running one, and what of it must not happen unasked.
 
-Parts are compared by name and told as they stand in the mapping file; a reload takes over what has the same name and
+Parts are compared by name and shown as they stand in the mapping file; a reload takes over what has the same name and
 the same place in the robot (`gatewayd.core.succession`).
 """
 
@@ -20,7 +20,7 @@ from gatewayd.report.printable import json_text, printable
 from gatewayd.report.weakening import weakened
 
 __all__ = [
-    "MOST_GONE",
+    "MAX_GONE",
     "Changes",
     "Detail",
     "Difference",
@@ -31,7 +31,7 @@ __all__ = [
     "objections",
 ]
 
-MOST_GONE = 0.3
+MAX_GONE = 0.3
 """Part of the variables that may disappear unasked: more looks like the wrong file."""
 
 
@@ -99,7 +99,7 @@ class Changes:
 
     def of(self, kind: Kind) -> tuple[str, ...]:
         """Names of the variables that were added, removed or changed."""
-        return tuple(one.name for one in self.variables if one.kind is kind)
+        return tuple(difference.name for difference in self.variables if difference.kind is kind)
 
     @property
     def summary(self) -> str:
@@ -112,9 +112,9 @@ class Changes:
                 parts.append(f"{count}{noun} {kind.name.lower()}")
         for noun, differences in (("writer", self.writers), ("group", self.groups)):
             if differences:
-                parts.append(f"{noun} {', '.join(one.name for one in differences)} changed")
+                parts.append(f"{noun} {', '.join(difference.name for difference in differences)} changed")
         if self.links:
-            parts.append(f"settings of {', '.join(one.name for one in self.links)} changed")
+            parts.append(f"settings of {', '.join(difference.name for difference in self.links)} changed")
         if self.renumbered and not parts:
             parts.append("variables in another order")
         if not parts and self:
@@ -142,9 +142,9 @@ def compare(old: Plan, new: Plan) -> Changes:
 
 
 def _differences(old: Mapping[str, Facts], new: Mapping[str, Facts]) -> Iterator[Difference]:
-    for name, told in new.items():
+    for name, facts_now in new.items():
         former = old.get(name)
-        details = tuple(_details(former or {}, told))
+        details = tuple(_details(former or {}, facts_now))
         if former is None:
             yield Difference(Kind.ADDED, name, details)
         elif details:
@@ -178,24 +178,24 @@ def objections(changes: Changes, owned: Collection[str]) -> tuple[str, ...]:
         *weakened(changes.old.cell, changes.new.cell),
     ]
     gone, before = len(changes.of(Kind.REMOVED)), len(changes.old.cell.variables)
-    if gone > MOST_GONE * before:
+    if gone > MAX_GONE * before:
         found.append(f"{gone} of {before} variables would be gone: is it the right file?")
     return tuple(found)
 
 
 def _touches_owned(changes: Changes, owned: Collection[str]) -> Iterator[str]:
-    for one in changes.variables:
-        if one.name not in owned:
+    for difference in changes.variables:
+        if difference.name not in owned:
             continue
-        if one.kind is Kind.REMOVED:
-            yield f"`{one.name}` is owned now and would be removed"
-        elif one.detail("direction") is None and not all(map(_is_harmless, one.details)):
-            yield f"`{one.name}` is owned now and would change: {_changed(one.details)}"
-    for one in changes.groups:
-        for name in sorted(_members(changes.old, one.name).intersection(owned))[:1]:
+        if difference.kind is Kind.REMOVED:
+            yield f"`{difference.name}` is owned now and would be removed"
+        elif difference.detail("direction") is None and not all(map(_is_harmless, difference.details)):
+            yield f"`{difference.name}` is owned now and would change: {_changed(difference.details)}"
+    for difference in changes.groups:
+        for name in sorted(_members(changes.old, difference.name).intersection(owned))[:1]:
             yield (
-                f"`{name}` of the group `{one.name}` is owned now, and the group would change: "
-                f"{_changed(one.details)}"
+                f"`{name}` of the group `{difference.name}` is owned now, and the group would change: "
+                f"{_changed(difference.details)}"
             )
 
 
@@ -207,10 +207,10 @@ def _is_harmless(detail: Detail) -> bool:
 
 
 def _turns_round(changes: Changes) -> Iterator[str]:
-    for one in changes.variables:
-        turned = one.detail("direction") if one.kind is Kind.CHANGED else None
+    for difference in changes.variables:
+        turned = difference.detail("direction") if difference.kind is Kind.CHANGED else None
         if turned is not None:
-            yield f"`{one.name}` would turn from {turned.old} to {turned.new}"
+            yield f"`{difference.name}` would turn from {turned.old} to {turned.new}"
 
 
 def _cuts_owners_off(changes: Changes, owned: Collection[str]) -> Iterator[str]:
@@ -278,8 +278,8 @@ def as_text(changes: Changes) -> str:
     if changes.old.cell.fingerprint != changes.new.cell.fingerprint:
         lines[0] += f"; fingerprint {changes.old.cell.fingerprint:08X} -> {changes.new.cell.fingerprint:08X}"
     for noun, differences in (("", changes.links), ("writer ", changes.writers), ("group ", changes.groups)):
-        lines += [_line(noun, one) for one in differences]
-    lines += [_line("", one) for one in _folded(changes.variables)]
+        lines += [_line(noun, difference) for difference in differences]
+    lines += [_line("", difference) for difference in _folded(changes.variables)]
     if changes.renumbered:
         first, count = changes.renumbered[0], len(changes.renumbered)
         lines.append(
@@ -310,21 +310,23 @@ def as_json(changes: Changes) -> str:
             name: list(map(_as_object, getattr(changes, name)))
             for name in ("links", "writers", "groups", "variables")
         },
-        "renumbered": [{"name": one.name, "old": one.old, "new": one.new} for one in changes.renumbered],
+        "renumbered": [
+            {"name": moved.name, "old": moved.old, "new": moved.new} for moved in changes.renumbered
+        ],
     }
     return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
 
-def _as_object(one: Difference) -> dict[str, object]:
-    details = [{"what": detail.what, "old": detail.old, "new": detail.new} for detail in one.details]
-    return {"kind": one.kind.name.lower(), "name": one.name, "details": details}
+def _as_object(difference: Difference) -> dict[str, object]:
+    details = [{"what": detail.what, "old": detail.old, "new": detail.new} for detail in difference.details]
+    return {"kind": difference.kind.name.lower(), "name": difference.name, "details": details}
 
 
-def _line(noun: str, one: Difference) -> str:
-    head = f"{one.kind.value} {noun}{one.name}: "
-    if one.kind is Kind.CHANGED:
-        return head + _changed(one.details)
-    return head + "; ".join(f"{detail.what} {detail.old or detail.new}" for detail in one.details)
+def _line(noun: str, difference: Difference) -> str:
+    head = f"{difference.kind.value} {noun}{difference.name}: "
+    if difference.kind is Kind.CHANGED:
+        return head + _changed(difference.details)
+    return head + "; ".join(f"{detail.what} {detail.old or detail.new}" for detail in difference.details)
 
 
 def _changed(details: Iterable[Detail]) -> str:
@@ -347,24 +349,24 @@ _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 def _folded(differences: Iterable[Difference]) -> Iterator[Difference]:
     """Elements that follow each other and differ in the same facts become one difference, `recipe[0..23]`."""
     run: list[Difference] = []
-    for one in differences:
-        if run and not _follows(run[-1], one):
+    for difference in differences:
+        if run and not _follows(run[-1], difference):
             yield _merged(run)
             run = []
-        run.append(one)
+        run.append(difference)
     if run:
         yield _merged(run)
 
 
-def _follows(one: Difference, other: Difference) -> bool:
-    first, second = _ELEMENT.fullmatch(one.name), _ELEMENT.fullmatch(other.name)
+def _follows(former: Difference, other: Difference) -> bool:
+    first, second = _ELEMENT.fullmatch(former.name), _ELEMENT.fullmatch(other.name)
     return (
         first is not None
         and second is not None
         and first[1] == second[1]
         and int(second[2]) == int(first[2]) + 1
-        and one.kind is other.kind
-        and [detail.what for detail in one.details] == [detail.what for detail in other.details]
+        and former.kind is other.kind
+        and [detail.what for detail in former.details] == [detail.what for detail in other.details]
     )
 
 
@@ -376,8 +378,8 @@ def _merged(run: list[Difference]) -> Difference:
     assert begin is not None
     assert end is not None
     details = tuple(
-        Detail(one.what, _span(one.old, other.old), _span(one.new, other.new))
-        for one, other in zip(first.details, last.details, strict=True)
+        Detail(detail.what, _span(detail.old, other.old), _span(detail.new, other.new))
+        for detail, other in zip(first.details, last.details, strict=True)
     )
     return Difference(first.kind, f"{begin[1]}[{begin[2]}..{end[2]}]", details)
 

@@ -22,11 +22,11 @@ from gatewayd.simulator.line import OutgoingLine
 from gatewayd.simulator.session import SimulatorSession
 from gatewayd.simulator.store import Scalar
 
-__all__ = ["DEFAULT_PORT", "MAKE_UP", "MOST_CONNECTIONS", "SimulatedController"]
+__all__ = ["DEFAULT_PORT", "MAKE_UP", "MAX_CONNECTIONS", "SimulatedController"]
 
 MAKE_UP = 25
 """Cycles of lateness that are made up for."""
-MOST_CONNECTIONS = 16
+MAX_CONNECTIONS = 16
 """Clients served at a time unless told otherwise."""
 
 _SHORTEST_CYCLE = 0.75  # of a period, before the timer's error
@@ -50,7 +50,7 @@ class SimulatedController:
         *,
         host: str = "127.0.0.1",
         port: int = 0,
-        connections: int = MOST_CONNECTIONS,
+        connections: int = MAX_CONNECTIONS,
     ) -> None:
         self.controller = controller or Controller()
         self.host = host

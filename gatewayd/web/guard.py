@@ -19,13 +19,13 @@ from aiohttp.web_protocol import RequestHandler
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 
-__all__ = ["GREATEST_BODY", "HEADERS", "MOST_CONNECTIONS", "PATIENCE", "Doors", "is_local_name", "middleware"]
+__all__ = ["HEADERS", "MAX_BODY", "MAX_CONNECTIONS", "PATIENCE", "Doors", "is_local_name", "middleware"]
 
-MOST_CONNECTIONS = 32
+MAX_CONNECTIONS = 32
 """Open at a time; further ones are closed at once, so that a flood costs the robot's loop next to nothing."""
 PATIENCE = 20.0
 """Seconds after which a connection that has not finished a request is closed: idle, slow, or not reading its answer."""
-GREATEST_BODY = 4096
+MAX_BODY = 4096
 """Bytes of a request's body."""
 HEADERS = {
     "Content-Security-Policy": (
@@ -48,7 +48,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Doors:
-    """Lets in at most `MOST_CONNECTIONS` connections to `server`, and shows out who wastes one."""
+    """Lets in at most `MAX_CONNECTIONS` connections to `server`, and shows out who wastes one."""
 
     def __init__(self, server: web.Server) -> None:
         self._server = server
@@ -58,7 +58,7 @@ class Doors:
     def __call__(self) -> asyncio.Protocol:
         """The protocol of a new connection."""
         self._forget_closed()
-        if len(self._seen) >= MOST_CONNECTIONS:
+        if len(self._seen) >= MAX_CONNECTIONS:
             return _Full()
         handler = self._server()
         self._seen[handler] = clock.now()
@@ -75,7 +75,7 @@ class Doors:
             await asyncio.sleep(_SWEEP)
             self._forget_closed()
             now = clock.now()
-            for handler in [one for one, seen in self._seen.items() if now - seen > PATIENCE]:
+            for handler in [handler for handler, seen in self._seen.items() if now - seen > PATIENCE]:
                 transport = handler.transport
                 if transport is not None:
                     transport.abort()

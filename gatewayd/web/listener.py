@@ -20,7 +20,7 @@ from gatewayd.control.server import application
 from gatewayd.loop import clock
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.web import view
-from gatewayd.web.guard import GREATEST_BODY, MOST_CONNECTIONS, Doors, is_local_name, middleware
+from gatewayd.web.guard import MAX_BODY, MAX_CONNECTIONS, Doors, is_local_name, middleware
 from gatewayd.web.health import health, readiness
 from gatewayd.web.metrics import CONTENT_TYPE, Exposition
 from gatewayd.web.probes import Probes
@@ -64,7 +64,7 @@ class StatusListener:
         self._exposition = Exposition(probes, __version__)
         self._doors: Doors | None = None
         guard = middleware(token, lambda: self._doors, local_only=_is_loopback(host))
-        self._app = web.Application(middlewares=[guard], client_max_size=GREATEST_BODY)
+        self._app = web.Application(middlewares=[guard], client_max_size=MAX_BODY)
         self._app.add_routes(self._routes())
         if api is not None:
             self._app.add_subapp("/api", application(*api))
@@ -86,7 +86,7 @@ class StatusListener:
         assert runner.server is not None
         doors = Doors(runner.server)
         loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(doors, self._host, self._port, backlog=MOST_CONNECTIONS)
+        self._server = await loop.create_server(doors, self._host, self._port, backlog=MAX_CONNECTIONS)
         self._doors, self._runner = doors, runner
         self._sweeper = loop.create_task(doors.sweep())
 
@@ -115,13 +115,13 @@ class StatusListener:
         ]
 
     async def _healthz(self, _request: web.Request) -> web.Response:
-        healthy, told = health(self._probes.late)
-        return _json(told, status=200 if healthy else 503)
+        healthy, answer = health(self._probes.late)
+        return _json(answer, status=200 if healthy else 503)
 
     async def _readyz(self, _request: web.Request) -> web.Response:
         probes = self._probes
-        ready, told = readiness(probes.verdicts(clock.now()), probes.late, probes.troubles())
-        return _json(told, status=200 if ready else 503)
+        ready, answer = readiness(probes.verdicts(clock.now()), probes.late, probes.troubles())
+        return _json(answer, status=200 if ready else 503)
 
     async def _metrics(self, request: web.Request) -> web.Response:
         return _packed(request, self._exposition.text(), {"Content-Type": CONTENT_TYPE})

@@ -272,7 +272,7 @@ def _cell(runtime: CellRuntime, now: float) -> dict[str, list[_Sample]]:
         "gatewayd_cell_info": [((f"{cell.definition.fingerprint:08X}",), 1)],
         "gatewayd_uptime_seconds": [((), max(0.0, now - health.started))],
         "gatewayd_robot_up": [((), _LEVELS[up])],
-        "gatewayd_robot_state": [((one.name.lower(),), _LEVELS[one is state]) for one in Source],
+        "gatewayd_robot_state": [((source.name.lower(),), _LEVELS[source is state]) for source in Source],
         "gatewayd_robot_package_rate_hertz": [((), health.frequency)],
         "gatewayd_robot_age_seconds": [((), now - cell.freshness.last_progress)],
         "gatewayd_robot_packages_total": [((), health.packages)],
@@ -286,7 +286,9 @@ def _cell(runtime: CellRuntime, now: float) -> dict[str, list[_Sample]]:
         "gatewayd_unadopted": [((), health.unadopted)],
         "gatewayd_adoption_seconds": [((), health.adoption)],
         "gatewayd_gaps_total": [((), health.gaps)],
-        "gatewayd_variables": [((one.name.lower(),), image.quality.count(one)) for one in Quality],
+        "gatewayd_variables": [
+            ((quality.name.lower(),), image.quality.count(quality)) for quality in Quality
+        ],
         "gatewayd_input_age_seconds": [
             ((), now - max((image.times[i] for i in image.inputs), default=-math.inf))
         ],

@@ -39,7 +39,7 @@ class CellProbe:
         """From the arrival of a write to the package with it; the wait for the control cycle is part of it."""
         self.events: Counter[EventKind] = Counter()
         self.refusals: Counter[Reason] = Counter()
-        """Equal ones are told every `REFUSAL_INTERVAL` seconds, so these may lag behind `Health.writes_refused`."""
+        """Equal ones are reported every `REFUSAL_INTERVAL` seconds, so these may lag behind `Health.writes_refused`."""
         self._image_time = 0.0
         self._written_at: float | None = None
         self._counted = 0

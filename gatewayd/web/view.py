@@ -27,7 +27,7 @@ from gatewayd.web.probes import Probes
 __all__ = ["EVENTS", "as_json", "layout", "overview", "state"]
 
 EVENTS = 100
-"""Events told at most in one answer; those of one deed, as many variables as it may concern, are one."""
+"""Events in one answer at most; those of one deed, as many variables as it may concern, count as one."""
 
 _IN_RUNS = frozenset(
     {
@@ -58,9 +58,9 @@ def as_json(document: object) -> bytes:
 
 def _finite(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
+        return {key: _finite(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(one) for one in value]
+        return [_finite(inner) for inner in value]
     if isinstance(value, float) and not math.isfinite(value):
         return "NaN" if value != value else "Infinity" if value > 0 else "-Infinity"  # noqa: PLR0124
     return value
@@ -97,10 +97,10 @@ def _lock(lock: Lock, cell: Cell) -> dict[str, object]:
     definition = cell.definition
     return {
         "name": lock.name,
-        "owners": [definition.writers[one].name for one in lock.owners],
+        "owners": [definition.writers[writer].name for writer in lock.owners],
         "takeover": lock.takeover,
         "lease": lock.lease,
-        "variables": [definition.variables[one].name for one in lock.members],
+        "variables": [definition.variables[member].name for member in lock.members],
     }
 
 
@@ -157,13 +157,13 @@ def _number(value: float) -> float:
 
 
 def _ages(cell: Cell, now: float) -> list[int | None]:
-    """Milliseconds since the source told each value; None: never."""
+    """Milliseconds since each value came from its source; None: never."""
     image = cell.image
     shared = _milliseconds(now - image.output_time)
     outputs = {index for index in image.outputs if not image.variables[index].valid_running}
-    told = (Quality.GOOD, Quality.STALE)
+    current = (Quality.GOOD, Quality.STALE)
     return [
-        shared if index in outputs and quality in told else _milliseconds(image.age(index, now))
+        shared if index in outputs and quality in current else _milliseconds(image.age(index, now))
         for index, quality in enumerate(image.quality)
     ]
 

@@ -150,7 +150,7 @@ async def test_a_body_that_is_no_object(path: Path, body: bytes, code: str) -> N
 
 
 async def test_a_body_is_bounded(client: Client) -> None:
-    body = {"x": "y" * server.GREATEST_BODY}
+    body = {"x": "y" * server.MAX_BODY}
     assert await refused(lambda: client.post("/v1/reload", body)) == (413, "too_large")
 
 

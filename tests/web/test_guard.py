@@ -124,7 +124,7 @@ async def test_nonsense_is_refused_without_a_traceback(listener: StatusListener,
 async def test_connections_are_bounded_and_come_back(
     listener: StatusListener, session: aiohttp.ClientSession
 ) -> None:
-    many = [await asyncio.open_connection("127.0.0.1", listener.port) for _ in range(guard.MOST_CONNECTIONS)]
+    many = [await asyncio.open_connection("127.0.0.1", listener.port) for _ in range(guard.MAX_CONNECTIONS)]
     await asyncio.sleep(0.05)
     assert await raw(listener.port, b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n") == b""
     for _, writer in many:
