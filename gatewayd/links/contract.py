@@ -33,6 +33,7 @@ __all__ = [
     "LinkKind",
     "LinkRuntime",
     "MetricInfo",
+    "Names",
     "Place",
     "PrepareError",
     "Prepared",
@@ -69,6 +70,12 @@ class Place:
     notation: str
     """The address as others spell it, or what else leads there: `400101`, `COB-ID 0x190`."""
     type: str
+
+
+class Names(str):
+    """A setting that is a list of names with blanks between them: what differs is shown name by name."""
+
+    __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from gatewayd.links.contract import Names
 from gatewayd.links.registry import kind_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.report import facts
@@ -334,7 +335,7 @@ def _changed(details: Iterable[Detail]) -> str:
 
 
 def _change(detail: Detail) -> str:
-    if detail.what in ("subscribed", "claimed"):
+    if isinstance(detail.old, Names) or isinstance(detail.new, Names):
         old, new = detail.old.split(), detail.new.split()
         marked = [f"+{name}" for name in new if name not in old] + [
             f"-{name}" for name in old if name not in new

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gatewayd.core.definition import CellDefinition
-from gatewayd.links.contract import Description
+from gatewayd.links.contract import Description, Names
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
 from gatewayd.report.format import address, exact, seconds
 
@@ -22,8 +22,8 @@ def description(plan: RobotPlan, cell: CellDefinition) -> Description:
             "adopt_for": seconds(cell.adopt_for) or "none",
             "verify": str(plan.verify).lower(),
             "watchdog": _watchdog(plan.watchdog, cell),
-            "subscribed": " ".join(sorted(plan.outputs)),
-            "claimed": " ".join(sorted(plan.inputs)),
+            "subscribed": Names(" ".join(sorted(plan.outputs))),
+            "claimed": Names(" ".join(sorted(plan.inputs))),
         },
         address=address(plan.host, plan.port),
         fields={"address": address(plan.host, plan.port)},
