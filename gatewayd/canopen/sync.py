@@ -11,7 +11,7 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
 
-__all__ = ["GREATEST_COUNTER", "LEAST_PERIOD", "PRODUCER", "Sync", "SyncPlan"]
+__all__ = ["GREATEST_COUNTER", "LEAST_PERIOD", "PRODUCER", "SyncPlan", "SyncService"]
 
 PRODUCER = 0x4000_0000
 """Bit 30 of 1005h: this node sends SYNC."""
@@ -33,7 +33,7 @@ class SyncPlan:
     """Synchronous counter overflow value; 0: SYNC carries no counter."""
 
 
-class Sync:
+class SyncService:
     """The SYNC object.
 
     `on_sync(counter, now)` is called for every SYNC of the right length, our own ones included; the counter is None
@@ -118,7 +118,7 @@ class Sync:
         self._last = -math.inf
         self._due = now + self._period.number / 1e6 if self.produces else math.inf
 
-    def resume(self, former: Sync) -> None:
+    def resume(self, former: SyncService) -> None:
         """Go on as another one: in its cycle, with its counter."""
         self._counter, self._last, self._due = former._counter, former._last, former._due
 

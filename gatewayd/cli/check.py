@@ -143,12 +143,12 @@ def _read(file: str) -> bytes | Unreadable:
     from pathlib import Path
 
     from gatewayd.mapping.loader import read_bytes
-    from gatewayd.mapping.source import MAXIMUM_BYTES
+    from gatewayd.mapping.source import MAX_BYTES
     from gatewayd.report.findings import Unreadable
 
     try:
         if file == STDIN:
-            return sys.stdin.buffer.read(MAXIMUM_BYTES + 1)
+            return sys.stdin.buffer.read(MAX_BYTES + 1)
         return read_bytes(Path(file))
     except IsADirectoryError:
         return Unreadable(_shown(file), "no mapping file (*.yaml) in this directory")

@@ -68,13 +68,13 @@ def _load(file: str) -> Plan | None:
     from pathlib import Path
 
     from gatewayd.mapping.loader import load, read_bytes
-    from gatewayd.mapping.source import MAXIMUM_BYTES
+    from gatewayd.mapping.source import MAX_BYTES
     from gatewayd.report.findings import Outcome, as_text
 
     name = "stdin" if file == "-" else str(click.format_filename(file))
     try:
         loaded = load(
-            sys.stdin.buffer.read(MAXIMUM_BYTES + 1) if file == "-" else read_bytes(Path(file)), name
+            sys.stdin.buffer.read(MAX_BYTES + 1) if file == "-" else read_bytes(Path(file)), name
         )
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)

@@ -101,12 +101,12 @@ def _plan(context: click.Context, file: str) -> Plan:
     from pathlib import Path
 
     from gatewayd.mapping.loader import load, read_bytes
-    from gatewayd.mapping.source import MAXIMUM_BYTES
+    from gatewayd.mapping.source import MAX_BYTES
     from gatewayd.report.findings import Outcome, as_text
 
     name = "stdin" if file == STDIN else str(click.format_filename(file))
     try:
-        data = sys.stdin.buffer.read(MAXIMUM_BYTES + 1) if file == STDIN else read_bytes(Path(file))
+        data = sys.stdin.buffer.read(MAX_BYTES + 1) if file == STDIN else read_bytes(Path(file))
     except (OSError, ValueError) as error:
         _fail(context, f"{name}: cannot be read: {_reason(error)}")
     loaded = load(data, name)

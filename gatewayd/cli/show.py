@@ -84,10 +84,10 @@ def _load(context: click.Context, file: str) -> Loaded:
     from pathlib import Path
 
     from gatewayd.mapping.loader import load, read_bytes
-    from gatewayd.mapping.source import MAXIMUM_BYTES
+    from gatewayd.mapping.source import MAX_BYTES
 
     if file == "-":
-        return load(sys.stdin.buffer.read(MAXIMUM_BYTES + 1), "stdin")
+        return load(sys.stdin.buffer.read(MAX_BYTES + 1), "stdin")
     name = str(click.format_filename(file))
     try:
         return load(read_bytes(Path(file)), name)

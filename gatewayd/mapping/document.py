@@ -12,7 +12,7 @@ from typing import Generic, TypeAlias, TypeVar, cast
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.model import Group, VariableSpec, WriterSpec
 from gatewayd.mapping.section import Section
-from gatewayd.mapping.source import Items, Node, Source, Table
+from gatewayd.mapping.source import Items, MappingText, Node, Table
 
 __all__ = ["Document", "Part", "Step", "walk"]
 
@@ -49,7 +49,7 @@ class Part(Generic[S_co]):
 class Document:
     """What could be read of a mapping file."""
 
-    source: Source
+    source: MappingText
     cell: str
     """Name of the cell; empty when it is missing or wrong."""
     sections: Mapping[str, Part[Section]] = field(default_factory=dict)

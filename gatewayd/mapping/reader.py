@@ -22,7 +22,7 @@ from gatewayd.mapping.language import FILE, VARIABLE, WRITER
 from gatewayd.mapping.model import ANY, FORMAT_VERSION, Group, VariableSpec, WriterSpec
 from gatewayd.mapping.scalars import CellName, Name
 from gatewayd.mapping.section import Section
-from gatewayd.mapping.source import Entry, Items, Node, Scalar, Source, Table
+from gatewayd.mapping.source import Items, MappingText, Node, Scalar, Table, TableEntry
 
 __all__ = ["read_document"]
 
@@ -30,7 +30,7 @@ S = TypeVar("S", bound=Section)
 Found = TypeVar("Found")
 
 
-def read_document(source: Source) -> tuple[Document, tuple[Diagnostic, ...]]:
+def read_document(source: MappingText) -> tuple[Document, tuple[Diagnostic, ...]]:
     """Validate the tree of a file part by part. Never raises."""
     if source.root is None:
         return Document(source, ""), source.findings
@@ -109,7 +109,7 @@ _CELL_READER: TypeAdapter[str] = TypeAdapter(CellName)
 
 
 class _Reader:
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: MappingText) -> None:
         self.source = source
         self.findings: list[Diagnostic] = []
         self._named: dict[type[Section], dict[str, Part[Any]]] = {}
@@ -146,7 +146,7 @@ class _Reader:
             message = f"{given} is no version of the mapping language that this gatewayd knows"
             self._find(syntax.FORMAT_VERSION, message, value.position, hint)
 
-    def _cell(self, entry: Entry | None) -> str:
+    def _cell(self, entry: TableEntry | None) -> str:
         if entry is None or not self._has_value("cell", entry):
             return ""
         try:
@@ -156,7 +156,7 @@ class _Reader:
                 self._translate(details, FILE, entry, ("cell",))
         return ""
 
-    def _sections(self, model: type[S], entry: Entry | None) -> dict[str, Part[S]]:
+    def _sections(self, model: type[S], entry: TableEntry | None) -> dict[str, Part[S]]:
         parts: dict[str, Part[S]] = {}
         if entry is None or not self._has_value(entry.key.text, entry):
             return parts
@@ -179,7 +179,7 @@ class _Reader:
         self.findings += broken
         return None if broken else part
 
-    def _name(self, model: type[Section], entry: Entry) -> bool:
+    def _name(self, model: type[Section], entry: TableEntry) -> bool:
         if model is WRITER and entry.key.text == ANY:
             message = f"a writer cannot be called `{ANY}`: that word stands for every writer"
             self._find(syntax.BAD_NAME, message, entry.key.position, "choose another name")
@@ -193,7 +193,7 @@ class _Reader:
             return False
         return True
 
-    def _section(self, model: type[S], entry: Entry | None) -> Part[S] | None:
+    def _section(self, model: type[S], entry: TableEntry | None) -> Part[S] | None:
         if entry is None or not self._has_value(entry.key.text, entry):
             return None
         found = len(self.findings)
@@ -210,7 +210,7 @@ class _Reader:
             else None
         )
 
-    def _has_value(self, key: str, entry: Entry) -> bool:
+    def _has_value(self, key: str, entry: TableEntry) -> bool:
         if isinstance(entry.value, Scalar) and entry.value.value is None:
             message = f"`{key}` has no value"
             self._find(syntax.WRONG_TYPE, message, entry.key.position, _valueless_hint(key))
@@ -232,7 +232,7 @@ class _Reader:
                 }
 
     def _translate(
-        self, details: ErrorDetails, model: type[Section], entry: Entry, prefix: tuple[Step, ...]
+        self, details: ErrorDetails, model: type[Section], entry: TableEntry, prefix: tuple[Step, ...]
     ) -> None:
         """Make one finding of a pydantic error."""
         path = details["loc"]
@@ -270,7 +270,7 @@ class _Reader:
             message = f"`{name}` is {text}: {_SIZES.get(kind, 'wrong number of values')}"
             self._find(syntax.WRONG_TYPE, message, value, _field_hint(inner, name))
 
-    def _missing_key(self, model: type[Section], path: tuple[Step, ...], entry: Entry) -> None:
+    def _missing_key(self, model: type[Section], path: tuple[Step, ...], entry: TableEntry) -> None:
         key = str(path[-1])
         parent, _ = walk(entry.value, path[:-1], entry.key.position)
         message = f"{_article(model)} needs the key `{key}`"

@@ -25,9 +25,9 @@ __all__ = [
     "OPTIONAL_DURATION_SCHEMA",
     "CellName",
     "Duration",
-    "Endpoint",
     "Host",
     "Listen",
+    "ListenAddress",
     "Name",
     "Names",
     "Network",
@@ -150,7 +150,7 @@ OptionalDuration = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class Endpoint:
+class ListenAddress:
     """Where a listener listens."""
 
     host: str
@@ -162,8 +162,8 @@ class Endpoint:
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
 
-def _listen(value: object) -> Endpoint:
-    if isinstance(value, Endpoint):
+def _listen(value: object) -> ListenAddress:
+    if isinstance(value, ListenAddress):
         return value
     hint = "write host:port, for example 127.0.0.1:1502, 0.0.0.0:502 or [::1]:502"
     text = scalar(value, "a listen address", hint)
@@ -180,11 +180,11 @@ def _listen(value: object) -> Endpoint:
     port = int(match["port"])
     if not 0 < port <= _MAX_PORT:
         refuse(syntax.OUT_OF_RANGE, f"port {port} is not between 1 and 65535", hint)
-    return Endpoint(str(address), port)
+    return ListenAddress(str(address), port)
 
 
 Listen = Annotated[
-    InstanceOf[Endpoint],
+    InstanceOf[ListenAddress],
     BeforeValidator(
         _listen,
         json_schema_input_type=Annotated[

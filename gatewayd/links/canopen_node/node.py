@@ -25,7 +25,7 @@ from gatewayd.canopen.lss import LssSlave
 from gatewayd.canopen.nmt import ALLOWED, UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
 from gatewayd.canopen.sdo import SdoServer
 from gatewayd.canopen.sdo.parameters import server_parameter
-from gatewayd.canopen.sync import Sync
+from gatewayd.canopen.sync import SyncService
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.core.requester import Requester
@@ -142,7 +142,7 @@ class Node:
             lost=self.errors.guarding_lost,
             back=self.errors.guarding_back,
         )
-        self.sync = Sync(
+        self.sync = SyncService(
             self._send,
             plan.sync,
             allowed=lambda: self.nmt.allows(Service.SYNC),

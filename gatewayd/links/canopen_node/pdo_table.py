@@ -20,7 +20,7 @@ from gatewayd.mapping.expanded import ExpandedCell
 
 __all__ = [
     "PdoRow",
-    "Run",
+    "PdoRun",
     "as_document",
     "by_sdo_only",
     "load_by_bit_rate",
@@ -31,7 +31,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class PdoRun:
     """Neighbouring variables of one line in a PDO, or a word of the status block."""
 
     names: str
@@ -63,7 +63,7 @@ class PdoRow:
     """Seconds: event timer, or deadline."""
     rate: float
     """Frames per second in the worst case."""
-    runs: tuple[Run, ...]
+    runs: tuple[PdoRun, ...]
 
 
 def object_place(one: MappedObject) -> str:
@@ -176,7 +176,7 @@ def as_document(cell: ExpandedCell) -> dict[str, Any] | None:
     }
 
 
-def _runs(cell: ExpandedCell, pdo: ExpandedPdo) -> tuple[Run, ...]:
+def _runs(cell: ExpandedCell, pdo: ExpandedPdo) -> tuple[PdoRun, ...]:
     groups: list[list[tuple[int, MappedObject]]] = []
     for bit, one in pdo.offsets:
         if groups and _follows(cell, groups[-1][-1][1], one):
@@ -184,7 +184,7 @@ def _runs(cell: ExpandedCell, pdo: ExpandedPdo) -> tuple[Run, ...]:
         else:
             groups.append([(bit, one)])
     words = (
-        Run(f"status: {word.name}", bit, word.type.bits, _status_place(word), word.type.name)
+        PdoRun(f"status: {word.name}", bit, word.type.bits, _status_place(word), word.type.name)
         for bit, word in pdo.status_offsets
     )
     return (*words, *(_run(cell, group) for group in groups))
@@ -203,7 +203,7 @@ def _follows(cell: ExpandedCell, earlier: MappedObject, later: MappedObject) -> 
     )
 
 
-def _run(cell: ExpandedCell, group: list[tuple[int, MappedObject]]) -> Run:
+def _run(cell: ExpandedCell, group: list[tuple[int, MappedObject]]) -> PdoRun:
     bit, first = group[0]
     last = group[-1][1]
     names = cell.variables[first.variable].name
@@ -212,4 +212,4 @@ def _run(cell: ExpandedCell, group: list[tuple[int, MappedObject]]) -> Run:
         member = cell.variables[last.variable].member
         names = f"{names.removesuffix(']')}..{member}]"
         objects += f"-{last.plan.subindex:02X}"
-    return Run(names, bit, sum(one.plan.type.bits for _, one in group), objects, first.plan.type.name)
+    return PdoRun(names, bit, sum(one.plan.type.bits for _, one in group), objects, first.plan.type.name)

@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 from gatewayd.links.modbus_server.scalars import BAD_ADDRESS, Address
 from gatewayd.mapping import syntax
 from gatewayd.mapping.scalars import (
-    Endpoint,
     Listen,
+    ListenAddress,
     Networks,
     OptionalDuration,
     Real,
@@ -32,7 +32,7 @@ class Modbus(Section):
     """One unit of a Modbus TCP listener."""
 
     listen: Listen = Field(
-        default=Endpoint("127.0.0.1", 502),
+        default=ListenAddress("127.0.0.1", 502),
         description="address and port to listen on",
         json_schema_extra={"default": "127.0.0.1:502"},
     )

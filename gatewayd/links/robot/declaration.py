@@ -14,7 +14,7 @@ from gatewayd.mapping.plan import LinkPlan
 __all__ = ["KIND"]
 
 
-class Robot(LinkKind):
+class RobotKind(LinkKind):
     """The kind with the section `robot`."""
 
     key = "robot"
@@ -67,5 +67,5 @@ def _session_of(plan: RobotPlan) -> tuple[object, ...]:
     return plan.host, plan.port, plan.frequency, plan.verify, fed
 
 
-KIND = Robot()
+KIND = RobotKind()
 """What everybody may know of this kind of link."""
