@@ -73,9 +73,7 @@ def _load(file: str) -> Plan | None:
 
     name = "stdin" if file == "-" else str(click.format_filename(file))
     try:
-        loaded = load(
-            sys.stdin.buffer.read(MAX_BYTES + 1) if file == "-" else read_bytes(Path(file)), name
-        )
+        loaded = load(sys.stdin.buffer.read(MAX_BYTES + 1) if file == "-" else read_bytes(Path(file)), name)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         click.echo(printable(f"{name}: cannot be read: {reason}"), err=True)

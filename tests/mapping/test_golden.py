@@ -1,4 +1,4 @@
-"""What a mapping means and what is said of it may change only on purpose: findings, fingerprints, tables and exports.
+"""What the mappings of the documentation mean, and what `show` prints on a screen, change only on purpose.
 
 `python -m tests.mapping.test_golden` writes the golden files anew; the diff is what has changed for users.
 """
@@ -9,53 +9,21 @@ import hashlib
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 from click.testing import CliRunner
 
 from gatewayd.cli import command
-from gatewayd.mapping.loader import load, load_together
-from gatewayd.mapping.rules import catalogue
-from gatewayd.report.findings import Outcome, as_json
+from gatewayd.mapping.loader import load
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = Path(__file__).parent / "golden"
-FORMS = (
-    ("show",), ("show", "--all"), ("show", "--format", "csv"), ("show", "--format", "json"),
-    ("show", "--format", "markdown"), ("export", "eds"), ("export", "dcf"), ("export", "urscript"),
-)  # fmt: skip
+FORMS = (("show",), ("show", "--all"), ("export", "urscript"))
 _MAPPING = re.compile(r"```yaml\n(gatewayd: 1\n.*?)```", re.DOTALL)
 
 
-def findings() -> dict[str, Any]:
-    """Everything that `check --format json` says of each rule's examples."""
-    found = {}
-    for rule in catalogue.complete():
-        folder = ROOT.joinpath(*rule.home.split("."), rule.folder)
-        for kind in ("bad", "good"):
-            files = [(path.name, path.read_bytes()) for path in sorted(folder.glob(f"{kind}*.yaml"))]
-            loaded = load_together(files)
-            outcome = Outcome(
-                tuple(name for name, _ in files), tuple(one for each in loaded for one in each.diagnostics)
-            )
-            found[f"{rule.folder}/{kind}"] = [_short(one) for one in json.loads(as_json(outcome))["findings"]]
-    return found
-
-
-def _short(finding: dict[str, Any]) -> dict[str, Any]:
-    """One line of the golden file."""
-    keys = ("file", "line", "column", "message")
-    return {
-        "rule": f"{finding['rule']} {finding['slug']}, {finding['family']}, {finding['severity']}",
-        "at": ":".join(str(finding[key]) for key in keys),
-        "hint": finding["hint"],
-        "related": [":".join(str(one[key]) for key in keys) for one in finding["related"]],
-    }
-
-
 def fingerprints() -> dict[str, str]:
-    """The fingerprint of every mapping that is shipped or shown."""
-    texts = {path.name: path.read_text() for path in sorted((ROOT / "mappings").glob("*.yaml"))}
+    """The fingerprint of every mapping in the documentation; `tests/contracts.py` has the shipped ones."""
+    texts = {}
     for page in sorted((ROOT / "docs").rglob("*.md")):
         for number, text in enumerate(_MAPPING.findall(page.read_text())):
             texts[f"{page.stem} {number}"] = text
@@ -64,7 +32,7 @@ def fingerprints() -> dict[str, str]:
 
 
 def shown() -> dict[str, str]:
-    """Hashes of what `show` and `export` print of the shipped mappings, with the exit code."""
+    """Hashes of what is printed of the shipped mappings, with the exit code."""
     found = {}
     for path in sorted((ROOT / "mappings").glob("*.yaml")):
         for form in FORMS:
@@ -74,15 +42,11 @@ def shown() -> dict[str, str]:
     return found
 
 
-MADE = {"findings": findings, "fingerprints": fingerprints, "shown": shown}
+MADE = {"fingerprints": fingerprints, "shown": shown}
 
 
 def _golden(name: str) -> Path:
     return GOLDEN / f"{name}.json"
-
-
-def test_findings_are_those_of_the_golden_file() -> None:
-    assert findings() == json.loads(_golden("findings").read_text())
 
 
 def test_fingerprints_are_those_of_the_golden_file() -> None:
@@ -91,7 +55,7 @@ def test_fingerprints_are_those_of_the_golden_file() -> None:
     assert made == json.loads(_golden("fingerprints").read_text())
 
 
-def test_tables_and_exports_are_those_of_the_golden_file() -> None:
+def test_screens_are_those_of_the_golden_file() -> None:
     assert shown() == json.loads(_golden("shown").read_text())
 
 
