@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
+from gatewayd.cli.files import name_of, read_file, reason_of
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from gatewayd.report.findings import Outcome, Unreadable
+    from gatewayd.mapping.compiled import Unreadable
+    from gatewayd.report.findings import Outcome
 
 __all__ = ["command"]
 
 CLEAN, FOUND, UNREADABLE = 0, 1, 2
 """Exit codes."""
-
-STDIN = "-"
-"""The file name that stands for standard input."""
 
 
 def _complete_rules(
@@ -118,7 +118,7 @@ def _check(files: tuple[str, ...], *, separately: bool) -> Outcome:
     for file in dict.fromkeys(_named(files)):
         content = _read(file)
         if isinstance(content, bytes):
-            readable.append((_shown(file), content))
+            readable.append((name_of(file), content))
         else:
             unreadable.append(content)
     loaded = tuple(load(data, name) for name, data in readable) if separately else load_together(readable)
@@ -139,26 +139,14 @@ def _named(files: tuple[str, ...]) -> Iterator[str]:
 
 
 def _read(file: str) -> bytes | Unreadable:
-    import sys
-    from pathlib import Path
-
-    from gatewayd.mapping.loader import read_bytes
-    from gatewayd.mapping.source import MAX_BYTES
-    from gatewayd.report.findings import Unreadable
+    from gatewayd.mapping.compiled import Unreadable
 
     try:
-        if file == STDIN:
-            return sys.stdin.buffer.read(MAX_BYTES + 1)
-        return read_bytes(Path(file))
+        return read_file(file)
     except IsADirectoryError:
-        return Unreadable(_shown(file), "no mapping file (*.yaml) in this directory")
+        return Unreadable(name_of(file), "no mapping file (*.yaml) in this directory")
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        return Unreadable(_shown(file), reason)
-
-
-def _shown(file: str) -> str:
-    return "stdin" if file == STDIN else str(click.format_filename(file))
+        return Unreadable(name_of(file), reason_of(error))
 
 
 def _written(outcome: Outcome, form: str) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import click
 
+from gatewayd.cli.files import load_file, reason_of
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
@@ -16,8 +17,8 @@ __all__ = ["command"]
 
 BROKEN, UNREADABLE = 1, 2
 """Exit codes."""
-STDIN = STDOUT = "-"
-"""The file name that stands for standard input and output."""
+STDOUT = "-"
+"""The file name that stands for standard output."""
 
 _EXIT_CODES = """\
 \b
@@ -97,21 +98,10 @@ def _made(context: click.Context, export: Export, file: str) -> str:
 
 
 def _plan(context: click.Context, file: str) -> Plan:
-    import sys
-    from pathlib import Path
-
-    from gatewayd.mapping.loader import load, read_bytes
-    from gatewayd.mapping.source import MAX_BYTES
-    from gatewayd.report.findings import Outcome, as_text
-
-    name = "stdin" if file == STDIN else str(click.format_filename(file))
-    try:
-        data = sys.stdin.buffer.read(MAX_BYTES + 1) if file == STDIN else read_bytes(Path(file))
-    except (OSError, ValueError) as error:
-        _fail(context, f"{name}: cannot be read: {_reason(error)}")
-    loaded = load(data, name)
+    loaded = load_file(file)
+    if loaded is None:
+        context.exit(UNREADABLE)
     if loaded.plan is None:
-        click.echo(as_text(Outcome((name,), loaded.diagnostics)), nl=False, err=True)
         context.exit(BROKEN)
     return loaded.plan
 
@@ -125,13 +115,6 @@ def _write(context: click.Context, output: str, text: str) -> None:
     try:
         Path(output).write_text(text, encoding="ascii", newline="\n")
     except (OSError, ValueError) as error:
-        _fail(context, f"{click.format_filename(output)}: cannot be written: {_reason(error)}")
-
-
-def _reason(error: OSError | ValueError) -> str:
-    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-
-
-def _fail(context: click.Context, message: str) -> NoReturn:
-    click.echo(printable(message), err=True)
-    context.exit(UNREADABLE)
+        message = f"{click.format_filename(output)}: cannot be written: {reason_of(error)}"
+        click.echo(printable(message), err=True)
+        context.exit(UNREADABLE)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from gatewayd.cli.files import load_file
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
@@ -60,10 +61,11 @@ def command(context: click.Context, file: str, form: str, *, every: bool) -> Non
     """Print what lies where in the mapping FILE: addresses from 0 and in 4xxxxx form, types, scales, limits, who may
     write for how long, and what is seen when a side is lost. `-` reads standard input.
     """
-    loaded = _load(context, file)
+    loaded = load_file(file)
+    if loaded is None:
+        context.exit(UNREADABLE)
     plan = loaded.plan
     if plan is None:
-        _complain(loaded)
         context.exit(BROKEN)
     if form == "table":
         _print_table(loaded, plan, every=every)
@@ -77,30 +79,6 @@ def command(context: click.Context, file: str, form: str, *, every: bool) -> Non
         "markdown": lambda: as_markdown(plan, loaded.cell, table),
     }
     click.echo(written[form](), nl=False)
-
-
-def _load(context: click.Context, file: str) -> Loaded:
-    import sys
-    from pathlib import Path
-
-    from gatewayd.mapping.loader import load, read_bytes
-    from gatewayd.mapping.source import MAX_BYTES
-
-    if file == "-":
-        return load(sys.stdin.buffer.read(MAX_BYTES + 1), "stdin")
-    name = str(click.format_filename(file))
-    try:
-        return load(read_bytes(Path(file)), name)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        click.echo(printable(f"{name}: cannot be read: {reason}"), err=True)
-        context.exit(UNREADABLE)
-
-
-def _complain(loaded: Loaded) -> None:
-    from gatewayd.report.findings import Outcome, as_text
-
-    click.echo(as_text(Outcome((loaded.name,), loaded.diagnostics)), nl=False, err=True)
 
 
 def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:

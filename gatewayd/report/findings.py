@@ -5,21 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
+from gatewayd.mapping.compiled import Unreadable
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Severity
 from gatewayd.report.printable import json_text, printable
 
-__all__ = ["Outcome", "Unreadable", "as_github", "as_json", "as_text"]
+__all__ = ["Outcome", "as_github", "as_json", "as_text"]
 
 _BOLD, _RED, _YELLOW, _DIM, _PLAIN = "\x1b[1m", "\x1b[31m", "\x1b[33m", "\x1b[2m", "\x1b[0m"
 _TINT = {Severity.ERROR: _RED, Severity.WARNING: _YELLOW}
-
-
-@dataclass(frozen=True, slots=True)
-class Unreadable:
-    """A file that could not be read at all, and why."""
-
-    file: str
-    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +41,7 @@ def as_text(outcome: Outcome, *, colour: bool = False) -> str:
     lines: list[str] = []
     for finding in outcome.findings:
         lines.extend(_finding_lines(finding, colour=colour))
-    lines.extend(printable(f"{item.file}: cannot be read: {item.reason}") for item in outcome.unreadable)
+    lines.extend(printable(f"{item.name}: cannot be read: {item.reason}") for item in outcome.unreadable)
     if lines:
         lines.append("")
     lines.append(_summary(outcome))
@@ -67,7 +60,7 @@ def as_json(outcome: Outcome) -> str:
         "errors": outcome.errors,
         "warnings": outcome.warnings,
         "findings": [_as_object(finding) for finding in outcome.findings],
-        "unreadable": [{"file": item.file, "reason": item.reason} for item in outcome.unreadable],
+        "unreadable": [{"file": item.name, "reason": item.reason} for item in outcome.unreadable],
     }
     return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
@@ -76,7 +69,7 @@ def as_github(outcome: Outcome) -> str:
     """Workflow commands that GitHub shows as annotations at the lines of a pull request."""
     lines = [_annotation(finding) for finding in outcome.findings]
     lines.extend(
-        f"::error file={_property(item.file)},title=unreadable::{_data(printable(item.reason))}"
+        f"::error file={_property(item.name)},title=unreadable::{_data(printable(item.reason))}"
         for item in outcome.unreadable
     )
     return "".join(f"{line}\n" for line in lines)

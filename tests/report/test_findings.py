@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 
+from gatewayd.mapping.compiled import Unreadable
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
-from gatewayd.report.findings import Outcome, Unreadable, as_github, as_json, as_text
+from gatewayd.report.findings import Outcome, as_github, as_json, as_text
 
 _OVERLAP = Rule("GW201", "register-overlap", Severity.ERROR, "two variables share a register", "why")
 _OPEN = Rule("GW217", "open-listener", Severity.WARNING, "everybody may connect", "why")
