@@ -189,16 +189,17 @@ def variable_view(declared: Json, cell: Cell, index: int, now: float) -> Json:
     lock = cell.definition.variables[index].lock
     owner = cell.ownership.owners[lock] if lock is not None else None
     force = cell.forcing.forces.get(index)
-    found = VariableStatus(
-        value=plain_value(cell.image.values[index]),
-        quality=_QUALITIES[cell.image.quality[index]],
-        age=_seconds(cell.image.age(index, now)),
-        owner=None if owner is None else cell.definition.writer_name(owner),
-        lease=None if lock is None or owner is None else _seconds(cell.ownership.remaining(lock, now)),
-        forced=None
+    # A literal, not a call of the type: this is asked for every variable of a full image, again and again.
+    found: VariableStatus = {
+        "value": plain_value(cell.image.values[index]),
+        "quality": _QUALITIES[cell.image.quality[index]],
+        "age": _seconds(cell.image.age(index, now)),
+        "owner": None if owner is None else cell.definition.writer_name(owner),
+        "lease": None if lock is None or owner is None else _seconds(cell.ownership.remaining(lock, now)),
+        "forced": None
         if force is None
         else {"value": plain_value(force.value), "remaining": _seconds(force.until - now)},
-    )
+    }
     return {**declared, **found}
 
 
