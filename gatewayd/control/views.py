@@ -31,7 +31,7 @@ from gatewayd.report.schema import (
     VariableStatus,
     WriterStatus,
 )
-from gatewayd.report.verdict import Part, ServedCell, Verdict, verdict_of
+from gatewayd.report.verdict import CellVerdict, PicturePart, ServedCell, verdict_of
 from gatewayd.service.audit import Record, plain_value, utc
 
 __all__ = [
@@ -137,8 +137,8 @@ def cell_view(served: ServedCell, declared: Declared, now: float) -> Json:
     return {**found, **_objects_of_links(served, declared, now)}
 
 
-def _link(name: str, verdict: Verdict, description: Description) -> LinkStatus:
-    part: Part = verdict.links.get(name, verdict.robot)
+def _link(name: str, verdict: CellVerdict, description: Description) -> LinkStatus:
+    part: PicturePart = verdict.links.get(name, verdict.robot)
     return LinkStatus(
         name=name,
         title=kind_of(name).title,

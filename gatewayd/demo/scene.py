@@ -8,7 +8,6 @@ import socket
 from collections import deque
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,11 +15,8 @@ from tempfile import TemporaryDirectory
 from gatewayd.core.cell import Cell
 from gatewayd.demo.master import Master
 from gatewayd.demo.plc import FORCE_SHARE, Plc
-from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
-from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
-from gatewayd.links.robot.plan import robot_of
 from gatewayd.loop import clock
-from gatewayd.mapping.loader import load
+from gatewayd.mapping.loader import Loaded, load
 from gatewayd.report.layout import Row
 from gatewayd.report.table import rows
 from gatewayd.service.daemon import Daemon
@@ -28,14 +24,19 @@ from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import parse
 from gatewayd.simulator.server import SimulatedController
 
-__all__ = ["HOST", "MAPPING", "PLC_ADDRESS", "PORT", "Scene", "free_port"]
+__all__ = ["CHANNEL", "HOST", "LINE", "MAPPING", "PLC_ADDRESS", "PORT", "Scene", "free_port", "mapping"]
 
 HOST = "127.0.0.1"
 PORT = 1502
 """The gateway's port, if it is free."""
+ROBOT_PORT = 30004
 PLC_ADDRESS = "127.0.0.2"
 """Where the PLC's connection comes from, so that the gateway can tell it from whatever else this machine starts."""
 MAPPING = "demo.yaml"
+CHANNEL = "gatewayd-demo"
+"""The bus inside this process, as the mapping names it."""
+LINE = "line"
+"""The writer that the CANopen master is."""
 
 ROBOT_PROGRAM = f"""\
 output_bit_register_0 = input_bit_register_0 for 400ms        # busy
@@ -50,14 +51,19 @@ _FULL_SPEED = 100.0
 _PROBLEMS = 4
 
 
+def mapping(robot_port: int = ROBOT_PORT, port: int = PORT) -> Loaded:
+    """The mapping of the demonstration, with its robot and its Modbus server at these ports."""
+    text = files(__package__).joinpath(MAPPING).read_text()
+    text = text.replace(f"host: {HOST}\n", f"host: {HOST}\n  port: {robot_port}\n")
+    return load(text.replace(f"listen: {HOST}:{PORT}", f"listen: {HOST}:{port}").encode(), MAPPING)
+
+
 class Scene:
     """The four parties and what can be seen of them. `port` 0 takes a free one."""
 
     def __init__(self, port: int) -> None:
-        loaded = load(files(__package__).joinpath(MAPPING).read_bytes(), MAPPING)
+        loaded = mapping()
         assert loaded.plan is not None
-        assert modbus_of(loaded.plan) is not None
-        assert canopen_of(loaded.plan) is not None
         self.rows: tuple[Row, ...] = rows(loaded.cell)
         self.port = port or free_port(HOST)
         self.started = clock.now()
@@ -66,11 +72,9 @@ class Scene:
         self.robot = SimulatedController(Controller(program=parse(ROBOT_PROGRAM, "robot program")), host=HOST)
         self.robot.set("input_double_register_1", _FULL_SPEED)
         self.plc = Plc(HOST, self.port, PLC_ADDRESS)
-        self.master = Master(loaded.plan.the(CanopenPlan).channel)
-        self.can_writer = loaded.plan.the(CanopenPlan).rpdo_writer
+        self.master = Master(CHANNEL)
+        self.can_writer = [writer.name for writer in loaded.plan.cell.writers].index(LINE)
         """Index of the writer that the master is."""
-        modbus = replace(loaded.plan.the(ModbusPlan), host=HOST, port=self.port)
-        self._plan = loaded.plan.with_links(modbus=modbus)
         self._daemon: Daemon | None = None
         self._state = TemporaryDirectory(prefix="gatewayd-demo-")
 
@@ -85,8 +89,9 @@ class Scene:
         """Everything runs inside the block. What follows it sees the parties as they ended."""
         stop = asyncio.Event()
         async with self.robot:
-            robot = replace(robot_of(self._plan), host=HOST, port=self.robot.port)
-            self._daemon = Daemon([self._plan.with_links(robot=robot)], Path(self._state.name))
+            plan = mapping(self.robot.port, self.port).plan
+            assert plan is not None
+            self._daemon = Daemon([plan], Path(self._state.name))
             line = asyncio.create_task(self.master.run())
             gateway = asyncio.create_task(self._daemon.run(stop))
             plc = asyncio.create_task(self.plc.run())

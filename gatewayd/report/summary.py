@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from gatewayd.core.cell import Cell
 from gatewayd.core.freshness import Source
 from gatewayd.report.format import counted
-from gatewayd.report.verdict import Verdict
+from gatewayd.report.verdict import CellVerdict
 
 __all__ = ["MAX_LIST", "summary"]
 
@@ -18,7 +18,7 @@ MAX_LIST = 4
 """Cells reported one by one; of more, only those with problems, and the others as a number."""
 
 
-def summary(cells: Sequence[tuple[Cell, Verdict]], troubles: Iterable[str] = ()) -> str:
+def summary(cells: Sequence[tuple[Cell, CellVerdict]], troubles: Iterable[str] = ()) -> str:
     """`troubles` concern the gateway as a whole and stand in front."""
     ill = [_cell(cell, verdict) for cell, verdict in cells if not verdict.healthy]
     well = [_cell(cell, verdict) for cell, verdict in cells if verdict.healthy]
@@ -35,7 +35,7 @@ def summary(cells: Sequence[tuple[Cell, Verdict]], troubles: Iterable[str] = ())
     return "; ".join(parts) or "no cell to serve"
 
 
-def _cell(cell: Cell, verdict: Verdict) -> str:
+def _cell(cell: Cell, verdict: CellVerdict) -> str:
     facts = []
     if cell.freshness.state is Source.FRESH:
         facts.append(

@@ -21,7 +21,7 @@ from gatewayd.mapping.plan import Plan
 from gatewayd.report.format import counted, listed, span
 from gatewayd.report.words import SOURCE_LEVELS, SOURCES
 
-__all__ = ["RECENT", "Part", "ServedCell", "Verdict", "gateway_part", "judge", "verdict_of"]
+__all__ = ["RECENT", "CellVerdict", "PicturePart", "ServedCell", "gateway_part", "judge", "verdict_of"]
 
 RECENT = 10.0
 """Seconds for which a refusal or a differing read-back colours its part."""
@@ -30,7 +30,7 @@ _LISTED = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PicturePart:
     """One part of the picture: the robot, the gateway, another link, a writer."""
 
     name: str
@@ -42,19 +42,19 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class CellVerdict:
     """How a cell is at one moment."""
 
     problems: tuple[str, ...]
     """What keeps it from being healthy, each in words that a maintenance crew understands."""
     unserved: tuple[str, ...]
     """Those of them for which it is not served: its values are not fresh, or nothing can be written."""
-    robot: Part
-    gateway: Part
+    robot: PicturePart
+    gateway: PicturePart
     """As far as this cell is concerned; `gateway_part` adds what concerns all."""
-    links: Mapping[str, Part]
+    links: Mapping[str, PicturePart]
     """All links but the robot's, by name."""
-    writers: tuple[Part, ...]
+    writers: tuple[PicturePart, ...]
 
     @property
     def healthy(self) -> bool:
@@ -95,19 +95,19 @@ class ServedCell(Protocol):
         """All links, by name."""
 
 
-def verdict_of(served: ServedCell, now: float) -> Verdict:
+def verdict_of(served: ServedCell, now: float) -> CellVerdict:
     """The verdict on a cell that is served."""
     others = {name: link.health() for name, link in served.links.items() if link is not served.source}
     return judge(served.cell, served.source.health(), others, now)
 
 
-def judge(cell: Cell, source: LinkHealth, links: Mapping[str, LinkHealth], now: float) -> Verdict:
+def judge(cell: Cell, source: LinkHealth, links: Mapping[str, LinkHealth], now: float) -> CellVerdict:
     """The verdict on a cell, its robot link (`source`: the problems are the cause of a loss) and its other links."""
     writers = range(len(cell.writers.alive))
     unserved, held = list(_unserved(cell, source, now)), list(_held_by_robot(cell))
     of_gateway = list(_of_gateway(cell, now))
     lost = {index: finding for index in writers for finding in _lost(cell, index, now)}
-    return Verdict(
+    return CellVerdict(
         problems=(
             *(finding.text for finding in unserved),
             *(problem for health in links.values() for problem in health.problems),
@@ -117,14 +117,14 @@ def judge(cell: Cell, source: LinkHealth, links: Mapping[str, LinkHealth], now: 
         robot=_part("Robot", [*unserved, *held], "fresh and writable", _rate(cell, source)),
         gateway=_part("Gateway", of_gateway, "running", _good(cell)),
         links={
-            name: Part(health.name, health.level, health.words, health.detail)
+            name: PicturePart(health.name, health.level, health.words, health.detail)
             for name, health in links.items()
         },
         writers=tuple(_writer(cell, index, lost.get(index), now) for index in writers),
     )
 
 
-def gateway_part(verdict: Verdict, hanging: Sequence[str], troubles: Sequence[str]) -> Part:
+def gateway_part(verdict: CellVerdict, hanging: Sequence[str], troubles: Sequence[str]) -> PicturePart:
     """The gateway with what concerns all cells: parts of it that hang, and standing troubles."""
     part = verdict.gateway
     found = [_Finding(Level.BAD, f"hangs: {', '.join(hanging)}")] if hanging else []
@@ -134,12 +134,12 @@ def gateway_part(verdict: Verdict, hanging: Sequence[str], troubles: Sequence[st
     return _part(part.name, found, part.words, part.detail)
 
 
-def _part(name: str, findings: Sequence[_Finding], well: str, detail: str) -> Part:
+def _part(name: str, findings: Sequence[_Finding], well: str, detail: str) -> PicturePart:
     """The part with its findings, the worst first; without any it is `well`."""
     if not findings:
-        return Part(name, Level.GOOD, well, detail)
+        return PicturePart(name, Level.GOOD, well, detail)
     ordered = sorted(findings, key=lambda finding: -finding.level)
-    return Part(name, ordered[0].level, "; ".join(finding.text for finding in ordered), detail)
+    return PicturePart(name, ordered[0].level, "; ".join(finding.text for finding in ordered), detail)
 
 
 # -- the robot ---------------------------------------------------------------------------------------------------
@@ -217,17 +217,17 @@ def _lost(cell: Cell, index: int, now: float) -> Iterator[_Finding]:
         yield _Finding(Level.BAD, f"writer {name} lost{_since(now - seen)}")
 
 
-def _writer(cell: Cell, index: int, lost: _Finding | None, now: float) -> Part:
+def _writer(cell: Cell, index: int, lost: _Finding | None, now: float) -> PicturePart:
     name, held = cell.definition.writers[index].name, len(cell.ownership.held_by(index))
     detail = f"holds {counted(held, 'lock')}" if held else "holds no lock"
     refused = _refused(cell, index, now)
     if lost is not None:
-        return Part(name, lost.level, lost.text, detail)
+        return PicturePart(name, lost.level, lost.text, detail)
     if refused:
-        return Part(name, Level.WARN, refused, detail)
+        return PicturePart(name, Level.WARN, refused, detail)
     if cell.writers.alive[index]:
-        return Part(name, Level.GOOD, "connected", detail)
-    return Part(name, Level.IDLE, "has not come yet", detail)
+        return PicturePart(name, Level.GOOD, "connected", detail)
+    return PicturePart(name, Level.IDLE, "has not come yet", detail)
 
 
 def _refused(cell: Cell, index: int, now: float) -> str:

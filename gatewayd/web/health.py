@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from gatewayd.report.verdict import Verdict
+from gatewayd.report.verdict import CellVerdict
 
 __all__ = ["health", "readiness"]
 
@@ -15,7 +15,7 @@ def health(late: Sequence[str]) -> tuple[bool, dict[str, object]]:
 
 
 def readiness(
-    verdicts: Mapping[str, Verdict], late: Sequence[str], troubles: Iterable[str]
+    verdicts: Mapping[str, CellVerdict], late: Sequence[str], troubles: Iterable[str]
 ) -> tuple[bool, dict[str, object]]:
     """Ready while every cell is served: no part hangs or has trouble, robots are fresh and can be written.
 

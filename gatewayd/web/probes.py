@@ -16,7 +16,7 @@ from gatewayd.core.events import Event, EventKind, EventRing
 from gatewayd.core.refusal import Reason
 from gatewayd.links.contract import SourceLink
 from gatewayd.loop import clock
-from gatewayd.report.verdict import Verdict, verdict_of
+from gatewayd.report.verdict import CellVerdict, verdict_of
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.liveness import Liveness
 from gatewayd.web.histogram import Histogram
@@ -115,7 +115,7 @@ class Probes:
         """What concerns the gateway as a whole."""
         return [*self._notes(), *self.daemon.troubles()]
 
-    def verdicts(self, now: float) -> dict[str, Verdict]:
+    def verdicts(self, now: float) -> dict[str, CellVerdict]:
         """How each cell is, by name."""
         return {runtime.cell.definition.name: verdict_of(runtime, now) for runtime in self.daemon.runtimes}
 

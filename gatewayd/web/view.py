@@ -19,7 +19,7 @@ from gatewayd.core.image import Quality
 from gatewayd.links.registry import kinds
 from gatewayd.report.event_text import EventRecord
 from gatewayd.report.printable import json_text
-from gatewayd.report.verdict import Part, gateway_part, verdict_of
+from gatewayd.report.verdict import PicturePart, gateway_part, verdict_of
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.probes import Probes
@@ -214,7 +214,7 @@ def _picture(runtime: CellRuntime, probes: Probes, now: float) -> dict[str, obje
     }
 
 
-def _node(part: Part) -> dict[str, object]:
+def _node(part: PicturePart) -> dict[str, object]:
     return {"name": part.name, "level": part.level.name.lower(), "words": part.words, "facts": part.detail}
 
 

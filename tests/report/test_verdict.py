@@ -10,7 +10,7 @@ from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
 from gatewayd.links.contract import Level, LinkHealth
 from gatewayd.mapping.loader import load
-from gatewayd.report.verdict import RECENT, Part, Verdict, gateway_part, judge
+from gatewayd.report.verdict import RECENT, CellVerdict, PicturePart, gateway_part, judge
 from tests.web.press import CYCLES, FORCE_LIMIT, HMI, LINE, MAPPING, PLC, SPARE, START
 
 ADDRESS = "10.0.0.1:30004"
@@ -37,18 +37,18 @@ def cell() -> Cell:
     return found
 
 
-def verdict(cell: Cell, now: float = NOW, why: str = "", **links: LinkHealth) -> Verdict:
+def verdict(cell: Cell, now: float = NOW, why: str = "", **links: LinkHealth) -> CellVerdict:
     source = LinkHealth("Robot", problems=(why,) if why else (), figures={"address": ADDRESS})
     return judge(cell, source, links, now)
 
 
-def robot(cell: Cell, now: float = NOW, why: str = "") -> Part:
+def robot(cell: Cell, now: float = NOW, why: str = "") -> PicturePart:
     return verdict(cell, now, why).robot
 
 
 def gateway(
     cell: Cell, hanging: tuple[str, ...] = (), troubles: tuple[str, ...] = (), now: float = NOW
-) -> Part:
+) -> PicturePart:
     return gateway_part(verdict(cell, now), hanging, troubles)
 
 
@@ -145,8 +145,10 @@ def test_links_say_themselves_how_they_are(cell: Cell) -> None:
     well = LinkHealth("Modbus :502", Level.GOOD, "listening, 1 connection")
     ill = LinkHealth("CAN can0", Level.BAD, "absent: no such interface", "node 16", ("CAN bus absent",))
     found = verdict(cell, modbus=well, canopen=ill)
-    assert found.links["modbus"] == Part("Modbus :502", Level.GOOD, "listening, 1 connection")
-    assert found.links["canopen"] == Part("CAN can0", Level.BAD, "absent: no such interface", "node 16")
+    assert found.links["modbus"] == PicturePart("Modbus :502", Level.GOOD, "listening, 1 connection")
+    assert found.links["canopen"] == PicturePart(
+        "CAN can0", Level.BAD, "absent: no such interface", "node 16"
+    )
     assert found.problems[0] == "CAN bus absent"
     assert found.level is Level.BAD
     assert not found.unserved

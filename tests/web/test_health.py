@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from gatewayd.core.cell import Cell
 from gatewayd.links.contract import LinkHealth
-from gatewayd.report.verdict import Verdict, judge
+from gatewayd.report.verdict import CellVerdict, judge
 from gatewayd.web.health import health, readiness
 
 
-def verdicts(cell: Cell) -> dict[str, Verdict]:
+def verdicts(cell: Cell) -> dict[str, CellVerdict]:
     return {cell.definition.name: judge(cell, LinkHealth(), {}, 1.0)}
 
 
