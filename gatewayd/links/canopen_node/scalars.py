@@ -43,10 +43,7 @@ EVENT: Final = 254
 """Transmission type of `event`: manufacturer-specific, since the node has no device profile."""
 
 BAD_COB_ID = declare(
-    "GW121",
-    "bad-cob-id",
-    "a COB-ID that cannot be read",
-    home="gatewayd.links.canopen_node.rules",
+    "GW121", "bad-cob-id", "a COB-ID that cannot be read", home="gatewayd.links.canopen_node.rules"
 )
 
 _COB_ID = re.compile(r"0x([0-9A-Fa-f]+)")

@@ -16,6 +16,7 @@ from gatewayd.links.modbus_server.expand import (
     placements_of,
 )
 from gatewayd.links.modbus_server.plan import ModbusPlan, Network, Placement
+from gatewayd.links.modbus_server.rules.wording import peer
 from gatewayd.links.modbus_server.sections import Modbus, ModbusPlaces, ModbusWriter, PlacementSpec
 from gatewayd.mapping.diagnostics import Related
 from gatewayd.mapping.document import Document, Part
@@ -88,8 +89,7 @@ class ModbusLanguage(LinkLanguage):
 
     def names(self, writer: WriterSpec) -> Sequence[str]:
         """Its addresses and networks."""
-        networks = writer.by(ModbusWriter).modbus
-        return [str(one.network_address) if one.num_addresses == 1 else str(one) for one in networks]
+        return [peer(network) for network in writer.by(ModbusWriter).modbus]
 
     def ways_of_writer(self, writer: WriterSpec) -> frozenset[str]:
         """Modbus, where it is known by an address."""

@@ -17,10 +17,7 @@ from gatewayd.mapping.scalars import refuse, scalar
 __all__ = ["BAD_ADDRESS", "Address"]
 
 BAD_ADDRESS = declare(
-    "GW115",
-    "bad-address",
-    "a Modbus address that cannot be read",
-    home="gatewayd.links.modbus_server.rules",
+    "GW115", "bad-address", "a Modbus address that cannot be read", home="gatewayd.links.modbus_server.rules"
 )
 _ADDRESS = re.compile(r"(0|[1-9][0-9]*)(?:\.(0|[1-9][0-9]*))?")
 _MAX_ADDRESS: Final = 0xFFFF

@@ -17,11 +17,7 @@ MAX_WRITERS = 32
 """The status block has a record for so many."""
 
 
-@cell_rule(
-    "GW119",
-    "too-many",
-    "more variables or writers than one cell can hold",
-)
+@cell_rule("GW119", "too-many", "more variables or writers than one cell can hold")
 def too_many(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first variable and the first writer beyond the limit."""
     if len(cell.variables) > MAX_VARIABLES:
@@ -39,11 +35,7 @@ def too_many(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(writers[MAX_WRITERS].key, message, hint=hint)
 
 
-@plant_rule(
-    "GW124",
-    "duplicate-cell",
-    "two files describe a cell of the same name",
-)
+@plant_rule("GW124", "duplicate-cell", "two files describe a cell of the same name")
 def duplicate_cell(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Equal names of cells."""
     first: dict[str, ExpandedCell] = {}
@@ -56,12 +48,7 @@ def duplicate_cell(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagno
             yield rule.at(cell.document.at("cell"), message, hint="rename one of the two", related=related)
 
 
-@cell_rule(
-    "GW221",
-    "unmapped-variable",
-    "a variable that no fieldbus can see",
-    Severity.WARNING,
-)
+@cell_rule("GW221", "unmapped-variable", "a variable that no fieldbus can see", Severity.WARNING)
 def unmapped_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Lines without a place by any kind of link."""
     examples = " or ".join(

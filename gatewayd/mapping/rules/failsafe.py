@@ -37,11 +37,7 @@ _MOTION_WORDS = frozenset(
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
 
 
-@cell_rule(
-    "GW601",
-    "fallback-outside-limits",
-    "a fallback value outside the limits",
-)
+@cell_rule("GW601", "fallback-outside-limits", "a fallback value outside the limits")
 def fallback_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`on_release` values beyond `limits`."""
     for variable in _lines(cell):
@@ -58,11 +54,7 @@ def fallback_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
             yield rule.at(variable.at("on_release"), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW602",
-    "fallback-type",
-    "a fallback value that the variable cannot have",
-)
+@cell_rule("GW602", "fallback-type", "a fallback value that the variable cannot have")
 def fallback_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Fallback values of another type or beyond the type's range."""
     for variable in _lines(cell):
@@ -93,12 +85,7 @@ def _mismatch(variable: ExpandedVariable, value: float) -> str | None:
     return None if fits else f"a whole number from {variable.low} to {variable.high}"
 
 
-@cell_rule(
-    "GW603",
-    "held-motion",
-    "a motion command that stays on when its owner is lost",
-    Severity.WARNING,
-)
+@cell_rule("GW603", "held-motion", "a motion command that stays on when its owner is lost", Severity.WARNING)
 def held_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`hold` at motion commands without supervision."""
     for variable, silent in silent_motion(cell):
@@ -110,12 +97,7 @@ def held_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.at("on_release"), message, hint=hint)
 
 
-@cell_rule(
-    "GW604",
-    "unsupervised-motion",
-    "a motion command whose owner nobody supervises",
-    Severity.WARNING,
-)
+@cell_rule("GW604", "unsupervised-motion", "a motion command whose owner nobody supervises", Severity.WARNING)
 def unsupervised_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Motion commands without supervision whose fallback would stop the motion."""
     for variable, silent in silent_motion(cell):
@@ -143,11 +125,7 @@ def _is_motion(variable: ExpandedVariable) -> bool:
     return variable.moves or not words.isdisjoint(_MOTION_WORDS)
 
 
-@cell_rule(
-    "GW605",
-    "policy-of-other-side",
-    "on_stale or valid at an input, or on_release at an output",
-)
+@cell_rule("GW605", "policy-of-other-side", "on_stale or valid at an input, or on_release at an output")
 def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Policies that belong to the other direction."""
     policies = {key: what for one in languages() for key, what in one.output_policies.items()}
@@ -166,11 +144,7 @@ def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
                 yield rule.at(variable.part.key_at(key), message, hint=f"remove `{key}`: {what}")
 
 
-@cell_rule(
-    "GW608",
-    "limits-inverted",
-    "limits that no value can satisfy",
-)
+@cell_rule("GW608", "limits-inverted", "limits that no value can satisfy")
 def limits_inverted(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Limits with the least not below the greatest."""
     for variable in _lines(cell):
@@ -182,11 +156,7 @@ def limits_inverted(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.at("limits"), message, hint=hint)
 
 
-@cell_rule(
-    "GW609",
-    "limits-outside-type",
-    "limits beyond what the robot's register can hold",
-)
+@cell_rule("GW609", "limits-outside-type", "limits beyond what the robot's register can hold")
 def limits_outside_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Limits of integers beyond their type."""
     for variable in _lines(cell):
@@ -204,11 +174,7 @@ def limits_outside_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             )
 
 
-@cell_rule(
-    "GW610",
-    "limits-without-effect",
-    "limits where nothing can be limited",
-)
+@cell_rule("GW610", "limits-without-effect", "limits where nothing can be limited")
 def limits_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Limits of bits, and clamping of outputs."""
     for variable in _lines(cell):
@@ -220,12 +186,7 @@ def limits_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
             yield rule.at(variable.part.key_at("clamp"), message, hint="remove `clamp`")
 
 
-@cell_rule(
-    "GW611",
-    "clear-outside-limits",
-    "a fallback of zero that the limits exclude",
-    Severity.WARNING,
-)
+@cell_rule("GW611", "clear-outside-limits", "a fallback of zero that the limits exclude", Severity.WARNING)
 def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`clear` at inputs whose limits exclude 0."""
     for variable in _lines(cell):
@@ -247,11 +208,7 @@ def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
             yield rule.at(variable.at("on_release" if written else "limits"), message, hint=hint)
 
 
-@cell_rule(
-    "GW612",
-    "clamp-without-limits",
-    "clamping without limits",
-)
+@cell_rule("GW612", "clamp-without-limits", "clamping without limits")
 def clamp_without_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`clamp` at inputs without `limits`."""
     for variable in _lines(cell):

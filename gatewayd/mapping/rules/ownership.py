@@ -21,11 +21,7 @@ _RESERVED = (ANY, "free", "gateway", "operator", "robot", "undeclared")
 _POLICY = ("owner", "lease", "takeover")
 
 
-@cell_rule(
-    "GW501",
-    "no-writer",
-    "input variables in a file without writers",
-)
+@cell_rule("GW501", "no-writer", "input variables in a file without writers")
 def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first input of a file without writers."""
     if cell.document.declared("writers") or cell.document.writers:
@@ -42,11 +38,7 @@ def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(inputs[0].position, message, hint=hint)
 
 
-@cell_rule(
-    "GW502",
-    "unknown-writer",
-    "an owner that is not among the writers",
-)
+@cell_rule("GW502", "unknown-writer", "an owner that is not among the writers")
 def unknown_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Names of owners and required writers that are not declared."""
     known = cell.document.declared("writers")
@@ -64,11 +56,7 @@ def unknown_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 break
 
 
-@cell_rule(
-    "GW503",
-    "writer-twice",
-    "a writer that stands twice in one list",
-)
+@cell_rule("GW503", "writer-twice", "a writer that stands twice in one list")
 def writer_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Repeated names in lists of owners."""
     for part in _owned(cell.document):
@@ -82,12 +70,7 @@ def writer_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 yield rule.at(part.at("owner", index), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW506",
-    "group-of-one",
-    "a group with a single variable",
-    Severity.WARNING,
-)
+@cell_rule("GW506", "group-of-one", "a group with a single variable", Severity.WARNING)
 def group_of_one(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Groups with one member."""
     if not _is_whole(cell):
@@ -101,11 +84,7 @@ def group_of_one(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(lock.group.key, message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW507",
-    "member-with-own-owner",
-    "a member of a group with an owner or lease of its own",
-)
+@cell_rule("GW507", "member-with-own-owner", "a member of a group with an owner or lease of its own")
 def member_with_own_owner(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`owner`, `lease` or `takeover` beside `group`."""
     for part in cell.document.variables.values():
@@ -122,12 +101,7 @@ def member_with_own_owner(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
                 yield rule.at(part.key_at(key), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW508",
-    "short-lease",
-    "a lease that ends before its owner can count as lost",
-    Severity.WARNING,
-)
+@cell_rule("GW508", "short-lease", "a lease that ends before its owner can count as lost", Severity.WARNING)
 def short_lease(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Leases below 100ms or below a time-out of an owner."""
     for lock in _distinct(cell.locks):
@@ -153,12 +127,7 @@ def short_lease(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 break
 
 
-@cell_rule(
-    "GW509",
-    "idle-writer",
-    "a writer that may write nothing",
-    Severity.WARNING,
-)
+@cell_rule("GW509", "idle-writer", "a writer that may write nothing", Severity.WARNING)
 def idle_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers that no owner list and no watchdog names."""
     if not _is_whole(cell):
@@ -176,11 +145,7 @@ def idle_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.key, message, hint="name it as `owner` of a variable, or remove it")
 
 
-@cell_rule(
-    "GW510",
-    "unknown-group",
-    "a group that is not declared",
-)
+@cell_rule("GW510", "unknown-group", "a group that is not declared")
 def unknown_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`group` with a name that is not declared."""
     known = cell.document.declared("groups")
@@ -191,12 +156,7 @@ def unknown_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.at("group"), f"the group `{name}` of `{part.name}` is not declared", hint=hint)
 
 
-@cell_rule(
-    "GW511",
-    "unused-group",
-    "a group without a member",
-    Severity.WARNING,
-)
+@cell_rule("GW511", "unused-group", "a group without a member", Severity.WARNING)
 def unused_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Groups that no variable names."""
     if not _is_whole(cell):
@@ -208,12 +168,7 @@ def unused_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(group.key, message, hint=f"write `group: {group.name}` at its variables")
 
 
-@cell_rule(
-    "GW512",
-    "takeover-of-nobody",
-    "takeover where there is no order of owners",
-    Severity.WARNING,
-)
+@cell_rule("GW512", "takeover-of-nobody", "takeover where there is no order of owners", Severity.WARNING)
 def takeover_of_nobody(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`takeover: true` without a list."""
     for part in _owned(cell.document):
@@ -226,11 +181,7 @@ def takeover_of_nobody(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.key_at("takeover"), message, hint=hint)
 
 
-@cell_rule(
-    "GW513",
-    "owner-of-output",
-    "an owner of a variable that nobody writes",
-)
+@cell_rule("GW513", "owner-of-output", "an owner of a variable that nobody writes")
 def owner_of_output(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`owner`, `lease`, `takeover` or `group` at an output."""
     seen: set[str] = set()
@@ -246,10 +197,7 @@ def owner_of_output(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 
 @cell_rule(
-    "GW514",
-    "endless-lock",
-    "a shared variable that a silent writer can keep for ever",
-    Severity.WARNING,
+    "GW514", "endless-lock", "a shared variable that a silent writer can keep for ever", Severity.WARNING
 )
 def endless_lock(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Shared locks without a lease whose owners are not all supervised."""
@@ -268,11 +216,7 @@ def endless_locks(cell: ExpandedCell) -> Iterator[tuple[ExpandedLock, str]]:
             yield lock, silent[0]
 
 
-@cell_rule(
-    "GW516",
-    "any-among-owners",
-    "the word any in a list of owners",
-)
+@cell_rule("GW516", "any-among-owners", "the word any in a list of owners")
 def any_among_owners(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`any` in lists of more than one owner."""
     for part in _owned(cell.document):
@@ -283,11 +227,7 @@ def any_among_owners(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.at("owner", owners.index(ANY)), message, hint=hint)
 
 
-@cell_rule(
-    "GW517",
-    "reserved-writer-name",
-    "a writer with a name that the gateway uses itself",
-)
+@cell_rule("GW517", "reserved-writer-name", "a writer with a name that the gateway uses itself")
 def reserved_writer_name(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers named like parties that no mapping declares."""
     for writer in cell.document.writers.values():

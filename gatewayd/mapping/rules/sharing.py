@@ -15,10 +15,7 @@ __all__: list[str] = []
 
 
 @cell_rule(
-    "GW518",
-    "inherited-value",
-    "a held variable that the next owner of its group inherits",
-    Severity.WARNING,
+    "GW518", "inherited-value", "a held variable that the next owner of its group inherits", Severity.WARNING
 )
 def inherited_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first member with `hold` in each group that is taken over in pieces."""
@@ -34,12 +31,7 @@ def inherited_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(first.at("on_release"), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW519",
-    "split-group",
-    "a group that no single request can take over whole",
-    Severity.WARNING,
-)
+@cell_rule("GW519", "split-group", "a group that no single request can take over whole", Severity.WARNING)
 def split_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Groups with an owner that ranks above another and cannot write them in one request."""
     for lock in _taken_over(cell):

@@ -45,11 +45,7 @@ def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(writer.key, message, hint=hint)
 
 
-@cell_rule(
-    "GW522",
-    "key-without-effect",
-    "a key that nothing in the file lets act",
-)
+@cell_rule("GW522", "key-without-effect", "a key that nothing in the file lets act")
 def key_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`timeout_counts`, `grace`, `whole` and `adopt_for` where they mean nothing."""
     yield from _writers(rule, cell)

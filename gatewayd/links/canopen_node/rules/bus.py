@@ -28,11 +28,7 @@ from gatewayd.report.wording import cob
 __all__: list[str] = []
 
 
-@plant_rule(
-    "GW407",
-    "bus-cob-id-clash",
-    "two cells on one bus that send with the same COB-ID",
-)
+@plant_rule("GW407", "bus-cob-id-clash", "two cells on one bus that send with the same COB-ID")
 def bus_cob_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """TPDOs of one cell that another cell sends too, or that are a service of it."""
     for nodes in _buses(cells):
@@ -58,11 +54,7 @@ def bus_cob_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diag
                 yield rule.at(place, message, hint="choose another COB-ID", related=related)
 
 
-@plant_rule(
-    "GW408",
-    "node-id-clash",
-    "two cells with the same node-ID on one bus",
-)
+@plant_rule("GW408", "node-id-clash", "two cells with the same node-ID on one bus")
 def node_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Equal node-IDs on one channel."""
     for nodes in _buses(cells):
@@ -77,11 +69,7 @@ def node_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnos
                 yield rule.at(node.part.at("node"), message, hint=hint, related=related)
 
 
-@plant_rule(
-    "GW428",
-    "bit-rate-clash",
-    "two cells on one bus with different bit-rates",
-)
+@plant_rule("GW428", "bit-rate-clash", "two cells on one bus with different bit-rates")
 def bit_rate_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Different bit-rates on one channel."""
     for first, *others in _buses(cells):
@@ -96,11 +84,7 @@ def bit_rate_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagno
                 yield rule.at(node.part.at("bitrate"), message, hint=hint, related=related)
 
 
-@plant_rule(
-    "GW429",
-    "two-sync-producers",
-    "two cells that send the same SYNC",
-)
+@plant_rule("GW429", "two-sync-producers", "two cells that send the same SYNC")
 def two_sync_producers(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Second producers of a COB-ID."""
     for nodes in _buses(cells):
@@ -115,22 +99,13 @@ def two_sync_producers(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Di
                 yield rule.at(node.part.at("sync", "producer"), message, hint=hint, related=related)
 
 
-@plant_rule(
-    "GW426",
-    "bus-load-high",
-    "a bus that can be loaded with more than 40 %",
-    Severity.WARNING,
-)
+@plant_rule("GW426", "bus-load-high", "a bus that can be loaded with more than 40 %", Severity.WARNING)
 def bus_load_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Buses between the two thresholds."""
     yield from _loaded(rule, cells, lambda share: WARNING_ABOVE < share <= ERROR_ABOVE)
 
 
-@plant_rule(
-    "GW427",
-    "bus-load-too-high",
-    "a bus that can be loaded with more than 70 %",
-)
+@plant_rule("GW427", "bus-load-too-high", "a bus that can be loaded with more than 70 %")
 def bus_load_too_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Buses above the second threshold."""
     yield from _loaded(rule, cells, lambda share: share > ERROR_ABOVE)

@@ -23,9 +23,7 @@ _RPDO = "RPDO"
 
 
 @cell_rule(
-    "GW401",
-    "no-canopen-section",
-    "variables or writers on CANopen in a file without a canopen section",
+    "GW401", "no-canopen-section", "variables or writers on CANopen in a file without a canopen section"
 )
 def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first variable, else the first writer, that names CANopen."""
@@ -44,11 +42,7 @@ def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             return
 
 
-@cell_rule(
-    "GW413",
-    "canopen-type",
-    "a CANopen type that does not suit the robot's type",
-)
+@cell_rule("GW413", "canopen-type", "a CANopen type that does not suit the robot's type")
 def canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Types of another kind."""
     for variable, one in _lines(cell):
@@ -65,12 +59,7 @@ def _suited(variable: ExpandedVariable) -> str:
     return "REAL64 or REAL32" if variable.kind is ValueKind.FLOAT else "an INTEGER or UNSIGNED type"
 
 
-@cell_rule(
-    "GW414",
-    "real32-loss",
-    "a double of the robot in a REAL32 that loses digits",
-    Severity.WARNING,
-)
+@cell_rule("GW414", "real32-loss", "a double of the robot in a REAL32 that loses digits", Severity.WARNING)
 def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Reals that are REAL32 without their line saying so, and those for which it is never enough."""
     for variable, one in _lines(cell):
@@ -110,11 +99,7 @@ def narrow_canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_type_place(variable), message, hint=hint)
 
 
-@cell_rule(
-    "GW420",
-    "watched-itself",
-    "a writer whose heartbeat is that of this node",
-)
+@cell_rule("GW420", "watched-itself", "a writer whose heartbeat is that of this node")
 def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers with the node-ID of the cell."""
     canopen = cell.document.part(Canopen)
@@ -129,11 +114,7 @@ def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.at("node"), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW421",
-    "unknown-bit-rate",
-    "a bit-rate that CANopen does not have",
-)
+@cell_rule("GW421", "unknown-bit-rate", "a bit-rate that CANopen does not have")
 def unknown_bit_rate(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Bit-rates outside the list."""
     canopen = cell.document.part(Canopen)
@@ -167,11 +148,7 @@ def idle_canopen_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.at("canopen"), message, hint=hint)
 
 
-@cell_rule(
-    "GW423",
-    "out-of-reach",
-    "an input that none of its owners can write where it lies",
-)
+@cell_rule("GW423", "out-of-reach", "an input that none of its owners can write where it lies")
 def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Inputs in RPDOs that no RPDO writer owns, and inputs without any common way."""
     if not cell.document.writers:
@@ -196,12 +173,7 @@ def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.position, message, hint=hint)
 
 
-@cell_rule(
-    "GW432",
-    "owner-elsewhere",
-    "an owner that cannot write where the variable lies",
-    Severity.WARNING,
-)
+@cell_rule("GW432", "owner-elsewhere", "an owner that cannot write where the variable lies", Severity.WARNING)
 def owner_elsewhere(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Named owners without a common way, where another one has one."""
     reported: set[Position] = set()
@@ -239,11 +211,7 @@ def _inputs(cell: ExpandedCell) -> Iterator[ExpandedVariable]:
             yield variable
 
 
-@cell_rule(
-    "GW424",
-    "two-canopen-writers",
-    "two writers for one service of the node",
-)
+@cell_rule("GW424", "two-canopen-writers", "two writers for one service of the node")
 def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Second writers by RPDO, and by SDO."""
     writers = [(writer, writer.spec.by(CanopenWriter)) for writer in cell.document.writers.values()]
@@ -259,11 +227,7 @@ def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(other.at("canopen"), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW425",
-    "half-supervision",
-    "a watched heartbeat without a node, a time, or CANopen",
-)
+@cell_rule("GW425", "half-supervision", "a watched heartbeat without a node, a time, or CANopen")
 def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`node` without `heartbeat` and the other way round, and either without `canopen`."""
     for writer in cell.document.writers.values():

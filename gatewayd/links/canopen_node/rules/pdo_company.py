@@ -45,10 +45,7 @@ def silenced_neighbour(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 
 @cell_rule(
-    "GW434",
-    "contended-pdo",
-    "variables in one PDO that may be held by different owners",
-    Severity.WARNING,
+    "GW434", "contended-pdo", "variables in one PDO that may be held by different owners", Severity.WARNING
 )
 def contended_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """RPDOs with variables of several locks, one of which somebody else may own."""

@@ -14,11 +14,7 @@ from gatewayd.report.wording import did_you_mean
 __all__: list[str] = []
 
 
-@cell_rule(
-    "GW410",
-    "unknown-pdo",
-    "a PDO that is not declared",
-)
+@cell_rule("GW410", "unknown-pdo", "a PDO that is not declared")
 def unknown_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Names of PDOs at variables."""
     node = node_of(cell)
@@ -35,11 +31,7 @@ def unknown_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.at("canopen", "pdo"), message, hint=hint)
 
 
-@cell_rule(
-    "GW411",
-    "variable-in-two-pdos",
-    "a variable in two PDOs, or twice in one",
-)
+@cell_rule("GW411", "variable-in-two-pdos", "a variable in two PDOs, or twice in one")
 def variable_in_two_pdos(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Variables that are wanted once more."""
     for wrong in _once(cell, MemberProblem.TAKEN, MemberProblem.OBJECT_ONLY):
@@ -57,11 +49,7 @@ def variable_in_two_pdos(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         yield rule.at(place, message, hint=f"remove it from `{wrong.pdo}` or from `{wrong.other}`")
 
 
-@cell_rule(
-    "GW412",
-    "empty-pdo",
-    "a PDO that carries nothing",
-)
+@cell_rule("GW412", "empty-pdo", "a PDO that carries nothing")
 def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """PDOs of the file without variables."""
     node = node_of(cell)
@@ -77,11 +65,7 @@ def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(node.part.key_at("pdos", name), message, hint=hint)
 
 
-@cell_rule(
-    "GW430",
-    "unknown-pdo-variable",
-    "a PDO that names a variable that does not exist",
-)
+@cell_rule("GW430", "unknown-pdo-variable", "a PDO that names a variable that does not exist")
 def unknown_pdo_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Members without a line, and members that a family does not have."""
     declared = cell.document.declared("variables")

@@ -26,11 +26,7 @@ _KEYS = {Direction.INPUT: "rpdo", Direction.OUTPUT: "tpdo"}
 _WORDS = {Direction.INPUT: "towards the robot", Direction.OUTPUT: "from the robot"}
 
 
-@cell_rule(
-    "GW402",
-    "pdo-too-long",
-    "a PDO with more than 64 bits",
-)
+@cell_rule("GW402", "pdo-too-long", "a PDO with more than 64 bits")
 def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """PDOs of the file beyond eight bytes."""
     for pdo in _pdos(cell):
@@ -43,11 +39,7 @@ def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(pdo.position, message, hint=hint)
 
 
-@cell_rule(
-    "GW403",
-    "pdo-misaligned",
-    "a number in a PDO that does not begin at a byte",
-)
+@cell_rule("GW403", "pdo-misaligned", "a number in a PDO that does not begin at a byte")
 def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first number of each PDO off a byte boundary."""
     for pdo in _pdos(cell):
@@ -60,11 +52,7 @@ def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 break
 
 
-@cell_rule(
-    "GW404",
-    "mixed-pdo",
-    "a PDO with variables of both directions",
-)
+@cell_rule("GW404", "mixed-pdo", "a PDO with variables of both directions")
 def mixed_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first variable of each PDO that flows the other way."""
     for pdo in _pdos(cell):
@@ -86,11 +74,7 @@ class _Use:
     place: Position
 
 
-@cell_rule(
-    "GW405",
-    "cob-id-clash",
-    "one COB-ID for two services of the node",
-)
+@cell_rule("GW405", "cob-id-clash", "one COB-ID for two services of the node")
 def cob_id_clash(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """COB-IDs of PDOs and of SYNC that are used already."""
     node = node_of(cell)
@@ -127,11 +111,7 @@ def _services(node: CanopenCell) -> Iterator[_Use]:
     yield _Use(Function.TIME, "TIME", place)
 
 
-@cell_rule(
-    "GW406",
-    "restricted-cob-id",
-    "a COB-ID that no PDO and no SYNC may have",
-)
+@cell_rule("GW406", "restricted-cob-id", "a COB-ID that no PDO and no SYNC may have")
 def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Restricted COB-IDs of SYNC and PDOs, and in the declared ranges."""
     node = node_of(cell)
@@ -155,11 +135,7 @@ def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(place, f"{what} has the COB-ID {cob(cob_id)}, which is reserved", hint=hint)
 
 
-@cell_rule(
-    "GW409",
-    "too-few-cob-ids",
-    "more PDOs than COB-IDs",
-)
+@cell_rule("GW409", "too-few-cob-ids", "more PDOs than COB-IDs")
 def too_few_cob_ids(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """How many are missing in each direction, and which would do."""
     node = node_of(cell)
@@ -209,11 +185,7 @@ def _spans(cob_ids: list[int]) -> str:
     return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
 
 
-@cell_rule(
-    "GW431",
-    "pdo-key-of-other-side",
-    "a key of a PDO that means nothing in its direction",
-)
+@cell_rule("GW431", "pdo-key-of-other-side", "a key of a PDO that means nothing in its direction")
 def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`event` at RPDOs, `deadline` at TPDOs, `sync_start` where no SYNC counts."""
     node = node_of(cell)
@@ -235,10 +207,7 @@ def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
 
 
 @cell_rule(
-    "GW416",
-    "sync-without-period",
-    "synchronous PDOs, and nobody says how often SYNC comes",
-    Severity.WARNING,
+    "GW416", "sync-without-period", "synchronous PDOs, and nobody says how often SYNC comes", Severity.WARNING
 )
 def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first synchronous PDO of a node without a period."""
@@ -252,11 +221,7 @@ def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(_key_place(node, pdo, "transmission"), message, hint=hint)
 
 
-@cell_rule(
-    "GW417",
-    "producer-without-period",
-    "a SYNC producer without a period",
-)
+@cell_rule("GW417", "producer-without-period", "a SYNC producer without a period")
 def producer_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`producer: true` alone."""
     node = node_of(cell)
@@ -266,10 +231,7 @@ def producer_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
 
 
 @cell_rule(
-    "GW418",
-    "inhibit-below-frame-time",
-    "an inhibit time shorter than the frame itself",
-    Severity.WARNING,
+    "GW418", "inhibit-below-frame-time", "an inhibit time shorter than the frame itself", Severity.WARNING
 )
 def inhibit_below_frame_time(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Inhibit times without effect."""
@@ -291,12 +253,7 @@ def inhibit_below_frame_time(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnos
             yield rule.at(place, message, hint="use some times the length of the frame, such as 10ms")
 
 
-@cell_rule(
-    "GW419",
-    "event-below-inhibit",
-    "an event time shorter than the inhibit time",
-    Severity.WARNING,
-)
+@cell_rule("GW419", "event-below-inhibit", "an event time shorter than the inhibit time", Severity.WARNING)
 def event_below_inhibit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Event timers that the inhibit time always delays."""
     node = node_of(cell)

@@ -22,12 +22,7 @@ _FLOAT_DIGITS = {"float32": 1 << 24, "float64": 1 << 53}
 _MIN_STEPS = 10
 
 
-@cell_rule(
-    "GW701",
-    "time-in-float32",
-    "the controller's time in a float32",
-    Severity.WARNING,
-)
+@cell_rule("GW701", "time-in-float32", "the controller's time in a float32", Severity.WARNING)
 def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Growing reals in a float32."""
     for placement in _numbers(cell):
@@ -38,12 +33,7 @@ def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint="use `type: float64`")
 
 
-@cell_rule(
-    "GW702",
-    "fraction-lost",
-    "a real in an integer type without a scale",
-    Severity.WARNING,
-)
+@cell_rule("GW702", "fraction-lost", "a real in an integer type without a scale", Severity.WARNING)
 def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Doubles in integer types without a written scale."""
     for placement in _numbers(cell):
@@ -62,10 +52,7 @@ def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 
 @cell_rule(
-    "GW703",
-    "narrow-integer",
-    "an integer from the robot in a register too small for it",
-    Severity.WARNING,
+    "GW703", "narrow-integer", "an integer from the robot in a register too small for it", Severity.WARNING
 )
 def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Integer outputs in types that do not hold their range."""
@@ -86,12 +73,7 @@ def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
 
-@cell_rule(
-    "GW704",
-    "coarse-scale",
-    "a scale too coarse for the limits",
-    Severity.WARNING,
-)
+@cell_rule("GW704", "coarse-scale", "a scale too coarse for the limits", Severity.WARNING)
 def coarse_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Scales of doubles with fewer than ten steps between the limits."""
     for placement in _numbers(cell):
@@ -125,12 +107,7 @@ def _fine(span: float) -> float:
     return scale
 
 
-@cell_rule(
-    "GW705",
-    "limit-not-reachable",
-    "a limit that the register type cannot express",
-    Severity.WARNING,
-)
+@cell_rule("GW705", "limit-not-reachable", "a limit that the register type cannot express", Severity.WARNING)
 def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Limits of inputs beyond what type, scale and offset reach."""
     for placement in _numbers(cell):
@@ -151,11 +128,7 @@ def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
 
-@cell_rule(
-    "GW706",
-    "scale-of-zero",
-    "a scale of zero",
-)
+@cell_rule("GW706", "scale-of-zero", "a scale of zero")
 def scale_of_zero(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Scales of zero."""
     zero = [item for item in placements_of(cell) if item.problem is PlacementProblem.SCALE_OF_ZERO]
@@ -164,11 +137,7 @@ def scale_of_zero(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(_key(placement, "scale"), message, hint="leave `scale` out, or write for example 0.1")
 
 
-@cell_rule(
-    "GW707",
-    "scaled-bit",
-    "scale, offset or order at a bit",
-)
+@cell_rule("GW707", "scaled-bit", "scale, offset or order at a bit")
 def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Number conversions of bits."""
     for placement in first_of_each_line(placements_of(cell)):
@@ -181,12 +150,7 @@ def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, key), message, hint=f"remove `{key}`")
 
 
-@cell_rule(
-    "GW708",
-    "uneven-scale",
-    "an integer with a scale that does not come out even",
-    Severity.WARNING,
-)
+@cell_rule("GW708", "uneven-scale", "an integer with a scale that does not come out even", Severity.WARNING)
 def uneven_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Scales of integers that need rounding."""
     for placement in _numbers(cell):
@@ -214,10 +178,7 @@ def _whole(value: float) -> bool:
 
 
 @cell_rule(
-    "GW709",
-    "integer-in-real",
-    "an integer in a real that has too few digits for it",
-    Severity.WARNING,
+    "GW709", "integer-in-real", "an integer in a real that has too few digits for it", Severity.WARNING
 )
 def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Integers in reals with fewer digits."""
@@ -235,12 +196,7 @@ def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
 
-@cell_rule(
-    "GW710",
-    "number-as-bool",
-    "a number shown as 0 or 1",
-    Severity.WARNING,
-)
+@cell_rule("GW710", "number-as-bool", "a number shown as 0 or 1", Severity.WARNING)
 def number_as_bool(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Numbers with the type bool."""
     for placement in _numbers(cell):
@@ -253,12 +209,7 @@ def number_as_bool(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
 
-@cell_rule(
-    "GW711",
-    "fallback-not-shown",
-    "a stale value that the register cannot show",
-    Severity.WARNING,
-)
+@cell_rule("GW711", "fallback-not-shown", "a stale value that the register cannot show", Severity.WARNING)
 def fallback_not_shown(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`on_stale` values that come back from the register as something else."""
     for placement in _numbers(cell):

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from ipaddress import ip_address, ip_network
 
 from gatewayd.links.modbus_server.plan import Network
+from gatewayd.links.modbus_server.rules.wording import peer
 from gatewayd.links.modbus_server.sections import Modbus, ModbusWriter
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.document import Part
@@ -20,11 +21,7 @@ _LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
 _SHARED = ("connections", "idle_timeout")
 
 
-@plant_rule(
-    "GW206",
-    "unit-clash",
-    "two cells with the same unit on one listener",
-)
+@plant_rule("GW206", "unit-clash", "two cells with the same unit on one listener")
 def unit_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Equal units on equal listen addresses."""
     first: dict[tuple[str, int], tuple[ExpandedCell, Part[Modbus]]] = {}
@@ -40,11 +37,7 @@ def unit_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic
         yield rule.at(modbus.at("unit"), message, hint=hint, related=related)
 
 
-@plant_rule(
-    "GW207",
-    "listen-clash",
-    "two listeners that ask for the same port",
-)
+@plant_rule("GW207", "listen-clash", "two listeners that ask for the same port")
 def listen_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Wildcard and single addresses on one port."""
     by_port: dict[int, list[Part[Modbus]]] = {}
@@ -61,10 +54,7 @@ def listen_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnost
 
 
 @plant_rule(
-    "GW208",
-    "listener-settings",
-    "cells on one listener disagree about its connections",
-    Severity.WARNING,
+    "GW208", "listener-settings", "cells on one listener disagree about its connections", Severity.WARNING
 )
 def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Different settings for equal listen addresses."""
@@ -82,11 +72,7 @@ def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Dia
                 yield rule.at(modbus.at(key), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW216",
-    "writer-shut-out",
-    "a writer that the access list does not let in",
-)
+@cell_rule("GW216", "writer-shut-out", "a writer that the access list does not let in")
 def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers without a network that `allow` reaches."""
     modbus = cell.document.part(Modbus)
@@ -94,21 +80,16 @@ def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         return
     for writer in cell.document.writers.values():
         if writer.spec.by(ModbusWriter).modbus and not any(
-            _meet(peer, modbus.spec.allow) for peer in writer.spec.by(ModbusWriter).modbus
+            _meet(network, modbus.spec.allow) for network in writer.spec.by(ModbusWriter).modbus
         ):
-            shown = ", ".join(map(_shown, writer.spec.by(ModbusWriter).modbus[:3]))
+            shown = ", ".join(map(peer, writer.spec.by(ModbusWriter).modbus[:3]))
             message = f"the access list of the listener shuts the writer `{writer.name}` ({shown}) out"
             related = (Related(modbus.at("allow"), "the access list is here"),)
-            hint = f"add {_shown(writer.spec.by(ModbusWriter).modbus[0])} to `allow`"
+            hint = f"add {peer(writer.spec.by(ModbusWriter).modbus[0])} to `allow`"
             yield rule.at(writer.at("modbus"), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW217",
-    "open-listener",
-    "a listener on every address without an access list",
-    Severity.WARNING,
-)
+@cell_rule("GW217", "open-listener", "a listener on every address without an access list", Severity.WARNING)
 def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Wildcard listeners without `allow`."""
     modbus = cell.document.part(Modbus)
@@ -118,12 +99,7 @@ def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(modbus.at("listen"), message, hint=hint)
 
 
-@cell_rule(
-    "GW218",
-    "foreign-port",
-    "a privileged port that belongs to another service",
-    Severity.WARNING,
-)
+@cell_rule("GW218", "foreign-port", "a privileged port that belongs to another service", Severity.WARNING)
 def foreign_port(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Low ports other than Modbus's own."""
     modbus = cell.document.part(Modbus)
@@ -148,9 +124,9 @@ def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         return
     for writer in cell.document.writers.values():
         if writer.spec.by(ModbusWriter).modbus and not any(
-            _meet(peer, _LOOPBACK) for peer in writer.spec.by(ModbusWriter).modbus
+            _meet(network, _LOOPBACK) for network in writer.spec.by(ModbusWriter).modbus
         ):
-            shown = _shown(writer.spec.by(ModbusWriter).modbus[0])
+            shown = peer(writer.spec.by(ModbusWriter).modbus[0])
             message = (
                 f"the writer `{writer.name}` ({shown}) cannot reach {modbus.spec.listen}, "
                 "which only this machine can"
@@ -178,7 +154,3 @@ def _clash(one: str, other: str) -> bool:
 
 def _meet(network: Network, allowed: Sequence[Network]) -> bool:
     return any(item.version == network.version and item.overlaps(network) for item in allowed)
-
-
-def _shown(network: Network) -> str:
-    return str(network.network_address) if network.num_addresses == 1 else str(network)

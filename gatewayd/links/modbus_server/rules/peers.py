@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gatewayd.links.modbus_server.plan import Network
+from gatewayd.links.modbus_server.rules.wording import peer
 from gatewayd.links.modbus_server.sections import ModbusWriter
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.document import Document, Part
@@ -15,11 +16,7 @@ from gatewayd.mapping.rules.registry import cell_rule
 __all__: list[str] = []
 
 
-@cell_rule(
-    "GW504",
-    "same-peer",
-    "two writers with the same address",
-)
+@cell_rule("GW504", "same-peer", "two writers with the same address")
 def same_peer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Equal networks of one or of two writers."""
     first: dict[Network, tuple[Part[WriterSpec], Position]] = {}
@@ -29,17 +26,14 @@ def same_peer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             continue
         other, place = first[network]
         whom = "the writer itself" if other is writer else f"the writer `{other.name}`"
-        message = f"{_shown(network)} of the writer `{writer.name}` already stands for {whom}"
-        related = (Related(place, f"{_shown(network)} first used here"),)
+        message = f"{peer(network)} of the writer `{writer.name}` already stands for {whom}"
+        related = (Related(place, f"{peer(network)} first used here"),)
         hint = "give each writer its own address, or make one writer of the two"
         yield rule.at(position, message, hint=hint, related=related)
 
 
 @cell_rule(
-    "GW505",
-    "overlapping-peers",
-    "the network of one writer holds the address of another",
-    Severity.WARNING,
+    "GW505", "overlapping-peers", "the network of one writer holds the address of another", Severity.WARNING
 )
 def overlapping_peers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Networks of one writer inside those of another."""
@@ -56,7 +50,7 @@ def overlapping_peers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             if holder is not None and holder[0] is not writer:
                 wide = network.supernet(new_prefix=length)
                 message = (
-                    f"{_shown(network)} of the writer `{writer.name}` lies in {wide} of `{holder[0].name}`; "
+                    f"{peer(network)} of the writer `{writer.name}` lies in {wide} of `{holder[0].name}`; "
                     f"it counts as `{writer.name}`"
                 )
                 related = (Related(holder[1], f"{wide} of `{holder[0].name}`"),)
@@ -69,7 +63,3 @@ def _peers(document: Document) -> Iterator[tuple[Part[WriterSpec], Network, Posi
     for writer in document.writers.values():
         for index, network in enumerate(writer.spec.by(ModbusWriter).modbus):
             yield writer, network, writer.at("modbus", index)
-
-
-def _shown(network: Network) -> str:
-    return str(network.network_address) if network.num_addresses == 1 else str(network)

@@ -30,11 +30,7 @@ _READ_ONLY = (Area.INPUT, Area.DISCRETE)
 _KEYS = {Area.HOLDING: "holding", Area.INPUT: "input", Area.COIL: "coil", Area.DISCRETE: "discrete"}
 
 
-@cell_rule(
-    "GW202",
-    "beyond-last-address",
-    "a value that runs past address 65535",
-)
+@cell_rule("GW202", "beyond-last-address", "a value that runs past address 65535")
 def beyond_last_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Placements that do not fit below the end of their area."""
     beyond = [item for item in placements_of(cell) if item.problem is PlacementProblem.BEYOND_END]
@@ -48,11 +44,7 @@ def beyond_last_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(placement.position, message, hint=hint)
 
 
-@cell_rule(
-    "GW203",
-    "status-block",
-    "a variable in the registers of the status block",
-)
+@cell_rule("GW203", "status-block", "a variable in the registers of the status block")
 def status_block(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Register placements at 60000 and above."""
     inside = [
@@ -68,11 +60,7 @@ def status_block(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(placement.position, message, hint="place it below 60000")
 
 
-@cell_rule(
-    "GW204",
-    "traditional-address",
-    "an address that looks like 40001 counting",
-)
+@cell_rule("GW204", "traditional-address", "an address that looks like 40001 counting")
 def traditional_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Written addresses in the range of the traditional notation of their area."""
     for placement in first_of_each_line(placements_of(cell)):
@@ -89,11 +77,7 @@ def traditional_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(placement.position, message, hint=hint)
 
 
-@cell_rule(
-    "GW209",
-    "number-in-bit",
-    "a number in a place that holds a single bit",
-)
+@cell_rule("GW209", "number-in-bit", "a number in a place that holds a single bit")
 def number_in_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Numbers in coils, discrete inputs and single bits."""
     wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.NUMBER_IN_BIT]
@@ -108,11 +92,7 @@ def number_in_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(placement.position, message, hint=hint)
 
 
-@cell_rule(
-    "GW210",
-    "input-in-read-only-area",
-    "an input variable that lies only where nobody can write",
-)
+@cell_rule("GW210", "input-in-read-only-area", "an input variable that lies only where nobody can write")
 def input_in_read_only_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Inputs all of whose placements are read-only."""
     for _, group in groupby(placements_of(cell), key=lambda item: item.variable.part.name):
@@ -129,11 +109,7 @@ def input_in_read_only_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
             yield rule.at(first.position, message, hint=f"place it in a writable area: {{{area}: N}}")
 
 
-@cell_rule(
-    "GW211",
-    "bit-without-place",
-    "type bit at a whole register",
-)
+@cell_rule("GW211", "bit-without-place", "type bit at a whole register")
 def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Type `bit` without a bit number."""
     wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.BIT_WITHOUT_PLACE]
@@ -143,11 +119,7 @@ def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(placement.position, message, hint=hint)
 
 
-@cell_rule(
-    "GW222",
-    "type-of-bit",
-    "a number type for a place that holds a single bit",
-)
+@cell_rule("GW222", "type-of-bit", "a number type for a place that holds a single bit")
 def type_of_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Number types at single bits."""
     wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.TYPE_IN_BIT]
@@ -198,11 +170,7 @@ def _cut(placements: list[ExpandedPlacement], limit: int) -> Iterator[tuple[Expa
             yield placement, start, start + (block + 1) * limit
 
 
-@cell_rule(
-    "GW213",
-    "mixed-directions",
-    "a register that mixes bits of both directions",
-)
+@cell_rule("GW213", "mixed-directions", "a register that mixes bits of both directions")
 def mixed_directions(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Holding registers with input bits and output bits."""
     packed = [item for item in placements_of(cell) if item.bit is not None and item.area is Area.HOLDING]
@@ -227,11 +195,7 @@ def _register(placement: ExpandedPlacement) -> str:
     return f"{AREA_WORDS[placement.area]} {placement.address} ({placement.area.notation(placement.address)})"
 
 
-@cell_rule(
-    "GW214",
-    "register-overlap",
-    "two variables at the same place of an area",
-)
+@cell_rule("GW214", "register-overlap", "two variables at the same place of an area")
 def register_overlap(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Overlaps of like with like."""
     for later, earlier, count in _overlaps(cell, mixed=False):
@@ -246,11 +210,7 @@ def register_overlap(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(later.position, message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW215",
-    "bit-in-number",
-    "a register that holds bits and a number",
-)
+@cell_rule("GW215", "bit-in-number", "a register that holds bits and a number")
 def bit_in_number(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Overlaps of a packed bit with a number."""
     for later, earlier, _ in _overlaps(cell, mixed=True):
@@ -330,11 +290,7 @@ def _first(addresses: range) -> int:
     return addresses[0]
 
 
-@cell_rule(
-    "GW220",
-    "no-modbus-section",
-    "variables with Modbus addresses in a file without a modbus section",
-)
+@cell_rule("GW220", "no-modbus-section", "variables with Modbus addresses in a file without a modbus section")
 def no_modbus_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Placements without a listener."""
     placements = placements_of(cell)

@@ -14,11 +14,7 @@ from gatewayd.rtde.companions import Companions, companions
 __all__: list[str] = []
 
 
-@cell_rule(
-    "GW310",
-    "missing-mask",
-    "a speed slider or robot output without the mask that makes it act",
-)
+@cell_rule("GW310", "missing-mask", "a speed slider or robot output without the mask that makes it act")
 def missing_mask(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Masked inputs whose mask is not mapped."""
     for variable, mask, _ in _without(cell, _mask):
@@ -28,10 +24,7 @@ def missing_mask(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 
 @cell_rule(
-    "GW316",
-    "missing-mask-bit",
-    "a robot output whose own bit of the mask is not mapped",
-    Severity.WARNING,
+    "GW316", "missing-mask-bit", "a robot output whose own bit of the mask is not mapped", Severity.WARNING
 )
 def missing_mask_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Masked inputs whose mask is mapped in other bits only."""

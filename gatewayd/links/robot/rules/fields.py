@@ -29,11 +29,7 @@ _UPPER_INPUTS = frozenset(
 )
 
 
-@cell_rule(
-    "GW301",
-    "unknown-field",
-    "a name that no RTDE guide and no implementation knows",
-)
+@cell_rule("GW301", "unknown-field", "a name that no RTDE guide and no implementation knows")
 def unknown_field(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """References and the watchdog with an unknown field."""
     for part, error in unresolved(cell):
@@ -60,11 +56,7 @@ def _suggestion(name: str) -> str:
     return "did you mean " + " or ".join(f"`{item}`" for item in close) + "?"
 
 
-@cell_rule(
-    "GW303",
-    "field-not-in-version",
-    "a field that the controller software does not have yet",
-)
+@cell_rule("GW303", "field-not-in-version", "a field that the controller software does not have yet")
 def field_not_in_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Fields that come later than the given software."""
     series, version = controller(cell.document)
@@ -84,11 +76,7 @@ def field_not_in_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         yield rule.at(variable.at("robot"), message, hint=hint)
 
 
-@cell_rule(
-    "GW312",
-    "series-and-version",
-    "a software version that does not belong to the series",
-)
+@cell_rule("GW312", "series-and-version", "a software version that does not belong to the series")
 def series_and_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Major versions of another series."""
     robot = cell.document.part(Robot)
@@ -106,11 +94,7 @@ def series_and_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(robot.at("version"), message, hint=f"write `series: {belongs.word}`", related=related)
 
 
-@cell_rule(
-    "GW304",
-    "no-such-part",
-    "a register, element or bit that the field does not have",
-)
+@cell_rule("GW304", "no-such-part", "a register, element or bit that the field does not have")
 def no_such_part(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """References beyond or beside what a field consists of."""
     for part, error in unresolved(cell):
@@ -147,11 +131,7 @@ def _last(error: UnresolvedReference) -> int:
     return error.limit if error.problem is ReferenceProblem.NO_SUCH_REGISTER else error.limit - 1
 
 
-@cell_rule(
-    "GW305",
-    "input-mapped-twice",
-    "two input variables on the same register or bits of the robot",
-)
+@cell_rule("GW305", "input-mapped-twice", "two input variables on the same register or bits of the robot")
 def input_mapped_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Inputs that share bits of a field."""
     owners: dict[tuple[str, int | None], dict[int | None, ExpandedVariable]] = {}
@@ -174,10 +154,7 @@ def input_mapped_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 
 @cell_rule(
-    "GW308",
-    "long-recipe",
-    "more field names than an old controller takes in one request",
-    Severity.WARNING,
+    "GW308", "long-recipe", "more field names than an old controller takes in one request", Severity.WARNING
 )
 def long_recipe(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Output recipes beyond 2048 bytes for software that has the limit."""
@@ -211,12 +188,7 @@ def _length(names: Sequence[str]) -> int:
     return len(",".join(("timestamp", *names)))
 
 
-@cell_rule(
-    "GW309",
-    "upper-range",
-    "an input register outside the range for fieldbuses",
-    Severity.WARNING,
-)
+@cell_rule("GW309", "upper-range", "an input register outside the range for fieldbuses", Severity.WARNING)
 def upper_range(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Upper input registers, once per line, and the watchdog's."""
     hint = "use integers and doubles 0 to 23, bits 0 to 63"
@@ -232,11 +204,7 @@ def upper_range(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(watchdog[1], message, hint=hint)
 
 
-@plant_rule(
-    "GW313",
-    "robot-claimed-twice",
-    "two cells that claim the same input of one robot",
-)
+@plant_rule("GW313", "robot-claimed-twice", "two cells that claim the same input of one robot")
 def robot_claimed_twice(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Equal input fields of one controller in two cells."""
     claimed: dict[tuple[str, int, str], tuple[ExpandedCell, str, Position]] = {}

@@ -17,11 +17,7 @@ from gatewayd.rtde.catalogue import Series
 __all__: list[str] = []
 
 
-@cell_rule(
-    "GW306",
-    "rate-above-base",
-    "a rate above the controller's own",
-)
+@cell_rule("GW306", "rate-above-base", "a rate above the controller's own")
 def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Frequencies of packages and of the watchdog above the base rate."""
     series, _ = controller(cell.document)
@@ -37,12 +33,7 @@ def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(position, message, hint=f"ask for {series.base_rate} or less")
 
 
-@cell_rule(
-    "GW307",
-    "rate-not-a-divisor",
-    "a rate that the controller cannot make",
-    Severity.WARNING,
-)
+@cell_rule("GW307", "rate-not-a-divisor", "a rate that the controller cannot make", Severity.WARNING)
 def rate_not_a_divisor(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Frequencies between two steps of the controller."""
     robot = cell.document.part(Robot)
@@ -60,11 +51,7 @@ def rate_not_a_divisor(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     yield rule.at(robot.at("frequency"), message, hint=hint)
 
 
-@cell_rule(
-    "GW314",
-    "rate-too-low",
-    "a rate of less than one package in ten seconds",
-)
+@cell_rule("GW314", "rate-too-low", "a rate of less than one package in ten seconds")
 def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Frequencies below 0.1 Hz that are not 0."""
     robot = cell.document.part(Robot)
@@ -74,11 +61,7 @@ def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(robot.at("frequency"), message, hint=hint)
 
 
-@cell_rule(
-    "GW607",
-    "stale-too-soon",
-    "stale_after shorter than the time between two packages",
-)
+@cell_rule("GW607", "stale-too-soon", "stale_after shorter than the time between two packages")
 def stale_too_soon(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`stale_after` below the package period."""
     robot = cell.document.part(Robot)

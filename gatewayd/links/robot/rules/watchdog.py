@@ -18,11 +18,7 @@ __all__: list[str] = []
 _WATCHDOG_TYPES = (DataType.INT32, DataType.DOUBLE)
 
 
-@cell_rule(
-    "GW302",
-    "watchdog-field",
-    "a watchdog on a field that cannot be fed",
-)
+@cell_rule("GW302", "watchdog-field", "a watchdog on a field that cannot be fed")
 def watchdog_field(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Watchdogs on outputs and on fields that are no plain number."""
     watchdog = fed_field(cell.document)
@@ -38,11 +34,7 @@ def watchdog_field(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(position, f"`{name}` comes from the robot and cannot be fed", hint=hint)
 
 
-@cell_rule(
-    "GW311",
-    "watchdog-mapped",
-    "a variable on the register of the watchdog",
-)
+@cell_rule("GW311", "watchdog-mapped", "a variable on the register of the watchdog")
 def watchdog_mapped(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Input variables on the watchdog's field."""
     watchdog = fed_field(cell.document)
@@ -58,10 +50,7 @@ def watchdog_mapped(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 
 @cell_rule(
-    "GW515",
-    "unsupervised-watchdog",
-    "a watchdog that requires a writer without a timeout",
-    Severity.WARNING,
+    "GW515", "unsupervised-watchdog", "a watchdog that requires a writer without a timeout", Severity.WARNING
 )
 def unsupervised_watchdog(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Required writers without `timeout`."""
