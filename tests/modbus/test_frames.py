@@ -4,7 +4,7 @@ import pytest
 
 from gatewayd.modbus.frames import (
     BUFFER_SIZE,
-    GREATEST_FRAME,
+    MAX_FRAME,
     FrameBuffer,
     FramingError,
     ModbusFrame,
@@ -61,7 +61,7 @@ def test_the_buffer_moves_the_rest_to_the_front() -> None:
 def test_the_buffer_never_grows_and_never_fills_up() -> None:
     """The rest is always less than a frame."""
     buffer = FrameBuffer(1)
-    assert len(buffer.data) == 2 * GREATEST_FRAME
-    buffer.discard(0, GREATEST_FRAME - 1)
-    assert len(buffer.space[0]) == GREATEST_FRAME + 1
-    assert len(buffer.data) == 2 * GREATEST_FRAME
+    assert len(buffer.data) == 2 * MAX_FRAME
+    buffer.discard(0, MAX_FRAME - 1)
+    assert len(buffer.space[0]) == MAX_FRAME + 1
+    assert len(buffer.data) == 2 * MAX_FRAME

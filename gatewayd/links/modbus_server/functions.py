@@ -18,8 +18,8 @@ from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.registers import (
-    GREATEST_BITS,
-    GREATEST_REGISTERS,
+    MAX_BITS,
+    MAX_REGISTERS,
     BitTable,
     RegisterImage,
     RegisterTable,
@@ -74,9 +74,9 @@ class Unit:
 Answer = bytes | ExceptionCode
 _Function = Callable[[Unit, Requester, bytes, float], Answer]
 
-_GREATEST_WRITTEN_BITS = 1968
-_GREATEST_WRITTEN_REGISTERS = 123
-_GREATEST_WRITTEN_WITH_READ = 121
+_MAX_WRITTEN_BITS = 1968
+_MAX_WRITTEN_REGISTERS = 123
+_MAX_WRITTEN_WITH_READ = 121
 _COIL_ON = 0xFF00
 _STATUS_END = status.BASE + status.LENGTH
 
@@ -121,7 +121,7 @@ def _read_bits(table: BitTable, pdu: bytes) -> Answer:
     if len(pdu) != 5:
         return ExceptionCode.ILLEGAL_VALUE
     address, count = _TWO_WORDS.unpack_from(pdu, 1)
-    if not 1 <= count <= GREATEST_BITS:
+    if not 1 <= count <= MAX_BITS:
         return ExceptionCode.ILLEGAL_VALUE
     if table.readable.reach[address] < count:
         return _unreadable(table.readable.mapped[address], count)
@@ -133,7 +133,7 @@ def _read_registers(unit: Unit, table: RegisterTable, pdu: bytes, now: float) ->
     if len(pdu) != 5:
         return ExceptionCode.ILLEGAL_VALUE
     address, count = _TWO_WORDS.unpack_from(pdu, 1)
-    if not 1 <= count <= GREATEST_REGISTERS:
+    if not 1 <= count <= MAX_REGISTERS:
         return ExceptionCode.ILLEGAL_VALUE
     refused = _refuse_registers(table, address, count)
     if refused is not None:
@@ -149,7 +149,7 @@ def _refuse_registers(table: RegisterTable, address: int, count: int) -> Excepti
 
 
 def _unreadable(mapped: int, count: int) -> ExceptionCode:
-    """Mapped, but held back because the robot has stopped telling; or not mapped at all."""
+    """Mapped, but held back because the robot no longer sends; or not mapped at all."""
     return ExceptionCode.TARGET_FAILED if mapped >= count else ExceptionCode.ILLEGAL_ADDRESS
 
 
@@ -186,7 +186,7 @@ def _write_coils(unit: Unit, requester: Requester, pdu: bytes, now: float) -> An
     if len(pdu) < 6:
         return ExceptionCode.ILLEGAL_VALUE
     address, count, size = _WRITE_MULTIPLE.unpack_from(pdu, 1)
-    if not 1 <= count <= _GREATEST_WRITTEN_BITS or size != (count + 7) >> 3 or len(pdu) != 6 + size:
+    if not 1 <= count <= _MAX_WRITTEN_BITS or size != (count + 7) >> 3 or len(pdu) != 6 + size:
         return ExceptionCode.ILLEGAL_VALUE
     packed = int.from_bytes(pdu[6:], "little")
     bits = [bool(packed >> position & 1) for position in range(count)]
@@ -197,7 +197,7 @@ def _write_multiple(unit: Unit, requester: Requester, pdu: bytes, now: float) ->
     if len(pdu) < 6:
         return ExceptionCode.ILLEGAL_VALUE
     address, count, size = _WRITE_MULTIPLE.unpack_from(pdu, 1)
-    if not 1 <= count <= _GREATEST_WRITTEN_REGISTERS or size != 2 * count or len(pdu) != 6 + size:
+    if not 1 <= count <= _MAX_WRITTEN_REGISTERS or size != 2 * count or len(pdu) != 6 + size:
         return ExceptionCode.ILLEGAL_VALUE
     return _write_registers(unit, requester, address, pdu[6:], now) or pdu[:5]
 
@@ -217,7 +217,7 @@ def _read_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
     if len(pdu) < 10:
         return ExceptionCode.ILLEGAL_VALUE
     first, count, address, written, size = _READ_WRITE.unpack_from(pdu, 1)
-    if not (1 <= count <= GREATEST_REGISTERS and 1 <= written <= _GREATEST_WRITTEN_WITH_READ):
+    if not (1 <= count <= MAX_REGISTERS and 1 <= written <= _MAX_WRITTEN_WITH_READ):
         return ExceptionCode.ILLEGAL_VALUE
     if size != 2 * written or len(pdu) != 10 + size:
         return ExceptionCode.ILLEGAL_VALUE
@@ -261,7 +261,7 @@ def _apply(
 
 
 def _refuse_undeclared(unit: Unit, requester: Requester, changes: list[Change], now: float) -> Refusal:
-    """A peer that may write nothing is told so even if it wrote what is there already."""
+    """A peer that may write nothing is refused even if it wrote what is there already."""
     variable: int | None = changes[0].variable if changes else None
     value: Value | None = changes[0].value if changes else None
     refusal = Refusal(Reason.NOT_WRITABLE, variable)

@@ -35,7 +35,7 @@ class PeerEvent:
     reason: str = ""
     """Why the connection ended, or could not begin."""
     repeats: int = 0
-    """How many equal events were not told since the last one."""
+    """How many equal events were not reported since the last one."""
 
 
 def address_of(host: str) -> Address:
@@ -61,19 +61,19 @@ def _within(address: Address, network: Network) -> bool:
 class DenialLog:
     """Lets one denial per address and interval through: a refused client may knock a hundred times a second."""
 
-    def __init__(self, interval: float = 60.0, greatest: int = 256) -> None:
+    def __init__(self, interval: float = 60.0, max_hosts: int = 256) -> None:
         self._interval = interval
-        self._greatest = greatest
-        self._told: dict[str, tuple[float, int]] = {}
+        self._max_hosts = max_hosts
+        self._reported: dict[str, tuple[float, int]] = {}
 
     def repeats(self, host: str, now: float) -> int | None:
         """How many denials of `host` were kept back before this one; None: keep this one back as well."""
-        told, kept_back = self._told.get(host, (-self._interval, 0))
-        if now - told < self._interval:
-            self._told[host] = (told, kept_back + 1)
+        reported, kept_back = self._reported.get(host, (-self._interval, 0))
+        if now - reported < self._interval:
+            self._reported[host] = (reported, kept_back + 1)
             return None
-        self._told.pop(host, None)
-        if len(self._told) >= self._greatest:
-            del self._told[next(iter(self._told))]
-        self._told[host] = (now, 0)
+        self._reported.pop(host, None)
+        if len(self._reported) >= self._max_hosts:
+            del self._reported[next(iter(self._reported))]
+        self._reported[host] = (now, 0)
         return kept_back

@@ -14,7 +14,7 @@ from gatewayd.loop import clock
 
 __all__ = ["ReadPoller"]
 
-_MOST_EVENTS = 32
+_MAX_EVENTS = 32
 """Sockets looked at together."""
 _LONGEST_TURN = 0.0002
 """Seconds after which other work of the loop has its turn, though more may have come in."""
@@ -51,7 +51,7 @@ class ReadPoller:
         now = clock.judged_now()
         end = now + _LONGEST_TURN
         # A client that waits for nothing has its next request under way by now: a look is cheaper than a sleep.
-        while now < end and (events := self._epoll.poll(0, _MOST_EVENTS)):
+        while now < end and (events := self._epoll.poll(0, _MAX_EVENTS)):
             for descriptor, _events in events:
                 reader = readers.get(descriptor)
                 if reader is not None:

@@ -223,19 +223,19 @@ def index_of(sketch: Sketch) -> Callable[[str], int]:
 
 @pytest.fixture
 def show(cell: Cell, index_of: Callable[[str], int]) -> Callable[..., None]:
-    """Lets the robot tell new values: `show(int_0=5)`."""
+    """Lets the robot send new values: `show(int_0=5)`."""
 
-    def tell(**values: Value) -> None:
+    def send(**values: Value) -> None:
         for name, value in values.items():
             cell.image.values[index_of(name)] = value
         cell.outputs_written(NOW)
 
-    return tell
+    return send
 
 
 @pytest.fixture
 def events() -> list[PeerEvent]:
-    """What the listener told of its connections."""
+    """What the listener reported of its connections."""
     return []
 
 

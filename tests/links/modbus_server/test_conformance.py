@@ -11,7 +11,7 @@ from gatewayd.links.modbus_server.listener import ModbusListener
 
 Ask = Callable[..., Awaitable[str]]
 
-PLC, HMI, STRANGER = "127.0.0.2", "127.0.0.3", "127.0.0.1"
+PLC, HMI, UNDECLARED = "127.0.0.2", "127.0.0.3", "127.0.0.1"
 
 READS = [
     ("01 0000 000a", "01 02 00 00", "coils"),
@@ -56,11 +56,11 @@ WRITES = [
     ("05 0000 0001", "85 03", "a coil neither on nor off"),
     ("05 00ff 1234", "85 03", "a coil's value is checked before its address"),
     ("05 00ff ff00", "85 02", "a coil that is not there"),
-    ("05 000a ff00", "85 02", "a coil that the robot tells"),
+    ("05 000a ff00", "85 02", "a coil that the robot sends"),
     ("05 0000 ff", "85 03", "a coil write cut short"),
     ("06 000a 0017", "06 00 0a 00 17", "one register"),
     ("06 000b 0001", "86 03", "one register of two"),
-    ("06 0064 0001", "86 02", "a register that the robot tells"),
+    ("06 0064 0001", "86 02", "a register that the robot sends"),
     ("06 0001 0001", "86 02", "a register that is not there"),
     ("06 000d 05dc", "06 00 0d 05 dc", "a scaled value on its limit"),
     ("06 000d 05dd", "86 03", "a scaled value over its limit"),
@@ -69,8 +69,8 @@ WRITES = [
     ("06 0000 0001", "06 00 00 00 01", "a register of bits, one's own changed"),
     ("06 0000 8003", "86 02", "a register of bits, with a bit that only another may write"),
     ("06 0000 7ffd", "06 00 00 7f fd", "bits that are not mapped are ignored"),
-    ("06 0014 0001", "06 00 14 00 01", "a register of bits, with one that the robot tells left alone"),
-    ("06 0014 0003", "86 02", "a register of bits, with one that the robot tells changed"),
+    ("06 0014 0001", "06 00 14 00 01", "a register of bits, with one that the robot sends left alone"),
+    ("06 0014 0003", "86 02", "a register of bits, with one that the robot sends changed"),
     ("0f 0000 000a 02 ff03", "0f 00 00 00 0a", "coils"),
     ("0f 0000 000a 01 ff", "8f 03", "coils with a byte too few"),
     ("0f 0000 000a 02 ff", "8f 03", "coils cut short"),
@@ -78,7 +78,7 @@ WRITES = [
     ("0f 0000 07b1 f7" + "00" * 247, "8f 03", "1969 coils"),
     ("0f 0000 07b0 f6" + "00" * 246, "8f 02", "1968 coils: the quantity is legal, the range is not"),
     ("0f 0009 0003 01 00", "8f 02", "coils that go over the last one"),
-    ("0f 0009 0002 01 00", "8f 02", "coils with one that the robot tells"),
+    ("0f 0009 0002 01 00", "8f 02", "coils with one that the robot sends"),
     ("10 000b 0002 04 fffffffe", "10 00 0b 00 02", "a value of two registers"),
     ("10 000a 0003 06 000100000002", "10 00 0a 00 03", "two values"),
     ("10 000a 0002 04 00010000", "90 03", "a value and half of the next one"),
@@ -104,9 +104,9 @@ MASKS = [
     ("16 000a 00f2 0025", "16 00 0a 00 f2 00 25", "a register"),
     ("16 0000 fffe 0001", "16 00 00 ff fe 00 01", "one bit of a register"),
     ("16 0000 fffd 0002", "96 02", "a bit that only another may write"),
-    ("16 0014 fffd 0002", "96 02", "a bit that the robot tells"),
+    ("16 0014 fffd 0002", "96 02", "a bit that the robot sends"),
     ("16 000b 0000 0001", "96 03", "one register of two"),
-    ("16 01f4 0000 0001", "96 02", "a register that the robot tells"),
+    ("16 01f4 0000 0001", "96 02", "a register that the robot sends"),
     ("16 0001 0000 0001", "96 02", "a register that is not there"),
     ("16 000a 00f2", "96 03", "a mask cut short"),
     ("16 000a 00f2 0025 00", "96 03", "a mask with a byte too many"),
@@ -179,8 +179,8 @@ async def test_an_unknown_unit_does_not_respond(ask: Ask, pdu: str) -> None:
 )
 async def test_a_peer_that_is_no_writer_may_only_read(ask: Ask, pdu: str) -> None:
     """Not even what is there already: success must not depend on the value."""
-    assert await ask(pdu, STRANGER) == f"{int(pdu[:2], 16) | 0x80:02x} 02"
-    assert await ask("03 000a 0001", STRANGER) == "03 02 00 00"
+    assert await ask(pdu, UNDECLARED) == f"{int(pdu[:2], 16) | 0x80:02x} 02"
+    assert await ask("03 000a 0001", UNDECLARED) == "03 02 00 00"
 
 
 async def test_what_another_owns_is_busy(ask: Ask) -> None:

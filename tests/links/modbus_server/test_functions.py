@@ -83,7 +83,9 @@ def test_reads_are_never_recorded_as_refusals(cell: Cell, unit: Unit) -> None:
     assert cell.health.writes_refused == 0
 
 
-def test_a_stranger_is_recorded_with_what_it_wanted(cell: Cell, unit: Unit, index_of: IndexOf) -> None:
+def test_an_undeclared_peer_is_recorded_with_what_it_wanted(
+    cell: Cell, unit: Unit, index_of: IndexOf
+) -> None:
     assert ask(unit, "06 000a 0005", None) == "86 02"
     assert cell.last_refusal is not None
     assert cell.last_refusal.refusal == Refusal(Reason.NOT_WRITABLE, index_of("part"))
@@ -143,7 +145,7 @@ def test_locks_are_taken_and_given_back_by_the_status_block(
     assert ask(unit, f"06 ea88 {number:04x}") == f"06 ea 88 00 {number:02x}"
     assert cell.ownership.held_by(PLC)
     assert ask(unit, f"06 ea88 {number:04x}", HMI) == "86 06"
-    assert ask(unit, f"03 {60192 + index_of('part'):04x} 0001") == "03 02 00 01", "the owner is told"
+    assert ask(unit, f"03 {60192 + index_of('part'):04x} 0001") == "03 02 00 01", "the owner is shown"
     assert ask(unit, f"06 ea89 {number:04x}") == f"06 ea 89 00 {number:02x}"
     assert not cell.ownership.held_by(PLC)
 

@@ -19,7 +19,7 @@ from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import Unit
 from gatewayd.links.modbus_server.listener import ModbusListener
 from gatewayd.links.modbus_server.session import Access, Session
-from gatewayd.modbus.frames import GREATEST_FRAME
+from gatewayd.modbus.frames import MAX_FRAME
 
 CASES = int(os.environ.get("GATEWAYD_FUZZ_CASES", "5000"))
 NOW = 1000.0
@@ -96,13 +96,13 @@ def test_any_stream_gets_whole_answers(cell: Cell, unit: Unit) -> None:
             expected = (int.from_bytes(data[asked : asked + 2], "big"), 0, data[asked + 6])
             assert (transaction, protocol, number) == expected, f"case {case}"
             assert function | 0x80 == data[asked + 7] | 0x80, f"case {case}"
-            assert 6 + length <= GREATEST_FRAME, f"case {case}"
+            assert 6 + length <= MAX_FRAME, f"case {case}"
             asked += 6 + size
             position += 6 + length
         assert position == len(answers), f"case {case}"
         assert len(session.buffer.data) == len(Session().buffer.data)
         if not session.broken:
-            assert len(data) - asked == session.buffer.end < GREATEST_FRAME, f"case {case}"
+            assert len(data) - asked == session.buffer.end < MAX_FRAME, f"case {case}"
     assert len(cell.events) <= 4096
 
 

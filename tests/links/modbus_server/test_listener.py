@@ -21,7 +21,7 @@ from gatewayd.links.modbus_server import listener as server
 from gatewayd.links.modbus_server.listener import ListenError, ModbusListener
 from gatewayd.links.modbus_server.peers import PeerEvent, PeerEventKind
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.modbus.frames import BUFFER_SIZE, GREATEST_FRAME
+from gatewayd.modbus.frames import BUFFER_SIZE, MAX_FRAME
 
 Ask = Callable[..., Awaitable[str]]
 PlanOf = Callable[..., ModbusPlan]
@@ -50,7 +50,7 @@ async def until(condition: Callable[[], bool]) -> None:
             await asyncio.sleep(0.005)
 
 
-async def test_a_port_that_is_taken_is_told_with_a_remedy(listener: ModbusListener) -> None:
+async def test_a_port_that_is_taken_is_reported_with_a_remedy(listener: ModbusListener) -> None:
     second = ModbusListener("127.0.0.1", listener.port)
     with pytest.raises(ListenError) as raised:
         await second.start()
@@ -60,7 +60,7 @@ async def test_a_port_that_is_taken_is_told_with_a_remedy(listener: ModbusListen
     await second.close()
 
 
-async def test_an_address_of_another_machine_is_told_with_a_remedy() -> None:
+async def test_an_address_of_another_machine_is_reported_with_a_remedy() -> None:
     listener = ModbusListener("203.0.113.1", 0)
     with pytest.raises(ListenError, match="no such address"):
         await listener.start()
@@ -92,7 +92,7 @@ async def test_closing_is_quick_and_ends_every_connection(
     assert not live_cell.listeners
 
 
-async def test_tells_who_comes_and_goes(
+async def test_reports_who_comes_and_goes(
     listener: ModbusListener, events: list[PeerEvent], live_cell: Cell
 ) -> None:
     reader, writer = await dial(listener, "127.0.0.3")
@@ -275,7 +275,7 @@ async def test_a_peer_that_does_not_read_is_not_read_from_and_then_dropped(
         await asyncio.sleep(0.001)
         unsent = max([unsent, *(one.wire.get_write_buffer_size() for one in listener._connections)])
     assert dropped
-    assert 0 < unsent < BUFFER_SIZE // len(READ) * GREATEST_FRAME
+    assert 0 < unsent < BUFFER_SIZE // len(READ) * MAX_FRAME
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 20_000
     assert events[-1].reason == "did not read its answers for 0.3 s"
     flood.close()

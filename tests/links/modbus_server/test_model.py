@@ -1,4 +1,4 @@
-"""Random requests of two writers and a stranger against a model of one dictionary."""
+"""Random requests of two writers and an undeclared peer against a model of one dictionary."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import make_codec
 
 NOW = 1000.0
-PLC, HMI, STRANGER = 0, 1, None
-WRITERS = st.sampled_from([PLC, HMI, STRANGER])
+PLC, HMI, UNDECLARED = 0, 1, None
+WRITERS = st.sampled_from([PLC, HMI, UNDECLARED])
 
 # Registers 0..5 are uint16 limited to 0..999, 6 and 7 one int32, 8 has bits 0..3; coils 0..3 are those bits again.
 NUMBERS, WIDE, BITS = range(6), 6, 8
@@ -162,7 +162,7 @@ class Requests(RuleBasedStateMachine):
 
     @rule(address=st.integers(0, 10), count=st.integers(1, 10))
     def read_registers(self, address: int, count: int) -> None:
-        answer = self.ask(STRANGER, struct.pack(">BHH", 3, address, count))
+        answer = self.ask(UNDECLARED, struct.pack(">BHH", 3, address, count))
         if address + count > BITS + 1:
             assert answer == bytes((0x83, 2))
         else:
@@ -170,8 +170,8 @@ class Requests(RuleBasedStateMachine):
 
     @invariant()
     def coils_and_registers_tell_the_same(self) -> None:
-        assert self.ask(STRANGER, struct.pack(">BHH", 1, 0, 4))[2] == self.word(BITS)
-        assert self.ask(STRANGER, struct.pack(">BHH", 3, 0, 9))[2:] == struct.pack(
+        assert self.ask(UNDECLARED, struct.pack(">BHH", 1, 0, 4))[2] == self.word(BITS)
+        assert self.ask(UNDECLARED, struct.pack(">BHH", 3, 0, 9))[2:] == struct.pack(
             ">9H", *map(self.word, range(9))
         )
 

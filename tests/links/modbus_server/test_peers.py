@@ -43,7 +43,7 @@ def test_an_access_list_names_who_may(plan_of: Callable[..., ModbusPlan]) -> Non
     assert not may_connect(ip_address("fe80::9"), plan)
 
 
-def test_denials_of_one_address_are_told_once_per_interval() -> None:
+def test_denials_of_one_address_are_reported_once_per_interval() -> None:
     log = DenialLog(60.0)
     assert log.repeats("10.0.0.9", 0.0) == 0
     assert log.repeats("10.0.0.9", 1.0) is None
@@ -53,7 +53,7 @@ def test_denials_of_one_address_are_told_once_per_interval() -> None:
 
 
 def test_denials_of_a_thousand_addresses_take_no_more_room_than_a_few() -> None:
-    log = DenialLog(60.0, greatest=8)
+    log = DenialLog(60.0, max_hosts=8)
     for number in range(1000):
         assert log.repeats(str(number), 0.0) == 0
-    assert len(log._told) == 8
+    assert len(log._reported) == 8

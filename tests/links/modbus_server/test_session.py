@@ -41,7 +41,7 @@ def session(unit: Unit) -> Session:
 @pytest.mark.parametrize(
     "pdu", ["06 000a 0005", "06 ea80 0001", "06 3a98 0001"], ids=["value", "lock", "nothing"]
 )
-def test_a_refused_stranger_is_named_by_its_address(cell: Cell, unit: Unit, pdu: str) -> None:
+def test_a_refused_undeclared_peer_is_named_by_its_address(cell: Cell, unit: Unit, pdu: str) -> None:
     """Whoever mends the mapping has to know what to write under `writers:`."""
     session = Session()
     session.serve({1: Access(unit, Requester(None, "192.168.1.77"))})
@@ -124,7 +124,7 @@ def test_answers_of_one_segment_are_joined(session: Session) -> None:
     assert len(session.received(len(data), NOW)) == 2 * 11
 
 
-def test_what_is_no_frame_is_told_after_the_answers_before_it(session: Session) -> None:
+def test_what_is_no_frame_is_reported_after_the_answers_before_it(session: Session) -> None:
     answers = feed(session, stream("03 000a 0001") + bytes.fromhex("0002 0001 0006 01 03 000a 0001"))
     assert answers == bytes.fromhex("0001 0000 0005 01 03 02 0000")
     assert session.broken == "protocol id 1 instead of 0"
