@@ -185,11 +185,7 @@ class PythonCanBus(SupervisedBus):
                     break
         except Exception as error:  # noqa: BLE001 - drivers let through whatever the nonsense of an adapter made of them
             failure = error
-        if frames:
-            self.counters.received += len(frames)
-            self._handler.on_frames(frames, now)
-        for report in errors:
-            self._take_error(report, now)
+        self._hand_over(frames, errors, now)
         if failure is not None:
             self._lose(failure)
         return exhausted or failure is not None

@@ -189,11 +189,7 @@ class SocketCanBus(SupervisedBus):
             pass
         except OSError as error:
             failure = error
-        if frames:
-            self.counters.received += len(frames)
-            self._handler.on_frames(frames, now)
-        for report in errors:
-            self._take_error(report, now)
+        self._hand_over(frames, errors, now)
         if failure is not None:
             self._failed(failure)
 

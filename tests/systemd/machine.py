@@ -14,7 +14,7 @@ import signal
 import subprocess
 from pathlib import Path
 
-from tests.kernel.uml import Boot, place_of_memory, without_xstate
+from tests.kernel.uml import TUNABLES, Boot, launch
 
 __all__ = ["LIMIT", "boot", "missing"]
 
@@ -28,9 +28,6 @@ _MODULES = (
     "drivers/net/can/dev/can-dev",
     "drivers/net/can/vcan",
 )
-
-# Between processes the kernel keeps no more of the vector registers than SSE has.
-_TUNABLES = "glibc.cpu.hwcaps=-AVX2,-AVX,-AVX512F,-AVX512VL,-ERMS,-AVX_Fast_Unaligned_Load,-XSAVEC,-XSAVE"
 
 _INIT = """\
 #!/bin/sh
@@ -111,7 +108,7 @@ def boot(results: Path, scenario: Path) -> int:
     init.write_text(
         _INIT.format(
             results=results,
-            tunables=_TUNABLES,
+            tunables=TUNABLES,
             python="/usr/bin/python3",
             modules=shlex.join(_MODULES),
             masked=_MASKED,
@@ -121,15 +118,7 @@ def boot(results: Path, scenario: Path) -> int:
     kernel = ["linux.uml", f"mem={MEMORY >> 20}M", "rootfstype=hostfs", "ro", f"init={init}", "quiet"]
     kernel += ["con=null", "con0=null,fd:1"]
     with (results / "kernel.log").open("wb") as log:
-        machine = subprocess.Popen(
-            kernel,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            preexec_fn=without_xstate,  # noqa: PLW1509 - tests start no threads
-            start_new_session=True,
-            env={**os.environ, "TMPDIR": place_of_memory(MEMORY)},
-        )
+        machine = launch(kernel, MEMORY, log)
     try:
         return machine.wait(LIMIT)
     except subprocess.TimeoutExpired:
