@@ -97,6 +97,8 @@ class LinkLanguage:
 
     writer_example: ClassVar[str] = ""
     """How a writer is made known: `modbus: 192.168.1.20`."""
+    way: ClassVar[str] = ""
+    """What people call writing by this kind, where it is only one service; empty: as its key."""
     supervision_example: ClassVar[str] = ""
     """How it is supervised by this kind: `node: 1, heartbeat: 1s`; empty: by `timeout` only."""
     lost_by: ClassVar[str] = ""
@@ -116,11 +118,11 @@ class LinkLanguage:
 
     def ways_of_writer(self, writer: WriterSpec) -> frozenset[str]:
         """Services by which the writer writes, as people call them."""
-        return frozenset()
+        return frozenset({self.way or self.key} if self.knows(writer) else ())
 
     def ways_of_variable(self, variable: ExpandedVariable, cell: ExpandedCell) -> frozenset[str]:
         """Services by which the variable can be written."""
-        return frozenset()
+        return frozenset({self.way or self.key} if self.places_of(variable.part, cell.document) else ())
 
     def writes_whole(
         self, writer: WriterSpec, variables: Sequence[ExpandedVariable], cell: ExpandedCell

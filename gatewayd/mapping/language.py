@@ -16,20 +16,16 @@ from gatewayd.mapping import syntax
 from gatewayd.mapping.model import Group, VariablePolicy, VariableSpec, WriterSpec
 from gatewayd.mapping.scalars import CellName, Name, refuse
 from gatewayd.mapping.section import Section
+from gatewayd.report.wording import alternatives
 
-__all__ = ["FILE", "VARIABLE", "WRITER", "is_known"]
-
-
-def is_known(writer: WriterSpec) -> bool:
-    """Whether the writer can be told from others by any kind of link."""
-    return any(language.knows(writer) for language in languages())
+__all__ = ["FILE", "VARIABLE", "WRITER"]
 
 
 def _known(writer: WriterSpec) -> WriterSpec:
-    if not is_known(writer):
+    if not any(language.knows(writer) for language in languages()):
         having = [language for language in languages() if language.writer_keys is not None]
-        keys = " or ".join(f"`{language.key}`" for language in having)
-        examples = " or ".join(f"`{language.writer_example}`" for language in having)
+        keys = alternatives([language.key for language in having])
+        examples = alternatives([language.writer_example for language in having])
         refuse(
             syntax.MISSING_KEY,
             f"a writer needs the key {keys}, by which it is known",

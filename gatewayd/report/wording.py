@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterable, Sequence
 
 __all__ = [
+    "alternatives",
     "cob",
     "did_you_mean",
     "family",
@@ -60,3 +61,9 @@ def family(first: str, last: str) -> str:
     head = first.rstrip("0123456789]")
     tail = "]" if first.endswith("]") else ""
     return f"{first.removesuffix(tail)}..{last[len(head) :]}" if last.startswith(head) else f"{first}..{last}"
+
+
+def alternatives(texts: Sequence[str]) -> str:
+    """In backticks: "`a`, `b` or `c`"."""
+    *others, last = (f"`{text}`" for text in texts)
+    return f"{', '.join(others)} or {last}" if others else last

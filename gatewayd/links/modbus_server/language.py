@@ -29,7 +29,6 @@ from gatewayd.modbus.codec import TYPES, Codec
 
 __all__ = ["LANGUAGE"]
 
-_WAY: Final = frozenset({"Modbus"})
 _MAX_WRITE: Final = {Area.HOLDING: 123, Area.COIL: 1968}
 """Registers and coils that one request writes at most (Application Protocol V1.1b3, 6.11 and 6.12)."""
 _SYNONYMS: Final = {
@@ -80,6 +79,7 @@ class ModbusLanguage(LinkLanguage):
         **{(Modbus, key): f"`{key}` belongs to the writer" for key in ("grace", "timeout", "timeout_counts")},
     }
     synonyms: ClassVar[Mapping[tuple[str, str], str]] = _SYNONYMS
+    way = "Modbus"
     writer_example = "modbus: 192.168.1.20"
     place_example = "modbus: N"
 
@@ -90,14 +90,6 @@ class ModbusLanguage(LinkLanguage):
     def names(self, writer: WriterSpec) -> Sequence[str]:
         """Its addresses and networks."""
         return [peer(network) for network in writer.by(ModbusWriter).modbus]
-
-    def ways_of_writer(self, writer: WriterSpec) -> frozenset[str]:
-        """Modbus, where it is known by an address."""
-        return _WAY if self.knows(writer) else frozenset()
-
-    def ways_of_variable(self, variable: ExpandedVariable, cell: ExpandedCell) -> frozenset[str]:
-        """Modbus, where the variable has an address."""
-        return _WAY if variable.spec.by(ModbusPlaces).modbus else frozenset()
 
     def writes_whole(
         self, writer: WriterSpec, variables: Sequence[ExpandedVariable], cell: ExpandedCell

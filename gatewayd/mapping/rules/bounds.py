@@ -8,6 +8,7 @@ from gatewayd.links.registry import definer, languages
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
+from gatewayd.report.wording import alternatives
 
 __all__ = ["MAX_VARIABLES", "MAX_WRITERS"]
 
@@ -51,9 +52,7 @@ def duplicate_cell(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagno
 @cell_rule("GW221", "unmapped-variable", "a variable that no fieldbus can see", Severity.WARNING)
 def unmapped_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Lines without a place by any kind of link."""
-    examples = " or ".join(
-        f"`{language.place_example}`" for language in languages() if language.place_example
-    )
+    examples = alternatives([language.place_example for language in languages() if language.place_example])
     for part in cell.document.variables.values():
         if not any(language.places_of(part, cell.document) for language in languages()):
             message = f"`{part.name}` ({definer().named(part)}) has no address on any fieldbus"
