@@ -24,7 +24,7 @@ from typing import IO, Any
 
 __all__ = ["LIMIT", "REPORTS", "TUNABLES", "Boot", "launch"]
 
-LIMIT = 90
+LIMIT = 180
 """Seconds for one boot with everything that runs in it."""
 REPORTS = "GATEWAYD_KERNEL_REPORTS"
 """Environment variable that names the file for reports; set inside."""
