@@ -37,6 +37,7 @@ SLOW = (
 """Files and directories whose tests are all slow; elsewhere a test says so itself."""
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """One more than there are processors: much of the time is spent waiting for something real to happen."""
     return len(os.sched_getaffinity(0)) + 1
