@@ -378,7 +378,7 @@ def log_calls() -> dict[str, list[str]]:
         for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
             if _is_logging(call):
                 text = ast.literal_eval(call.args[0])
-                found.setdefault(text, set()).add(f"{call.func.attr} {_fields(call, tree)}".strip())  # type: ignore[attr-defined]
+                found.setdefault(text, set()).add(f"{_method(call)} {_fields(call, tree)}".strip())
     return {text: sorted(calls) for text, calls in found.items()}
 
 
@@ -396,6 +396,12 @@ def _is_logging(call: ast.Call) -> bool:
         and bool(call.args)
         and isinstance(call.args[0], ast.Constant)
     )
+
+
+def _method(call: ast.Call) -> str:
+    assert isinstance(call.func, ast.Attribute)
+    is_exception = any(keyword.arg == "exc_info" for keyword in call.keywords)
+    return "exception" if is_exception else call.func.attr
 
 
 def _fields(call: ast.Call, tree: ast.Module) -> str:
