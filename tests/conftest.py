@@ -25,6 +25,8 @@ settings.load_profile("ordinary")
 HERE = Path(__file__).parent
 SLOW = (
     "cli/test_demo.py",
+    "demo/test_scene.py",
+    "demo/test_snapshot.py",
     "docs",
     "e2e",
     "kernel",

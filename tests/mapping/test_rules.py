@@ -343,9 +343,9 @@ def test_the_largest_cell_is_judged_in_bounded_time() -> None:
     lines = "".join(
         f"  v{n}: {{robot: output_double_register_{n % 48}, modbus: {n % 40}}}\n" for n in range(1000)
     )
-    started = time.perf_counter()
+    started = time.process_time()
     found = findings(lines)
-    assert time.perf_counter() - started < 10
+    assert time.process_time() - started < 10
     assert {rule for rule, _ in found} == {"GW214"}
 
 

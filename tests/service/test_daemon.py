@@ -162,6 +162,7 @@ async def test_a_link_that_ends_by_a_defect_is_started_again(
     assert len([record for record in caplog.records if "internal error" in record.getMessage()]) == 2
 
 
+@pytest.mark.slow
 async def test_a_link_that_rests_after_a_defect_turns_and_a_core_that_fails_does_not(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -209,6 +209,7 @@ async def test_a_real_daemon_is_ready_without_its_robot_and_its_port(
             await asyncio.gather(*tasks)
 
 
+@pytest.mark.slow
 async def test_every_part_of_a_real_daemon_turns_whatever_its_peers_do() -> None:
     """A robot that is there, one whose host accepts and never says a word, one that refuses, a port that is taken."""
     with socket.socket() as dumb:

@@ -180,14 +180,14 @@ def test_emergencies_reach_the_master(master: Master) -> None:
 
 def test_heartbeat_of_the_master_is_watched(master: Master) -> None:
     node = master.node
-    node.sdo[0x1016][1].raw = 1 << 16 | 50
+    node.sdo[0x1016][1].raw = 1 << 16 | 300
     node.nmt.state = "OPERATIONAL"
     node.rpdo.read()
     node.rpdo[2].map[0].raw = 5
     node.rpdo[2].transmit()
     master.until(lambda: master.values("ints_in[0]") == [5])
     beat = master.network.send_periodic(0x701, b"\5", 0.01)
-    time.sleep(0.2)
+    time.sleep(0.6)
     assert node.emcy.log == []
     beat.stop()
     master.until(lambda: node.emcy.log)
@@ -214,9 +214,9 @@ def test_lss_master_finds_and_configures_a_node_without_node_id() -> None:
         network.subscribe(0x700 + NODE, lambda *_: booted.set())
         lss.send_switch_state_global(lss.WAITING_STATE)
         assert booted.wait(SECONDS)
-        assert network.add_node(canopen.RemoteNode(NODE, no_sheet)).sdo.upload(0x1018, 4) == address[
-            3
-        ].to_bytes(4, "little")
+        node = network.add_node(canopen.RemoteNode(NODE, no_sheet))
+        node.sdo.RESPONSE_TIMEOUT = SECONDS
+        assert node.sdo.upload(0x1018, 4) == address[3].to_bytes(4, "little")
     finally:
         network.disconnect()
         device.power_off()
