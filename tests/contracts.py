@@ -31,8 +31,10 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import PRECEDENCE, Reason, Refusal
 from gatewayd.core.requester import Requester
-from gatewayd.core.status import BASE, FIELDS, HEADER_WORDS, LENGTH, TABLES, StatusBlock
+from gatewayd.core.status import StatusBlock
+from gatewayd.core.status_layout import BASE, HEADER_WORDS, LENGTH, TABLES
 from gatewayd.links.canopen_node.status_objects import StatusObjects
+from gatewayd.links.registry import status_fields
 from gatewayd.logs.events import EventLog
 from gatewayd.logs.records import Format, configure
 from gatewayd.mapping.diagnostics import Diagnostic, Rule
@@ -206,9 +208,7 @@ FIGURES: Mapping[str, object] = {
     "watchdog_fed": True,
     "writes_accepted": 1_000_005,
     "writes_refused": 1_000_006,
-    "modbus_connections": 6,
-    "can_bus": 5,
-    "nmt_state": 127,
+    "words": {"modbus_connections": 6, "can_bus": 5, "nmt_state": 127},
 }
 """A value for every figure of a cell's header."""
 
@@ -250,10 +250,10 @@ def set_figures(cell: Cell, figures: Mapping[str, object]) -> None:
 
 def status_block() -> object:
     """Where what lies, and the bytes of a header."""
-    header = StatusBlock(cell_with_every_figure()).read(0, HEADER_WORDS, 10.0)
+    header = StatusBlock(cell_with_every_figure(), status_fields()).read(0, HEADER_WORDS, 10.0)
     return [
         f"{BASE}, {LENGTH} words",
-        *([field.offset, field.words, field.name, field.meaning] for field in FIELDS),
+        *([field.offset, field.words, field.name, field.meaning] for field in status_fields()),
         *([table.offset, table.words, table.name, table.meaning] for table in TABLES),
         *(header[at : at + 16].hex(" ", 2) for at in range(0, len(header), 16)),
     ]

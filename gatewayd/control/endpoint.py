@@ -80,7 +80,7 @@ class Endpoint:
         if isinstance(error, OSError | ImportError):
             log.error("no control socket", extra=fields(socket=str(self.path), reason=reason_of(error)))
         else:
-            log.error("internal error, starting the control interface again", exc_info=error)
+            log.exception("internal error, starting the control interface again")  # noqa: LOG004 - called by a handler
 
     async def _serve(self) -> None:
         """Serve until somebody removes the socket's file."""

@@ -386,7 +386,7 @@ class Cell:
         self.writers.succeed(former.writers, match.writers)
         self.freshness.succeed(former.freshness)
         self.lag.succeed(former.lag)
-        self.health = replace(former.health)
+        self.health = replace(former.health, words={})
         self.events.succeed(former.events, match)
         last = former.last_refusal
         self.last_refusal = last.translated(match) if last is not None else None

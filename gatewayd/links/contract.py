@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     # A check, which has no use for a running cell, imports this module.
     from gatewayd.core.cell import Cell
     from gatewayd.core.definition import CellDefinition
-    from gatewayd.core.status import StatusField
+    from gatewayd.core.status_layout import StatusField
     from gatewayd.mapping.plan import LinkPlan, Plan
 
 __all__ = [

@@ -7,6 +7,7 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
+from gatewayd.core.status_layout import FIELDS, StatusField
 from gatewayd.links.contract import LinkKind, LinkRuntime
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ __all__ = [
     "language_of",
     "languages",
     "runtime_of",
+    "status_fields",
     "tables",
 ]
 
@@ -39,6 +41,13 @@ def kinds() -> tuple[LinkKind, ...]:
     """All kinds, in order."""
     found = (import_module(f"{package}.declaration").KIND for package in LINK_KINDS)
     return tuple(kind for kind in found if isinstance(kind, LinkKind))
+
+
+@cache
+def status_fields() -> tuple[StatusField, ...]:
+    """All numbers of the status block's header, the core's and those of all kinds, by address."""
+    fields = (*FIELDS, *(field for kind in kinds() for field in kind.status_fields))
+    return tuple(sorted(fields, key=lambda field: field.offset))
 
 
 def kind_of(key: str) -> LinkKind:

@@ -156,7 +156,6 @@ class Daemon:
         cell, former = runtime.cell, runtime.links
         stranded = runtime.succeed(plan, now)
         self._show(runtime.cell)
-        runtime.cell.health.modbus_connections = 0
         successors[cell] = runtime.cell
         ended = {
             name: self._end(link) for name, link in former.items() if runtime.links.get(name) is not link

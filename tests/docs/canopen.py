@@ -16,7 +16,7 @@ from gatewayd.canopen.identity import REACTIONS
 from gatewayd.canopen.lss import Command
 from gatewayd.canopen.nmt import ALLOWED, NmtState, Service
 from gatewayd.core.refusal import Reason
-from gatewayd.core.status import FIELDS, TABLES
+from gatewayd.core.status_layout import TABLES
 from gatewayd.links.canopen_node.bus_load import BIT_RATES, frame_bits
 from gatewayd.links.canopen_node.communication_errors import OVERRUN_TIME
 from gatewayd.links.canopen_node.eds import objects_of
@@ -25,6 +25,7 @@ from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.robot_errors import QUIET
 from gatewayd.links.canopen_node.status_objects import HEADER, TABLE_INDICES
 from gatewayd.links.canopen_node.variables import ABORT_OF
+from gatewayd.links.registry import status_fields
 from gatewayd.mapping.loader import load
 
 __all__ = ["PARTS", "table"]
@@ -185,7 +186,7 @@ def status_objects() -> str:
     by_index = {one.index: one for one in _sample()}
     header = by_index[HEADER]
     rows: list[tuple[object, ...]] = []
-    for entry, field in zip(header.entries[1:], FIELDS, strict=True):
+    for entry, field in zip(header.entries[1:], status_fields(), strict=True):
         assert entry.name == field.name
         rows.append(
             (f"{HEADER:04X}h", f"{entry.subindex:02X}", f"`{entry.name}`", *_facts(entry)[:2], field.meaning)

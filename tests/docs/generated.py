@@ -25,9 +25,9 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.program import STATES
 from gatewayd.core.refusal import PRECEDENCE, Reason
-from gatewayd.core.status import BASE, FIELDS, TABLES
+from gatewayd.core.status_layout import BASE, TABLES
 from gatewayd.links.modbus_server.functions import EXCEPTION_OF, ExceptionCode
-from gatewayd.links.registry import kinds
+from gatewayd.links.registry import kinds, status_fields
 from gatewayd.logs.events import LEVELS
 from gatewayd.logs.records import LEVELS as LEVEL_NAMES
 from gatewayd.mapping.schema import mapping_schema
@@ -213,7 +213,7 @@ def _places(offset: int, words: int) -> tuple[str, str]:
 
 def status_header() -> str:
     """The numbers of the status block."""
-    rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in FIELDS]
+    rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in status_fields()]
     return table(("address", "4xxxxx", "name", "meaning"), rows)
 
 

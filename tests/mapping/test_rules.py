@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.core import status
+from gatewayd.core import status_layout as status
 from gatewayd.links.modbus_server.rules import places
 from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
 from gatewayd.mapping.loader import load, load_together

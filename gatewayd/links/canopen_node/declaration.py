@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
+from gatewayd.core.status_layout import StatusField
 from gatewayd.links.canopen_node.description import description
 from gatewayd.links.canopen_node.plan import CanopenPlan, by_name
 from gatewayd.links.contract import Description, LinkKind
@@ -18,6 +19,10 @@ NMT_STATES = {0: "initialising", 4: "stopped", 5: "operational", 127: "pre-opera
 """What the status word `nmt_state` means."""
 
 
+def _numbered(names: Iterable[tuple[int, str]]) -> str:
+    return ", ".join(f"{number} {name}" for number, name in names)
+
+
 class CanopenNode(LinkKind):
     """The kind with the section `canopen`."""
 
@@ -29,6 +34,10 @@ class CanopenNode(LinkKind):
         "bus": "`absent`, `down`, `bus-off`, `passive`, `warning` or `active`",
         "nmt_state": "`initialising`, `stopped`, `pre-operational` or `operational`",
     }
+    status_fields = (
+        StatusField(27, 1, "can_bus", f"0 no CANopen, {_numbered(enumerate(BUS_STATES[1:], 1))}"),
+        StatusField(28, 1, "nmt_state", _numbered(NMT_STATES.items())),
+    )
     place = (
         "null, or `object` (2010h:01), `type`, and `cob_id` of the PDO that carries it, null for SDO alone"
     )

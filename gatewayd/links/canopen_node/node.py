@@ -42,6 +42,7 @@ from gatewayd.links.canopen_node.robot_errors import RobotErrors
 from gatewayd.links.canopen_node.status_objects import StatusObjects
 from gatewayd.links.canopen_node.storage import Parameters, Store
 from gatewayd.links.canopen_node.variables import VariableObjects
+from gatewayd.links.registry import status_fields
 
 __all__ = ["Node"]
 
@@ -439,7 +440,7 @@ class Node:
     # -- assembly ------------------------------------------------------------------------------------------------
 
     def _objects(self, identity: Identity) -> Iterable[Object]:
-        status = StatusBlock(self.cell)
+        status = StatusBlock(self.cell, status_fields())
         requester = partial(self._peers.requester, self.plan.sdo_writer)
 
         def asking() -> Requester:

@@ -84,7 +84,7 @@ class CanLink(Link, Observer):
         self._store = store
         self.node = self._new_node()
         cell.listeners.append(self._on_image)
-        cell.health.can_bus = BusState.ABSENT + 1
+        self._show_words()
 
     @property
     def progress(self) -> int:
@@ -154,7 +154,7 @@ class CanLink(Link, Observer):
         if self._started:
             self.node.resume(former, now)
         cell.listeners.append(self._on_image)
-        cell.health.can_bus = former.bus + 1
+        self._show_words()
         self.cob_ids_changed()
         if self._runs:
             self._schedule(now)
@@ -206,7 +206,7 @@ class CanLink(Link, Observer):
             state.name.lower().replace("_", "-"),
             extra=fields(**self._names(), reason=reason),
         )
-        self._cell.health.can_bus = state + 1
+        self._cell.health.words["can_bus"] = state + 1
         if state.carries:
             self._compare_bit_rates()
             self._transmitter.open()
@@ -228,7 +228,7 @@ class CanLink(Link, Observer):
 
     def nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
         """The node is in another NMT state."""
-        self._cell.health.nmt_state = new
+        self._cell.health.words["nmt_state"] = new
         log.info("CANopen node %s", new.name.lower().replace("_", "-"), extra=fields(**self._names()))
 
     def report(self, text: str) -> None:
@@ -253,6 +253,9 @@ class CanLink(Link, Observer):
         self._switching.set()
 
     # -- inside --------------------------------------------------------------------------------------------------
+
+    def _show_words(self) -> None:
+        self._cell.health.words.update(can_bus=self.node.bus + 1, nmt_state=self.node.nmt.state)
 
     def _new_node(self) -> Node:
         return Node(

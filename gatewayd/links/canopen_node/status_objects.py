@@ -14,15 +14,17 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, Access, Entry, Object, Pdo, array, record
 from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
-from gatewayd.core.status import FIELDS, RELEASE, REQUEST, TABLES, StatusBlock, StatusField, StatusTable
+from gatewayd.core.status import StatusBlock
+from gatewayd.core.status_layout import RELEASE, REQUEST, TABLES, StatusField, StatusTable
 from gatewayd.links.canopen_node.pdo.codec import Mapped
 from gatewayd.links.canopen_node.plan import FIRST_STATUS_OBJECT
 from gatewayd.links.canopen_node.variables import ABORT_OF
+from gatewayd.links.registry import status_fields
 
 __all__ = ["HEADER", "TABLE_INDICES", "StatusObjects", "status_word"]
 
 HEADER: Final = FIRST_STATUS_OBJECT
-"""The record of the header's fields, in the order of `core.status.FIELDS`."""
+"""The record of the header's fields, in the order of `registry.status_fields`."""
 TABLE_INDICES: Final = {
     "good": 0x5F01,
     "writers_alive": 0x5F02,
@@ -31,7 +33,7 @@ TABLE_INDICES: Final = {
     "age": 0x5F30,
     "quality": 0x5F40,
 }
-"""The first index of each table of `core.status.TABLES`."""
+"""The first index of each table of `core.status_layout.TABLES`."""
 
 _LARGEST_ARRAY = 254
 _TYPES = {1: CanType.UNSIGNED16, 2: CanType.UNSIGNED32}
@@ -44,7 +46,8 @@ def status_word(index: int, subindex: int) -> Mapped | None:
     Whether a table has so many entries, the dictionary knows.
     """
     if index == HEADER:
-        field = FIELDS[subindex - 1] if 0 < subindex <= len(FIELDS) else None
+        fields = status_fields()
+        field = fields[subindex - 1] if 0 < subindex <= len(fields) else None
         if field is None or field.offset in (REQUEST, RELEASE):
             return None
         return Mapped(None, _TYPES[field.words], field.offset)
@@ -69,7 +72,7 @@ class StatusObjects:
 
         `asking`: the same, when one asks for a lock.
         """
-        self._block = StatusBlock(cell)
+        self._block = StatusBlock(cell, status_fields())
         self._definition = cell.definition
         self._clock = clock
         self._requester = requester
@@ -77,7 +80,7 @@ class StatusObjects:
 
     def objects(self) -> Iterator[Object]:
         """5F00h and the tables that have entries."""
-        yield record(HEADER, "Status", (self._field(*item) for item in enumerate(FIELDS, 1)))
+        yield record(HEADER, "Status", (self._field(*item) for item in enumerate(status_fields(), 1)))
         for table in TABLES:
             names = self._names(table)
             first = TABLE_INDICES[table.name]

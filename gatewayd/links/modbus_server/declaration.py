@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
+from gatewayd.core.status_layout import StatusField
 from gatewayd.links.contract import Description, LinkKind
 from gatewayd.links.modbus_server.description import description
 from gatewayd.links.modbus_server.plan import ModbusPlan
@@ -24,6 +25,9 @@ class ModbusServer(LinkKind):
         "unit": "unit id",
         "connections": "open connections of the listener",
     }
+    status_fields = (
+        StatusField(26, 1, "modbus_connections", "open Modbus connections to this unit's listener"),
+    )
     place = "list of its places: `area`, `address` from 0, `bit` or null, `notation` (4xxxxx form)"
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:

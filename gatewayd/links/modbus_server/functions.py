@@ -11,11 +11,12 @@ import struct
 from collections.abc import Callable, Sequence
 from enum import IntEnum
 
-from gatewayd.core import status
+from gatewayd.core import status_layout
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Value
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
+from gatewayd.core.status import StatusBlock
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.registers import (
     MAX_BITS,
@@ -24,6 +25,7 @@ from gatewayd.links.modbus_server.registers import (
     RegisterImage,
     RegisterTable,
 )
+from gatewayd.links.registry import status_fields
 from gatewayd.modbus import identification
 from gatewayd.modbus.identification import Identification
 
@@ -63,7 +65,7 @@ class Unit:
         self.plan = plan
         self.cell = cell
         self.image = RegisterImage(plan, cell)
-        self.status = status.StatusBlock(cell)
+        self.status = StatusBlock(cell, status_fields())
         self.identification = Identification(cell.definition.name, cell.definition.fingerprint)
 
     def close(self) -> None:
@@ -78,7 +80,7 @@ _MAX_WRITTEN_BITS = 1968
 _MAX_WRITTEN_REGISTERS = 123
 _MAX_WRITTEN_WITH_READ = 121
 _COIL_ON = 0xFF00
-_STATUS_END = status.BASE + status.LENGTH
+_STATUS_END = status_layout.BASE + status_layout.LENGTH
 
 _TWO_WORDS = struct.Struct(">HH")
 _MASK = struct.Struct(">HHH")
@@ -154,13 +156,13 @@ def _unreadable(mapped: int, count: int) -> ExceptionCode:
 
 
 def _registers(unit: Unit, table: RegisterTable, address: int, count: int, now: float) -> bytes:
-    if address >= status.BASE:
-        return unit.status.read(address - status.BASE, count, now)
+    if address >= status_layout.BASE:
+        return unit.status.read(address - status_layout.BASE, count, now)
     return bytes(table.image[2 * address : 2 * (address + count)])
 
 
 def _of_status(address: int, count: int) -> bool:
-    return address >= status.BASE and address + count <= _STATUS_END
+    return address >= status_layout.BASE and address + count <= _STATUS_END
 
 
 # -- writing ----------------------------------------------------------------------------------------------------------
@@ -207,7 +209,7 @@ def _mask_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
         return ExceptionCode.ILLEGAL_VALUE
     address, and_mask, or_mask = _MASK.unpack_from(pdu, 1)
     if _of_status(address, 1):
-        present = int.from_bytes(unit.status.read(address - status.BASE, 1, now), "big")
+        present = int.from_bytes(unit.status.read(address - status_layout.BASE, 1, now), "big")
         word = (present & and_mask) | (or_mask & ~and_mask & 0xFFFF)
         return _write_status(unit, requester, address, [word], now) or pdu
     return _apply(unit, requester, unit.image.holding.masked(address, and_mask, or_mask), now) or pdu
@@ -242,7 +244,7 @@ def _write_registers(
 def _write_status(
     unit: Unit, requester: Requester, address: int, words: Sequence[int], now: float
 ) -> ExceptionCode | None:
-    refusal = unit.status.write(requester, address - status.BASE, words, now)
+    refusal = unit.status.write(requester, address - status_layout.BASE, words, now)
     return EXCEPTION_OF[refusal.reason] if refusal is not None else None
 
 

@@ -169,7 +169,7 @@ class ModbusListener:
                 connection.abort("not on the access list any more")
         for number, unit in former.items():
             if units_now.get(number) is not unit:
-                unit.cell.health.modbus_connections = 0
+                unit.cell.health.words["modbus_connections"] = 0
                 unit.close()
         self._count()
 
@@ -279,4 +279,4 @@ class ModbusListener:
 
     def _count(self) -> None:
         for unit in self._units.values():
-            unit.cell.health.modbus_connections = len(self._connections)
+            unit.cell.health.words["modbus_connections"] = len(self._connections)

@@ -96,13 +96,13 @@ async def test_values_go_both_ways(station: Station) -> None:
     async with running(station):
         await until(lambda: station.frames(HEARTBEAT))
         station.send(0x000, b"\1\5")
-        await until(lambda: station.cell.health.nmt_state == NmtState.OPERATIONAL)
+        await until(lambda: station.cell.health.words["nmt_state"] == NmtState.OPERATIONAL)
         station.send(0x305, b"\7\0\0\0\x08\0\0\0")
         await until(lambda: station.cell.image.values[station.names["ints_in[1]"]] == 8)
         station.cell.image.values[station.names["ints_out[0]"]] = 9
         station.cell.outputs_written(time.monotonic())
         await until(lambda: b"\x09" + bytes(7) in station.frames(0x285))
-        assert station.cell.health.can_bus == BusState.ACTIVE + 1
+        assert station.cell.health.words["can_bus"] == BusState.ACTIVE + 1
 
 
 async def test_two_nodes_share_a_bus() -> None:
@@ -151,7 +151,7 @@ async def test_nothing_runs_on_after_the_end(station: Station) -> None:
     station.forget()
     await asyncio.sleep(0.05)
     assert station.heard == []
-    assert station.cell.health.can_bus == BusState.DOWN + 1
+    assert station.cell.health.words["can_bus"] == BusState.DOWN + 1
 
 
 async def test_a_bus_that_cannot_be_used_is_told_once_and_shown_as_absent(
@@ -159,11 +159,13 @@ async def test_a_bus_that_cannot_be_used_is_told_once_and_shown_as_absent(
 ) -> None:
     monkeypatch.setattr(link_module, "RETRY", 0.01)
     station = Station(str(uuid4()), interface="nosuchinterface")
-    assert station.cell.health.can_bus == BusState.ABSENT + 1, "not 0, which says that there is no CANopen"
+    assert station.cell.health.words["can_bus"] == BusState.ABSENT + 1, (
+        "not 0, which says that there is no CANopen"
+    )
     async with running(station) as task:
         await asyncio.sleep(0.05)
         assert not task.done()
-        assert station.cell.health.can_bus == BusState.ABSENT + 1
+        assert station.cell.health.words["can_bus"] == BusState.ABSENT + 1
     assert [record.levelname for record in caplog.records if "nosuchinterface" in record.message] == ["ERROR"]
 
 
@@ -191,11 +193,11 @@ async def test_end_while_the_bit_rate_is_switched(station: Station) -> None:
         await until(lambda: station.frames(HEARTBEAT))
         station.send(0x7E5, b"\4\1".ljust(8, b"\0"))
         station.send(0x7E5, bytes([0x15, 20, 0]).ljust(8, b"\0"))
-        await until(lambda: station.cell.health.can_bus == BusState.DOWN + 1)
+        await until(lambda: station.cell.health.words["can_bus"] == BusState.DOWN + 1)
     station.forget()
     await asyncio.sleep(0.08)
     assert station.frames(HEARTBEAT) == []
-    assert station.cell.health.can_bus == BusState.DOWN + 1
+    assert station.cell.health.words["can_bus"] == BusState.DOWN + 1
 
 
 async def test_lost_frames_are_told_seldom_and_all_counted(

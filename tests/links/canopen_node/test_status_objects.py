@@ -12,8 +12,10 @@ from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
-from gatewayd.core.status import FIELDS, LENGTH, RELEASE_ALL, TABLES, StatusBlock
+from gatewayd.core.status import StatusBlock
+from gatewayd.core.status_layout import LENGTH, RELEASE_ALL, TABLES
 from gatewayd.links.canopen_node.status_objects import HEADER, TABLE_INDICES, StatusObjects, status_word
+from gatewayd.links.registry import status_fields
 
 LINE, HMI = range(2)
 COUNT = 300
@@ -105,7 +107,7 @@ def test_header_has_every_field_by_its_name() -> None:
     header = next(iter(Node().dictionary))
     assert header.index == 0x5F00
     assert [(one.subindex, one.name) for one in header.entries[1:]] == [
-        (number, field.name) for number, field in enumerate(FIELDS, 1)
+        (number, field.name) for number, field in enumerate(status_fields(), 1)
     ]
     assert {one.type for one in header.entries[1:]} == {CanType.UNSIGNED16, CanType.UNSIGNED32}
     writable = [one.name for one in header.entries if one.access is Access.RW]
@@ -139,13 +141,13 @@ def test_every_word_is_that_of_the_block(node: Node) -> None:
         assert cell.write(Requester(LINE), [Change(index, 3)], 0.5 + index / 1000) is None
     assert cell.write(Requester(HMI), [Change(20, 4)], 0.9) is not None
     cell.set_availability([7], False, "in use", 0.9)
-    block = StatusBlock(cell).read(0, LENGTH, node.now)
+    block = StatusBlock(cell, status_fields()).read(0, LENGTH, node.now)
 
     def words(offset: int, count: int) -> int:
         return int.from_bytes(block[2 * offset : 2 * (offset + count)], "big")
 
-    assert {field.name: node.field(field.name) for field in FIELDS} == {
-        field.name: words(field.offset, field.words) for field in FIELDS
+    assert {field.name: node.field(field.name) for field in status_fields()} == {
+        field.name: words(field.offset, field.words) for field in status_fields()
     }
     counts = {"good": 19, "writers_alive": 2}
     for table in TABLES:
@@ -237,7 +239,7 @@ def test_a_release_and_a_read_are_no_request(node: Node) -> None:
 
 def test_what_a_tpdo_may_carry_is_where_the_dictionary_has_it(node: Node) -> None:
     """And holds the same bytes."""
-    block = StatusBlock(node.cell)
+    block = StatusBlock(node.cell, status_fields())
     for one in node.dictionary:
         for entry in one.entries:
             word = status_word(one.index, entry.subindex)

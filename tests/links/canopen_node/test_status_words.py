@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from gatewayd.core import status
+from gatewayd.core import status_layout as status
 from gatewayd.links.canopen_node import status_objects
 from gatewayd.links.canopen_node.status_words import FIELD_NAMES, field_word, quality_word
+from gatewayd.links.registry import status_fields
 
 
 def test_fields_are_those_of_the_status_block() -> None:
-    """Said twice: names, sub-indices and lengths are the core's."""
-    for subindex, field in enumerate(status.FIELDS, 1):
+    """Names, sub-indices and lengths are those of the block."""
+    for subindex, field in enumerate(status_fields(), 1):
         if field.offset in (status.REQUEST, status.RELEASE):
             assert field.name not in FIELD_NAMES
             continue
         word = field_word(field.name)
         assert (word.index, word.subindex) == (status_objects.HEADER, subindex)
         assert word.type.bits == 16 * field.words
-    readable = [field.name for field in status.FIELDS if field.offset not in (status.REQUEST, status.RELEASE)]
+    readable = [
+        field.name for field in status_fields() if field.offset not in (status.REQUEST, status.RELEASE)
+    ]
     assert list(FIELD_NAMES)[: len(readable)] == readable
 
 

@@ -98,14 +98,14 @@ async def test_reports_who_comes_and_goes(
     reader, writer = await dial(listener, "127.0.0.3")
     port = writer.get_extra_info("sockname")[1]
     assert await is_served(reader, writer)
-    assert live_cell.health.modbus_connections == 1
+    assert live_cell.health.words["modbus_connections"] == 1
     writer.close()
     await until(lambda: len(events) == 2)
     assert events == [
         PeerEvent(PeerEventKind.CONNECTED, f"127.0.0.3:{port}", ("hmi",)),
         PeerEvent(PeerEventKind.DISCONNECTED, f"127.0.0.3:{port}", ("hmi",), "closed by the peer"),
     ]
-    assert live_cell.health.modbus_connections == 0
+    assert live_cell.health.words["modbus_connections"] == 0
 
 
 async def test_a_reset_by_the_peer_releases_what_it_owned(

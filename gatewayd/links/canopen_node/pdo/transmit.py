@@ -28,6 +28,7 @@ from gatewayd.core.definition import Value, Variable
 from gatewayd.core.status import StatusBlock
 from gatewayd.links.canopen_node.pdo.codec import ReadWord
 from gatewayd.links.canopen_node.pdo.parameters import Configuration
+from gatewayd.links.registry import status_fields
 
 __all__ = [
     "MOVES",
@@ -200,7 +201,7 @@ class TransmitEngine:
         self.is_operational = False
         self._cell = cell
         self._values = cell.image.values
-        self._block = StatusBlock(cell)
+        self._block = StatusBlock(cell, status_fields())
         self._now = 0.0
         """The time of the last call, at which words of the status block are read."""
         self._look_due = math.inf

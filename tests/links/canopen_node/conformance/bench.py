@@ -194,7 +194,7 @@ class LinkDevice(Device):
         link = asyncio.create_task(self._link.run())
         clock = asyncio.create_task(self._tick())
         # What is sent before the bus is open, nobody hears.
-        while self._cell.health.can_bus != BusState.ACTIVE + 1:  # noqa: ASYNC110 - the link tells nobody
+        while self._cell.health.words["can_bus"] != BusState.ACTIVE + 1:  # noqa: ASYNC110 - the link tells nobody
             await asyncio.sleep(0.001)
         started.set()
         await self._off.wait()
