@@ -27,10 +27,11 @@ FAMILIES = {
     5: "ownership",
     6: "fail-safe",
     7: "lossy conversion",
+    8: "other links",
 }
 """Rule families by the hundreds digit of their ids."""
 
-_ID = re.compile(r"GW[1-7]\d\d")
+_ID = re.compile(r"GW[1-8]\d\d")
 _SLUG = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 
 

@@ -46,7 +46,7 @@ def test_unknown_rule_is_none() -> None:
 
 @pytest.mark.parametrize(
     "rule_id,slug",
-    [("GW801", "new"), ("GW1", "new"), ("GW199", "Not Kebab"), ("GW101", "new"), ("GW199", "yaml-syntax")],
+    [("GW901", "new"), ("GW1", "new"), ("GW199", "Not Kebab"), ("GW101", "new"), ("GW199", "yaml-syntax")],
 )
 def test_malformed_and_used_ids_are_refused(rule_id: str, slug: str) -> None:
     """Ids and slugs are well formed and unique."""
