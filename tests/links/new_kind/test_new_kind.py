@@ -58,9 +58,9 @@ def command(tree: Path, *arguments: str | Path) -> list[str]:
     return ["env", "-C", str(tree), sys.executable, "-m", "gatewayd", *map(str, arguments)]
 
 
-def run(tree: Path, *arguments: str | Path, code: int = 0) -> str:
+def run(tree: Path, *arguments: str | Path, code: int | None = 0) -> str:
     done = subprocess.run(command(tree, *arguments), capture_output=True, text=True, check=False)
-    assert done.returncode == code, done.stdout + done.stderr
+    assert code is None or done.returncode == code, done.stdout + done.stderr
     assert "Traceback" not in done.stderr
     return done.stdout
 
@@ -85,10 +85,7 @@ def test_check_knows_its_keys_and_their_types(tree: Path, tmp_path: Path) -> Non
     file = mapping(tmp_path / "press.yaml")
     file.write_text(file.read_text().replace("listen:", "lisen:"))
     findings = json.loads(run(tree, "check", "--format", "json", file, code=1))["findings"]
-    assert [one["rule"] for one in findings] == ["GW112", "GW113"] or {one["slug"] for one in findings} == {
-        "unknown-key",
-        "missing-key",
-    }
+    assert {one["slug"] for one in findings} == {"unknown-key", "missing-key"}
     assert all("the section `lines`" in one["message"] for one in findings)
     assert "did you mean `listen`?" in {one["hint"] for one in findings}
 
@@ -177,11 +174,11 @@ class Served:
     def status(self) -> dict[str, Any]:
         if not self.socket.exists():
             return {"cells": [{"healthy": False}]}
-        found: dict[str, Any] = json.loads(self.ask("status", "--format", "json"))
+        found: dict[str, Any] = json.loads(self.ask("status", "--json", code=None))
         return found
 
-    def ask(self, *arguments: str, code: int = 0) -> str:
-        return run(self.tree, arguments[0], "--control", self.socket, *arguments[1:], code=code)
+    def ask(self, *arguments: str, code: int | None = 0) -> str:
+        return run(self.tree, arguments[0], "--socket", self.socket, *arguments[1:], code=code)
 
     def get(self, path: str) -> str:
         with urllib.request.urlopen(f"http://{HOST}:{self.page}{path}", timeout=5) as answer:

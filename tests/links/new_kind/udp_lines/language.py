@@ -58,6 +58,7 @@ class LinesLanguage(LinkLanguage):
     variable_keys = LinesPlace
     writer_keys = LinesWriter
     rules = (f"{__package__}.rules.names",)
+    tables = f"{__package__}.tables"
     articles: ClassVar = {Lines: "the section `lines`"}
     writer_example = "lines: 192.168.1.20"
     place_example = "lines: NAME"
