@@ -223,16 +223,16 @@ def test_it_is_in_status_metrics_page_and_status_block(served: Served) -> None:
 
 def test_a_reload_keeps_it_rebinds_it_and_hears_its_objections(served: Served) -> None:
     own = served.party.mouth.getsockname()
-    served.map(VARIABLES.replace("done", "parts"))
+    served.map(VARIABLES.replace("lines: done", "lines: parts"))
     assert "reloaded" in served.ask("reload")
     wait_for(lambda: "parts0" in served.party.line(), "the other names")
     assert served.party.mouth.getsockname() == own
     assert served.party.write(speed=0.25) is None
-    served.map(VARIABLES.replace("done", "parts"), to=free_port())
+    served.map(VARIABLES.replace("lines: done", "lines: parts"), to=free_port())
     said = served.ask("reload", code=1)
     assert "lines would go to" in said
     assert served.party.write(speed=0.3) is None, "the old mapping runs on"
-    served.map(VARIABLES.replace("done", "parts"), listen=free_port())
+    served.map(VARIABLES.replace("lines: done", "lines: parts"), listen=free_port())
     assert "lines would move while `speed` is owned" in served.ask("reload", code=1)
 
 
