@@ -29,6 +29,8 @@ NOT_CONNECTED = 11
 """Exception code 0B."""
 _CYCLES = 0.03
 """Seconds in which a value may be overtaken by the next one without having been seen."""
+_TAKEN = 0.2
+"""Seconds from when a writer was about to write until the gateway has taken it, by a serial CAN adapter too."""
 _RESUMED = 0.1
 """Seconds in which a process that was stopped goes on, on a busy machine."""
 _AROUND = 0.2
@@ -91,7 +93,7 @@ def misheld(name: str, changes: Sequence[Change], entries: Sequence[Entry], reco
 
 def _stopped_in_the_act(sent: float, stops: Sequence[Stop]) -> float:
     """Seconds for which the gateway was stopped while it served what had just been sent."""
-    return sum(stop.end - stop.begin for stop in _begun(stops, sent - _CYCLES, sent + _CYCLES))
+    return sum(stop.end - stop.begin for stop in _begun(stops, sent - _CYCLES, sent + _TAKEN))
 
 
 def _begun(stops: Sequence[Stop], since: float, until: float) -> Sequence[Stop]:
