@@ -117,6 +117,7 @@ class Rig:
         for name in WRITERS:
             for field in FIELDS_OF[name]:
                 mine = [one for one in entries(journal(self.directory, name)) if one.field == field]
+                accepted = sorted(one.time for one in noted if one.field == field and one.outcome == 0)
                 found += unheard(
                     field,
                     self.witness.changes[field],
@@ -124,6 +125,7 @@ class Rig:
                     self.witness.watching,
                     stops,
                     lost=lost,
+                    accepted=accepted,
                 )
         return found
 

@@ -151,6 +151,14 @@ def test_what_went_into_a_breaking_connection_is_no_lie(lost: float, count: int)
     assert len(list(unheard(A, changes, written, lambda _since, _until: True, lost=[lost]))) == count
 
 
+@pytest.mark.parametrize("later, count", [(10.02, 0), (10.2, 1)], ids=["at once", "later"])
+def test_of_two_writes_at_once_the_robot_gets_the_newer_one(later: float, count: int) -> None:
+    written = [sent(10.0, 7), Entry(10.01, A, 7, 0)]
+    changes = [Change(9.5, 6, 0.0), Change(10.3, 8, 0.0)]
+    found = unheard(A, changes, written, lambda _since, _until: True, accepted=[10.01, later])
+    assert len(list(found)) == count
+
+
 def test_a_write_that_was_being_served_when_the_gateway_was_stopped_comes_late() -> None:
     """It did not wait: it had been taken already (docs/explanation/promises.md)."""
     late, written = Change(16.2, 7, 0.0), [sent(10.0, 7)]

@@ -120,12 +120,14 @@ def unheard(
     stops: Sequence[Stop] = (),
     *,
     lost: Sequence[float] = (),
+    accepted: Sequence[float] = (),
 ) -> Iterator[str]:
     """What was acknowledged and never seen in the robot's field, though it was watched and nothing took its place.
 
     Where the gateway was stopped before the package left, its fallback may be seen instead, or what came at once when
     it went on: of two values that wait, the newer one is sent. `lost`: when somebody was answered that the robot is not
-    connected, in order; what was acknowledged just before went into a broken connection.
+    connected, in order; what was acknowledged just before went into a broken connection. `accepted`: when writes to the
+    field were acknowledged, anybody's, in order; the next one takes the place of one that has not been sent.
     """
     times = [change.time for change in changes]
     begun = 0.0
@@ -142,6 +144,9 @@ def unheard(
             last = bisect.bisect_right(times, entry.time + _REACHED)
             seen = changes[first:last]
             overtaken = any(change.time - change.blind < entry.time + _CYCLES for change in seen)
+            overtaken |= bisect.bisect_right(accepted, entry.time) < bisect.bisect_left(
+                accepted, entry.time + _CYCLES
+            )
             overtaken |= any(
                 _replaced(changes, times, stop)
                 for stop in _begun(stops, begun - _CYCLES, entry.time + _CYCLES)
