@@ -20,6 +20,7 @@ from typing import Any
 import pytest
 
 from tests.e2e.plant import Plant
+from tests.e2e.plc import STRANGER, Plc
 from tests.e2e.processes import HOST, Process, free_port, wait_for
 
 HERE = Path(__file__).parent
@@ -29,13 +30,14 @@ HEAD = """\
 gatewayd: 1
 cell: press
 robot: {{host: {host}, port: {robot}}}
+modbus: {{listen: '{host}:{modbus}'}}
 lines: {{listen: '{host}:{listen}', to: '{host}:{to}'}}
 writers:
   plc: {{lines: {host}, timeout: 1s}}
 variables:
 """
 VARIABLES = """\
-  speed: {robot: input_double_register_0, lines: speed, owner: plc, limits: [0, 1], on_release: 0}
+  speed: {robot: input_double_register_0, lines: speed, modbus: 0, owner: plc, limits: [0, 1], on_release: 0}
   done: {robot: output_int_register_0..1, lines: done}
 """
 
@@ -62,11 +64,11 @@ def run(tree: Path, *arguments: str | Path, code: int | None = 0) -> str:
     done = subprocess.run(command(tree, *arguments), capture_output=True, text=True, check=False)
     assert code is None or done.returncode == code, done.stdout + done.stderr
     assert "Traceback" not in done.stderr
-    return done.stdout
+    return done.stdout + (done.stderr if code else "")
 
 
 def mapping(path: Path, variables: str = VARIABLES, **ports: int) -> Path:
-    numbers = {"robot": 30004, "listen": 9001, "to": 9002} | ports
+    numbers = {"robot": 30004, "modbus": 1502, "listen": 9001, "to": 9002} | ports
     path.write_text(HEAD.format(host=HOST, **numbers) + variables)
     return path
 
@@ -76,8 +78,8 @@ def test_check_finds_by_its_rule_with_place_and_remedy(tree: Path, tmp_path: Pat
     twice = file.read_text().replace("output_int_register_0..1", "output_int_register_0")
     file.write_text(twice)
     (finding,) = json.loads(run(tree, "check", "--format", "json", file, code=1))["findings"]
-    assert (finding["rule"], finding["line"], finding["hint"]) == ("GW801", 9, "give it another name")
-    assert finding["related"][0]["line"] == 8
+    assert (finding["rule"], finding["line"], finding["hint"]) == ("GW801", 10, "give it another name")
+    assert finding["related"][0]["line"] == 9
     assert "JSON keeps the last" in run(tree, "check", "--explain", "GW801")
 
 
@@ -158,7 +160,7 @@ class Served:
     def __init__(self, tree: Path, plant: Plant, directory: Path) -> None:
         self.tree = tree
         self.robot = plant.simulator()
-        self.listen, self.to, self.page = free_port(), free_port(), free_port()
+        self.listen, self.to, self.page, self.modbus = (free_port() for _ in range(4))
         self.file = directory / "press.yaml"
         self.map()
         self.party = Party(self.to, self.listen)
@@ -168,7 +170,12 @@ class Served:
         wait_for(lambda: self.status()["cells"][0]["healthy"], "a healthy cell", 20)
 
     def map(self, variables: str = VARIABLES, **ports: int) -> None:
-        numbers = {"robot": self.robot.port, "listen": self.listen, "to": self.to} | ports
+        numbers = {
+            "robot": self.robot.port,
+            "modbus": self.modbus,
+            "listen": self.listen,
+            "to": self.to,
+        } | ports
         mapping(self.file, variables, **numbers)
 
     def status(self) -> dict[str, Any]:
@@ -208,17 +215,25 @@ def test_it_runs_reads_and_writes(served: Served) -> None:
     wait_for(lambda: served.robot.number("input_double_register_0") == 0.0, "the time-out of its writer", 5)
 
 
-def test_it_is_in_status_metrics_page_and_status_block(served: Served) -> None:
+def test_it_is_in_status_metrics_and_page(served: Served) -> None:
     cell = served.status()["cells"][0]
     assert cell["lines"]["listen"] == f"{HOST}:{served.listen}"
     assert cell["lines"]["sent"] > 0
     text = served.ask("status")
-    assert f"lines {HOST}:{served.listen}" in text
+    assert f"{HOST}:{served.listen} sending" in text
     assert 'gatewayd_lines_total{cell="press",direction="out"}' in served.get("/metrics")
     layout = json.loads(served.get("/page/cells/press"))
     assert "speed" in json.dumps(layout["variables"][0]["places"])
     picture = json.loads(served.get("/page/cells/press/state?since=0"))["picture"]
     assert f"lines {HOST}:{served.listen}" in [one["name"] for one in picture["buses"]]
+
+
+def test_its_word_is_in_the_status_block_behind_all_others(served: Served) -> None:
+    reader = Plc(served.modbus, STRANGER, host=HOST)
+    before = reader.status(49)
+    wait_for(lambda: reader.status(49) > before, "lines that were sent")
+    assert reader.status(0) == 1
+    reader.close()
 
 
 def test_a_reload_keeps_it_rebinds_it_and_hears_its_objections(served: Served) -> None:

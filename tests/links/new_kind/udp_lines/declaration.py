@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
-from gatewayd.core.status import StatusField
+from gatewayd.core.status_layout import StatusField
 from gatewayd.links.contract import Description, LinkKind, MetricInfo, Place
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address, seconds
