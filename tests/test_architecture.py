@@ -280,7 +280,6 @@ TO_COME = {"service.assemble"}
 SAME_NAME: dict[str, str] = {
     "Access": "D",
     "Kind": "C",
-    "MetricInfo": "A",
     "Outcome": "C",
     "Service": "A",
     "Session": "D",

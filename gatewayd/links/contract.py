@@ -31,8 +31,8 @@ __all__ = [
     "Link",
     "LinkHealth",
     "LinkKind",
+    "LinkMetric",
     "LinkRuntime",
-    "MetricInfo",
     "Names",
     "Place",
     "PrepareError",
@@ -45,14 +45,23 @@ __all__ = [
 
 
 @dataclass(frozen=True, slots=True)
-class MetricInfo:
-    """A gauge or counter (`..._total`) with one sample for each cell; `figures` of the link's health has the value."""
+class LinkMetric:
+    """A gauge or counter (`..._total`) with one sample for each link, whose cell is its label."""
 
     name: str
     figure: str
+    """The figure of the link's health that has the value."""
     meaning: str
     label: str = ""
     """A further label; the figure is then a mapping from its values to numbers."""
+    shared: tuple[str, str] | None = None
+    """Of something that several cells share: a label in place of the cell, and the figure that says which it is."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What tells its samples apart."""
+        first = self.shared[0] if self.shared is not None else "cell"
+        return (first, self.label) if self.label else (first,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +118,7 @@ class LinkKind:
     """A variable has one place at most: the interface has that or null, not a list."""
     status_fields: ClassVar[tuple[StatusField, ...]] = ()
     """Words of the status block that its links tell (`Cell.health.words`), at addresses that nobody else has."""
-    metrics: ClassVar[tuple[MetricInfo, ...]] = ()
+    metrics: ClassVar[tuple[LinkMetric, ...]] = ()
     usual: ClassVar[bool] = False
     """Nearly every cell has one: its runtime is imported while the mapping files are read."""
 

@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 from prometheus_client import CollectorRegistry, ProcessCollector, generate_latest
 from prometheus_client.core import HistogramMetricFamily, Metric
@@ -21,10 +20,11 @@ from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
+from gatewayd.links.contract import LinkMetric
+from gatewayd.links.registry import kind_of, kinds
 from gatewayd.loop import clock
 from gatewayd.report.printable import printable
 from gatewayd.service.cell_runtime import CellRuntime
-from gatewayd.service.daemon import Daemon
 from gatewayd.web.health import readiness
 from gatewayd.web.histogram import Histogram
 from gatewayd.web.probes import Probes
@@ -51,6 +51,11 @@ class MetricInfo:
     kind: Kind
     labels: tuple[str, ...]
     meaning: str
+
+
+def _of_link(metric: LinkMetric) -> MetricInfo:
+    kind = Kind.COUNTER if metric.name.endswith("_total") else Kind.GAUGE
+    return MetricInfo(metric.name, kind, metric.labels, metric.meaning)
 
 
 _CELL = ("cell",)
@@ -167,20 +172,7 @@ METRICS = (
         "requests refused by reason; equal ones are added every 10 s, so it may lag behind the total",
     ),
     MetricInfo("gatewayd_events_total", Kind.COUNTER, ("cell", "kind"), "events by kind"),
-    MetricInfo("gatewayd_modbus_up", Kind.GAUGE, ("listener",), "1 while the listener accepts connections"),
-    MetricInfo("gatewayd_modbus_connections", Kind.GAUGE, ("listener",), "open Modbus connections"),
-    MetricInfo(
-        "gatewayd_can_bus_state",
-        Kind.GAUGE,
-        _CELL,
-        "1 absent, 2 down, 3 bus-off, 4 passive, 5 warning, 6 active; only with a CAN bus",
-    ),
-    MetricInfo(
-        "gatewayd_can_total",
-        Kind.COUNTER,
-        ("cell", "counter"),
-        "the CANopen node's counters by name; only with a CAN bus",
-    ),
+    *(_of_link(metric) for kind in kinds() for metric in kind.metrics),
     MetricInfo(
         "gatewayd_package_to_image_seconds",
         Kind.HISTOGRAM,
@@ -241,7 +233,6 @@ class Exposition:
             "gatewayd_ready": [((), _LEVELS[ready])],
             "gatewayd_parts_hanging": [((), len(probes.late))],
             "gatewayd_troubles": [((), len(troubles))],
-            **_listeners(daemon),
         }
         histograms: dict[str, list[tuple[tuple[str, ...], Histogram]]] = {
             "gatewayd_loop_lag_seconds": [((), probes.lag)],
@@ -252,6 +243,8 @@ class Exposition:
             name, probe = runtime.cell.definition.name, probes.of(runtime.cell)
             for metric, found in _cell(runtime, now).items():
                 samples.setdefault(metric, []).extend(((name, *labels), value) for labels, value in found)
+            for metric, link_samples in _links(runtime).items():
+                samples.setdefault(metric, []).extend(link_samples)
             for metric, counted in _counted(probe.events, probe.refusals).items():
                 samples.setdefault(metric, []).extend(((name, label), value) for label, value in counted)
             histograms["gatewayd_package_to_image_seconds"].append(((name,), probe.package_to_image))
@@ -260,7 +253,8 @@ class Exposition:
             if info.kind is Kind.HISTOGRAM:
                 yield _histogram(info, histograms[info.name])
             elif samples.get(info.name):
-                yield _family(info, samples[info.name])
+                # What several cells share is reported by each of them, and counts once.
+                yield _family(info, dict(samples[info.name]).items())
 
 
 def _cell(runtime: CellRuntime, now: float) -> dict[str, list[_Sample]]:
@@ -296,7 +290,6 @@ def _cell(runtime: CellRuntime, now: float) -> dict[str, list[_Sample]]:
         "gatewayd_writes_accepted_total": [((), health.writes_accepted)],
         "gatewayd_writes_refused_total": [((), health.writes_refused)],
         **_owners(cell),
-        **_can(runtime),
     }
 
 
@@ -313,26 +306,18 @@ def _owners(cell: Cell) -> dict[str, list[_Sample]]:
     }
 
 
-def _listeners(daemon: Daemon) -> dict[str, list[_Sample]]:
-    found = {}
-    for runtime in daemon.runtimes:
-        if "modbus" in runtime.links:
-            figures: Any = runtime.links["modbus"].health().figures
-            found[str(figures["listen"])] = figures
-    return {
-        "gatewayd_modbus_up": [((name,), _LEVELS[figures["listening"]]) for name, figures in found.items()],
-        "gatewayd_modbus_connections": [((name,), figures["connections"]) for name, figures in found.items()],
-    }
-
-
-def _can(runtime: CellRuntime) -> dict[str, list[_Sample]]:
-    if "canopen" not in runtime.links:
-        return {}
-    figures: Any = runtime.links["canopen"].health().figures
-    return {
-        "gatewayd_can_bus_state": [((), figures["bus_state"])],
-        "gatewayd_can_total": [((name,), value) for name, value in figures["counters"].items()],
-    }
+def _links(runtime: CellRuntime) -> dict[str, list[_Sample]]:
+    found: dict[str, list[_Sample]] = {}
+    for name, link in runtime.links.items():
+        figures = link.health().figures
+        for metric in kind_of(name).metrics:
+            first = str(figures[metric.shared[1]]) if metric.shared else runtime.cell.definition.name
+            value = figures.get(metric.figure)
+            if isinstance(value, Mapping):
+                found[metric.name] = [((first, label), number) for label, number in value.items()]
+            elif isinstance(value, int | float):
+                found[metric.name] = [((first,), float(value))]
+    return found
 
 
 def _counted(

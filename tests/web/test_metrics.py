@@ -5,16 +5,19 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
+from pathlib import Path
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from gatewayd.core.cell import Cell
 from gatewayd.links.contract import Link, LinkHealth
+from gatewayd.mapping.loader import load
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS, Exposition, Kind
 from gatewayd.web.probes import Probes
+from tests.web.press import MAPPING
 
 Samples = dict[str, dict[tuple[tuple[str, str], ...], float]]
 
@@ -108,6 +111,15 @@ def test_counters_of_a_can_node_are_told_by_name(probes: Probes, runtime: CellRu
     samples = read(probes)
     assert one(samples, "gatewayd_can_total", cell="press", counter="received") == 5
     assert one(samples, "gatewayd_can_bus_state", cell="press") == 6
+
+
+def test_a_listener_that_cells_share_is_told_once(tmp_path: Path) -> None:
+    files = (MAPPING, MAPPING.replace("cell: press", "cell: welder").replace("unit: 1", "unit: 2"))
+    plans = [load(text.encode(), "a.yaml").plan for text in files]
+    daemon = Daemon([plan for plan in plans if plan is not None], tmp_path)
+    assert len(daemon.runtimes) == 2
+    text = Exposition(Probes(daemon), "1").text().decode()
+    assert text.count("gatewayd_modbus_up{") == 1
 
 
 def test_troubles_are_counted(daemon: Daemon) -> None:

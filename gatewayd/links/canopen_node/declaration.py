@@ -8,7 +8,7 @@ from gatewayd.core.definition import CellDefinition
 from gatewayd.core.status_layout import StatusField
 from gatewayd.links.canopen_node.description import description
 from gatewayd.links.canopen_node.plan import CanopenPlan, by_name
-from gatewayd.links.contract import Description, LinkKind
+from gatewayd.links.contract import Description, LinkKind, LinkMetric
 from gatewayd.mapping.plan import LinkPlan
 
 __all__ = ["BUS_STATES", "KIND", "NMT_STATES"]
@@ -37,6 +37,19 @@ class CanopenNode(LinkKind):
     status_fields = (
         StatusField(27, 1, "can_bus", f"0 no CANopen, {_numbered(enumerate(BUS_STATES[1:], 1))}"),
         StatusField(28, 1, "nmt_state", _numbered(NMT_STATES.items())),
+    )
+    metrics = (
+        LinkMetric(
+            "gatewayd_can_bus_state",
+            "bus_state",
+            f"{_numbered(enumerate(BUS_STATES[1:], 1))}; only with a CAN bus",
+        ),
+        LinkMetric(
+            "gatewayd_can_total",
+            "counters",
+            "the CANopen node's counters by name; only with a CAN bus",
+            label="counter",
+        ),
     )
     place = (
         "null, or `object` (2010h:01), `type`, and `cob_id` of the PDO that carries it, null for SDO alone"

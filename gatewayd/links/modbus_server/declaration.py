@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.status_layout import StatusField
-from gatewayd.links.contract import Description, LinkKind
+from gatewayd.links.contract import Description, LinkKind, LinkMetric
 from gatewayd.links.modbus_server.description import description
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.plan import LinkPlan
@@ -27,6 +27,20 @@ class ModbusServer(LinkKind):
     }
     status_fields = (
         StatusField(26, 1, "modbus_connections", "open Modbus connections to this unit's listener"),
+    )
+    metrics = (
+        LinkMetric(
+            "gatewayd_modbus_up",
+            "listening",
+            "1 while the listener accepts connections",
+            shared=("listener", "listen"),
+        ),
+        LinkMetric(
+            "gatewayd_modbus_connections",
+            "connections",
+            "open Modbus connections",
+            shared=("listener", "listen"),
+        ),
     )
     place = "list of its places: `area`, `address` from 0, `bit` or null, `notation` (4xxxxx form)"
 
