@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.status_layout import StatusField
-from gatewayd.links.contract import Description, LinkKind, MetricInfo, Place
+from gatewayd.links.contract import Description, LinkKind, LinkMetric, Place
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address, seconds
 
@@ -24,7 +24,7 @@ class UdpLines(LinkKind):
     place = "name that the lines have for it, or null"
     has_one_place = True
     status_fields = (StatusField(49, 1, "lines_sent", "lines sent, wraps"),)
-    metrics = (MetricInfo("gatewayd_lines_total", "lines", "lines, by direction", label="direction"),)
+    metrics = (LinkMetric("gatewayd_lines_total", "lines", "lines, by direction", label="direction"),)
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
         """Socket, receiver, names."""
