@@ -162,11 +162,16 @@ async def test_a_bus_that_cannot_be_used_is_told_once_and_shown_as_absent(
     assert station.cell.health.words["can_bus"] == BusState.ABSENT + 1, (
         "not 0, which says that there is no CANopen"
     )
+
+    def reported() -> list[str]:
+        return [record.levelname for record in caplog.records if "nosuchinterface" in record.message]
+
     async with running(station) as task:
+        await until(lambda: bool(reported()))
         await asyncio.sleep(0.05)
         assert not task.done()
         assert station.cell.health.words["can_bus"] == BusState.ABSENT + 1
-    assert [record.levelname for record in caplog.records if "nosuchinterface" in record.message] == ["ERROR"]
+    assert reported() == ["ERROR"]
 
 
 async def test_bit_rate_is_switched_once_whatever_comes_at_once(station: Station) -> None:
