@@ -25,11 +25,14 @@ settings.load_profile("ordinary")
 HERE = Path(__file__).parent
 SLOW = (
     "cli/test_demo.py",
+    "cli/test_run.py",
+    "core/test_cell_properties.py",
     "demo/test_scene.py",
     "demo/test_snapshot.py",
     "docs",
     "e2e",
     "kernel",
+    "mapping/test_check_fuzz.py",
     "service/test_signals.py",
     "soak",
     "systemd",
