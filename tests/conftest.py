@@ -32,6 +32,7 @@ SLOW = (
     "docs",
     "e2e",
     "kernel",
+    "links/new_kind",
     "mapping/test_check_fuzz.py",
     "service/test_signals.py",
     "soak",
