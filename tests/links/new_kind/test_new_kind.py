@@ -33,7 +33,7 @@ robot: {{host: {host}, port: {robot}}}
 modbus: {{listen: '{host}:{modbus}'}}
 lines: {{listen: '{host}:{listen}', to: '{host}:{to}'}}
 writers:
-  plc: {{lines: {host}, timeout: 1s}}
+  plc: {{lines: {host}, timeout: 1min}}
 variables:
 """
 VARIABLES = """\
@@ -208,11 +208,13 @@ def served(tree: Path, tmp_path: Path, plant: Plant) -> Iterator[Served]:
 def test_it_runs_reads_and_writes(served: Served) -> None:
     """Values go out, writes come back to the robot, and what is refused is refused as anywhere."""
     assert set(served.party.line()) == {"speed", "done0", "done1"}
+    served.map(VARIABLES.replace("owner: plc,", "owner: plc, lease: 500ms,"))
+    served.ask("reload")
     assert served.party.write(speed=0.5) is None
     wait_for(lambda: served.robot.number("input_double_register_0") == 0.5, "the robot to have it")
     assert served.party.line()["speed"] == 0.5
     assert served.party.write(speed=7.0) == "value out of limits"
-    wait_for(lambda: served.robot.number("input_double_register_0") == 0.0, "the time-out of its writer", 5)
+    wait_for(lambda: served.robot.number("input_double_register_0") == 0.0, "the end of its lease", 5)
 
 
 def test_it_is_in_status_metrics_and_page(served: Served) -> None:
@@ -221,6 +223,7 @@ def test_it_is_in_status_metrics_and_page(served: Served) -> None:
     assert cell["lines"]["sent"] > 0
     text = served.ask("status")
     assert f"{HOST}:{served.listen} sending" in text
+    assert 'gatewayd_lines_total{cell="press",direction="out"}' in served.get("/metrics")
     layout = json.loads(served.get("/page/cells/press"))
     assert "speed" in json.dumps(layout["variables"][0]["places"])
     picture = json.loads(served.get("/page/cells/press/state?since=0"))["picture"]
