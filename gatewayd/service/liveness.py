@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-__all__ = ["PATIENCE", "Liveness", "Turned"]
+__all__ = ["PATIENCE", "Liveness", "Progressed"]
 
 PATIENCE = 1.0
 """Seconds for which a part may stand still before it is told to hang: several turns, and less than the watchdog waits,
 so that the journal has its name before the process is ended."""
 
 
-class Turned:
+class Progressed:
     """Whether all parts have moved since this was last the case: what a watchdog may be fed for."""
 
     def __init__(self) -> None:

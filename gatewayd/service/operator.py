@@ -17,7 +17,7 @@ from gatewayd.loop.retry import keep_running
 from gatewayd.service.audit import Audit
 from gatewayd.service.audit_file import AuditFile
 
-__all__ = ["JUST_NOW", "RETRY_PERIOD", "Operated", "Operation", "Standstill"]
+__all__ = ["JUST_NOW", "RETRY_PERIOD", "Operated", "OperatorAccess", "Standstill"]
 
 RETRY_PERIOD = 2.0
 """Seconds before what ended in a defect is started again."""
@@ -66,7 +66,7 @@ class Operated(Gateway, Protocol):
         """A counter for each part of the gateway; 0: it has not begun."""
 
 
-class Operation:
+class OperatorAccess:
     """The audit from the first write on; the control socket at `control` once the gateway serves. None: without."""
 
     def __init__(

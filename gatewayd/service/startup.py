@@ -14,7 +14,14 @@ from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.plan import Plan
 from gatewayd.service.compilation import Compilation
 
-__all__ = ["PATTERN", "Startup", "load_plans", "mapping_files", "state_directory", "tell_findings"]
+__all__ = [
+    "PATTERN",
+    "Startup",
+    "load_plans",
+    "mapping_files",
+    "state_directory",
+    "tell_findings",
+]
 
 PATTERN = "*.yaml"
 """The files of a configuration directory."""
@@ -40,6 +47,12 @@ class Startup:
     """Files that could not be read."""
     broken: int
     """Files with errors."""
+
+    @property
+    def notes(self) -> list[str]:
+        """What the service manager shows until a reload mends it."""
+        count = self.broken + self.unreadable
+        return [f"{count} mapping file{'s' if count > 1 else ''} not served, see the log"] if count else []
 
 
 def mapping_files(paths: Iterable[Path]) -> list[Path]:

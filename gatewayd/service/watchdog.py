@@ -16,10 +16,10 @@ from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.report.summary import summary
 from gatewayd.report.verdict import ServedCell, verdict_of
-from gatewayd.service.liveness import Liveness, Turned
+from gatewayd.service.liveness import Liveness, Progressed
 from gatewayd.service.systemd import Notifier
 
-__all__ = ["PERIOD", "STATUS_PERIOD", "Service", "Watched"]
+__all__ = ["PERIOD", "STATUS_PERIOD", "ManagerReporter", "Watched"]
 
 PERIOD = 0.5
 """Seconds between two looks; a quarter of the watchdog's time where that is less."""
@@ -43,7 +43,7 @@ class Watched(Protocol):
         """What is wrong with the gateway as a whole, in a few words each."""
 
 
-class Service:
+class ManagerReporter:
     """Reports on `daemon` while `run` runs. `notes` are troubles that stay until somebody changes them."""
 
     def __init__(self, notifier: Notifier, daemon: Watched, notes: Sequence[str] = ()) -> None:
@@ -53,7 +53,7 @@ class Service:
         self._notifier = notifier
         self._daemon = daemon
         self._liveness = Liveness()
-        self._turned = Turned()
+        self._progressed = Progressed()
         self._ready = False
         self._reported = ""
         self._reported_at = 0.0
@@ -85,7 +85,7 @@ class Service:
         self.late = late
         if not self._ready:
             self._ready = all(counts.values()) and self._notifier.ready()
-        if self._turned.all_of(counts):
+        if self._progressed.all_of(counts):
             self._notifier.watchdog()
         self._report(now)
 

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import stat
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gatewayd.logs.records import fields
@@ -19,66 +17,19 @@ from gatewayd.loop.retry import keep_running, reason_of, until_done
 from gatewayd.report.format import address
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.probes import Probes
+from gatewayd.web.settings import Settings
 
 if TYPE_CHECKING:
     from gatewayd.control.api import Api
     from gatewayd.control.endpoint import Reload
     from gatewayd.web.listener import StatusListener
 
-__all__ = ["MIN_TOKEN", "RETRY_PERIOD", "Settings", "SettingsError", "parse_address", "read_token", "serve"]
+__all__ = ["RETRY_PERIOD", "serve"]
 
-MIN_TOKEN = 16
-"""Characters that a token must have."""
 RETRY_PERIOD = 2.0
 _LOOK = 0.05
 
 log = logging.getLogger("gatewayd.status")
-
-
-class SettingsError(ValueError):
-    """An option that cannot be used; the text says what to do."""
-
-
-class Settings:
-    """Where to listen and what to ask for. Raises SettingsError."""
-
-    def __init__(self, text: str, token_file: Path | None = None) -> None:
-        self.host, self.port = parse_address(text)
-        self.token = read_token(token_file) if token_file is not None else None
-
-
-def parse_address(text: str) -> tuple[str, int]:
-    """`127.0.0.1:9502`, `[::1]:9502`, `gateway.plant:9502`; `:9502` alone is loopback."""
-    host, colon, port = text.rpartition(":")
-    bare = host.removeprefix("[").removesuffix("]")
-    bracketed = host.startswith("[") and host.endswith("]")
-    if not (colon and port.isascii() and port.isdigit() and int(port) <= 0xFFFF) or (
-        ":" in bare and not bracketed
-    ):
-        raise SettingsError(f"{text!r} is no address: use HOST:PORT, say 127.0.0.1:9502 or [::1]:9502")
-    return bare or "127.0.0.1", int(port)
-
-
-def read_token(path: Path) -> str:
-    """The token: the file's only line. A file that others may read is refused."""
-    try:
-        mode = path.stat().st_mode
-        if not stat.S_ISREG(mode):
-            raise SettingsError(f"{path}: no ordinary file")
-        if mode & (stat.S_IROTH | stat.S_IWOTH):
-            raise SettingsError(f"{path}: others may read or change it; run: chmod o-rw {path}")
-        with path.open("rb") as stream:
-            text = stream.read(1024).decode().strip()
-    except OSError as error:
-        raise SettingsError(f"{path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise SettingsError(f"{path}: no text") from error
-    if len(text) < MIN_TOKEN or not text.isascii() or not text.isprintable() or " " in text:
-        raise SettingsError(
-            f"{path}: a token is one word of at least {MIN_TOKEN} characters; make one: "
-            f"head -c 24 /dev/urandom | base64 > {path}"
-        )
-    return text
 
 
 async def serve(

@@ -18,7 +18,7 @@ from gatewayd.mapping.loader import load_together
 from gatewayd.mapping.plan import Plan
 from gatewayd.service import daemon as daemon_module
 from gatewayd.service.daemon import Daemon
-from gatewayd.service.liveness import Turned
+from gatewayd.service.liveness import Progressed
 from gatewayd.simulator.server import SimulatedController
 
 STATE = Path("/nonexistent/gatewayd")  # nothing here keeps anything
@@ -174,7 +174,7 @@ async def test_a_link_that_rests_after_a_defect_turns_and_a_core_that_fails_does
     async with SimulatedController() as robot:
         daemon = Daemon(plans((1, robot.port, free_port())), STATE)
         (runtime,) = daemon.runtimes
-        turned = Turned()
+        turned = Progressed()
         async with running(daemon):
             await until(lambda: turned.all_of(daemon.progress()))
             monkeypatch.setattr(runtime.cell, "package_arrived", fail)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gatewayd.service.liveness import Liveness, Turned
+from gatewayd.service.liveness import Liveness, Progressed
 
 
 def test_whoever_moves_is_alive() -> None:
@@ -54,7 +54,7 @@ def test_the_first_look_accuses_nobody() -> None:
 
 
 def test_all_have_turned_once_the_slowest_has() -> None:
-    turned = Turned()
+    turned = Progressed()
     counts = [
         {"core": 1, "robot": 0},
         {"core": 2, "robot": 1},
@@ -65,14 +65,14 @@ def test_all_have_turned_once_the_slowest_has() -> None:
 
 
 def test_turns_since_the_last_time_count_not_since_the_last_question() -> None:
-    turned = Turned()
+    turned = Progressed()
     assert turned.all_of({"core": 1, "robot": 1})
     assert not turned.all_of({"core": 2, "robot": 1})
     assert turned.all_of({"core": 2, "robot": 2})
 
 
 def test_a_part_that_is_new_has_turned_when_it_has_begun() -> None:
-    turned = Turned()
+    turned = Progressed()
     assert turned.all_of({"core": 1})
     assert not turned.all_of({"core": 2, "CAN": 0})
     assert turned.all_of({"core": 2, "CAN": 1})

@@ -15,7 +15,7 @@ from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind,
 from gatewayd.core.requester import Requester
 from gatewayd.loop import clock
 from gatewayd.report.verdict import ServedCell
-from gatewayd.service.operator import JUST_NOW, Operation, Standstill
+from gatewayd.service.operator import JUST_NOW, OperatorAccess, Standstill
 
 
 class Gateway:
@@ -55,9 +55,9 @@ async def until(condition: Callable[[], bool]) -> None:
 
 async def test_the_first_write_is_in_the_file_at_the_end(tmp_path: Path) -> None:
     gateway = Gateway()
-    operation = Operation(gateway, None, tmp_path / "audit.jsonl")
+    access = OperatorAccess(gateway, None, tmp_path / "audit.jsonl")
     assert gateway.cell.write(Requester(0), [Change(0, 7)], 1.0) is None
-    task = asyncio.create_task(operation.run())
+    task = asyncio.create_task(access.run())
     await asyncio.sleep(0)
     task.cancel()
     await asyncio.wait((task,))
@@ -69,19 +69,19 @@ async def test_a_file_that_cannot_be_written_makes_the_gateway_unhealthy_and_not
     tmp_path: Path,
 ) -> None:
     gateway = Gateway()
-    operation = Operation(gateway, None, tmp_path / "missing" / "audit.jsonl")
+    access = OperatorAccess(gateway, None, tmp_path / "missing" / "audit.jsonl")
     assert gateway.cell.write(Requester(0), [Change(0, 7)], 1.0) is None
     moment = Moment(1.0, 2.0)
-    await until(lambda: not operation.api.status(moment)["healthy"])
-    assert operation.api.status(moment)["problems"] == [
+    await until(lambda: not access.api.status(moment)["healthy"])
+    assert access.api.status(moment)["problems"] == [
         "the audit file cannot be written: No such file or directory"
     ]
-    assert operation.api.audit({}, moment)["records"][-1]["new"] == 7
+    assert access.api.audit({}, moment)["records"][-1]["new"] == 7
 
 
 async def test_the_socket_comes_and_goes(tmp_path: Path) -> None:
     path = tmp_path / "control.sock"
-    task = asyncio.create_task(Operation(Gateway(), path, None).run())
+    task = asyncio.create_task(OperatorAccess(Gateway(), path, None).run())
     await until(path.exists)
     assert (await asyncio.to_thread(Client(path).get, "/v1/version"))["api"] == 1
     task.cancel()

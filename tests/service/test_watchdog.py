@@ -14,9 +14,9 @@ from gatewayd.loop.progress import STEP
 from gatewayd.mapping.loader import load_together
 from gatewayd.report.verdict import ServedCell
 from gatewayd.service.daemon import Daemon
-from gatewayd.service.liveness import Turned
+from gatewayd.service.liveness import Progressed
 from gatewayd.service.systemd import Notifier
-from gatewayd.service.watchdog import STATUS_PERIOD, Service
+from gatewayd.service.watchdog import STATUS_PERIOD, ManagerReporter
 from gatewayd.simulator.server import SimulatedController
 
 MAPPING = """\
@@ -89,14 +89,14 @@ class Gateway:
 
 def test_ready_is_said_once_all_parts_have_turned(manager: Manager, notifier: Notifier) -> None:
     gateway = Gateway()
-    service = Service(notifier, gateway)
-    service.look(0.0)
+    reporter = ManagerReporter(notifier, gateway)
+    reporter.look(0.0)
     assert "READY=1" not in manager.read()
     gateway.turn()
-    service.look(0.5)
+    reporter.look(0.5)
     assert "READY=1" in manager.read()
     gateway.turn()
-    service.look(1.0)
+    reporter.look(1.0)
     assert manager.read() == ["WATCHDOG=1"]
 
 
@@ -105,13 +105,13 @@ def test_the_watchdog_is_fed_only_while_every_part_turns(
 ) -> None:
     """From the first look at which one part has not turned since the last ping; its name comes before the end."""
     gateway = Gateway()
-    service = Service(notifier, gateway)
+    reporter = ManagerReporter(notifier, gateway)
     fed, told = [], []
     for step in range(16):
         gateway.turn()
         if step >= 10:
             gateway.counts["robot"] = 99
-        service.look(step / 2)
+        reporter.look(step / 2)
         heard = manager.read()
         if "WATCHDOG=1" in heard:
             fed.append(step / 2)
@@ -125,30 +125,30 @@ def test_the_watchdog_is_fed_only_while_every_part_turns(
 
 def test_a_changed_number_is_told_later_than_a_changed_word(manager: Manager, notifier: Notifier) -> None:
     gateway = Gateway()
-    service = Service(notifier, gateway)
+    reporter = ManagerReporter(notifier, gateway)
     told = []
     for step, trouble in enumerate(["at 500 Hz", "at 499 Hz", "at 498 Hz", "lost", "lost"]):
         gateway.wrong = [trouble]
         gateway.turn()
-        service.look(step / 2)
+        reporter.look(step / 2)
         told.append([one for one in manager.read() if one.startswith("STATUS=")])
     assert told == [["STATUS=at 500 Hz"], [], [], ["STATUS=lost"], []]
     gateway.wrong = ["at 1 Hz"]
     gateway.turn()
-    service.look(3.0)
+    reporter.look(3.0)
     gateway.wrong = ["at 2 Hz"]
-    service.look(3.0 + STATUS_PERIOD)
+    reporter.look(3.0 + STATUS_PERIOD)
     assert [one for one in manager.read() if "STATUS" in one] == ["STATUS=at 1 Hz", "STATUS=at 2 Hz"]
 
 
 def test_a_reload_ends_ready_whatever_came_of_it(manager: Manager, notifier: Notifier) -> None:
-    service = Service(notifier, Gateway())
-    service.reload_begins()
-    service.reload_ended(["reload refused: `part` is owned by plc"])
+    reporter = ManagerReporter(notifier, Gateway())
+    reporter.reload_begins()
+    reporter.reload_ended(["reload refused: `part` is owned by plc"])
     begin, end = manager.read()
     assert begin.startswith("RELOADING=1\nMONOTONIC_USEC=")
     assert end == "READY=1\nSTATUS=reload refused: `part` is owned by plc"
-    service.look(0.0)
+    reporter.look(0.0)
     assert not any(one.startswith("STATUS") for one in manager.read())
 
 
@@ -163,7 +163,7 @@ async def test_a_defect_is_logged_once_and_feeds_nobody(
 
     monkeypatch.setattr(gateway, "progress", fail)
     stop = asyncio.Event()
-    task = asyncio.create_task(Service(notifier, gateway).run(stop))
+    task = asyncio.create_task(ManagerReporter(notifier, gateway).run(stop))
     await asyncio.sleep(0.1)
     stop.set()
     await task
@@ -199,7 +199,9 @@ async def test_a_real_daemon_is_ready_without_its_robot_and_its_port(
         port = taken.getsockname()[1]
         gateway = daemon(free_port(), port)
         stop = asyncio.Event()
-        tasks = [asyncio.create_task(run(stop)) for run in (gateway.run, Service(notifier, gateway).run)]
+        tasks = [
+            asyncio.create_task(run(stop)) for run in (gateway.run, ManagerReporter(notifier, gateway).run)
+        ]
         try:
             await until(lambda: manager.read() and "READY=1" in manager.heard)
             assert any(f"not listening on 127.0.0.1:{port}" in one for one in manager.heard)
@@ -226,7 +228,7 @@ async def test_every_part_of_a_real_daemon_turns_whatever_its_peers_do() -> None
             tasks = [asyncio.create_task(gateway.run(stop)) for gateway in gateways]
             try:
                 await until(lambda: all(all(gateway.progress().values()) for gateway in gateways))
-                turned = [Turned() for _ in gateways]
+                turned = [Progressed() for _ in gateways]
                 for _ in range(6):
                     await asyncio.sleep(4 * STEP)
                     assert all(
