@@ -40,7 +40,7 @@ _EXTENDED, _REMOTE, _ERROR = 0x8000_0000, 0x4000_0000, 0x2000_0000
 _BASIC = 0x7FF
 _EXACT = _BASIC | _EXTENDED | _REMOTE
 """Mask of a filter for one identifier and data frames; the kernel finds the socket for it by a table."""
-_GREATEST_FILTERS = 512
+_MAX_FILTERS = 512
 _MEMINFO_SENDING, _MEMINFO_DROPS = 2, 8
 _SO_MEMINFO, _CAN_RAW_ERR_FILTER = 55, 2
 _EVERY_ERROR = 0x1FFF_FFFF
@@ -71,7 +71,7 @@ def filters(can_ids: Iterable[int], remote_ids: Iterable[int]) -> bytes:
     """CAN_RAW_FILTER: exactly these; with more of them than the kernel takes, every 11-bit identifier."""
     wanted = [_FILTER.pack(can_id, _EXACT) for can_id in sorted(set(can_ids))]
     wanted += [_FILTER.pack(can_id | _REMOTE, _EXACT) for can_id in sorted(set(remote_ids))]
-    if len(wanted) > _GREATEST_FILTERS:
+    if len(wanted) > _MAX_FILTERS:
         return _FILTER.pack(0, _EXTENDED)
     return b"".join(wanted)
 

@@ -11,13 +11,13 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
 
-__all__ = ["GREATEST_COUNTER", "LEAST_PERIOD", "PRODUCER", "SyncPlan", "SyncService"]
+__all__ = ["MAX_COUNTER", "MIN_PERIOD", "PRODUCER", "SyncPlan", "SyncService"]
 
 PRODUCER = 0x4000_0000
 """Bit 30 of 1005h: this node sends SYNC."""
 _DO_NOT_CARE = 0x8000_0000
-GREATEST_COUNTER = 240
-LEAST_PERIOD = 1000
+MAX_COUNTER = 240
+MIN_PERIOD = 1000
 """Microseconds: a shorter cycle would fill the bus, and no timer of this node keeps it."""
 
 
@@ -189,12 +189,12 @@ class SyncService:
             raise Abort(AbortCode.INVALID_VALUE)
 
     def _check_overflow(self, data: bytes) -> None:
-        if data[0] == 1 or data[0] > GREATEST_COUNTER:
+        if data[0] == 1 or data[0] > MAX_COUNTER:
             raise Abort(AbortCode.INVALID_VALUE)
         if self._period.number:
             raise Abort(AbortCode.DEVICE_STATE)
 
 
 def _check_period(data: bytes) -> None:
-    if 0 < int.from_bytes(data, "little") < LEAST_PERIOD:
+    if 0 < int.from_bytes(data, "little") < MIN_PERIOD:
         raise Abort(AbortCode.VALUE_TOO_LOW)

@@ -21,7 +21,7 @@ _WIDE = 98
 """Columns of a terminal that has room for the CANopen side too."""
 _SPACIOUS = 115
 """Columns of one that has room for everything, the 4xxxxx form among it."""
-_LEAST_EVENTS, _MOST_EVENTS = 3, 8
+_MIN_EVENTS, _MOST_EVENTS = 3, 8
 _LINES_OF_LINKS = 2
 _FRAME_OF_TABLE = 5
 """Lines of the table that are no variables: title, rules and blank ones."""
@@ -50,10 +50,10 @@ def screen(shot: Snapshot, before: Snapshot | None, pokes: Sequence[Poke], width
     wide, spacious = width >= _WIDE, width >= _SPACIOUS
     table = _table(shot.lines, old, wide=wide, spacious=spacious)
     fixed = _LINES_OF_LINKS + _FRAME_OF_TABLE + len(shot.lines)
-    shown = list(pokes) if height >= fixed + _LEAST_EVENTS + len(pokes) + _FRAME_OF_POKES else []
+    shown = list(pokes) if height >= fixed + _MIN_EVENTS + len(pokes) + _FRAME_OF_POKES else []
     room = height - fixed - (len(shown) + _FRAME_OF_POKES if shown else 0) - _ABOVE
     # A small window gives one event's line to the hint.
-    events = min(max(room, _LEAST_EVENTS) - (not shown), _MOST_EVENTS)
+    events = min(max(room, _MIN_EVENTS) - (not shown), _MOST_EVENTS)
     links = _links(shot, wide=spacious), _canopen(shot)
     parts: list[RenderableType] = [*links, table, *_events(shot, events)]
     if shown:

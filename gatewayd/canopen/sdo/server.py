@@ -17,7 +17,7 @@ from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary
 from gatewayd.canopen.sdo import protocol
 from gatewayd.canopen.sdo.protocol import BLOCK_SEGMENTS, REQUESTS, Request
 from gatewayd.canopen.sdo.transfers import (
-    BLOCK_SEGMENTS_GREATEST,
+    MAX_BLOCK_SEGMENTS,
     BlockDownload,
     BlockUpload,
     Download,
@@ -221,9 +221,7 @@ class SdoServer:
         checked = bool(data[0] & _CRC_SUPPORTED)
         self._block_download = BlockDownload(Download(size, self._longest), checked=checked)
         self.state = SdoState.BLOCK_DOWNLOAD
-        return [
-            protocol.block_download_initiated(self._multiplexer, BLOCK_SEGMENTS_GREATEST, checked=checked)
-        ]
+        return [protocol.block_download_initiated(self._multiplexer, MAX_BLOCK_SEGMENTS, checked=checked)]
 
     def _take_block_segment(self, data: bytes) -> list[bytes]:
         block = self._block_download

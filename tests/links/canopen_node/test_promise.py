@@ -129,7 +129,7 @@ def test_another_one_of_the_same_plan_goes_on(bench: Bench) -> None:
 
 _TIMES = (0, 200, 500, 60_000)
 """What somebody writes into 1016h."""
-_LEAST = 0.2
+_MIN = 0.2
 _EVENTS = st.one_of(
     st.sampled_from(["write", "heartbeat", "boot", "gap", "read"]), st.sampled_from(_TIMES).map(str)
 )
@@ -179,7 +179,7 @@ class Both:
         assert not self.bound or self.is_broken or silent < PROMISED / 1000 + 1e-9, "silent and believed"
         assert not self.lost or self.heard, "8130h before the first heartbeat"
         assert not self.broken or self.bound, "missed before the first write"
-        assert all(now - self.sign >= _LEAST - 1e-9 for now in self.broken), "heard and missed"
+        assert all(now - self.sign >= _MIN - 1e-9 for now in self.broken), "heard and missed"
         self.lost.clear()
         self.broken.clear()
 

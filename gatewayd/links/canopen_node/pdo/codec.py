@@ -23,9 +23,9 @@ from gatewayd.core.cell import Change
 from gatewayd.core.definition import Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
 
-__all__ = ["GREATEST_BITS", "Layout", "Mapped", "fit", "is_aligned", "native"]
+__all__ = ["MAX_BITS", "Layout", "Mapped", "fit", "is_aligned", "native"]
 
-GREATEST_BITS: Final = 64
+MAX_BITS: Final = 64
 """What one CAN frame carries."""
 
 _DIGITS: Final = b"0" + b"1" * 255
@@ -105,7 +105,7 @@ class Layout:
     def __init__(self, mapping: Sequence[Mapped], variables: Sequence[Variable]) -> None:
         types = [one.type for one in mapping]
         bits = sum(one.bits for one in types)
-        assert bits <= GREATEST_BITS
+        assert bits <= MAX_BITS
         assert is_aligned(types)
         assert all(one.variable is not None for one in mapping if one.type is CanType.BOOLEAN)
         self.mapping = tuple(mapping)

@@ -30,13 +30,13 @@ from gatewayd.canopen.cob_ids import BASIC_FRAME, INVALID, is_restricted, predef
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, Pdo, record
 from gatewayd.core.definition import Direction, Variable
-from gatewayd.links.canopen_node.pdo.codec import GREATEST_BITS, Layout, Mapped, is_aligned
+from gatewayd.links.canopen_node.pdo.codec import MAX_BITS, Layout, Mapped, is_aligned
 from gatewayd.links.canopen_node.plan import CanopenPlan, PdoEntry, PdoPlan
 from gatewayd.links.canopen_node.status_objects import status_word
 
-__all__ = ["LEAST_NUMBER", "Configuration", "PdoParameters", "PdoTable"]
+__all__ = ["MIN_NUMBER", "Configuration", "PdoParameters", "PdoTable"]
 
-LEAST_NUMBER: Final = 4
+MIN_NUMBER: Final = 4
 """PDOs per direction that a node has even if its mapping uses fewer, so that a master can map its own."""
 
 NO_RTR: Final = 0x4000_0000
@@ -141,7 +141,7 @@ class PdoParameters:
         self._count = self._entry(0, "Number of mapped objects", CanType.UNSIGNED8, self._check_count)
         self._slots = tuple(
             self._entry(one, f"Mapped object {one}", CanType.UNSIGNED32, partial(self._check_slot, one))
-            for one in range(1, GREATEST_BITS + 1)
+            for one in range(1, MAX_BITS + 1)
         )
 
     @property
@@ -256,7 +256,7 @@ class PdoParameters:
         if 0 in values:
             raise Abort(AbortCode.NOT_MAPPABLE)
         mapping = tuple(self._mapped(value) for value in values)
-        if sum(one.type.bits for one in mapping) > GREATEST_BITS:
+        if sum(one.type.bits for one in mapping) > MAX_BITS:
             raise Abort(AbortCode.PDO_LENGTH)
         if not is_aligned(one.type for one in mapping):
             raise Abort(AbortCode.NOT_MAPPABLE)
@@ -264,7 +264,7 @@ class PdoParameters:
 
     def _mapped(self, value: int) -> Mapped:
         index, subindex, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
-        if bits > GREATEST_BITS:
+        if bits > MAX_BITS:
             raise Abort(AbortCode.PDO_LENGTH)
         mapped = self._dummy(index, subindex) or self._object(index, subindex)
         if mapped.type.bits != bits:
@@ -350,7 +350,7 @@ class PdoTable:
         find: Find,
         changed: Changed,
         *,
-        least: int = LEAST_NUMBER,
+        least: int = MIN_NUMBER,
         refused: Callable[[int], bool] = is_restricted,
     ) -> None:
         around = _Surroundings(
