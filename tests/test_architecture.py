@@ -280,15 +280,6 @@ TESTED_TOGETHER = {
 TO_COME: set[str] = set()
 """Modules that somebody is about to make."""
 
-SAME_NAME: dict[str, str] = {
-    "Access": "D",
-    "Kind": "C",
-    "Outcome": "C",
-    "Session": "D",
-    "Waiting": "D",
-}
-"""Name of several public classes -> who is about to rename all but one."""
-
 
 def _modules() -> dict[str, Path]:
     found = {}
@@ -436,7 +427,7 @@ def test_public_classes_have_names_of_their_own() -> None:
         for node in tree(module).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes.setdefault(node.name, []).append(module)
-    assert {name: places for name, places in homes.items() if len(places) > 1 and name not in SAME_NAME} == {}
+    assert {name: places for name, places in homes.items() if len(places) > 1} == {}
 
 
 def test_module_is_short_enough_to_be_read() -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from gatewayd.mapping.compiled import Unreadable
-    from gatewayd.report.findings import Outcome
+    from gatewayd.report.findings import CheckOutcome
 
 __all__ = ["command"]
 
@@ -108,9 +108,9 @@ def command(
     context.exit(FOUND if outcome.errors or (strict and outcome.findings) else CLEAN)
 
 
-def _check(files: tuple[str, ...], *, separately: bool) -> Outcome:
+def _check(files: tuple[str, ...], *, separately: bool) -> CheckOutcome:
     from gatewayd.mapping.loader import load, load_together
-    from gatewayd.report.findings import Outcome
+    from gatewayd.report.findings import CheckOutcome
 
     readable: list[tuple[str, bytes]] = []
     unreadable: list[Unreadable] = []
@@ -123,7 +123,7 @@ def _check(files: tuple[str, ...], *, separately: bool) -> Outcome:
             unreadable.append(content)
     loaded = tuple(load(data, name) for name, data in readable) if separately else load_together(readable)
     findings = tuple(finding for one in loaded for finding in one.diagnostics)
-    return Outcome(tuple(name for name, _ in readable), findings, tuple(unreadable))
+    return CheckOutcome(tuple(name for name, _ in readable), findings, tuple(unreadable))
 
 
 def _named(files: tuple[str, ...]) -> Iterator[str]:
@@ -149,7 +149,7 @@ def _read(file: str) -> bytes | Unreadable:
         return Unreadable(name_of(file), reason_of(error))
 
 
-def _written(outcome: Outcome, form: str) -> str:
+def _written(outcome: CheckOutcome, form: str) -> str:
     from gatewayd.report.findings import as_github, as_json, as_text
 
     if form == "json":

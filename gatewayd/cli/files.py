@@ -41,7 +41,7 @@ def reason_of(error: OSError | ValueError) -> str:
 def load_file(file: str) -> Loaded | None:
     """The file, with its findings printed where they leave no plan; None after it was said why it cannot be read."""
     from gatewayd.mapping.loader import load
-    from gatewayd.report.findings import Outcome, as_text
+    from gatewayd.report.findings import CheckOutcome, as_text
 
     name = name_of(file)
     try:
@@ -50,5 +50,5 @@ def load_file(file: str) -> Loaded | None:
         click.echo(printable(f"{name}: cannot be read: {reason_of(error)}"), err=True)
         return None
     if loaded.plan is None:
-        click.echo(as_text(Outcome((name,), loaded.diagnostics)), nl=False, err=True)
+        click.echo(as_text(CheckOutcome((name,), loaded.diagnostics)), nl=False, err=True)
     return loaded

@@ -22,10 +22,10 @@ from gatewayd.report.weakening import weakened
 
 __all__ = [
     "MAX_GONE",
+    "ChangeKind",
     "Changes",
     "Detail",
     "Difference",
-    "Kind",
     "as_json",
     "as_text",
     "compare",
@@ -36,7 +36,7 @@ MAX_GONE = 0.3
 """Part of the variables that may disappear unasked: more looks like the wrong file."""
 
 
-class Kind(Enum):
+class ChangeKind(Enum):
     """What became of a part; the value is the mark in front of its line."""
 
     ADDED = "+"
@@ -57,7 +57,7 @@ class Detail:
 class Difference:
     """One part that differs. Of an added or removed one every fact is a detail."""
 
-    kind: Kind
+    kind: ChangeKind
     name: str
     details: tuple[Detail, ...]
 
@@ -98,7 +98,7 @@ class Changes:
     def _named(self) -> bool:
         return self.old.cell.name != self.new.cell.name
 
-    def of(self, kind: Kind) -> tuple[str, ...]:
+    def of(self, kind: ChangeKind) -> tuple[str, ...]:
         """Names of the variables that were added, removed or changed."""
         return tuple(difference.name for difference in self.variables if difference.kind is kind)
 
@@ -106,7 +106,7 @@ class Changes:
     def summary(self) -> str:
         """`press-3: 1 variable added, 2 changed, settings of robot changed`."""
         parts: list[str] = []
-        for kind in Kind:
+        for kind in ChangeKind:
             count = len(self.of(kind))
             if count:
                 noun = "" if parts else " variable" if count == 1 else " variables"
@@ -147,12 +147,12 @@ def _differences(old: Mapping[str, Facts], new: Mapping[str, Facts]) -> Iterator
         former = old.get(name)
         details = tuple(_details(former or {}, facts_now))
         if former is None:
-            yield Difference(Kind.ADDED, name, details)
+            yield Difference(ChangeKind.ADDED, name, details)
         elif details:
-            yield Difference(Kind.CHANGED, name, details)
+            yield Difference(ChangeKind.CHANGED, name, details)
     for name, former in old.items():
         if name not in new:
-            yield Difference(Kind.REMOVED, name, tuple(_details(former, {})))
+            yield Difference(ChangeKind.REMOVED, name, tuple(_details(former, {})))
 
 
 def _details(old: Facts, new: Facts) -> Iterator[Detail]:
@@ -178,7 +178,7 @@ def objections(changes: Changes, owned: Collection[str]) -> tuple[str, ...]:
         *_disturbed(changes),
         *weakened(changes.old.cell, changes.new.cell),
     ]
-    gone, before = len(changes.of(Kind.REMOVED)), len(changes.old.cell.variables)
+    gone, before = len(changes.of(ChangeKind.REMOVED)), len(changes.old.cell.variables)
     if gone > MAX_GONE * before:
         found.append(f"{gone} of {before} variables would be gone: is it the right file?")
     return tuple(found)
@@ -188,7 +188,7 @@ def _touches_owned(changes: Changes, owned: Collection[str]) -> Iterator[str]:
     for difference in changes.variables:
         if difference.name not in owned:
             continue
-        if difference.kind is Kind.REMOVED:
+        if difference.kind is ChangeKind.REMOVED:
             yield f"`{difference.name}` is owned now and would be removed"
         elif difference.detail("direction") is None and not all(map(_is_harmless, difference.details)):
             yield f"`{difference.name}` is owned now and would change: {_changed(difference.details)}"
@@ -209,7 +209,7 @@ def _is_harmless(detail: Detail) -> bool:
 
 def _turns_round(changes: Changes) -> Iterator[str]:
     for difference in changes.variables:
-        turned = difference.detail("direction") if difference.kind is Kind.CHANGED else None
+        turned = difference.detail("direction") if difference.kind is ChangeKind.CHANGED else None
         if turned is not None:
             yield f"`{difference.name}` would turn from {turned.old} to {turned.new}"
 
@@ -224,7 +224,7 @@ def _cuts_owners_off(changes: Changes, owned: Collection[str]) -> Iterator[str]:
         if moved:
             yield f"{link.name} would move while {whose} owned: {_changed(moved)}"
     for writer in changes.writers:
-        if writer.kind is Kind.ADDED or not any(writer.detail(name) for name in changes.old.links):
+        if writer.kind is ChangeKind.ADDED or not any(writer.detail(name) for name in changes.old.links):
             continue
         held = sorted(_may_own(changes.old, writer.name).intersection(owned))
         if held:
@@ -325,7 +325,7 @@ def _as_object(difference: Difference) -> dict[str, object]:
 
 def _line(noun: str, difference: Difference) -> str:
     head = f"{difference.kind.value} {noun}{difference.name}: "
-    if difference.kind is Kind.CHANGED:
+    if difference.kind is ChangeKind.CHANGED:
         return head + _changed(difference.details)
     return head + "; ".join(f"{detail.what} {detail.old or detail.new}" for detail in difference.details)
 

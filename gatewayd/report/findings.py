@@ -9,14 +9,14 @@ from gatewayd.mapping.compiled import Unreadable
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Severity
 from gatewayd.report.printable import json_text, printable
 
-__all__ = ["Outcome", "as_github", "as_json", "as_text"]
+__all__ = ["CheckOutcome", "as_github", "as_json", "as_text"]
 
 _BOLD, _RED, _YELLOW, _DIM, _PLAIN = "\x1b[1m", "\x1b[31m", "\x1b[33m", "\x1b[2m", "\x1b[0m"
 _TINT = {Severity.ERROR: _RED, Severity.WARNING: _YELLOW}
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CheckOutcome:
     """What one run of `gatewayd check` found in all its files."""
 
     files: tuple[str, ...]
@@ -36,7 +36,7 @@ class Outcome:
         return len(self.findings) - self.errors
 
 
-def as_text(outcome: Outcome, *, colour: bool = False) -> str:
+def as_text(outcome: CheckOutcome, *, colour: bool = False) -> str:
     """One line `file:line:col: severity GWnnn slug: message` per finding, details indented; a summary line."""
     lines: list[str] = []
     for finding in outcome.findings:
@@ -48,7 +48,7 @@ def as_text(outcome: Outcome, *, colour: bool = False) -> str:
     return "\n".join(lines) + "\n"
 
 
-def as_json(outcome: Outcome) -> str:
+def as_json(outcome: CheckOutcome) -> str:
     """One JSON document: `version`, `files`, `errors`, `warnings`, `findings`, `unreadable`.
 
     A finding has `rule`, `slug`, `family`, `severity`, `file`, `line`, `column`, `message`, `hint` (or null)
@@ -65,7 +65,7 @@ def as_json(outcome: Outcome) -> str:
     return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
 
-def as_github(outcome: Outcome) -> str:
+def as_github(outcome: CheckOutcome) -> str:
     """Workflow commands that GitHub shows as annotations at the lines of a pull request."""
     lines = [_annotation(finding) for finding in outcome.findings]
     lines.extend(
@@ -89,7 +89,7 @@ def _finding_lines(finding: Diagnostic, *, colour: bool) -> list[str]:
     return lines
 
 
-def _summary(outcome: Outcome) -> str:
+def _summary(outcome: CheckOutcome) -> str:
     parts = [f"{_count(len(outcome.files), 'file')} checked"]
     if outcome.unreadable:
         parts.append(f"{_count(len(outcome.unreadable), 'file')} not readable")

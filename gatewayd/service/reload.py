@@ -28,7 +28,7 @@ from gatewayd.service.compilation import Compilation, CompilationError
 from gatewayd.service.shared_parts import AllPrepared
 from gatewayd.service.startup import mapping_files, tell_findings
 
-__all__ = ["Outcome", "Reloader", "Result", "Swapping"]
+__all__ = ["ReloadOutcome", "Reloader", "Result", "Swapping"]
 
 SETTLING_TIME = 0.5
 """Seconds for which a swap waits for a link that is about to know more, a robot's that has just claimed registers."""
@@ -56,7 +56,7 @@ class Result(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class ReloadOutcome:
     """What a reload came to."""
 
     result: Result
@@ -136,9 +136,9 @@ class Reloader:
         daemon: Swapping,
         paths: Sequence[Path],
         began: Callable[[], None] = lambda: None,
-        ended: Callable[[Outcome], None] = lambda _outcome: None,
+        ended: Callable[[ReloadOutcome], None] = lambda _outcome: None,
     ) -> None:
-        self.last: Outcome | None = None
+        self.last: ReloadOutcome | None = None
         """What the last reload came to."""
         self._daemon = daemon
         self._paths = tuple(paths)
@@ -158,16 +158,16 @@ class Reloader:
             self._asked.clear()
             await self.reload()
 
-    async def reload(self, *, force: bool = False) -> Outcome:
+    async def reload(self, *, force: bool = False) -> ReloadOutcome:
         """Read, check, compare and swap; `force`: also what is unsafe. Never raises but for a cancellation."""
         async with self._busy:
             self._began()
-            outcome = Outcome(Result.FAILED, ("it was interrupted",))
+            outcome = ReloadOutcome(Result.FAILED, ("it was interrupted",))
             try:
                 outcome = await self._reload(force=force)
             except Exception as error:
                 log.exception("internal error")
-                outcome = Outcome(Result.FAILED, (f"internal error: {error!r}",))
+                outcome = ReloadOutcome(Result.FAILED, (f"internal error: {error!r}",))
             finally:
                 self.last = outcome
                 self._ended(outcome)
@@ -176,49 +176,49 @@ class Reloader:
         log.log(level, outcome.text, extra=fields(**took))
         return outcome
 
-    async def _reload(self, *, force: bool) -> Outcome:
+    async def _reload(self, *, force: bool) -> ReloadOutcome:
         files = await asyncio.to_thread(mapping_files, self._paths)
         if not files:
-            return Outcome(Result.FAILED, (f"no mapping file in {', '.join(map(str, self._paths))}",))
+            return ReloadOutcome(Result.FAILED, (f"no mapping file in {', '.join(map(str, self._paths))}",))
         try:
             with Compilation(files) as compilation:
                 compiled = await asyncio.to_thread(compilation.result)
         except CompilationError as error:
-            return Outcome(Result.FAILED, (str(error),))
+            return ReloadOutcome(Result.FAILED, (str(error),))
         tell_findings(compiled.files)
         reasons = tuple(_reasons(compiled))
         if reasons:
-            return Outcome(Result.FAILED, reasons)
+            return ReloadOutcome(Result.FAILED, reasons)
         plans = compiled.plans
         differences = self._compare(plans)
         if not differences:
-            return Outcome(Result.UNCHANGED)
+            return ReloadOutcome(Result.UNCHANGED)
         outcome = await self._swap(plans, differences, force=force)
         told = (one if isinstance(one, str) else one.summary for one in differences)
         return replace(outcome, changes=tuple(told), details=tuple(_details(differences)))
 
     async def _swap(
         self, plans: Sequence[Plan], differences: Sequence[Changes | str], *, force: bool
-    ) -> Outcome:
+    ) -> ReloadOutcome:
         objected = () if force else self._objections(plans, differences)
         if objected:
-            return Outcome(Result.REFUSED, objected)
+            return ReloadOutcome(Result.REFUSED, objected)
         try:
             prepared = await self._daemon.prepare(plans)
         except PrepareError as error:
-            return Outcome(Result.FAILED, (reason_of(error),))
+            return ReloadOutcome(Result.FAILED, (reason_of(error),))
         await self._settle()
         # From here to the swap nothing waits: what is owned now is owned in the swap.
         objected = () if force else self._objections(plans, differences)
         if objected or not self._daemon.running:
             await prepared.abort()
             if objected:
-                return Outcome(Result.REFUSED, objected)
-            return Outcome(Result.FAILED, ("the gateway stops",))
+                return ReloadOutcome(Result.REFUSED, objected)
+            return ReloadOutcome(Result.FAILED, ("the gateway stops",))
         now = clock.now()
         stranded = self._daemon.swap(plans, now, prepared)
         left = tuple(f"the robot keeps what it holds in {name}" for name in stranded)
-        return Outcome(Result.APPLIED, left, swap=clock.now() - now)
+        return ReloadOutcome(Result.APPLIED, left, swap=clock.now() - now)
 
     def _compare(self, plans: Sequence[Plan]) -> list[Changes | str]:
         """What differs, by cell; a cell that is new or gone in one sentence."""

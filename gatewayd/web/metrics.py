@@ -29,12 +29,12 @@ from gatewayd.web.health import readiness
 from gatewayd.web.histogram import Histogram
 from gatewayd.web.probes import Probes
 
-__all__ = ["CONTENT_TYPE", "METRICS", "PROCESS_METRICS", "Exposition", "Kind", "MetricInfo"]
+__all__ = ["CONTENT_TYPE", "METRICS", "PROCESS_METRICS", "Exposition", "MetricInfo", "MetricKind"]
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
 
-class Kind(Enum):
+class MetricKind(Enum):
     """What Prometheus calls the type of a metric."""
 
     COUNTER = "counter"
@@ -48,140 +48,148 @@ class MetricInfo:
 
     name: str
     """As it is asked for; counters end in `_total`."""
-    kind: Kind
+    kind: MetricKind
     labels: tuple[str, ...]
     meaning: str
 
 
 def _of_link(metric: LinkMetric) -> MetricInfo:
-    kind = Kind.COUNTER if metric.name.endswith("_total") else Kind.GAUGE
+    kind = MetricKind.COUNTER if metric.name.endswith("_total") else MetricKind.GAUGE
     return MetricInfo(metric.name, kind, metric.labels, metric.meaning)
 
 
 _CELL = ("cell",)
 METRICS = (
-    MetricInfo("gatewayd_info", Kind.GAUGE, ("version",), "1, with the version of the gateway"),
-    MetricInfo("gatewayd_ready", Kind.GAUGE, (), "1 while every cell is served, as /readyz tells it"),
+    MetricInfo("gatewayd_info", MetricKind.GAUGE, ("version",), "1, with the version of the gateway"),
+    MetricInfo("gatewayd_ready", MetricKind.GAUGE, (), "1 while every cell is served, as /readyz tells it"),
     MetricInfo(
-        "gatewayd_parts_hanging", Kind.GAUGE, (), "parts of the gateway that do not turn; /healthz names them"
+        "gatewayd_parts_hanging",
+        MetricKind.GAUGE,
+        (),
+        "parts of the gateway that do not turn; /healthz names them",
     ),
     MetricInfo(
         "gatewayd_troubles",
-        Kind.GAUGE,
+        MetricKind.GAUGE,
         (),
         "what is wrong with no cell in particular, say a mapping not served or a reload refused; /readyz names it",
     ),
     MetricInfo(
         "gatewayd_loop_lag_seconds",
-        Kind.HISTOGRAM,
+        MetricKind.HISTOGRAM,
         (),
         "by how much the event loop came late, ten times a second",
     ),
     MetricInfo(
-        "gatewayd_cell_info", Kind.GAUGE, ("cell", "fingerprint"), "1, with the fingerprint of the mapping"
+        "gatewayd_cell_info",
+        MetricKind.GAUGE,
+        ("cell", "fingerprint"),
+        "1, with the fingerprint of the mapping",
     ),
-    MetricInfo("gatewayd_uptime_seconds", Kind.GAUGE, _CELL, "seconds since the cell was first served"),
+    MetricInfo("gatewayd_uptime_seconds", MetricKind.GAUGE, _CELL, "seconds since the cell was first served"),
     MetricInfo(
         "gatewayd_robot_up",
-        Kind.GAUGE,
+        MetricKind.GAUGE,
         _CELL,
         "1 while the robot's values are fresh and its inputs can be written",
     ),
     MetricInfo(
         "gatewayd_robot_state",
-        Kind.GAUGE,
+        MetricKind.GAUGE,
         ("cell", "state"),
         "1 for the state the robot is in, 0 for all others",
     ),
-    MetricInfo("gatewayd_robot_package_rate_hertz", Kind.GAUGE, _CELL, "packages per second, measured"),
+    MetricInfo("gatewayd_robot_package_rate_hertz", MetricKind.GAUGE, _CELL, "packages per second, measured"),
     MetricInfo(
         "gatewayd_robot_age_seconds",
-        Kind.GAUGE,
+        MetricKind.GAUGE,
         _CELL,
         "seconds since the robot last told anything new; +Inf: never",
     ),
-    MetricInfo("gatewayd_robot_packages_total", Kind.COUNTER, _CELL, "packages received"),
+    MetricInfo("gatewayd_robot_packages_total", MetricKind.COUNTER, _CELL, "packages received"),
     MetricInfo(
-        "gatewayd_robot_packages_skipped_total", Kind.COUNTER, _CELL, "packages the controller left out"
+        "gatewayd_robot_packages_skipped_total", MetricKind.COUNTER, _CELL, "packages the controller left out"
     ),
-    MetricInfo("gatewayd_robot_packages_late_total", Kind.COUNTER, _CELL, "packages that came late"),
+    MetricInfo("gatewayd_robot_packages_late_total", MetricKind.COUNTER, _CELL, "packages that came late"),
     MetricInfo(
         "gatewayd_robot_sessions_total",
-        Kind.COUNTER,
+        MetricKind.COUNTER,
         _CELL,
         "sessions with the controller; the first is no reconnect",
     ),
-    MetricInfo("gatewayd_robot_watchdog_fed", Kind.GAUGE, _CELL, "1 while the robot's watchdog is fed"),
+    MetricInfo("gatewayd_robot_watchdog_fed", MetricKind.GAUGE, _CELL, "1 while the robot's watchdog is fed"),
     MetricInfo(
         "gatewayd_read_back_mismatches_total",
-        Kind.COUNTER,
+        MetricKind.COUNTER,
         _CELL,
         "inputs whose read-back differed from what was written",
     ),
     MetricInfo(
         "gatewayd_lag_seconds",
-        Kind.GAUGE,
+        MetricKind.GAUGE,
         _CELL,
         "by how much the newest package of the robot is later than the quickest ones were; part of every age",
     ),
     MetricInfo(
         "gatewayd_differing",
-        Kind.GAUGE,
+        MetricKind.GAUGE,
         _CELL,
         "inputs for which the robot holds something else than it was given",
     ),
-    MetricInfo("gatewayd_unadopted", Kind.GAUGE, _CELL, "inputs whose content in the robot is not known"),
+    MetricInfo(
+        "gatewayd_unadopted", MetricKind.GAUGE, _CELL, "inputs whose content in the robot is not known"
+    ),
     MetricInfo(
         "gatewayd_adoption_seconds",
-        Kind.GAUGE,
+        MetricKind.GAUGE,
         _CELL,
         "seconds until adopted inputs without an owner fall back; 0: none will",
     ),
     MetricInfo(
         "gatewayd_gaps_total",
-        Kind.COUNTER,
+        MetricKind.COUNTER,
         _CELL,
         "times the gateway stood still: stopped, suspended or starved of the CPU",
     ),
-    MetricInfo("gatewayd_variables", Kind.GAUGE, ("cell", "quality"), "variables by quality"),
+    MetricInfo("gatewayd_variables", MetricKind.GAUGE, ("cell", "quality"), "variables by quality"),
     MetricInfo(
         "gatewayd_input_age_seconds",
-        Kind.GAUGE,
+        MetricKind.GAUGE,
         _CELL,
         "seconds since any input was last written; +Inf: never",
     ),
-    MetricInfo("gatewayd_locks", Kind.GAUGE, _CELL, "locks, owned or not"),
+    MetricInfo("gatewayd_locks", MetricKind.GAUGE, _CELL, "locks, owned or not"),
     MetricInfo(
         "gatewayd_locks_owned",
-        Kind.GAUGE,
+        MetricKind.GAUGE,
         ("cell", "writer"),
         "locks that the writer owns; `operator` is the local operator",
     ),
     MetricInfo(
         "gatewayd_writer_up",
-        Kind.GAUGE,
+        MetricKind.GAUGE,
         ("cell", "writer"),
         "1 while the writer is connected and heard in time",
     ),
-    MetricInfo("gatewayd_writes_accepted_total", Kind.COUNTER, _CELL, "write requests applied"),
-    MetricInfo("gatewayd_writes_refused_total", Kind.COUNTER, _CELL, "requests refused"),
+    MetricInfo("gatewayd_writes_accepted_total", MetricKind.COUNTER, _CELL, "write requests applied"),
+    MetricInfo("gatewayd_writes_refused_total", MetricKind.COUNTER, _CELL, "requests refused"),
     MetricInfo(
         "gatewayd_refusals_total",
-        Kind.COUNTER,
+        MetricKind.COUNTER,
         ("cell", "reason"),
         "requests refused by reason; equal ones are added every 10 s, so it may lag behind the total",
     ),
-    MetricInfo("gatewayd_events_total", Kind.COUNTER, ("cell", "kind"), "events by kind"),
+    MetricInfo("gatewayd_events_total", MetricKind.COUNTER, ("cell", "kind"), "events by kind"),
     *(_of_link(metric) for kind in kinds() for metric in kind.metrics),
     MetricInfo(
         "gatewayd_package_to_image_seconds",
-        Kind.HISTOGRAM,
+        MetricKind.HISTOGRAM,
         _CELL,
         "from the arrival of a robot's package to its values standing in every fieldbus's image",
     ),
     MetricInfo(
         "gatewayd_write_to_package_seconds",
-        Kind.HISTOGRAM,
+        MetricKind.HISTOGRAM,
         _CELL,
         "from the arrival of a write to the package with it to the robot, its wait for the control cycle included",
     ),
@@ -250,7 +258,7 @@ class Exposition:
             histograms["gatewayd_package_to_image_seconds"].append(((name,), probe.package_to_image))
             histograms["gatewayd_write_to_package_seconds"].append(((name,), probe.write_to_package))
         for info in METRICS:
-            if info.kind is Kind.HISTOGRAM:
+            if info.kind is MetricKind.HISTOGRAM:
                 yield _histogram(info, histograms[info.name])
             elif samples.get(info.name):
                 # What several cells share is reported by each of them, and counts once.
@@ -331,9 +339,9 @@ def _counted(
 
 def _family(info: MetricInfo, samples: Iterable[_Sample] = ()) -> Metric:
     family: CounterMetricFamily | GaugeMetricFamily | HistogramMetricFamily
-    if info.kind is Kind.HISTOGRAM:
+    if info.kind is MetricKind.HISTOGRAM:
         return HistogramMetricFamily(info.name, info.meaning, labels=info.labels)
-    make = CounterMetricFamily if info.kind is Kind.COUNTER else GaugeMetricFamily
+    make = CounterMetricFamily if info.kind is MetricKind.COUNTER else GaugeMetricFamily
     family = make(info.name, info.meaning, labels=info.labels)
     for labels, value in samples:
         family.add_metric(list(map(printable, labels)), value)

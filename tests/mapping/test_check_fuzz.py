@@ -18,7 +18,7 @@ from gatewayd.links.canopen_node.plan import canopen_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together
 from gatewayd.mapping.source import parse, plain
-from gatewayd.report.findings import Outcome, as_github, as_json, as_text
+from gatewayd.report.findings import CheckOutcome, as_github, as_json, as_text
 from gatewayd.report.table import as_csv, as_markdown, rows
 from gatewayd.report.table import as_json as table_as_json
 
@@ -41,7 +41,7 @@ def examine(data: bytes) -> Loaded:
     """Check, report and, where it passes, show: the whole way of a file."""
     started = time.perf_counter()
     loaded = load(data, "cell.yaml")
-    outcome = Outcome(("cell.yaml",), loaded.diagnostics)
+    outcome = CheckOutcome(("cell.yaml",), loaded.diagnostics)
     lines = data.count(b"\n") + data.count(b"\r") + data.count(b"\x85") + data.count(b"\xe2\x80") + 2
     for finding in loaded.diagnostics:
         assert 1 <= finding.position.line <= lines

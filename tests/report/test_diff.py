@@ -9,7 +9,7 @@ import pytest
 
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
-from gatewayd.report.diff import Changes, Kind, as_json, as_text, compare, objections
+from gatewayd.report.diff import ChangeKind, Changes, as_json, as_text, compare, objections
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "diff.txt"
 
@@ -133,7 +133,7 @@ FACTS = {
 @pytest.mark.parametrize("what", FACTS)
 def test_every_fact_of_a_variable_is_told(what: str) -> None:
     changes = changed(FACTS[what])
-    assert any(one.kind is Kind.CHANGED and one.detail(what) for one in changes.variables)
+    assert any(one.kind is ChangeKind.CHANGED and one.detail(what) for one in changes.variables)
 
 
 def test_nothing_that_means_anything_is_missed() -> None:

@@ -6,7 +6,7 @@ import json
 
 from gatewayd.mapping.compiled import Unreadable
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
-from gatewayd.report.findings import Outcome, as_github, as_json, as_text
+from gatewayd.report.findings import CheckOutcome, as_github, as_json, as_text
 
 _OVERLAP = Rule("GW201", "register-overlap", Severity.ERROR, "two variables share a register", "why")
 _OPEN = Rule("GW217", "open-listener", Severity.WARNING, "everybody may connect", "why")
@@ -23,7 +23,7 @@ def _warning() -> Diagnostic:
 
 def test_text_names_place_rule_message_and_remedy() -> None:
     """The text form is one line per finding, details indented, a summary at the end."""
-    outcome = Outcome(("a.yaml", "b,1:2.yaml"), (_error(), _warning()))
+    outcome = CheckOutcome(("a.yaml", "b,1:2.yaml"), (_error(), _warning()))
     assert as_text(outcome).splitlines() == [
         "a.yaml:4:9: error GW201 register-overlap: `y` lies on `x`",
         "    a.yaml:3:7: `x` is here",
@@ -36,12 +36,12 @@ def test_text_names_place_rule_message_and_remedy() -> None:
 
 def test_text_of_a_clean_run_is_one_line() -> None:
     """Nothing found is said, not left silent."""
-    assert as_text(Outcome(("a.yaml",), ())) == "1 file checked: no findings\n"
+    assert as_text(CheckOutcome(("a.yaml",), ())) == "1 file checked: no findings\n"
 
 
 def test_text_lists_unreadable_files() -> None:
     """A file that could not be read has a line with the reason and counts in the summary."""
-    outcome = Outcome((), (), (Unreadable("c.yaml", "No such file or directory"),))
+    outcome = CheckOutcome((), (), (Unreadable("c.yaml", "No such file or directory"),))
     assert as_text(outcome).splitlines() == [
         "c.yaml: cannot be read: No such file or directory",
         "",
@@ -51,7 +51,7 @@ def test_text_lists_unreadable_files() -> None:
 
 def test_text_is_coloured_only_on_demand() -> None:
     """Escape sequences appear with `colour` alone."""
-    outcome = Outcome(("a.yaml",), (_error(),))
+    outcome = CheckOutcome(("a.yaml",), (_error(),))
     assert "\x1b" not in as_text(outcome)
     assert "\x1b[31m\x1b[1merror GW201\x1b[0m" in as_text(outcome, colour=True)
 
@@ -59,13 +59,13 @@ def test_text_is_coloured_only_on_demand() -> None:
 def test_text_escapes_control_characters() -> None:
     """What a file says cannot steer the terminal."""
     finding = _OPEN.at(Position("a.yaml", 1, 1), "`\x1b[2J\udc80`")
-    line = as_text(Outcome(("a.yaml",), (finding,))).splitlines()[0]
+    line = as_text(CheckOutcome(("a.yaml",), (finding,))).splitlines()[0]
     assert line == r"a.yaml:1:1: warning GW217 open-listener: `\x1b[2J\udc80`"
 
 
 def test_json_is_complete() -> None:
     """The JSON form holds everything that the text form shows."""
-    document = json.loads(as_json(Outcome(("a.yaml",), (_error(),), (Unreadable("c", "gone"),))))
+    document = json.loads(as_json(CheckOutcome(("a.yaml",), (_error(),), (Unreadable("c", "gone"),))))
     assert document == {
         "version": 1,
         "files": ["a.yaml"],
@@ -91,7 +91,7 @@ def test_json_is_complete() -> None:
 
 def test_github_annotations_are_escaped() -> None:
     """Percent signs and line ends are escaped in the text, commas and colons in the properties too."""
-    outcome = Outcome(("a.yaml",), (_error(), _warning()), (Unreadable("c", "gone"),))
+    outcome = CheckOutcome(("a.yaml",), (_error(), _warning()), (Unreadable("c", "gone"),))
     assert as_github(outcome).splitlines() == [
         (
             "::error file=a.yaml,line=4,col=9,title=GW201 register-overlap::"

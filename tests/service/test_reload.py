@@ -27,7 +27,7 @@ from gatewayd.service import startup as startup_module
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.compilation import Compilation
 from gatewayd.service.daemon import Daemon
-from gatewayd.service.reload import Outcome, Reloader, Result
+from gatewayd.service.reload import Reloader, ReloadOutcome, Result
 from gatewayd.service.startup import load_plans
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import DEMO, parse
@@ -78,7 +78,7 @@ class Rig:
     reloader: Reloader
     directory: Path
     port: int
-    outcomes: list[Outcome]
+    outcomes: list[ReloadOutcome]
 
     def write(
         self,
@@ -155,7 +155,7 @@ def rigged(tmp_path: Path) -> Rigged:
     @asynccontextmanager
     async def run() -> AsyncIterator[Rig]:
         async with SimulatedController(Controller(program=parse(DEMO))) as robot:
-            outcomes: list[Outcome] = []
+            outcomes: list[ReloadOutcome] = []
             rig = Rig(robot, Daemon([], tmp_path), None, tmp_path, free_port(), outcomes)  # type: ignore[arg-type]
             rig.write()
             rig.daemon = Daemon(load_plans([tmp_path]).plans, tmp_path)

@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
-from gatewayd.web.metrics import METRICS, PROCESS_METRICS, Kind
+from gatewayd.web.metrics import METRICS, PROCESS_METRICS, MetricKind
 
 DOCS = Path(__file__).parents[2] / "docs"
 OF_PROMETHEUS = {"instance", "job", "le"}
@@ -24,7 +24,7 @@ OF_PROMETHEUS = {"instance", "job", "le"}
 def _known() -> dict[str, set[str]]:
     found = {"up": set[str](), **{name: set[str]() for name in PROCESS_METRICS}}
     for info in METRICS:
-        suffixes = ("_bucket", "_sum", "_count") if info.kind is Kind.HISTOGRAM else ("",)
+        suffixes = ("_bucket", "_sum", "_count") if info.kind is MetricKind.HISTOGRAM else ("",)
         found |= {info.name + suffix: set(info.labels) for suffix in suffixes}
     return found
 

@@ -15,7 +15,7 @@ from gatewayd.links.contract import Link, LinkHealth
 from gatewayd.mapping.loader import load
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
-from gatewayd.web.metrics import METRICS, PROCESS_METRICS, Exposition, Kind
+from gatewayd.web.metrics import METRICS, PROCESS_METRICS, Exposition, MetricKind
 from gatewayd.web.probes import Probes
 from tests.web.press import MAPPING
 
@@ -41,7 +41,7 @@ def test_everything_that_is_listed_is_told_and_nothing_else(probes: Probes) -> N
     for info in METRICS:
         names |= (
             {f"{info.name}{suffix}" for suffix in ("_bucket", "_sum", "_count")}
-            if info.kind is Kind.HISTOGRAM
+            if info.kind is MetricKind.HISTOGRAM
             else {info.name}
         )
     assert set(read(probes)) == names - ONLY_WITH_CAN | set(PROCESS_METRICS)
@@ -50,7 +50,7 @@ def test_everything_that_is_listed_is_told_and_nothing_else(probes: Probes) -> N
 def test_labels_are_those_that_are_listed(probes: Probes) -> None:
     samples = read(probes)
     for info in METRICS:
-        name = f"{info.name}_count" if info.kind is Kind.HISTOGRAM else info.name
+        name = f"{info.name}_count" if info.kind is MetricKind.HISTOGRAM else info.name
         for labels in samples.get(name, {}):
             assert {label for label, _ in labels} == set(info.labels), info.name
 
@@ -60,8 +60,8 @@ def test_names_follow_the_conventions_of_prometheus(info: object) -> None:
     assert dataclasses.is_dataclass(info)
     name, kind = getattr(info, "name", ""), getattr(info, "kind", None)
     assert name.startswith("gatewayd_")
-    assert name.endswith("_total") == (kind is Kind.COUNTER)
-    assert (kind is Kind.HISTOGRAM) <= name.endswith("_seconds")
+    assert name.endswith("_total") == (kind is MetricKind.COUNTER)
+    assert (kind is MetricKind.HISTOGRAM) <= name.endswith("_seconds")
 
 
 def test_values_are_those_of_the_cell(probes: Probes, cell: Cell) -> None:

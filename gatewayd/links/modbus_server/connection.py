@@ -2,7 +2,7 @@
 
 asyncio owns the socket's life: it accepts, keeps answers that the peer does not take yet, and closes. It does not read.
 Telling a protocol of a few bytes costs it more than answering them costs us, so the listener's `ReadPoller` watches
-all sockets, and each one is read straight into the buffer of its `Session`.
+all sockets, and each one is read straight into the buffer of its `ModbusSession`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Protocol, cast
 from gatewayd.core.requester import new_connection
 from gatewayd.links.modbus_server.peers import Address, address_of
 from gatewayd.links.modbus_server.polling import ReadPoller
-from gatewayd.links.modbus_server.session import Access, Session
+from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
 from gatewayd.links.modbus_server.sockets import has_unread, seconds_since_established, set_options
-from gatewayd.links.modbus_server.waiting import Waiting
+from gatewayd.links.modbus_server.waiting import WaitedInput
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 
@@ -48,14 +48,14 @@ class PeerConnection(asyncio.BufferedProtocol):
     def __init__(self, admission: PeerAdmission, poller: ReadPoller) -> None:
         self.admission = admission
         self.poller = poller
-        self.session = Session()
+        self.session = ModbusSession()
         self.receive = self.session.received
         """What takes the bytes that came in; another function while they may have waited."""
-        self.waiting: Waiting | None = None
+        self.waiting: WaitedInput | None = None
         self.number = new_connection()
         self.peer = ""
         self.address: Address | None = None
-        self.accesses: dict[int, Access] = {}
+        self.accesses: dict[int, UnitAccess] = {}
         self.last_request = 0.0
         """When the last whole request came in; bytes that make none keep no connection open."""
         self.stalled_since: float | None = None
@@ -139,7 +139,7 @@ class PeerConnection(asyncio.BufferedProtocol):
     def wait(self, since: float, until: float) -> None:
         """What is in the socket may have waited from `since` to `until`."""
         unread = bool(self.session.buffer.end) or has_unread(self.descriptor)
-        self.waiting = Waiting(since, until, unread=unread, former=self.waiting)
+        self.waiting = WaitedInput(since, until, unread=unread, former=self.waiting)
         self.receive = self._receive_late
 
     def _receive_late(self, count: int, now: float) -> bytes:

@@ -21,7 +21,7 @@ from gatewayd.links.modbus_server.limits import idle_timeout, longest_unused, ma
 from gatewayd.links.modbus_server.peers import DenialLog, PeerEvent, PeerEventKind, may_connect, writer_of
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.polling import ReadPoller
-from gatewayd.links.modbus_server.session import Access
+from gatewayd.links.modbus_server.session import UnitAccess
 from gatewayd.links.modbus_server.waiting import SETTLING
 from gatewayd.links.modbus_server.writers import names_of, succeeded, writers_of
 from gatewayd.loop import clock
@@ -231,7 +231,7 @@ class ModbusListener:
         """
         address = connection.address
         accesses = {
-            number: Access(
+            number: UnitAccess(
                 unit, Requester(writer_of(address, unit.plan.writers), str(address), connection.number)
             )
             for number, unit in self._units.items()

@@ -18,7 +18,7 @@ from gatewayd.links.modbus_server.registers import MAX_REGISTERS
 from gatewayd.loop import clock
 from gatewayd.modbus.frames import FrameBuffer, FramingError, encode, split
 
-__all__ = ["Access", "Session"]
+__all__ = ["ModbusSession", "UnitAccess"]
 
 _READ_HOLDING = 3
 _READ_INPUT = 4
@@ -31,7 +31,7 @@ _THIS_DEVICE = (0, 255)
 """Unit ids by which a client on TCP means the device itself (Messaging on TCP/IP Guide V1.0b, 4.4.2.3)."""
 
 
-class Access:
+class UnitAccess:
     """What a peer may do with one unit."""
 
     __slots__ = ("requester", "unit", "writer_seen")
@@ -43,17 +43,17 @@ class Access:
         self.writer_seen = unit.cell.writer_seen
 
 
-class Session:
+class ModbusSession:
     """The requests of one connection."""
 
     def __init__(self) -> None:
         self.buffer = FrameBuffer()
         self.broken = ""
         """Why the connection must be closed, once something came in that is no Modbus frame."""
-        self._accesses: dict[int, Access] = {}
-        self._reads: dict[int, tuple[Any, bytearray, tuple[bytes, ...], Access]] = {}
+        self._accesses: dict[int, UnitAccess] = {}
+        self._reads: dict[int, tuple[Any, bytearray, tuple[bytes, ...], UnitAccess]] = {}
 
-    def serve(self, accesses: Mapping[int, Access]) -> None:
+    def serve(self, accesses: Mapping[int, UnitAccess]) -> None:
         """Answer for these units from now on. The only one also answers to 0 and 255."""
         self._accesses = dict(accesses)
         if len(accesses) == 1:

@@ -9,18 +9,20 @@ Not seen: what a peer's system sends again, because it could not deliver it to a
 
 from __future__ import annotations
 
-__all__ = ["SETTLING", "Waiting"]
+__all__ = ["SETTLING", "WaitedInput"]
 
 SETTLING = 0.01
 """Seconds after a gap in which what comes in counts as having waited."""
 
 
-class Waiting:
+class WaitedInput:
     """One connection after a gap: how long what is read from it may have waited."""
 
     __slots__ = ("_settled_at", "since", "undrained")
 
-    def __init__(self, since: float, until: float, *, unread: bool, former: Waiting | None = None) -> None:
+    def __init__(
+        self, since: float, until: float, *, unread: bool, former: WaitedInput | None = None
+    ) -> None:
         """`unread`: there is something in the socket, or a part of a request was read already.
 
         `former` is what an earlier gap left.

@@ -18,7 +18,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import Unit
 from gatewayd.links.modbus_server.listener import ModbusListener
-from gatewayd.links.modbus_server.session import Access, Session
+from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
 from gatewayd.modbus.frames import MAX_FRAME
 
 CASES = int(os.environ.get("GATEWAYD_FUZZ_CASES", "5000"))
@@ -69,7 +69,7 @@ def made_stream(chance: random.Random) -> bytes:
     return bytes(frames)
 
 
-def answered(session: Session, data: bytes, chance: random.Random) -> bytes:
+def answered(session: ModbusSession, data: bytes, chance: random.Random) -> bytes:
     """Hand the stream over in pieces, as long as the session takes it."""
     answers = bytearray()
     position = 0
@@ -85,8 +85,8 @@ def test_any_stream_gets_whole_answers(cell: Cell, unit: Unit) -> None:
     """One per frame that is whole, with its transaction and unit; and the buffer stays what it is."""
     for case in range(CASES):
         chance = random.Random(case)
-        session = Session()
-        session.serve({1: Access(unit, Requester(chance.choice((0, 1, None))))})
+        session = ModbusSession()
+        session.serve({1: UnitAccess(unit, Requester(chance.choice((0, 1, None))))})
         data = made_stream(chance)
         answers = answered(session, data, chance)
         asked = position = 0
@@ -100,7 +100,7 @@ def test_any_stream_gets_whole_answers(cell: Cell, unit: Unit) -> None:
             asked += 6 + size
             position += 6 + length
         assert position == len(answers), f"case {case}"
-        assert len(session.buffer.data) == len(Session().buffer.data)
+        assert len(session.buffer.data) == len(ModbusSession().buffer.data)
         if not session.broken:
             assert len(data) - asked == session.buffer.end < MAX_FRAME, f"case {case}"
     assert len(cell.events) <= 4096

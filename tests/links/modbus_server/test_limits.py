@@ -16,7 +16,7 @@ from gatewayd.links.modbus_server.limits import (
     overdue,
 )
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.links.modbus_server.session import Access
+from gatewayd.links.modbus_server.session import UnitAccess
 from gatewayd.links.modbus_server.writers import Accesses
 from tests.links.modbus_server.conftest import NOW, PLC
 
@@ -37,7 +37,7 @@ def owning(unit: Unit, index_of: Callable[[str], int]) -> Accesses:
     """Accesses of a connection that holds a lock."""
     requester = Requester(PLC, connection=7)
     assert unit.cell.request(requester, index_of("part"), NOW) is None
-    return {1: Access(unit, requester)}
+    return {1: UnitAccess(unit, requester)}
 
 
 def test_the_most_generous_unit_counts(plan_of: PlanOf) -> None:

@@ -11,7 +11,7 @@ from gatewayd.core.events import EventKind
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import Unit, execute
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.links.modbus_server.session import Access, Session
+from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
 from gatewayd.modbus.frames import encode
 
 PLC = 0
@@ -32,9 +32,9 @@ REQUESTS = (
 
 
 @pytest.fixture
-def session(unit: Unit) -> Session:
-    session = Session()
-    session.serve({1: Access(unit, Requester(PLC))})
+def session(unit: Unit) -> ModbusSession:
+    session = ModbusSession()
+    session.serve({1: UnitAccess(unit, Requester(PLC))})
     return session
 
 
@@ -43,8 +43,8 @@ def session(unit: Unit) -> Session:
 )
 def test_a_refused_undeclared_peer_is_named_by_its_address(cell: Cell, unit: Unit, pdu: str) -> None:
     """Whoever mends the mapping has to know what to write under `writers:`."""
-    session = Session()
-    session.serve({1: Access(unit, Requester(None, "192.168.1.77"))})
+    session = ModbusSession()
+    session.serve({1: UnitAccess(unit, Requester(None, "192.168.1.77"))})
     feed(session, stream(pdu))
     assert cell.last_refusal is not None
     assert cell.last_refusal.peer == "192.168.1.77"
@@ -52,16 +52,19 @@ def test_a_refused_undeclared_peer_is_named_by_its_address(cell: Cell, unit: Uni
 
 
 def test_a_writer_is_named_by_its_name_alone(cell: Cell, unit: Unit) -> None:
-    session = Session()
+    session = ModbusSession()
     session.serve(
-        {1: Access(unit, Requester(None, "192.168.1.77")), 2: Access(unit, Requester(PLC, "192.168.1.20"))}
+        {
+            1: UnitAccess(unit, Requester(None, "192.168.1.77")),
+            2: UnitAccess(unit, Requester(PLC, "192.168.1.20")),
+        }
     )
     feed(session, stream("06 000a 0005", unit=1))
     feed(session, stream("06 3a98 0001", unit=2))
     assert [event.peer for event in cell.events if event.kind is EventKind.REFUSED] == ["192.168.1.77", ""]
 
 
-def feed(session: Session, data: bytes, sizes: list[int] | None = None) -> bytes:
+def feed(session: ModbusSession, data: bytes, sizes: list[int] | None = None) -> bytes:
     """Hand `data` over in pieces of the given sizes, over and over."""
     answers = b""
     position = turn = 0
@@ -79,10 +82,10 @@ def stream(*requests: str, unit: int = 1) -> bytes:
     return b"".join(encode(number, unit, bytes.fromhex(pdu)) for number, pdu in enumerate(requests, 1))
 
 
-def fresh(unit: Unit) -> Session:
+def fresh(unit: Unit) -> ModbusSession:
     """A session over the same cell, with the values all tests begin with."""
-    session = Session()
-    session.serve({1: Access(unit, Requester(PLC))})
+    session = ModbusSession()
+    session.serve({1: UnitAccess(unit, Requester(PLC))})
     feed(session, stream("06 000a 0000", "10 000b 0002 04 00000000"))
     return session
 
@@ -112,19 +115,19 @@ def test_a_stream_may_come_byte_by_byte(unit: Unit) -> None:
 @given(sizes=st.lists(st.integers(1, 400), min_size=1, max_size=8), depth=st.integers(1, 400))
 def test_any_depth_of_pipelining_is_answered(sizes: list[int], depth: int) -> None:
     """More than the buffer holds as well."""
-    session = Session()
+    session = ModbusSession()
     data = stream(*["07"] * depth, unit=9)
     expected = b"".join(encode(number, 9, bytes.fromhex("87 0b")) for number in range(1, depth + 1))
     assert feed(session, data, sizes) == expected
 
 
-def test_answers_of_one_segment_are_joined(session: Session) -> None:
+def test_answers_of_one_segment_are_joined(session: ModbusSession) -> None:
     data = stream("03 000a 0001", "03 000a 0001")
     session.buffer.space[0][: len(data)] = data
     assert len(session.received(len(data), NOW)) == 2 * 11
 
 
-def test_what_is_no_frame_is_reported_after_the_answers_before_it(session: Session) -> None:
+def test_what_is_no_frame_is_reported_after_the_answers_before_it(session: ModbusSession) -> None:
     answers = feed(session, stream("03 000a 0001") + bytes.fromhex("0002 0001 0006 01 03 000a 0001"))
     assert answers == bytes.fromhex("0001 0000 0005 01 03 02 0000")
     assert session.broken == "protocol id 1 instead of 0"
@@ -132,8 +135,8 @@ def test_what_is_no_frame_is_reported_after_the_answers_before_it(session: Sessi
 
 def test_the_quick_way_and_the_other_one_agree(unit: Unit) -> None:
     """Reads are answered by the loop itself where they can be; nobody must be able to tell."""
-    session = Session()
-    session.serve({1: Access(unit, Requester(PLC)), 2: Access(unit, Requester(None))})
+    session = ModbusSession()
+    session.serve({1: UnitAccess(unit, Requester(PLC)), 2: UnitAccess(unit, Requester(None))})
     for pdu in (
         "03 000a 0006",
         "04 0000 0006",
@@ -147,8 +150,8 @@ def test_the_quick_way_and_the_other_one_agree(unit: Unit) -> None:
 
 
 def test_with_two_units_the_device_itself_is_not_known(unit: Unit) -> None:
-    session = Session()
-    session.serve({1: Access(unit, Requester(PLC)), 2: Access(unit, Requester(PLC))})
+    session = ModbusSession()
+    session.serve({1: UnitAccess(unit, Requester(PLC)), 2: UnitAccess(unit, Requester(PLC))})
     assert feed(session, stream("03 000a 0001", unit=0)) == bytes.fromhex("0001 0000 0003 00 83 0b")
     assert feed(session, stream("03 000a 0001", unit=255)) == bytes.fromhex("0001 0000 0003 ff 83 0b")
     assert feed(session, stream("03 000a 0001", unit=2)) == bytes.fromhex("0001 0000 0005 02 03 02 0000")
@@ -159,22 +162,22 @@ def test_a_request_is_a_sign_of_life_for_the_unit_it_is_for(
 ) -> None:
     cells = [new_cell(NOW), new_cell(NOW)]
     units = {number: Unit(plan_of(number), cell) for number, cell in enumerate(cells, 1)}
-    session = Session()
-    session.serve({number: Access(unit, Requester(PLC)) for number, unit in units.items()})
+    session = ModbusSession()
+    session.serve({number: UnitAccess(unit, Requester(PLC)) for number, unit in units.items()})
     feed(session, stream("03 000a 0001", unit=2))
     assert [cell.writers.alive[PLC] for cell in cells] == [False, True]
     feed(session, stream("07", unit=1))
     assert cells[0].writers.alive[PLC]
 
 
-def test_units_can_be_exchanged_between_two_requests(session: Session, unit: Unit) -> None:
+def test_units_can_be_exchanged_between_two_requests(session: ModbusSession, unit: Unit) -> None:
     session.serve({})
     assert feed(session, stream("03 000a 0001")) == bytes.fromhex("0001 0000 0003 01 83 0b")
-    session.serve({7: Access(unit, Requester(PLC))})
+    session.serve({7: UnitAccess(unit, Requester(PLC))})
     assert feed(session, stream("03 000a 0001", unit=7)) == bytes.fromhex("0001 0000 0005 07 03 02 0000")
 
 
-def test_what_is_held_back_is_so_for_connections_that_exist(session: Session, cell: Cell) -> None:
+def test_what_is_held_back_is_so_for_connections_that_exist(session: ModbusSession, cell: Cell) -> None:
     request = stream("03 012c 0001")
     assert feed(session, request) == bytes.fromhex("0001 0000 0005 01 03 02 0000")
     cell.robot_lost("cable", NOW)
