@@ -228,13 +228,6 @@ IMPURE_IMPORTS = {"asyncio", "select", "selectors", "signal", "socket", "subproc
 MAX_LENGTH = 500
 """Lines of a module."""
 
-TESTS_TO_COME = {
-    "links.modbus_server.link": "A",
-    "links.modbus_server.runtime": "A",
-    "service.shared_parts": "A",
-}
-"""Modules without a test file for now, and who is about to write it."""
-
 WITHOUT_TEST_FILE: dict[str, str] = {
     "service.options": "a record; tests/service/test_main.py",
     "gatewayd": "the version",
@@ -276,9 +269,6 @@ TESTED_TOGETHER = {
     "mapping.rules": "tests/mapping/test_rules.py",
 }
 """Package -> the one file that tests all its modules: rules are tested by their own bad and good examples."""
-
-TO_COME: set[str] = set()
-"""Modules that somebody is about to make."""
 
 
 def _modules() -> dict[str, Path]:
@@ -443,7 +433,7 @@ def file_of_tests(module: str) -> Path:
 
 def test_module_has_its_test_file() -> None:
     for module in MODULES:
-        if within(module, TESTED_TOGETHER) or module in TESTS_TO_COME or is_empty(module):
+        if within(module, TESTED_TOGETHER) or is_empty(module):
             continue
         path = file_of_tests(module)
         if module in WITHOUT_TEST_FILE:
@@ -455,7 +445,7 @@ def test_module_has_its_test_file() -> None:
 def test_tables_name_only_what_exists() -> None:
     """No rule outlives the module that it is about."""
     named = {*LAYERS, *PURE, *IMPURE, *WITHOUT_TEST_FILE, *TESTED_TOGETHER}.union(*LIBRARIES.values())
-    assert named - set(MODULES) - TO_COME == set()
+    assert named - set(MODULES) == set()
     assert [file for file in TESTED_TOGETHER.values() if not (ROOT / file).exists()] == []
 
 

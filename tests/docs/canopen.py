@@ -433,7 +433,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "nmt-services": nmt_services,
     "connection-set": connection_set,
     "emergencies": emergencies,
-    "node-happenings": happenings,
+    "node-events": happenings,
     "received-pdos": received_pdos,
     "pdo-changes": pdo_changes,
     "error-behaviour": error_behaviour,

@@ -2,7 +2,7 @@
 
 What befalls the node, and what follows:
 
-| happening | writers of the cell | NMT (1029h = 0 / 1 / 2) | EMCY |
+| event | writers of the cell | NMT (1029h = 0 / 1 / 2) | EMCY |
 |---|---|---|---|
 | RPDO in OPERATIONAL, SDO request | the writer is alive | | |
 | heartbeat of a node of 1016h ends | its writer is lost, and refused till it is back \
