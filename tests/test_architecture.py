@@ -46,6 +46,7 @@ LAYERS: dict[str, set[str]] = {
         "links.language",
         "links.registry",
         "mapping",
+        "report.format",
         "report.printable",
         "report.wording",
     },

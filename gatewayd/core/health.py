@@ -15,7 +15,7 @@ class Health:
     started: float = math.inf
     """Monotonic time of the first tick; infinity before it."""
     heartbeat: int = 0
-    """Counts up every `HEARTBEAT_PERIOD` while the core turns."""
+    """Counts up every `HEARTBEAT_PERIOD` while the core works."""
     packages: int = 0
     skipped: int = 0
     """Packages the controller left out, seen from its timestamps."""

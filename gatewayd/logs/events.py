@@ -1,6 +1,6 @@
 """Tells the core's events to the log: names instead of indices, one line for each event.
 
-What befalls many variables alike at one moment, say all bits of a word that another client has claimed, is one line.
+What happens to many variables alike at one moment, say all bits of a word that another client has claimed, is one line.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LEVELS = {
     EventKind.ACQUIRED: logging.DEBUG,
     EventKind.RELEASED: logging.DEBUG,
 }
-"""Kinds that are not told at INFO. Locks come and go with every lease, so they are for debugging and for the ring."""
+"""Kinds that are not logged at INFO. Locks come and go with every lease, so they are for debugging and for the ring."""
 
 _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 
@@ -46,8 +46,8 @@ _Story = tuple[int, EventKind, dict[str, object]]
 class EventLog:
     """A listener for one cell's event ring.
 
-    In a running event loop an event of a variable is told in the loop's next turn, together with those that follow it
-    and differ in the variable alone. Events are told in their order.
+    In a running event loop an event of a variable is logged in the loop's next turn, together with those that follow it
+    and differ in the variable alone. Events are logged in their order.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -84,8 +84,8 @@ class EventLog:
         (level, kind, found), names = self._waiting, self._names
         self._waiting, self._names = None, []
         subject = {"variable" if len(names) == 1 else "variables": _ranges(names)} if names else {}
-        told = {"cell": self._definition.name, **subject, **found}
-        self._log.log(level, kind.value, extra=fields(**told))
+        found_all = {"cell": self._definition.name, **subject, **found}
+        self._log.log(level, kind.value, extra=fields(**found_all))
 
     def _fields(self, event: Event) -> dict[str, object]:
         definition = self._definition
@@ -120,7 +120,7 @@ def _limits(event: Event, variable: Variable | None) -> str | None:
 
 
 def _level(event: Event) -> int:
-    """What the local operator does is unusual, and told with the default settings too."""
+    """What the local operator does is unusual, and logged with the default settings too."""
     return logging.WARNING if event.writer == OPERATOR else LEVELS.get(event.kind, logging.INFO)
 
 

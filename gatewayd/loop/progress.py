@@ -1,4 +1,4 @@
-"""Long waits taken in short turns, so that a part that waits can be told from one that hangs."""
+"""Long waits taken in short steps, so that a part that waits can be told from one that hangs."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from gatewayd.loop import clock
 __all__ = ["GRACE", "STEP", "wait_with_progress"]
 
 STEP = 0.25
-"""Seconds between two turns of a part, whatever it waits for."""
+"""Seconds between two signs of progress of a part, whatever it waits for."""
 GRACE = 1.0
 """Seconds beyond its own limit after which a wait is no wait any more."""
 
 _Result = TypeVar("_Result")
 
 
-async def wait_with_progress(work: Awaitable[_Result], turn: Callable[[], None], limit: float) -> _Result:
-    """The result of `work`, which ends by itself within `limit` seconds; `turn` is called every STEP seconds meanwhile.
+async def wait_with_progress(work: Awaitable[_Result], progress: Callable[[], None], limit: float) -> _Result:
+    """The result of `work`, which ends by itself within `limit` seconds.
 
-    Work that outlasts its limit by GRACE seconds hangs, and `turn` is called no more. Raises what the work raises. A
-    cancellation ends the work first.
+    `progress` is called every STEP seconds meanwhile, but no more once the work has outlasted its limit by GRACE
+    seconds: it hangs. Raises what the work raises. A cancellation ends the work first.
     """
     task = asyncio.ensure_future(work)
     end = clock.now() + limit + GRACE
     try:
         while not task.done():
             if clock.now() < end:
-                turn()
+                progress()
             await asyncio.wait((task,), timeout=STEP)
     except asyncio.CancelledError:
         task.cancel()

@@ -20,6 +20,7 @@ from gatewayd.core.definition import Fallback, FallbackKind
 from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Rule
 from gatewayd.mapping.source import RealNumber, WholeNumber
+from gatewayd.report.format import address as address_text
 
 __all__ = [
     "OPTIONAL_DURATION_SCHEMA",
@@ -159,7 +160,7 @@ class ListenAddress:
 
     def __str__(self) -> str:
         """`host:port`, with brackets around IPv6."""
-        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+        return address_text(self.host, self.port)
 
 
 def _listen(value: object) -> ListenAddress:

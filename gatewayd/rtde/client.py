@@ -158,7 +158,7 @@ class RtdeClient:
             if lasted > self._settings.backoff_limit:
                 delay = self._settings.backoff
             self._handler.session_lost(replace(loss, attempts=attempts, retry_in=delay))
-            await wait_with_progress(asyncio.sleep(delay), self._turn, delay)
+            await wait_with_progress(asyncio.sleep(delay), self._count, delay)
             delay = min(2 * delay, self._settings.backoff_limit)
 
     async def _session(self) -> tuple[Loss, float]:
@@ -166,7 +166,7 @@ class RtdeClient:
         wishes = self._wishes()
         try:
             connection = await wait_with_progress(
-                self._connect(wishes), self._turn, self._settings.connect_timeout
+                self._connect(wishes), self._count, self._settings.connect_timeout
             )
         except OSError as error:
             return connect_failure(error, self._address), 0.0
@@ -228,8 +228,8 @@ class RtdeClient:
                 with contextlib.suppress(OSError):
                     candidate.setsockopt(socket.IPPROTO_TCP, option, value)
 
-    def _turn(self) -> None:
-        self.statistics.turns += 1
+    def _count(self) -> None:
+        self.statistics.progress += 1
 
     def _wishes(self) -> Wishes:
         settings = self._settings

@@ -388,7 +388,7 @@ class Connection(asyncio.Protocol):
         self._heard = self._loop.time()
 
     def _watch(self) -> None:
-        self._statistics.turns += 1
+        self._statistics.progress += 1
         now = self._loop.time()
         silence = now - self._heard
         if self._negotiation.running and silence > self._patience:

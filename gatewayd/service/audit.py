@@ -29,7 +29,7 @@ __all__ = ["CAPACITY", "KINDS", "MERGED", "Audit", "Record", "plain_value", "utc
 CAPACITY = 2000
 """Records kept in memory, of all cells together."""
 MERGED = 1.0
-"""Seconds for which further changes of a variable by the same writer are counted before they are told."""
+"""Seconds for which further changes of a variable by the same writer are counted before they are recorded."""
 KINDS = frozenset(
     {
         EventKind.REFUSED,
@@ -62,23 +62,23 @@ class Record:
 
     def as_json(self) -> dict[str, object]:
         """Plain values for JSON; what does not apply is left out."""
-        told = self.event
+        event = self.event
         found: dict[str, object | None] = {
             "time": utc(self.wall),
             "monotonic": round(self.monotonic, 6),
             "cell": self.cell,
-            "what": told.what,
-            "writer": told.writer,
-            "variable": told.variable,
+            "what": event.what,
+            "writer": event.writer,
+            "variable": event.variable,
             # A variable's lock goes without saying.
-            "lock": told.lock if told.variable is None else None,
-            "old": plain_value(told.old),
-            "new": plain_value(told.new),
-            "times": told.times if told.times > 1 else None,
-            "holder": told.holder,
-            "reason": told.reason,
-            "peer": told.peer,
-            "detail": told.detail or None,
+            "lock": event.lock if event.variable is None else None,
+            "old": plain_value(event.old),
+            "new": plain_value(event.new),
+            "times": event.times if event.times > 1 else None,
+            "holder": event.holder,
+            "reason": event.reason,
+            "peer": event.peer,
+            "detail": event.detail or None,
         }
         return {name: value for name, value in found.items() if value is not None}
 
@@ -105,7 +105,7 @@ class Audit:
             self._watches[id(cell)] = _Watch(cell, self)
 
     def unwatch(self, cell: Cell) -> None:
-        """Watch the cell no longer; what was merged and not told yet is told."""
+        """Watch the cell no longer; what was merged and is not recorded yet is recorded."""
         watch = self._watches.pop(id(cell), None)
         if watch is not None:
             watch.end()
@@ -119,12 +119,12 @@ class Audit:
             self.watch(cell)
 
     def tick(self, now: float) -> None:
-        """Tell what was merged long enough. Cheap while nothing was."""
+        """Record what was merged long enough. Cheap while nothing was."""
         for watch in self._watches.values():
             watch.tick(now)
 
     async def run(self, cells: Callable[[], Iterable[Cell]]) -> None:
-        """Keep up with the gateway's cells until cancelled; then tell what was merged and not told yet."""
+        """Keep up with the gateway's cells until cancelled; then record what was merged and is not recorded yet."""
         try:
             while True:
                 self.follow(cells())
@@ -154,16 +154,16 @@ class Audit:
 
 @dataclass(slots=True)
 class _Series:
-    """Changes of one variable by one writer that were not told yet."""
+    """Changes of one variable by one writer that are not recorded yet."""
 
     writer: int
-    told: float
-    """When it was told last."""
+    recorded: float
+    """When it was recorded last."""
     old: Value
     new: Value
     last: float
     """When it was changed last."""
-    untold: int
+    pending: int
 
 
 class _Watch:
@@ -191,36 +191,35 @@ class _Watch:
 
     def written(self, writer: int, changes: Written, now: float) -> None:
         """A write was accepted: the hot path."""
-        series = self._series
         for index, old, new in changes:
-            open_one = series.get(index)
-            if open_one is not None and open_one.writer == writer and now - open_one.told < MERGED:
-                if not open_one.untold:
-                    open_one.old = old
-                    self._next = min(self._next, open_one.told + MERGED)
-                open_one.new = new
-                open_one.last = now
-                open_one.untold += 1
+            current = self._series.get(index)
+            if current is not None and current.writer == writer and now - current.recorded < MERGED:
+                if not current.pending:
+                    current.old = old
+                    self._next = min(self._next, current.recorded + MERGED)
+                current.new = new
+                current.last = now
+                current.pending += 1
                 continue
-            if open_one is not None:
-                self._tell(index, open_one, now)
-            series[index] = open_one = _Series(writer, now, old, new, now, 1)
-            self._tell(index, open_one, now)
+            if current is not None:
+                self._record(index, current, now)
+            self._series[index] = current = _Series(writer, now, old, new, now, 1)
+            self._record(index, current, now)
             self._next = min(self._next, now + MERGED)
 
     def tick(self, now: float) -> None:
-        """Tell what was merged for `MERGED` seconds, and forget what was not changed again."""
+        """Record what was merged for `MERGED` seconds, and forget what was not changed again."""
         if now < self._next:
             return
-        for index, one in list(self._series.items()):
-            if now - one.told < MERGED:
+        for index, series in list(self._series.items()):
+            if now - series.recorded < MERGED:
                 continue
-            if one.untold:
-                self._tell(index, one, now)
-                one.told = now
+            if series.pending:
+                self._record(index, series, now)
+                series.recorded = now
             else:
                 del self._series[index]
-        self._next = min((one.told + MERGED for one in self._series.values()), default=math.inf)
+        self._next = min((series.recorded + MERGED for series in self._series.values()), default=math.inf)
 
     def happened(self, event: Event) -> None:
         """An event of the cell."""
@@ -228,28 +227,28 @@ class _Watch:
             return
         definition = self.cell.definition
         if event.variable is not None and event.variable in self._series:
-            # In their order: what was written before a fallback or a force is told before it.
-            self._tell(event.variable, self._series.pop(event.variable), event.time)
-        told = EventRecord.of(event, definition)
-        self._audit.append(Record(self._audit.wall(), event.time, definition.name, told))
+            # In their order: what was written before a fallback or a force is recorded before it.
+            self._record(event.variable, self._series.pop(event.variable), event.time)
+        record = EventRecord.of(event, definition)
+        self._audit.append(Record(self._audit.wall(), event.time, definition.name, record))
 
-    def _tell(self, index: int, one: _Series, now: float) -> None:
-        if not one.untold:
+    def _record(self, index: int, series: _Series, now: float) -> None:
+        if not series.pending:
             return
         definition = self.cell.definition
         variable = definition.variables[index]
-        told = EventRecord(
+        record = EventRecord(
             ACCEPTED,
-            definition.writer_name(one.writer),
+            definition.writer_name(series.writer),
             variable.name,
             variable.unit,
-            old=one.old,
-            new=one.new,
-            times=one.untold,
+            old=series.old,
+            new=series.new,
+            times=series.pending,
         )
-        wall = self._audit.wall(now - one.last if now < math.inf else 0.0)
-        self._audit.append(Record(wall, one.last, definition.name, told))
-        one.untold = 0
+        wall = self._audit.wall(now - series.last if now < math.inf else 0.0)
+        self._audit.append(Record(wall, series.last, definition.name, record))
+        series.pending = 0
 
 
 def plain_value(value: Value | None) -> PlainValue:

@@ -36,7 +36,7 @@ log = logging.getLogger("gatewayd.daemon")
 
 
 class Daemon:
-    """Runs the cells of `plans` until told to stop; `state` is the directory of what is kept across restarts."""
+    """Runs the cells of `plans` until asked to stop; `state` is the directory of what is kept across restarts."""
 
     def __init__(self, plans: Sequence[Plan], state: Path) -> None:
         self._state = state

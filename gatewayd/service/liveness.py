@@ -1,7 +1,7 @@
-"""Whether every part of the gateway turns, seen from counters that each part moves by itself.
+"""Whether every part of the gateway makes progress, seen from counters that each part moves by itself.
 
 A part counts what it cannot do without running: the core its ticks, a robot link its looks at the session, a listener
-its sweeps, each the turns of a wait (`gatewayd.loop.progress`). Whether the robot or a PLC answers plays no role.
+its sweeps, each the steps of a wait (`gatewayd.loop.progress`). Whether the robot or a PLC answers plays no role.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from collections.abc import Mapping
 __all__ = ["PATIENCE", "Liveness", "Progressed"]
 
 PATIENCE = 1.0
-"""Seconds for which a part may stand still before it is told to hang: several turns, and less than the watchdog waits,
-so that the journal has its name before the process is ended."""
+"""Seconds for which a part may stand still before it is reported to hang: several steps, and less than the watchdog
+waits, so that the journal has its name before the process is ended."""
 
 
 class Progressed:
@@ -22,9 +22,9 @@ class Progressed:
         self._former: dict[str, int] = {}
 
     def all_of(self, counts: Mapping[str, int]) -> bool:
-        """True at most once for each turn of the slowest part.
+        """True at most once for each step of the slowest part.
 
-        A part that was not among the counts before has turned if it has begun (its count is not 0).
+        A part that was not among the counts before has moved if it has begun (its count is not 0).
         """
         if any(count == self._former.get(name, 0) for name, count in counts.items()):
             return False

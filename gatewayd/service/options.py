@@ -1,4 +1,4 @@
-"""What `gatewayd run` is told by its command line."""
+"""The options of `gatewayd run`."""
 
 from __future__ import annotations
 

@@ -194,8 +194,8 @@ class Reloader:
         if not differences:
             return ReloadOutcome(Result.UNCHANGED)
         outcome = await self._swap(plans, differences, force=force)
-        told = (one if isinstance(one, str) else one.summary for one in differences)
-        return replace(outcome, changes=tuple(told), details=tuple(_details(differences)))
+        summaries = (one if isinstance(one, str) else one.summary for one in differences)
+        return replace(outcome, changes=tuple(summaries), details=tuple(_details(differences)))
 
     async def _swap(
         self, plans: Sequence[Plan], differences: Sequence[Changes | str], *, force: bool

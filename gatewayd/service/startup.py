@@ -59,7 +59,7 @@ def mapping_files(paths: Iterable[Path]) -> list[Path]:
     """The files meant: a directory stands for its *.yaml files, by name."""
     found: list[Path] = []
     for path in paths:
-        # Path.is_dir would raise for a name that no file can have; such a one is told when it is opened.
+        # Path.is_dir would raise for a name that no file can have; such a one is reported when it is opened.
         if isdir(path):  # noqa: PTH112
             inside = sorted(path.glob(PATTERN))
             if not inside:

@@ -1,4 +1,4 @@
-"""What the service manager is told: one datagram per message to the socket it named (sd_notify(3)).
+"""What is sent to the service manager: one datagram per message to the socket it named (sd_notify(3)).
 
 Without a service manager everything here does nothing. Nothing waits and nothing raises: a manager that does not read
 must not hold up the robot.

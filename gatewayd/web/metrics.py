@@ -194,7 +194,7 @@ METRICS = (
         "from the arrival of a write to the package with it to the robot, its wait for the control cycle included",
     ),
 )
-"""In the order in which they are told."""
+"""In the order in which they are reported."""
 
 PROCESS_METRICS = {
     "process_cpu_seconds_total": "user and system time used",

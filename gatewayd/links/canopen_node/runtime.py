@@ -43,7 +43,7 @@ RETRY = 2.0
 LOSS_INTERVAL = 10.0
 """Seconds between two lines of the log about lost frames."""
 CLOCK_STEP = 1.0
-"""Seconds by which the network's time may differ from what was last told before it is told again."""
+"""Seconds by which the network's time may differ from what was last reported before it is reported again."""
 
 log = logging.getLogger("gatewayd.canopen")
 
@@ -236,7 +236,7 @@ class CanLink(Link, Observer):
         log.warning("CANopen: %s", text, extra=fields(**self._names()))
 
     def time_told(self, moment: datetime, now: float) -> None:
-        """The network's clock: told once, and when it was set."""
+        """The network's clock: reported once, and when it was set."""
         offset = moment.timestamp() - now
         if abs(offset - self._offset) > CLOCK_STEP:
             self._offset = offset

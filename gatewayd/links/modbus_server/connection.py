@@ -20,6 +20,7 @@ from gatewayd.links.modbus_server.sockets import has_unread, seconds_since_estab
 from gatewayd.links.modbus_server.waiting import WaitedInput
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
+from gatewayd.report.format import address as address_text
 
 __all__ = ["PeerAdmission", "PeerConnection"]
 
@@ -73,7 +74,7 @@ class PeerConnection(asyncio.BufferedProtocol):
         if not peer:
             self.wire.abort()
             return
-        self.peer = f"[{peer[0]}]:{peer[1]}" if ":" in peer[0] else f"{peer[0]}:{peer[1]}"
+        self.peer = address_text(peer[0], peer[1])
         self.address = address_of(peer[0])
         sock = self.wire.get_extra_info("socket")
         self.descriptor = sock.fileno()

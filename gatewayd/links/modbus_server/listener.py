@@ -25,6 +25,7 @@ from gatewayd.links.modbus_server.session import UnitAccess
 from gatewayd.links.modbus_server.waiting import SETTLING
 from gatewayd.links.modbus_server.writers import names_of, succeeded, writers_of
 from gatewayd.loop import clock
+from gatewayd.report.format import address as address_text
 
 __all__ = ["ListenError", "ModbusListener"]
 
@@ -66,7 +67,7 @@ class ModbusListener:
         self._sweeper: asyncio.TimerHandle | None = None
         self._gap = (-math.inf, -math.inf)
         """When the process stood still last, if ever."""
-        self.turns = 0
+        self.progress = 0
         """Moves with each attempt to listen, and several times a second from then on."""
 
     @property
@@ -92,7 +93,7 @@ class ModbusListener:
     @property
     def name(self) -> str:
         """Host and port, for messages."""
-        return f"[{self._host}]:{self._port}" if ":" in self._host else f"{self._host}:{self._port}"
+        return address_text(self._host, self._port)
 
     async def start(self) -> None:
         """Listen. Raises ListenError."""
@@ -104,7 +105,7 @@ class ModbusListener:
             )
         except OSError as error:
             poller.close()
-            self.turns += 1
+            self.progress += 1
             raise self._explained(error) from error
         self._server, self._poller = server, poller
         self._sweep()
@@ -267,7 +268,7 @@ class ModbusListener:
         return [unit.plan for unit in self._units.values()]
 
     def _sweep(self) -> None:
-        self.turns += 1
+        self.progress += 1
         now = clock.now()
         idle = idle_timeout(self._plans())
         for connection in list(self._connections):

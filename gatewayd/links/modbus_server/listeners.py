@@ -54,7 +54,7 @@ class Listeners(SharedPart):
 
     def progress(self) -> dict[str, int]:
         """Attempts, then sweeps, of each listener."""
-        return {f"listener {one.name}": one.turns + self._waits[one] for one in self.listeners}
+        return {f"listener {one.name}": one.progress + self._waits[one] for one in self.listeners}
 
     def troubles(self) -> list[str]:
         """Addresses that cannot be had."""

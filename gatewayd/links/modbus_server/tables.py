@@ -12,6 +12,7 @@ from gatewayd.links.tables import LinkTables
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.areas import AREA_NAMES
+from gatewayd.report.format import address as address_text
 from gatewayd.report.layout import Column, Row, span
 
 __all__ = ["TABLES"]
@@ -78,8 +79,7 @@ class ModbusTables(LinkTables):
     def headline(self, plan: Plan) -> str:
         """Listener and unit."""
         modbus = plan.the(ModbusPlan)
-        host = f"[{modbus.host}]" if ":" in modbus.host else modbus.host
-        return f"Modbus TCP {host}:{modbus.port} unit {modbus.unit}"
+        return f"Modbus TCP {address_text(modbus.host, modbus.port)} unit {modbus.unit}"
 
     def introduction(self, plan: Plan) -> str:
         """Port and unit."""

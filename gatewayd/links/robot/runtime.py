@@ -35,7 +35,7 @@ from gatewayd.rtde.messages import TextMessage
 __all__ = ["LAST_WORDS", "LOSS_INTERVAL", "RUNTIME", "RobotLink"]
 
 LOSS_INTERVAL = 60.0
-"""Seconds after which a connection that still fails for the same reason is told again."""
+"""Seconds after which a connection that still fails for the same reason is reported again."""
 LAST_WORDS = 0.4
 """Seconds for which the end of the link waits until what is due has been sent."""
 _LOOK = 0.005
@@ -89,7 +89,7 @@ class RobotLink(SourceLink):
         self._pending: asyncio.TimerHandle | None = None
         self._stage: asyncio.TimerHandle | None = None
         self._feeds = 0
-        self._loss_told: tuple[str, float] = ("", -math.inf)
+        self._loss_reported: tuple[str, float] = ("", -math.inf)
         self._closing = False
         self.sent_listeners = []
         cell.listeners.append(self._on_change)
@@ -97,7 +97,7 @@ class RobotLink(SourceLink):
     def health(self) -> LinkHealth:
         """The session; how fresh what it brings is, the cell knows."""
         where = address(self._plan.host, self._plan.port)
-        trouble = self._loss_told[0].removeprefix(f"{self._plan.host}:{self._plan.port}: ")
+        trouble = self._loss_reported[0].removeprefix(f"{self._plan.host}:{self._plan.port}: ")
         figures = {"address": where, "trouble": trouble, "watchdog": self._watchdog_fed()}
         if self._client.session is not None:
             return LinkHealth("Robot", Level.GOOD, "connected", where, figures=figures)
@@ -110,7 +110,7 @@ class RobotLink(SourceLink):
     @property
     def progress(self) -> int:
         """Moves several times a second while `run` works, whatever the controller does."""
-        return self._client.statistics.turns
+        return self._client.statistics.progress
 
     async def run(self) -> None:
         """Stay connected until cancelled. Raises what is a defect, after the cell was told that the robot is lost."""
@@ -228,7 +228,7 @@ class RobotLink(SourceLink):
         self._cycle = 1 / session.series.base_rate if session.series is not None else _CYCLE_UNKNOWN
         self._inputs = ClaimedInputs(variables, session, self._driven, self._cycle)
         self._session = self._agreed = session
-        self._loss_told = ("", -math.inf)
+        self._loss_reported = ("", -math.inf)
         rate = f"{1 / session.period:g} Hz"
         self._cell.robot_connected(
             now, f"controller {session.controller}, RTDE protocol {session.protocol}, {rate}"
@@ -277,9 +277,9 @@ class RobotLink(SourceLink):
         self._cell.health.watchdog_fed = False
         if loss.started:
             self._cell.robot_lost(loss.text, now)
-        told, at = self._loss_told
-        if not loss.started and (loss.text != told or now - at >= LOSS_INTERVAL):
-            self._loss_told = (loss.text, now)
+        reported, at = self._loss_reported
+        if not loss.started and (loss.text != reported or now - at >= LOSS_INTERVAL):
+            self._loss_reported = (loss.text, now)
             address = f"{self._plan.host}:{self._plan.port}"
             log.warning(
                 "no robot", extra=fields(cell=self._cell.definition.name, robot=address, reason=loss.text)
