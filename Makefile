@@ -13,8 +13,11 @@ INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --no-input
 COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url
 SOURCES = gatewayd tests
 
+# Tests start hundreds of processes and collect thousands of tests: let nobody's environment make each compile it all anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
-.PHONY: help demo test setup dev lint format types check docs-check generated unit-checks ci bench fuzz soak deb install lock \
+.PHONY: help demo test quick setup dev lint format types check docs-check generated unit-checks ci bench fuzz soak deb install lock \
 	install-hook clean
 
 help: ## Show this list
@@ -26,6 +29,9 @@ demo: $(VENV)/.runtime ## Set up, then run simulator, gateway and a small PLC pr
 
 test: $(VENV)/.dev ## Set up, then pass the tests (ARGS="tests/core -x")
 	$(PY) -m pytest -n $(JOBS) $(ARGS)
+
+quick: $(VENV)/.dev ## Pass the tests that are not slow: no kernel, no browser, few processes (ARGS="tests/core -x")
+	$(PY) -m pytest -n $(JOBS) -m "not slow" $(ARGS)
 
 setup: $(VENV)/.runtime ## Set up what the daemon needs
 dev: $(VENV)/.dev ## Set up what developers need
@@ -68,7 +74,7 @@ install: $(VENV)/.made ## Install as the package would, below DESTDIR (as root; 
 	packaging/install "$(DESTDIR)" $(PY)
 
 fuzz: $(VENV)/.dev ## Try the parsers and the running daemon with 100,000 hostile cases (CASES=1000000)
-	GATEWAYD_FUZZ_CASES=$(CASES) $(PY) -m pytest --timeout 1800 tests/e2e/test_hostile.py tests/modbus/test_fuzz.py tests/rtde $(ARGS)
+	GATEWAYD_FUZZ_CASES=$(CASES) $(PY) -m pytest --timeout 1800 tests/e2e/test_hostile.py tests/links/modbus_server/test_fuzz.py tests/rtde $(ARGS)
 
 soak: $(VENV)/.dev ## Torment the running daemon for an hour, from a seed (SECONDS=300 ARGS="--seed 7 --speed fast")
 	$(PY) -m tests.soak --seconds $(SECONDS) $(ARGS)

@@ -11,7 +11,7 @@ import sys
 from contextlib import suppress
 from typing import NoReturn
 
-from gatewayd.signals import SIGNALS
+from gatewayd.service.signals import SIGNALS
 
 __all__ = ["main"]
 
@@ -79,7 +79,7 @@ def _report(defect: Exception) -> None:
     import traceback
     from pathlib import Path
 
-    from gatewayd.printable import printable
+    from gatewayd.report.printable import printable
 
     if os.environ.get("GATEWAYD_TRACEBACK") == "1":
         traceback.print_exception(defect)

@@ -1,4 +1,4 @@
-"""What all tests share: how hypothesis behaves, and a plant of real processes.
+"""What all tests share: how hypothesis behaves, a plant of real processes, which tests are slow and when they run.
 
 The ordinary profile makes the same examples every time, so a red run can be repeated; `--hypothesis-profile=thorough`
 looks for new ones, and for longer.
@@ -6,6 +6,7 @@ looks for new ones, and for longer.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +21,48 @@ settings.register_profile(
 )
 settings.register_profile("thorough", settings.get_profile("ordinary"), derandomize=False, max_examples=5000)
 settings.load_profile("ordinary")
+
+HERE = Path(__file__).parent
+SLOW = (
+    "cli/test_demo.py",
+    "cli/test_run.py",
+    "core/test_cell_properties.py",
+    "demo/test_scene.py",
+    "demo/test_snapshot.py",
+    "docs",
+    "e2e",
+    "kernel",
+    "links/new_kind",
+    "mapping/test_check_fuzz.py",
+    "service/test_signals.py",
+    "soak",
+    "systemd",
+    "test_demo.py",
+    "web/test_page.py",
+)
+"""Files and directories whose tests are all slow; elsewhere a test says so itself."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are processors: much of the time is spent waiting for something real to happen."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is slow, and put it last: the machines that boot meanwhile leave it more of the processors then."""
+    slow = [HERE / name for name in SLOW]
+    for item in items:
+        if any(item.path.is_relative_to(path) for path in slow):
+            item.add_marker(pytest.mark.slow)
+    items.sort(key=_place)
+
+
+def _place(item: pytest.Item) -> int:
+    """The soak is the longest of all: it begins before the other slow ones."""
+    if item.path.is_relative_to(HERE / "soak"):
+        return 1
+    return 2 if item.get_closest_marker("slow") else 0
 
 
 @pytest.fixture

@@ -5,9 +5,11 @@ from __future__ import annotations
 import struct
 from enum import Enum
 
-from gatewayd.core.definition import Value
-
 __all__ = ["CanType"]
+
+
+Value = bool | int | float
+"""What a numeric type holds."""
 
 
 class CanType(Enum):
@@ -45,6 +47,12 @@ class CanType(Enum):
     def is_real(self) -> bool:
         """Whether values are floating-point numbers."""
         return self in (CanType.REAL32, CanType.REAL64)
+
+    @property
+    def bounds(self) -> tuple[int, int]:
+        """Least and greatest number of an integer type."""
+        signed = self.char.islower()
+        return -(1 << self.bits - 1) if signed else 0, (1 << self.bits - signed) - 1
 
     def pack(self, value: Value) -> bytes:
         """Little-endian bytes of a number. OverflowError or struct.error if the type cannot hold it."""

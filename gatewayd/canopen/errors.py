@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntFlag
 
-__all__ = ["Controller", "ErrorClass", "ErrorFrame", "Violation", "decode"]
+__all__ = ["ControllerFlags", "ErrorClass", "ErrorFrame", "Violation", "decode"]
 
 
 class ErrorClass(IntFlag):
@@ -23,7 +23,7 @@ class ErrorClass(IntFlag):
     COUNTERS = 0x200
 
 
-class Controller(IntFlag):
+class ControllerFlags(IntFlag):
     """State of the controller; byte 1."""
 
     RX_OVERFLOW = 0x01
@@ -48,7 +48,7 @@ class Violation(IntFlag):
     WHILE_SENDING = 0x80
 
 
-_NO_CONTROLLER = Controller(0)
+_NO_CONTROLLER = ControllerFlags(0)
 _NO_VIOLATION = Violation(0)
 _ACKNOWLEDGE_SLOT = 0x19
 """Byte 3 of a protocol error where nobody acknowledged."""
@@ -59,7 +59,7 @@ class ErrorFrame:
     """One error frame, decoded."""
 
     classes: ErrorClass
-    controller: Controller = _NO_CONTROLLER
+    controller: ControllerFlags = _NO_CONTROLLER
     violation: Violation = _NO_VIOLATION
     location: int = 0
     """Where in the frame the protocol was violated; 0: unknown."""
@@ -72,7 +72,7 @@ class ErrorFrame:
     @property
     def overrun(self) -> bool:
         """Whether the controller lost received frames."""
-        return bool(self.controller & Controller.RX_OVERFLOW)
+        return bool(self.controller & ControllerFlags.RX_OVERFLOW)
 
     @property
     def unacknowledged(self) -> bool:
@@ -99,7 +99,7 @@ def decode(can_id: int, data: bytes) -> ErrorFrame:
     counted = bool(classes & ErrorClass.COUNTERS) or (about_controller and any(bytes_[6:8]))
     return ErrorFrame(
         classes,
-        Controller(bytes_[1] & 0x7F) if about_controller else _NO_CONTROLLER,
+        ControllerFlags(bytes_[1] & 0x7F) if about_controller else _NO_CONTROLLER,
         Violation(bytes_[2]) if classes & ErrorClass.PROTOCOL else _NO_VIOLATION,
         bytes_[3] if classes & ErrorClass.PROTOCOL else 0,
         bytes_[4] if classes & ErrorClass.TRANSCEIVER else 0,

@@ -1,4 +1,4 @@
-"""A gap of our own (`gatewayd.clock`): deadlines of others, whom we were not there to hear, and frames that waited."""
+"""A gap of our own (`gatewayd.loop.clock`): deadlines of others whom we could not hear, and frames that waited."""
 
 from __future__ import annotations
 

@@ -13,12 +13,22 @@ from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object,
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.gap import spared
 from gatewayd.canopen.nmt import NmtState
-from gatewayd.canopen.plan import Consumer
 
-__all__ = ["LEAST_CONSUMERS", "WATCH", "HeartbeatConsumer", "HeartbeatProducer", "Seen", "Watch"]
+__all__ = ["MIN_CONSUMERS", "WATCH", "Consumer", "HeartbeatConsumer", "HeartbeatProducer", "Seen", "Watch"]
 
-LEAST_CONSUMERS = 8
+MIN_CONSUMERS = 8
 """Entries of 1016h, or more if the mapping names more nodes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Consumer:
+    """A node whose heartbeat is watched (1016h)."""
+
+    node: int
+    timeout: int
+    """Milliseconds."""
+    writer: int | None
+    """The writer that is lost with it."""
 
 
 class HeartbeatProducer:
@@ -150,7 +160,7 @@ class HeartbeatConsumer:
         self._nodes_changed = changed
         self._stale = False
         self._watched: dict[int, _Watched] = {}
-        count = max(LEAST_CONSUMERS, len(consumers))
+        count = max(MIN_CONSUMERS, len(consumers))
         defaults = [one.node << 16 | one.timeout for one in consumers] + [0] * (count - len(consumers))
         self._entries = tuple(
             Entry(

@@ -62,7 +62,7 @@ _IFLA_INFO_DATA = 2
 _IFLA_CAN_BITTIMING, _IFLA_CAN_STATE, _IFLA_CAN_RESTART_MS, _IFLA_CAN_BERR_COUNTER = 1, 4, 6, 8
 _ARPHRD_CAN, _IFF_UP = 280, 1
 _TYPE_MASK = 0x3FFF
-_GREATEST_REPLY = 32768
+_MAX_REPLY = 32768
 
 
 def request(name: str, sequence: int) -> bytes:
@@ -141,7 +141,7 @@ class InterfaceReader:
         self._socket.sendto(request(name, sequence), (0, 0))
         while True:
             try:  # the kernel has answered before sendto returns
-                return parse(self._socket.recv(_GREATEST_REPLY), sequence)
+                return parse(self._socket.recv(_MAX_REPLY), sequence)
             except ValueError:
                 continue
 

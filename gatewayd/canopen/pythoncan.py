@@ -1,9 +1,9 @@
 """Every other interface of python-can on the loop: virtual, slcan, udp_multicast, vendors' adapters.
 
-Opening may take seconds, and is done aside; apart from that there is no thread of ours. Where the interface has a file
-descriptor the loop watches it; where it has none it is asked for frames every millisecond while there is traffic, more
-seldom when there is none. What python-can's configuration file says (`~/.canrc`, `/etc/can.conf`) holds for what the
-mapping does not say, so a vendor's own options have a place.
+Opening may take seconds, and is done in a daemon thread; apart from that there is no thread of ours. Where the
+interface has a file descriptor the loop watches it; where it has none it is asked for frames every millisecond while
+there is traffic, more seldom when there is none. What python-can's configuration file says (`~/.canrc`,
+`/etc/can.conf`) holds for what the mapping does not say, so a vendor's own options have a place.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from typing import Any
 
 import can
 
-from gatewayd import clock
-from gatewayd.aside import aside
 from gatewayd.canopen.bus import DRAIN, BusError, BusHandler
 from gatewayd.canopen.cob_ids import BASIC_FRAME
 from gatewayd.canopen.errors import ErrorClass, ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.supervised import SupervisedBus
-from gatewayd.canopen.supervision import LOOK, Event
+from gatewayd.canopen.supervision import LOOK, BusSignal
+from gatewayd.loop import clock
+from gatewayd.loop.threads import in_daemon_thread
 
 __all__ = ["ASK", "ASK_LIMIT", "PythonCanBus"]
 
@@ -185,11 +185,7 @@ class PythonCanBus(SupervisedBus):
                     break
         except Exception as error:  # noqa: BLE001 - drivers let through whatever the nonsense of an adapter made of them
             failure = error
-        if frames:
-            self.counters.received += len(frames)
-            self._handler.on_frames(frames, now)
-        for report in errors:
-            self._take_error(report, now)
+        self._hand_over(frames, errors, now)
         if failure is not None:
             self._lose(failure)
         return exhausted or failure is not None
@@ -224,7 +220,9 @@ class PythonCanBus(SupervisedBus):
                 self._lose(error)
                 return
             self._feed(
-                Event.OFF if off else Event.UP, now, f"{self._name} is {'off the bus' if off else 'up'}"
+                BusSignal.OFF if off else BusSignal.UP,
+                now,
+                f"{self._name} is {'off the bus' if off else 'up'}",
             )
 
     @property
@@ -236,7 +234,7 @@ class PythonCanBus(SupervisedBus):
         now = clock.now()
         self._release(broken=True)
         self._supervisor.failed(now)
-        self._feed(Event.GONE, now, f"{self._name}: {error}")
+        self._feed(BusSignal.GONE, now, f"{self._name}: {error}")
 
     # The interface
 
@@ -251,9 +249,9 @@ class PythonCanBus(SupervisedBus):
         assert self._loop is not None
         self._supervisor.failed(clock.now())  # until it is known better
         try:
-            bus = await aside(self._make, f"open {self._name}", can.BusABC.shutdown)
+            bus = await in_daemon_thread(self._make, f"open {self._name}", can.BusABC.shutdown)
         except (can.CanInitializationError, can.CanOperationError, OSError) as error:
-            self._feed(Event.GONE, clock.now(), f"{self._name} cannot be opened: {error}")
+            self._feed(BusSignal.GONE, clock.now(), f"{self._name} cannot be opened: {error}")
             return
         self._bus = bus
         self._supervisor.opened()
@@ -268,7 +266,7 @@ class PythonCanBus(SupervisedBus):
         self._ask = ASK
         read = self._readable if self._descriptor >= 0 else self._look_for_frames
         self._reading = self._loop.call_soon(read)
-        self._feed(Event.UP, clock.now(), f"{self._name} is open")
+        self._feed(BusSignal.UP, clock.now(), f"{self._name} is open")
 
     def _make(self) -> can.BusABC:
         try:

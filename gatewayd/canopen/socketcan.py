@@ -12,13 +12,13 @@ import socket
 import struct
 from collections.abc import Iterable
 
-from gatewayd import clock
 from gatewayd.canopen.bus import DRAIN, BusError, BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.interface import ControllerState, Interface, InterfaceReader
 from gatewayd.canopen.supervised import SupervisedBus
-from gatewayd.canopen.supervision import LOOK, Event, event_of_errno
+from gatewayd.canopen.supervision import LOOK, BusSignal, event_of_errno
+from gatewayd.loop import clock
 
 __all__ = ["RECEIVE_BUFFER", "SEND_BUFFER", "SocketCanBus", "filters", "pack", "seen"]
 
@@ -40,7 +40,7 @@ _EXTENDED, _REMOTE, _ERROR = 0x8000_0000, 0x4000_0000, 0x2000_0000
 _BASIC = 0x7FF
 _EXACT = _BASIC | _EXTENDED | _REMOTE
 """Mask of a filter for one identifier and data frames; the kernel finds the socket for it by a table."""
-_GREATEST_FILTERS = 512
+_MAX_FILTERS = 512
 _MEMINFO_SENDING, _MEMINFO_DROPS = 2, 8
 _SO_MEMINFO, _CAN_RAW_ERR_FILTER = 55, 2
 _EVERY_ERROR = 0x1FFF_FFFF
@@ -51,12 +51,12 @@ _new_frame = tuple.__new__
 """A Frame without the detour over its keyword arguments: a third of the cost of a received frame."""
 
 _CONTROLLER = {
-    ControllerState.ACTIVE: Event.ACTIVE,
-    ControllerState.WARNING: Event.WARNING,
-    ControllerState.PASSIVE: Event.PASSIVE,
-    ControllerState.BUS_OFF: Event.OFF,
-    ControllerState.STOPPED: Event.DOWN,
-    ControllerState.SLEEPING: Event.DOWN,
+    ControllerState.ACTIVE: BusSignal.ACTIVE,
+    ControllerState.WARNING: BusSignal.WARNING,
+    ControllerState.PASSIVE: BusSignal.PASSIVE,
+    ControllerState.BUS_OFF: BusSignal.OFF,
+    ControllerState.STOPPED: BusSignal.DOWN,
+    ControllerState.SLEEPING: BusSignal.DOWN,
 }
 
 
@@ -71,20 +71,20 @@ def filters(can_ids: Iterable[int], remote_ids: Iterable[int]) -> bytes:
     """CAN_RAW_FILTER: exactly these; with more of them than the kernel takes, every 11-bit identifier."""
     wanted = [_FILTER.pack(can_id, _EXACT) for can_id in sorted(set(can_ids))]
     wanted += [_FILTER.pack(can_id | _REMOTE, _EXACT) for can_id in sorted(set(remote_ids))]
-    if len(wanted) > _GREATEST_FILTERS:
+    if len(wanted) > _MAX_FILTERS:
         return _FILTER.pack(0, _EXTENDED)
     return b"".join(wanted)
 
 
-def seen(interface: Interface | None) -> Event:
+def seen(interface: Interface | None) -> BusSignal:
     """What a look at the interface means."""
     if interface is None:
-        return Event.GONE
+        return BusSignal.GONE
     if not interface.up:
-        return Event.DOWN
+        return BusSignal.DOWN
     if not interface.carrier:
-        return Event.OFF
-    return Event.UP if interface.controller is None else _CONTROLLER[interface.controller]
+        return BusSignal.OFF
+    return BusSignal.UP if interface.controller is None else _CONTROLLER[interface.controller]
 
 
 class SocketCanBus(SupervisedBus):
@@ -189,11 +189,7 @@ class SocketCanBus(SupervisedBus):
             pass
         except OSError as error:
             failure = error
-        if frames:
-            self.counters.received += len(frames)
-            self._handler.on_frames(frames, now)
-        for report in errors:
-            self._take_error(report, now)
+        self._hand_over(frames, errors, now)
         if failure is not None:
             self._failed(failure)
 
@@ -214,8 +210,10 @@ class SocketCanBus(SupervisedBus):
     def _failed(self, error: OSError) -> None:
         """A send or receive failed: believe it, and look at once, for the reason may be gone already."""
         now = clock.now()
-        self._feed(event_of_errno(error.errno or 0) or Event.GONE, now, f"{self._channel}: {error.strerror}")
-        if event_of_errno(error.errno or 0) is not Event.DOWN:
+        self._feed(
+            event_of_errno(error.errno or 0) or BusSignal.GONE, now, f"{self._channel}: {error.strerror}"
+        )
+        if event_of_errno(error.errno or 0) is not BusSignal.DOWN:
             self._release()
 
     def _look(self) -> None:
@@ -270,7 +268,7 @@ class SocketCanBus(SupervisedBus):
             self._socket = self._make_socket()
         except OSError as error:
             self._supervisor.failed(now)
-            self._feed(Event.GONE, now, f"{self._channel} cannot be opened: {error.strerror}")
+            self._feed(BusSignal.GONE, now, f"{self._channel} cannot be opened: {error.strerror}")
             return False
         self._supervisor.opened()
         self._index = found.index

@@ -1,18 +1,19 @@
-"""What every driver does alike: keep the state of its bus, count, tell its handler, and wait for room to send."""
+"""What every driver does alike: keep the state of its bus, count, call its handler, and wait for room to send."""
 
 from __future__ import annotations
 
 import asyncio
 
-from gatewayd import clock
 from gatewayd.canopen.bus import BusCounters, BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame
-from gatewayd.canopen.supervision import Event, Supervisor, event_of_error
+from gatewayd.canopen.frame import Frame
+from gatewayd.canopen.supervision import BusSignal, Supervisor, event_of_error
+from gatewayd.loop import clock
 
 __all__ = ["LAG", "ROOM_RETRY", "SupervisedBus"]
 
 ROOM_RETRY = 0.001
-"""Seconds to wait for room of which nobody tells."""
+"""Seconds to wait for room that nothing announces."""
 LAG = 0.005
 """Seconds after which a frame that was taken should have gone out."""
 _LAG_BITS = 1350
@@ -50,7 +51,7 @@ class SupervisedBus:
         """Bytes that were taken and have not gone out; 0 where nobody knows."""
         return 0
 
-    def _feed(self, event: Event, now: float, reason: str) -> None:
+    def _feed(self, event: BusSignal, now: float, reason: str) -> None:
         """Judge an event, and tell of the state if it is another one now."""
         if not self._supervisor.feed(event, now):
             return
@@ -61,8 +62,16 @@ class SupervisedBus:
             self._forget_waiting()
         self._handler.on_state(state, reason, now)
 
+    def _hand_over(self, frames: list[Frame], errors: list[ErrorFrame], now: float) -> None:
+        """Give the handler what was read, data frames first."""
+        if frames:
+            self.counters.received += len(frames)
+            self._handler.on_frames(frames, now)
+        for report in errors:
+            self._take_error(report, now)
+
     def _take_error(self, report: ErrorFrame, now: float) -> None:
-        """Tell an error frame, then the state that follows from it."""
+        """Report an error frame, then the state that follows from it."""
         self.counters.errors += 1
         if report.tx_errors is not None and report.rx_errors is not None:
             self.counters.tx_errors, self.counters.rx_errors = report.tx_errors, report.rx_errors

@@ -12,14 +12,14 @@ from enum import Enum, auto
 from types import MappingProxyType
 
 from gatewayd.canopen.bus import BusState
-from gatewayd.canopen.errors import Controller, ErrorClass, ErrorFrame
+from gatewayd.canopen.errors import ControllerFlags, ErrorClass, ErrorFrame
 
 __all__ = [
     "LOOK",
     "RETRY",
     "RETRY_LIMIT",
     "TRANSITIONS",
-    "Event",
+    "BusSignal",
     "Supervisor",
     "event_of_errno",
     "event_of_error",
@@ -33,7 +33,7 @@ RETRY_LIMIT = 2.0
 """Longest wait before an attempt."""
 
 
-class Event(Enum):
+class BusSignal(Enum):
     """What befalls a bus."""
 
     GONE = auto()
@@ -51,62 +51,62 @@ class Event(Enum):
     UP = auto()
     """Seen: it carries frames; how well, the driver does not tell."""
     TOLD_OFF = auto()
-    TOLD_PASSIVE = auto()
-    TOLD_WARNING = auto()
-    TOLD_ACTIVE = auto()
+    REPORTED_PASSIVE = auto()
+    REPORTED_WARNING = auto()
+    REPORTED_ACTIVE = auto()
     TOLD_RESTARTED = auto()
     """Told: the controller is back on the bus."""
 
 
 _SEEN = {
-    Event.GONE: BusState.ABSENT,
-    Event.DOWN: BusState.DOWN,
-    Event.OFF: BusState.BUS_OFF,
-    Event.PASSIVE: BusState.PASSIVE,
-    Event.WARNING: BusState.WARNING,
-    Event.ACTIVE: BusState.ACTIVE,
+    BusSignal.GONE: BusState.ABSENT,
+    BusSignal.DOWN: BusState.DOWN,
+    BusSignal.OFF: BusState.BUS_OFF,
+    BusSignal.PASSIVE: BusState.PASSIVE,
+    BusSignal.WARNING: BusState.WARNING,
+    BusSignal.ACTIVE: BusState.ACTIVE,
 }
 _TOLD = {
-    Event.TOLD_OFF: BusState.BUS_OFF,
-    Event.TOLD_PASSIVE: BusState.PASSIVE,
-    Event.TOLD_WARNING: BusState.WARNING,
-    Event.TOLD_ACTIVE: BusState.ACTIVE,
+    BusSignal.TOLD_OFF: BusState.BUS_OFF,
+    BusSignal.REPORTED_PASSIVE: BusState.PASSIVE,
+    BusSignal.REPORTED_WARNING: BusState.WARNING,
+    BusSignal.REPORTED_ACTIVE: BusState.ACTIVE,
 }
 
 TRANSITIONS = MappingProxyType(
     {(state, event): target for state in BusState for event, target in _SEEN.items()}
     | {(state, event): target for state in BusState if state.carries for event, target in _TOLD.items()}
     | {
-        (BusState.ABSENT, Event.UP): BusState.ACTIVE,
-        (BusState.DOWN, Event.UP): BusState.ACTIVE,
-        (BusState.BUS_OFF, Event.UP): BusState.ACTIVE,
-        (BusState.BUS_OFF, Event.TOLD_RESTARTED): BusState.ACTIVE,
+        (BusState.ABSENT, BusSignal.UP): BusState.ACTIVE,
+        (BusState.DOWN, BusSignal.UP): BusState.ACTIVE,
+        (BusState.BUS_OFF, BusSignal.UP): BusState.ACTIVE,
+        (BusState.BUS_OFF, BusSignal.TOLD_RESTARTED): BusState.ACTIVE,
     }
 )
 """State and event -> next state; what is not here changes nothing."""
 
 _REPORTS = (
-    (Controller.RX_PASSIVE | Controller.TX_PASSIVE, Event.TOLD_PASSIVE),
-    (Controller.RX_WARNING | Controller.TX_WARNING, Event.TOLD_WARNING),
-    (Controller.ACTIVE, Event.TOLD_ACTIVE),
+    (ControllerFlags.RX_PASSIVE | ControllerFlags.TX_PASSIVE, BusSignal.REPORTED_PASSIVE),
+    (ControllerFlags.RX_WARNING | ControllerFlags.TX_WARNING, BusSignal.REPORTED_WARNING),
+    (ControllerFlags.ACTIVE, BusSignal.REPORTED_ACTIVE),
 )
 _FAILURES = {
-    errno.ENETDOWN: Event.DOWN,
-    errno.ENODEV: Event.GONE,
-    errno.ENXIO: Event.GONE,
+    errno.ENETDOWN: BusSignal.DOWN,
+    errno.ENODEV: BusSignal.GONE,
+    errno.ENXIO: BusSignal.GONE,
 }
 
 
-def event_of_error(error: ErrorFrame) -> Event | None:
+def event_of_error(error: ErrorFrame) -> BusSignal | None:
     """What an error frame tells of the state; None if it tells nothing of it."""
     if error.classes & ErrorClass.BUS_OFF:
-        return Event.TOLD_OFF
+        return BusSignal.TOLD_OFF
     if error.classes & ErrorClass.RESTARTED:
-        return Event.TOLD_RESTARTED
+        return BusSignal.TOLD_RESTARTED
     return next((event for flags, event in _REPORTS if error.controller & flags), None)
 
 
-def event_of_errno(number: int) -> Event | None:
+def event_of_errno(number: int) -> BusSignal | None:
     """What a failed send or receive tells of the interface; None if it tells nothing of it."""
     return _FAILURES.get(number)
 
@@ -121,7 +121,7 @@ class Supervisor:
         self._retry_at = 0.0
         self._wait = RETRY
 
-    def feed(self, event: Event, now: float) -> bool:
+    def feed(self, event: BusSignal, now: float) -> bool:
         """Judge an event; whether the state is another one now."""
         target = TRANSITIONS.get((self.state, event), self.state)
         if target is self.state:

@@ -4,24 +4,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from gatewayd.canopen.cob_ids import BASIC_FRAME, is_restricted
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
-from gatewayd.canopen.plan import SyncPlan
 
-__all__ = ["GREATEST_COUNTER", "LEAST_PERIOD", "PRODUCER", "Sync"]
+__all__ = ["MAX_COUNTER", "MIN_PERIOD", "PRODUCER", "SyncPlan", "SyncService"]
 
 PRODUCER = 0x4000_0000
 """Bit 30 of 1005h: this node sends SYNC."""
 _DO_NOT_CARE = 0x8000_0000
-GREATEST_COUNTER = 240
-LEAST_PERIOD = 1000
+MAX_COUNTER = 240
+MIN_PERIOD = 1000
 """Microseconds: a shorter cycle would fill the bus, and no timer of this node keeps it."""
 
 
-class Sync:
+@dataclass(frozen=True, slots=True)
+class SyncPlan:
+    """What this node has to do with SYNC."""
+
+    cob_id: int = 0x80
+    producer: bool = False
+    period: int = 0
+    """Communication cycle period in us; 0: none."""
+    counter: int = 0
+    """Synchronous counter overflow value; 0: SYNC carries no counter."""
+
+
+class SyncService:
     """The SYNC object.
 
     `on_sync(counter, now)` is called for every SYNC of the right length, our own ones included; the counter is None
@@ -106,7 +118,7 @@ class Sync:
         self._last = -math.inf
         self._due = now + self._period.number / 1e6 if self.produces else math.inf
 
-    def resume(self, former: Sync) -> None:
+    def resume(self, former: SyncService) -> None:
         """Go on as another one: in its cycle, with its counter."""
         self._counter, self._last, self._due = former._counter, former._last, former._due
 
@@ -177,12 +189,12 @@ class Sync:
             raise Abort(AbortCode.INVALID_VALUE)
 
     def _check_overflow(self, data: bytes) -> None:
-        if data[0] == 1 or data[0] > GREATEST_COUNTER:
+        if data[0] == 1 or data[0] > MAX_COUNTER:
             raise Abort(AbortCode.INVALID_VALUE)
         if self._period.number:
             raise Abort(AbortCode.DEVICE_STATE)
 
 
 def _check_period(data: bytes) -> None:
-    if 0 < int.from_bytes(data, "little") < LEAST_PERIOD:
+    if 0 < int.from_bytes(data, "little") < MIN_PERIOD:
         raise Abort(AbortCode.VALUE_TOO_LOW)

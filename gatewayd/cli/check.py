@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
+from gatewayd.cli.files import name_of, read_file, reason_of
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from gatewayd.mapping.report import Outcome, Unreadable
+    from gatewayd.mapping.compiled import Unreadable
+    from gatewayd.report.findings import CheckOutcome
 
 __all__ = ["command"]
 
 CLEAN, FOUND, UNREADABLE = 0, 1, 2
 """Exit codes."""
-
-STDIN = "-"
-"""The file name that stands for standard input."""
 
 
 def _complete_rules(
@@ -108,9 +108,9 @@ def command(
     context.exit(FOUND if outcome.errors or (strict and outcome.findings) else CLEAN)
 
 
-def _check(files: tuple[str, ...], *, separately: bool) -> Outcome:
+def _check(files: tuple[str, ...], *, separately: bool) -> CheckOutcome:
     from gatewayd.mapping.loader import load, load_together
-    from gatewayd.mapping.report import Outcome
+    from gatewayd.report.findings import CheckOutcome
 
     readable: list[tuple[str, bytes]] = []
     unreadable: list[Unreadable] = []
@@ -118,12 +118,12 @@ def _check(files: tuple[str, ...], *, separately: bool) -> Outcome:
     for file in dict.fromkeys(_named(files)):
         content = _read(file)
         if isinstance(content, bytes):
-            readable.append((_shown(file), content))
+            readable.append((name_of(file), content))
         else:
             unreadable.append(content)
     loaded = tuple(load(data, name) for name, data in readable) if separately else load_together(readable)
     findings = tuple(finding for one in loaded for finding in one.diagnostics)
-    return Outcome(tuple(name for name, _ in readable), findings, tuple(unreadable))
+    return CheckOutcome(tuple(name for name, _ in readable), findings, tuple(unreadable))
 
 
 def _named(files: tuple[str, ...]) -> Iterator[str]:
@@ -131,7 +131,7 @@ def _named(files: tuple[str, ...]) -> Iterator[str]:
     from os.path import isdir
     from pathlib import Path
 
-    from gatewayd.startup import PATTERN
+    from gatewayd.service.startup import PATTERN
 
     for file in files:
         inside = sorted(Path(file).glob(PATTERN)) if isdir(file) else []  # noqa: PTH112 - as in startup.py
@@ -139,30 +139,18 @@ def _named(files: tuple[str, ...]) -> Iterator[str]:
 
 
 def _read(file: str) -> bytes | Unreadable:
-    import sys
-    from pathlib import Path
-
-    from gatewayd.mapping.loader import read_bytes
-    from gatewayd.mapping.report import Unreadable
-    from gatewayd.mapping.source import MAXIMUM_BYTES
+    from gatewayd.mapping.compiled import Unreadable
 
     try:
-        if file == STDIN:
-            return sys.stdin.buffer.read(MAXIMUM_BYTES + 1)
-        return read_bytes(Path(file))
+        return read_file(file)
     except IsADirectoryError:
-        return Unreadable(_shown(file), "no mapping file (*.yaml) in this directory")
+        return Unreadable(name_of(file), "no mapping file (*.yaml) in this directory")
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        return Unreadable(_shown(file), reason)
+        return Unreadable(name_of(file), reason_of(error))
 
 
-def _shown(file: str) -> str:
-    return "stdin" if file == STDIN else str(click.format_filename(file))
-
-
-def _written(outcome: Outcome, form: str) -> str:
-    from gatewayd.mapping.report import as_github, as_json, as_text
+def _written(outcome: CheckOutcome, form: str) -> str:
+    from gatewayd.report.findings import as_github, as_json, as_text
 
     if form == "json":
         return as_json(outcome)
@@ -189,7 +177,7 @@ def _explain(name: str) -> str:
         )
     rule = rule_of(name)
     if rule is None:
-        from gatewayd.mapping.rules.wording import did_you_mean
+        from gatewayd.report.wording import did_you_mean
 
         known = [*(rule.id for rule in rules), *(rule.slug for rule in rules)]
         hint = did_you_mean(name, known, "`gatewayd check --explain all` lists them")

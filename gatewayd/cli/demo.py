@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gatewayd import clock
+from gatewayd.loop import clock
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -73,13 +73,13 @@ def command(seconds: float | None, port: int | None) -> int:
     if seconds is None and not live:
         seconds = UNATTENDED
     try:
-        chosen, told = _port(port)
+        chosen, note = _port(port)
     except OSError as error:
         reason = error.strerror or str(error)
         click.echo(f"gatewayd: cannot listen on port {port}: {reason}; --port 0 takes a free one", err=True)
         return FAILED
     with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
-        return runner.run(_play(console, chosen, told, seconds or None, live=live))
+        return runner.run(_play(console, chosen, note, seconds or None, live=live))
 
 
 def _port(wanted: int | None) -> tuple[int, str]:
@@ -96,7 +96,7 @@ def _port(wanted: int | None) -> tuple[int, str]:
         return free_port(HOST), f" ({PORT} is taken by another program)"
 
 
-async def _play(console: Console, port: int, told: str, seconds: float | None, *, live: bool) -> int:
+async def _play(console: Console, port: int, note: str, seconds: float | None, *, live: bool) -> int:
     from gatewayd.demo.scene import HOST, PLC_ADDRESS, Scene
     from gatewayd.demo.summary import summary
 
@@ -107,7 +107,7 @@ async def _play(console: Console, port: int, told: str, seconds: float | None, *
     async with scene.playing():
         console.print(
             f"[bold]gatewayd demo[/]: simulated robot on port {scene.robot.port}, "
-            f"gateway on Modbus TCP [bold]{HOST}:{port}[/]{told}, PLC at {PLC_ADDRESS}",
+            f"gateway on Modbus TCP [bold]{HOST}:{port}[/]{note}, PLC at {PLC_ADDRESS}",
             soft_wrap=True,
         )
         if live:

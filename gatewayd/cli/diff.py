@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
-from gatewayd.printable import printable
-
-if TYPE_CHECKING:
-    from gatewayd.mapping.plan import Plan
+from gatewayd.cli.files import load_file
 
 __all__ = ["command"]
 
@@ -49,37 +44,13 @@ def command(context: click.Context, old: str, new: str, form: str) -> None:
 
     Compared is what the files mean: order of keys, spelling and formatting do not count. `-` reads standard input.
     """
-    from gatewayd.mapping.diff import as_json, as_text, compare
+    from gatewayd.report.diff import as_json, as_text, compare
 
     if old == new == "-":
         raise click.UsageError("only one of the two files can be standard input")
-    plans = [_load(file) for file in (old, new)]
-    before, after = plans
+    before, after = (loaded.plan if loaded is not None else None for loaded in map(load_file, (old, new)))
     if before is None or after is None:
         context.exit(UNREADABLE)
     changes = compare(before, after)
     click.echo(as_json(changes) if form == "json" else as_text(changes), nl=False)
     context.exit(DIFFERENT if changes else SAME)
-
-
-def _load(file: str) -> Plan | None:
-    """The plan; None after its findings were told."""
-    import sys
-    from pathlib import Path
-
-    from gatewayd.mapping.loader import load, read_bytes
-    from gatewayd.mapping.report import Outcome, as_text
-    from gatewayd.mapping.source import MAXIMUM_BYTES
-
-    name = "stdin" if file == "-" else str(click.format_filename(file))
-    try:
-        loaded = load(
-            sys.stdin.buffer.read(MAXIMUM_BYTES + 1) if file == "-" else read_bytes(Path(file)), name
-        )
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        click.echo(printable(f"{name}: cannot be read: {reason}"), err=True)
-        return None
-    if loaded.plan is None:
-        click.echo(as_text(Outcome((name,), loaded.diagnostics)), nl=False, err=True)
-    return loaded.plan

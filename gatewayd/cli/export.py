@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import click
 
-from gatewayd.printable import printable
+from gatewayd.cli.files import load_file, reason_of
+from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
-    from gatewayd.canopen.dictionary import Dictionary
-    from gatewayd.canopen.plan import CanopenPlan
+    from gatewayd.links.exports import Export
     from gatewayd.mapping.plan import Plan
 
 __all__ = ["command"]
 
 BROKEN, UNREADABLE = 1, 2
 """Exit codes."""
-STDIN = STDOUT = "-"
-"""The file name that stands for standard input and output."""
+STDOUT = "-"
+"""The file name that stands for standard output."""
 
 _EXIT_CODES = """\
 \b
@@ -28,19 +28,27 @@ Exit codes:
   2  wrong usage, or a file that cannot be read or written
 """
 
-_file = click.argument("file", type=click.Path(allow_dash=True))
-_output = click.option(
-    "-o",
-    "--output",
-    metavar="OUT",
-    type=click.Path(allow_dash=True),
-    default=STDOUT,
-    help="Where to write it; standard output otherwise.",
-)
+
+class ExportGroup(click.Group):
+    """One command for each file that some kind of link writes; what writes it is imported to use it."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The names in order."""
+        from gatewayd.links.registry import exports
+
+        return sorted(exports())
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of that name; None when there is none."""
+        from gatewayd.links.registry import exports
+
+        export = exports().get(cmd_name)
+        return _command(export) if export is not None else None
 
 
 @click.group(
     name="export",
+    cls=ExportGroup,
     epilog="""\b
 Examples:
   gatewayd export eds my-cell.yaml -o my-cell.eds      for the CANopen master's configurator
@@ -53,120 +61,47 @@ def command() -> None:
     """Write files for other tools from a mapping FILE: the CANopen data sheet, robot program lines."""
 
 
-@command.command(
-    name="eds",
-    short_help="The electronic data sheet, for the master's configurator.",
-    epilog=f"""\b
-Examples:
-  gatewayd export eds my-cell.yaml -o my-cell.eds
-\n{_EXIT_CODES}""",
-)
-@_file
-@_output
-@click.pass_context
-def eds(context: click.Context, file: str, output: str) -> None:
-    """Write the electronic data sheet (CiA 306) of the node of a mapping FILE, for the configurator of the master.
+def _command(export: Export) -> click.Command:
+    from inspect import cleandoc
 
-    Before it is written, python-canopen's importer has read it back, every entry as it was meant. The same mapping
-    gives the same bytes. The sheet is valid for any node-ID; COB-IDs beyond the four predefined of each direction are
-    those of the mapping.
-    """
-    from gatewayd.canopen.eds import eds_text, objects_of, sheet_of
+    def run(file: str, output: str) -> None:
+        context = click.get_current_context()
+        _write(context, output, _made(context, export, file))
 
-    plan, canopen = _node(context, file)
-    dictionary = objects_of(canopen, plan.cell)
-    text = eds_text(dictionary, sheet_of(canopen, plan.cell, "eds"))
-    _read_back(context, text, dictionary, canopen)
-    _write(context, output, text)
-
-
-@command.command(
-    name="dcf",
-    short_help="The same with node-ID, bit-rate and values.",
-    epilog=f"""\b
-Examples:
-  gatewayd export dcf my-cell.yaml -o my-cell.dcf
-\n{_EXIT_CODES}""",
-)
-@_file
-@_output
-@click.pass_context
-def dcf(context: click.Context, file: str, output: str) -> None:
-    """Write the device configuration file (CiA 306) of a mapping FILE: its data sheet with the node-ID, the bit-rate
-    and the value of every parameter as the mapping has them.
-    """
-    from gatewayd.canopen.eds import Commissioning, dcf_text, objects_of, sheet_of
-
-    plan, canopen = _node(context, file)
-    commissioning = Commissioning(canopen.node, canopen.bitrate, plan.cell.name)
-    dictionary = objects_of(canopen, plan.cell)
-    text = dcf_text(dictionary, sheet_of(canopen, plan.cell, "dcf"), commissioning)
-    _read_back(context, text, dictionary, canopen)
-    _write(context, output, text)
+    return click.Command(
+        export.name,
+        callback=run,
+        params=[
+            click.Argument(["file"], type=click.Path(allow_dash=True)),
+            click.Option(
+                ["-o", "--output"],
+                metavar="OUT",
+                type=click.Path(allow_dash=True),
+                default=STDOUT,
+                help="Where to write it; standard output otherwise.",
+            ),
+        ],
+        help=cleandoc(export.help),
+        short_help=export.summary,
+        epilog=f"\b\nExamples:\n  {export.example}\n\n{_EXIT_CODES}",
+    )
 
 
-@command.command(
-    name="urscript",
-    short_help="The watchdog line of the robot program.",
-    epilog=f"""\b
-Examples:
-  gatewayd export urscript my-cell.yaml
-\n{_EXIT_CODES}""",
-)
-@_file
-@_output
-@click.pass_context
-def urscript(context: click.Context, file: str, output: str) -> None:
-    """Write the lines of a mapping FILE for the robot program: the watchdog that stops it when the gateway or a
-    required writer is gone.
-    """
-    from gatewayd.mapping.urscript import watchdog_script
+def _made(context: click.Context, export: Export, file: str) -> str:
+    from gatewayd.links.exports import ExportError
 
-    plan = _plan(context, file)
-    if plan.robot.watchdog is None:
-        _stop(
-            context,
-            f"{plan.source}: the mapping declares no watchdog: add `watchdog:` to the section `robot`",
-        )
-    _write(context, output, watchdog_script(plan))
-
-
-def _node(context: click.Context, file: str) -> tuple[Plan, CanopenPlan]:
-    plan = _plan(context, file)
-    if plan.canopen is None:
-        _stop(
-            context,
-            f"{plan.source}: the cell is on no CAN bus: "
-            "add `canopen: {channel: can0, bitrate: 500000, node: 16}`",
-        )
-    return plan, plan.canopen
-
-
-def _read_back(context: click.Context, text: str, dictionary: Dictionary, plan: CanopenPlan) -> None:
-    """Let no sheet out that another implementation understands otherwise."""
-    from gatewayd.canopen.importer import differences
-
-    found = differences(text, dictionary, plan.node)
-    if found:
-        _stop(context, f"not written, because python-canopen reads it otherwise: {'; '.join(found[:3])}")
+    try:
+        return export.make(_plan(context, file))
+    except ExportError as error:
+        click.echo(printable(str(error)), err=True)
+        context.exit(BROKEN)
 
 
 def _plan(context: click.Context, file: str) -> Plan:
-    import sys
-    from pathlib import Path
-
-    from gatewayd.mapping.loader import load, read_bytes
-    from gatewayd.mapping.report import Outcome, as_text
-    from gatewayd.mapping.source import MAXIMUM_BYTES
-
-    name = "stdin" if file == STDIN else str(click.format_filename(file))
-    try:
-        data = sys.stdin.buffer.read(MAXIMUM_BYTES + 1) if file == STDIN else read_bytes(Path(file))
-    except (OSError, ValueError) as error:
-        _fail(context, f"{name}: cannot be read: {_reason(error)}")
-    loaded = load(data, name)
+    loaded = load_file(file)
+    if loaded is None:
+        context.exit(UNREADABLE)
     if loaded.plan is None:
-        click.echo(as_text(Outcome((name,), loaded.diagnostics)), nl=False, err=True)
         context.exit(BROKEN)
     return loaded.plan
 
@@ -180,18 +115,6 @@ def _write(context: click.Context, output: str, text: str) -> None:
     try:
         Path(output).write_text(text, encoding="ascii", newline="\n")
     except (OSError, ValueError) as error:
-        _fail(context, f"{click.format_filename(output)}: cannot be written: {_reason(error)}")
-
-
-def _reason(error: OSError | ValueError) -> str:
-    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-
-
-def _stop(context: click.Context, message: str) -> NoReturn:
-    click.echo(printable(message), err=True)
-    context.exit(BROKEN)
-
-
-def _fail(context: click.Context, message: str) -> NoReturn:
-    click.echo(printable(message), err=True)
-    context.exit(UNREADABLE)
+        message = f"{click.format_filename(output)}: cannot be written: {reason_of(error)}"
+        click.echo(printable(message), err=True)
+        context.exit(UNREADABLE)

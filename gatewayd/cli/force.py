@@ -53,8 +53,8 @@ def command(name: str, value: str, seconds: float, socket: Path | None, cell: st
     limits hold. Afterwards an output shows the truth again, and an input its release fallback until its owner writes.
     """
     from gatewayd.control.client import segment
-    from gatewayd.figures import span
-    from gatewayd.figures import value as shown
+    from gatewayd.report.format import span
+    from gatewayd.report.format import value as shown
 
     body: dict[str, Any] = {"value": _parse(value), "for": seconds}
     client = connect(socket)

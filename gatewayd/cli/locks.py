@@ -120,7 +120,7 @@ def _post(
 
 
 def _print(locks: list[dict[str, Any]]) -> None:
-    from gatewayd.figures import age
+    from gatewayd.report.format import age
 
     several = len({lock["cell"] for lock in locks}) > 1
     rows = [("lock", "owner", "left", "may own it", "variables")]
@@ -138,6 +138,6 @@ def _print(locks: list[dict[str, Any]]) -> None:
 
 
 def _members(lock: Mapping[str, Any]) -> str:
-    shown = lock["members"][:5]
-    more = len(lock["members"]) - len(shown)
-    return ", ".join(shown) + (f" and {more} more" if more else "")
+    from gatewayd.report.format import listed
+
+    return listed(lock["members"], 5)

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from gatewayd.figures import age
+from gatewayd.links.registry import kinds
+from gatewayd.report.format import age
 
 __all__ = ["clock", "owner", "places", "quality"]
 
@@ -27,8 +28,12 @@ def quality(name: str) -> str:
 
 
 def places(variable: Mapping[str, Any]) -> str:
-    """`400011`, or several."""
-    return " ".join(place["notation"] for place in variable["modbus"])
+    """`400011`, `2010h:01`, or several: its places on all links, by notation or else by what comes first."""
+    found: list[Mapping[str, Any]] = []
+    for kind in kinds():
+        here = variable.get(kind.key) if kind.place else None
+        found += here if isinstance(here, list) else [here] if here else []
+    return " ".join(str(place.get("notation") or next(iter(place.values()))) for place in found)
 
 
 def clock(time: str) -> str:

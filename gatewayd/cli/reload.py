@@ -85,4 +85,4 @@ def _lines(answer: Mapping[str, Any]) -> list[str]:
         lines = ["refused, the old mapping runs on; --force applies it all the same:"]
     else:
         lines = ["failed, the old mapping runs on:"]
-    return [*lines, *(f"  {one}" for one in (*reasons, *answer.get("details", ())))]
+    return [*lines, *(f"  {line}" for line in (*reasons, *answer.get("details", ())))]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from gatewayd.printable import json_text, printable, printable_answer
+from gatewayd.report.printable import json_text, printable, printable_answer
 
 if TYPE_CHECKING:
     from gatewayd.control.client import Client
@@ -73,7 +73,7 @@ def connect(socket: Path | None) -> Client:
 
 @contextmanager
 def refusals(client: Client | None = None, name: str = "") -> Iterator[None]:
-    """Turn what a client raises into an error of the command; with `client` told what `name` was meant to be."""
+    """Turn what a client raises into an error of the command; with `client`, with names close to `name`."""
     from gatewayd.control.client import ControlError, NoDaemon
 
     try:
@@ -99,7 +99,7 @@ def _meant(client: Client, kind: str, name: str) -> str:
     from gatewayd.control.client import ControlError, NoDaemon
 
     try:
-        names = sorted({one["name"] for one in client.get(f"/v1/{kind}")[kind]})
+        names = sorted({found["name"] for found in client.get(f"/v1/{kind}")[kind]})
     except (NoDaemon, ControlError):
         return ""
     close = get_close_matches(name, names)
@@ -149,7 +149,7 @@ def _names(context: click.Context, path: str, kind: str) -> list[dict[str, Any]]
         client = Client(find_socket(context.params.get("socket"), os.environ), _COMPLETION_PATIENCE)
         found = client.get(path, cell=context.params.get("cell"))[kind]
         # A shell would take what is not printable for something else.
-        return [one for one in found if printable(one["name"]) == one["name"]]
+        return [thing for thing in found if printable(thing["name"]) == thing["name"]]
     except (NoDaemon, ControlError, OSError):
         return []
 
@@ -159,25 +159,25 @@ def complete_variables(
 ) -> list[CompletionItem]:
     """Names of variables, with what they are in the robot."""
     return [
-        CompletionItem(one["name"], help=printable(one["robot"]))
-        for one in _names(context, "/v1/variables", "variables")
-        if one["name"].startswith(incomplete)
+        CompletionItem(variable["name"], help=printable(variable["robot"]))
+        for variable in _names(context, "/v1/variables", "variables")
+        if variable["name"].startswith(incomplete)
     ]
 
 
 def complete_locks(context: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Names of locks, with their owners."""
     return [
-        CompletionItem(one["name"], help=printable(one["owner"] or "free"))
-        for one in _names(context, "/v1/locks", "locks")
-        if one["name"].startswith(incomplete)
+        CompletionItem(lock["name"], help=printable(lock["owner"] or "free"))
+        for lock in _names(context, "/v1/locks", "locks")
+        if lock["name"].startswith(incomplete)
     ]
 
 
 def complete_cells(context: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Names of cells."""
     found = _names(context, "/v1/status", "cells")
-    return [CompletionItem(one["name"]) for one in found if one["name"].startswith(incomplete)]
+    return [CompletionItem(cell["name"]) for cell in found if cell["name"].startswith(incomplete)]
 
 
 def socket_option(command: _Command) -> _Command:

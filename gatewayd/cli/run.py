@@ -3,32 +3,17 @@
 from __future__ import annotations
 
 import logging
-import math
 import os
 import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from gatewayd.signals import SIGNALS
-
 if TYPE_CHECKING:
-    import asyncio
-
-    from gatewayd.daemon import Daemon
-    from gatewayd.signals import Effect
-    from gatewayd.startup import Startup
-    from gatewayd.status.launch import Settings
+    from gatewayd.web.settings import Settings
 
 __all__ = ["command"]
-
-STOPPED = 0
-NOTHING_TO_RUN = 1
-UNREADABLE = 2
-DEFECT = 70
-"""Worth another attempt, unlike the others: the service manager starts it again."""
 
 
 @click.command(
@@ -110,27 +95,23 @@ def command(
     A FILE may also be a directory: all its *.yaml files are meant. Cells with the same `modbus: listen:` share one
     listener and differ by their unit id. Robots, PLCs and interfaces may come and go in any order.
     """
-    from gatewayd.logs import Format, configure
-    from gatewayd.logstream import LogStream
+    from gatewayd.logs.records import Format, configure
+    from gatewayd.logs.stream import LogStream
+    from gatewayd.service.main import main
+    from gatewayd.service.options import Options
 
     page = _settings(status, token_file) if status else None
+    options = Options(files, state, control, audit, page, strict=strict)
     stream = LogStream(_descriptor())
     configure(Format(log_format), logging.getLevelNamesMapping()[log_level.upper()], stream)
     try:
-        found = _load(files, strict=strict)
-        if SIGNALS.stopping:
-            _log_stop("stopped before anything was served")
-            return STOPPED
-        if isinstance(found, int):
-            return found
-        return _run(found, files, state, page=page, control=control, audit=audit)
+        return main(options)
     finally:
         stream.close()
 
 
 def _settings(status: str, token_file: Path | None) -> Settings:
-    # Its import brings the daemon's, which otherwise happens while the mapping files are read.
-    from gatewayd.status.launch import Settings, SettingsError
+    from gatewayd.web.settings import Settings, SettingsError
 
     try:
         return Settings(status, token_file)
@@ -141,162 +122,3 @@ def _settings(status: str, token_file: Path | None) -> Settings:
 def _descriptor() -> int:
     """Standard error; nowhere if the process was started without: its number may belong to a PLC by now."""
     return os.open(os.devnull, os.O_WRONLY) if sys.stderr is None else sys.stderr.fileno()
-
-
-def _load(files: Sequence[Path], *, strict: bool) -> Startup | int:
-    """What there is to serve, or the exit code."""
-    from gatewayd.compilation import CompilationError
-    from gatewayd.startup import load_plans
-
-    try:
-        found = load_plans(files, _import_the_daemon, lambda: SIGNALS.stopping)
-    except CompilationError as error:
-        if not SIGNALS.stopping:
-            logging.getLogger("gatewayd.startup").error("%s", error)  # noqa: TRY400 - the text says it all
-        return DEFECT
-    if not found.plans and not found.broken:
-        return UNREADABLE
-    if not found.plans or (strict and (found.broken or found.unreadable)):
-        return NOTHING_TO_RUN
-    return found
-
-
-def _run(
-    found: Startup,
-    files: Sequence[Path],
-    state: Path | None,
-    *,
-    page: Settings | None,
-    control: Path | None,
-    audit: Path | None,
-) -> int:
-    import asyncio
-
-    from gatewayd import clock
-    from gatewayd.daemon import Daemon
-    from gatewayd.startup import state_directory
-
-    daemon = Daemon(found.plans, state or state_directory(os.environ))
-    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
-        runner.run(_serve(daemon, files, _notes(found), page=page, control=_socket(control), audit=audit))
-    return STOPPED
-
-
-def _log_stop(text: str) -> None:
-    from gatewayd.logs import fields
-    from gatewayd.signals import name_of
-
-    logging.getLogger("gatewayd.run").info(text, extra=fields(signal=name_of(SIGNALS.stopped_by)))
-
-
-def _import_the_daemon() -> None:
-    """What takes as long as reading the files, and can be done meanwhile."""
-    import gatewayd.daemon
-    import gatewayd.operation
-    import gatewayd.reload
-    import gatewayd.service  # noqa: F401
-
-
-def _socket(named: Path | None) -> Path | None:
-    from gatewayd.control.paths import default_socket
-    from gatewayd.logs import fields
-
-    if named is not None:
-        return None if str(named) == "none" else named
-    found = default_socket(os.environ)
-    if found is None:
-        log = logging.getLogger("gatewayd.control")
-        log.warning(
-            "no place for a control socket, gatewayd status and watch cannot ask this gateway",
-            extra=fields(
-                reason="neither a service nor a session (XDG_RUNTIME_DIR)",
-                remedy="gatewayd run --control PATH",
-            ),
-        )
-    return found
-
-
-def _notes(found: Startup) -> list[str]:
-    """What the service manager shows until a reload mends it."""
-    count = found.broken + found.unreadable
-    return [f"{count} mapping file{'s' if count > 1 else ''} not served, see the log"] if count else []
-
-
-async def _serve(
-    daemon: Daemon,
-    files: Sequence[Path],
-    notes: list[str],
-    *,
-    page: Settings | None,
-    control: Path | None,
-    audit: Path | None,
-) -> None:
-    import asyncio
-
-    from gatewayd import clock
-    from gatewayd.operation import Operation, Standstill
-    from gatewayd.reload import Reloader
-    from gatewayd.service import Service
-    from gatewayd.status.launch import serve
-    from gatewayd.systemd import Notifier
-
-    stop = asyncio.Event()
-    service = Service(Notifier(os.environ, os.getpid()), daemon, notes)
-    reloader = Reloader(
-        daemon, files, service.reload_begins, lambda outcome: service.reload_ended(outcome.notes)
-    )
-    SIGNALS.follow(asyncio.get_running_loop(), _Obedience(stop, reloader.ask))
-    if stop.is_set():
-        return
-    standstill = Standstill()
-    clock.on_gap(standstill.gap)
-    operation = Operation(
-        daemon,
-        control,
-        audit,
-        lambda: service.notes,
-        lambda force: reloader.reload(force=force),
-        stood_still=standstill.seconds,
-    )
-    operating = asyncio.create_task(operation.run())
-    reporting = asyncio.create_task(service.run(stop))
-    reloading = asyncio.create_task(reloader.run())
-    showing = (
-        asyncio.create_task(serve(page, daemon, (operation.api, operation.reload), lambda: service.notes))
-        if page
-        else None
-    )
-    await daemon.run(stop)
-    reloading.cancel()
-    operating.cancel()
-    if showing is not None:
-        showing.cancel()
-    await asyncio.wait((operating,))
-    await reporting
-    SIGNALS.leave()
-
-
-class _Obedience:
-    """Carries out what a signal asks for."""
-
-    QUIET = 10.0
-    """Seconds for which further signals of a kind that is ignored are not logged."""
-
-    def __init__(self, stop: asyncio.Event, reload: Callable[[], None]) -> None:
-        self._stop = stop
-        self._reload = reload
-        self._logged: dict[int, float] = {}
-
-    def __call__(self, number: int, effect: Effect) -> None:
-        from gatewayd import clock
-        from gatewayd.logs import fields
-        from gatewayd.signals import Effect, name_of
-
-        if effect is Effect.END:
-            _log_stop("stopping")
-            self._stop.set()
-        elif effect is Effect.RELOAD:
-            self._reload()
-        elif clock.now() - self._logged.get(number, -math.inf) >= self.QUIET:
-            self._logged[number] = clock.now()
-            logging.getLogger("gatewayd.run").warning("signal ignored", extra=fields(signal=name_of(number)))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from gatewayd.rtde.catalogue import Series, SoftwareVersion
     from gatewayd.simulator.controller import Controller
     from gatewayd.simulator.faults import DropAt
-    from gatewayd.simulator.program import Rule
+    from gatewayd.simulator.program import ProgramRule
 
 __all__ = ["command"]
 
@@ -325,11 +325,11 @@ def _generation(series: str | None, version: str | None) -> tuple[Series, Softwa
     return own, software
 
 
-def _rules(programs: tuple[str, ...], files: tuple[Path, ...]) -> list[Rule]:
+def _rules(programs: tuple[str, ...], files: tuple[Path, ...]) -> list[ProgramRule]:
     """The rules of the options, then those of the files."""
     from gatewayd.simulator.program import DEMO, parse
 
-    rules: list[Rule] = []
+    rules: list[ProgramRule] = []
     for number, text in enumerate(programs, 1):
         source = "--program" if len(programs) == 1 else f"--program {number}"
         rules += parse(DEMO if text == "demo" else text, source)

@@ -69,19 +69,19 @@ def command(context: click.Context, socket: Path | None, cell: str | None, *, as
 
 def _narrowed(answer: Answer, cell: str) -> dict[str, Any]:
     """The answer for one cell alone."""
-    (one,) = [one for one in answer["cells"] if one["name"] == cell]
-    of_others = tuple(f"{other['name']}: " for other in answer["cells"] if other is not one)
+    (wanted,) = [found for found in answer["cells"] if found["name"] == cell]
+    of_others = tuple(f"{other['name']}: " for other in answer["cells"] if other is not wanted)
     problems = (
         [text for text in answer["problems"] if not text.startswith(of_others)]
         if of_others
         else answer["problems"]
     )
-    return {**answer, "cells": [one], "problems": problems, "healthy": not problems}
+    return {**answer, "cells": [wanted], "problems": problems, "healthy": not problems}
 
 
 def _lines(answer: Answer, locks: list[Answer], events: list[Answer]) -> Iterator[str]:
     from gatewayd.cli.phrases import clock
-    from gatewayd.figures import span
+    from gatewayd.report.format import span
 
     healthy = answer["healthy"]
     state = click.style("healthy" if healthy else "degraded", fg="green" if healthy else "red", bold=True)
@@ -102,7 +102,7 @@ def _lines(answer: Answer, locks: list[Answer], events: list[Answer]) -> Iterato
 
 
 def _cell(cell: Answer, locks: list[Answer]) -> Iterator[str]:
-    from gatewayd.figures import counted
+    from gatewayd.report.format import counted
 
     yield (
         click.style(cell["name"], bold=True)
@@ -110,15 +110,9 @@ def _cell(cell: Answer, locks: list[Answer]) -> Iterator[str]:
         + (f", the gateway stood still {counted(cell['gaps'], 'time')}" if cell["gaps"] else "")
     )
     yield from _part("robot", _robot(cell["robot"]))
-    modbus = cell["modbus"]
-    if modbus is not None:
-        connections = counted(modbus["connections"], "connection")
-        yield from _part("modbus", [f"{modbus['listen']} unit {modbus['unit']}, {connections}"])
-    canopen = cell["canopen"]
-    if canopen is not None:
-        bus = click.style(f"bus {canopen['bus']}", fg="green" if canopen["bus"] == "active" else "red")
-        node = f"node {canopen['node']} {canopen['nmt_state']}"
-        yield from _part("canopen", [f"{canopen['channel']} {bus}, {node}"])
+    for link in cell["links"]:
+        if link["name"] != "robot":
+            yield from _part(link["name"], [_link(link)])
     yield from _part("writers", [_writer(writer, cell["locks"]["total"]) for writer in cell["writers"]])
     yield from _part("variables", [_variables(cell["variables"])])
     yield from _part("locks", _locks(locks))
@@ -131,21 +125,24 @@ def _part(title: str, lines: list[str]) -> Iterator[str]:
         title = ""
 
 
-_STATES = {
-    "lost": ("not connected", "red"),
-    "waiting": ("connected, but it sends no data yet", "yellow"),
-    "fresh": ("fresh", "green"),
-    "silent": ("silent", "red"),
-    "frozen": ("frozen, its clock stands still", "red"),
-    "late": ("late, its values are too old when they come", "red"),
-}
+def _link(link: Answer) -> str:
+    words = click.style(link["words"], fg=_colour(link["level"]))
+    return f"{link['address']} {words}" + (f", {link['detail']}" if link["detail"] else "")
+
+
+def _colour(level: str) -> str | None:
+    from gatewayd.links.contract import Level
+    from gatewayd.report.words import LEVEL_COLOURS
+
+    return None if level == "idle" else LEVEL_COLOURS[Level[level.upper()]]
 
 
 def _robot(robot: Answer) -> list[str]:
-    from gatewayd.figures import age, counted
+    from gatewayd.report.format import age, counted
+    from gatewayd.report.words import LEVEL_COLOURS, SOURCE_LEVELS, SOURCES, source
 
-    words, colour = _STATES[robot["state"]]
-    first = f"{robot['address']} {click.style(words, fg=colour)}"
+    state = source(robot["state"])
+    first = f"{robot['address']} {click.style(SOURCES[state], fg=LEVEL_COLOURS[SOURCE_LEVELS[state]])}"
     if robot["state"] == "fresh":
         # No rate was measured yet just after the start: 0 Hz would be a lie.
         first += f" at {robot['frequency']:g} Hz" if robot["frequency"] else ""
@@ -170,7 +167,7 @@ def _robot(robot: Answer) -> list[str]:
 
 
 def _writer(writer: Answer, locks: int) -> str:
-    from gatewayd.figures import age
+    from gatewayd.report.format import age
 
     if writer["alive"]:
         state, colour = f"there, last request {age(writer['age'])} ago", "green"
@@ -187,13 +184,15 @@ def _variables(counts: Answer) -> str:
     from gatewayd.cli.phrases import quality
 
     others = [
-        f"{count} {quality(one)}" for one, count in counts.items() if count and one not in ("total", "good")
+        f"{count} {quality(name)}"
+        for name, count in counts.items()
+        if count and name not in ("total", "good")
     ]
     return f"{counts['total']}: {counts['good']} good, " + click.style(", ".join(others), fg="yellow")
 
 
 def _locks(locks: list[Answer]) -> list[str]:
-    from gatewayd.figures import age
+    from gatewayd.report.format import age
 
     held = [
         f"{lock['name']}: {lock['owner']}"
@@ -206,7 +205,7 @@ def _locks(locks: list[Answer]) -> list[str]:
 
 
 def _writes(cell: Answer) -> list[str]:
-    from gatewayd.figures import age
+    from gatewayd.report.format import age
 
     writes, last = cell["writes"], cell["last_refusal"]
     lines = [f"{writes['accepted']} accepted, {writes['refused']} refused"]

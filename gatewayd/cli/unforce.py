@@ -32,7 +32,7 @@ Exit codes:
 def command(name: str | None, socket: Path | None, cell: str | None, *, every: bool) -> None:
     """End the force of variable NAME: an output shows the truth again, an input its release fallback."""
     from gatewayd.control.client import segment
-    from gatewayd.figures import value
+    from gatewayd.report.format import value
 
     if every == (name is not None):
         raise click.UsageError("name one variable, or use --all")
@@ -42,10 +42,14 @@ def command(name: str | None, socket: Path | None, cell: str | None, *, every: b
             wanted = [(name, cell)]
         else:
             variables = client.get("/v1/variables", cell=cell)["variables"]
-            wanted = [(one["name"], one["cell"]) for one in variables if one["forced"] is not None]
-        for one, its_cell in wanted:
+            wanted = [
+                (variable["name"], variable["cell"])
+                for variable in variables
+                if variable["forced"] is not None
+            ]
+        for forced, its_cell in wanted:
             body = {} if its_cell is None else {"cell": its_cell}
-            found = readable(client.post(f"/v1/variables/{segment(one)}/unforce", body))
+            found = readable(client.post(f"/v1/variables/{segment(forced)}/unforce", body))
             shown = value(found["value"], found["unit"])
             click.echo(f"{found['name']} is no longer forced: {shown}, {found['quality']}")
     if not wanted:

@@ -23,7 +23,7 @@ from gatewayd.cli.remote import (
     refusals,
     socket_option,
 )
-from gatewayd.printable import printable
+from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -97,7 +97,7 @@ def _look(client: Client, cell: str | None) -> Glimpse:
 
     status = client.get("/v1/status")
     if cell is not None:
-        status["cells"] = [one for one in status["cells"] if one["name"] == cell]
+        status["cells"] = [found for found in status["cells"] if found["name"] == cell]
     variables = client.get("/v1/variables", cell=cell)["variables"]
     events = client.get("/v1/events", cell=cell, limit=_EVENTS)["events"]
     return Glimpse(*readable([status, variables, events]))
@@ -153,7 +153,8 @@ def keys(descriptor: int, patience: float) -> Iterator[str]:
     text = data.decode(errors="ignore")
     while text:
         known = next(
-            (one for one in sorted(_SEQUENCES, key=len, reverse=True) if text.startswith(one)), text[0]
+            (sequence for sequence in sorted(_SEQUENCES, key=len, reverse=True) if text.startswith(sequence)),
+            text[0],
         )
         text = text[len(known) :]
         yield _SEQUENCES.get(known, known)

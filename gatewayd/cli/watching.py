@@ -13,7 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from gatewayd.cli import phrases
-from gatewayd.figures import age, counted, value
+from gatewayd.report.format import age, value
+from gatewayd.report.words import LEVEL_COLOURS, QUALITY_COLOURS, SOURCE_LEVELS, quality, source
 
 __all__ = ["KEYS", "Glimpse", "Show", "View", "chosen", "plain", "press", "screen", "settled"]
 
@@ -24,18 +25,7 @@ _FRAME = 6
 """Lines that are neither links nor variables nor events: heads, rules, keys."""
 _EVENTS = 4
 _WIDE, _SPACIOUS = 96, 124
-"""Columns from which on the Modbus place, and the robot's name, have room."""
-_QUALITY_STYLES = {
-    "good": "green",
-    "stale": "yellow",
-    "unavailable": "red",
-    "never": "dim",
-    "forced": "magenta",
-    "differs": "red",
-    "out_of_range": "yellow",
-    "not_running": "yellow",
-}
-_SOURCE_STYLES = {"fresh": "green", "waiting": "yellow"}
+"""Columns from which on the places, and the robot's name, have room."""
 
 
 class Show(Enum):
@@ -123,11 +113,13 @@ def chosen(variables: Sequence[Answer], view: View) -> list[Answer]:
     """The variables whose name, robot register or owner contains the filter, and that are asked for."""
     wanted, directions = view.filter.lower(), _DIRECTIONS[view.show]
     return [
-        one
-        for one in variables
-        if one["direction"] in directions
-        and not (view.only_bad and one["quality"] == "good")
-        and any(wanted in text.lower() for text in (one["name"], one["robot"], one["owner"] or ""))
+        variable
+        for variable in variables
+        if variable["direction"] in directions
+        and not (view.only_bad and variable["quality"] == "good")
+        and any(
+            wanted in text.lower() for text in (variable["name"], variable["robot"], variable["owner"] or "")
+        )
     ]
 
 
@@ -147,7 +139,8 @@ def screen(glimpse: Glimpse, before: Glimpse | None, view: View, width: int) -> 
     """One picture of a `settled` view; values that differ from `before` are bright."""
     variables = chosen(glimpse.variables, view)
     room, top = view.page, view.top
-    old = {(one["cell"], one["name"]): one["value"] for one in before.variables} if before is not None else {}
+    former = before.variables if before is not None else ()
+    old = {(variable["cell"], variable["name"]): variable["value"] for variable in former}
     shown = variables[top : top + room]
     parts: list[RenderableType] = [_head(glimpse, view), *_links(glimpse)]
     parts.append(_table(shown, old, glimpse, width))
@@ -163,11 +156,11 @@ def plain(glimpse: Glimpse, view: View) -> str:
     variables = chosen(glimpse.variables, view)
     if not variables and not glimpse.lost:
         lines.append("  no variable fits")
-    for one in variables:
-        arrow = "->" if one["direction"] == "input" else "<-"
-        shown, quality = value(one["value"], one["unit"]), phrases.quality(one["quality"])
-        line = f"  {arrow} {one['name']:<20} {shown:>14}  {quality:<12} {age(one['age']):>9}  {phrases.owner(one)}"
-        lines.append(line.rstrip())
+    for variable in variables:
+        arrow = "->" if variable["direction"] == "input" else "<-"
+        shown = f"{variable['name']:<20} {value(variable['value'], variable['unit']):>14}"
+        state = f"{phrases.quality(variable['quality']):<12} {age(variable['age']):>9}"
+        lines.append(f"  {arrow} {shown}  {state}  {phrases.owner(variable)}".rstrip())
     return "\n".join([*lines, ""])
 
 
@@ -192,17 +185,16 @@ def _health(status: Answer) -> str:
 
 def _links(glimpse: Glimpse) -> Iterator[Text]:
     for cell in glimpse.status.get("cells", ()):
-        style = "dim" if glimpse.lost else _SOURCE_STYLES.get(cell["robot"]["state"], "red")
+        style = "dim" if glimpse.lost else LEVEL_COLOURS[SOURCE_LEVELS[source(cell["robot"]["state"])]]
         text = Text(no_wrap=True, overflow="ellipsis").append(" ● ", style).append(cell["name"], "bold")
         yield text.append(f"  {_link_words(cell)}")
 
 
 def _link_words(cell: Answer) -> str:
-    robot, modbus, writes = cell["robot"], cell["modbus"], cell["writes"]
+    robot, writes = cell["robot"], cell["writes"]
     rate = f" at {robot['frequency']:g} Hz" if robot["state"] == "fresh" and robot["frequency"] else ""
     words = [f"robot {robot['state']}{rate}, age {age(robot['age'])}"]
-    if modbus is not None:
-        words.append(counted(modbus["connections"], "Modbus connection"))
+    words += [f"{link['name']} {link['words']}" for link in cell["links"] if link["name"] != "robot"]
     there = [writer["name"] for writer in cell["writers"] if writer["alive"]]
     words.append(f"{', '.join(there)} there" if there else "no writer there")
     words.append(f"writes {writes['accepted']} accepted, {writes['refused']} refused")
@@ -218,29 +210,35 @@ def _table(shown: Sequence[Answer], old: Mapping[Any, Any], glimpse: Glimpse, wi
     table.add_column("age", justify="right", no_wrap=True, min_width=7)
     table.add_column("owner", no_wrap=True, min_width=18)
     if width >= _WIDE:
-        table.add_column("Modbus", no_wrap=True, min_width=8, max_width=24)
+        table.add_column("places", no_wrap=True, min_width=8, max_width=24)
     if width >= _SPACIOUS:
         table.add_column("robot register", no_wrap=True)
-    for one in shown:
-        table.add_row(*_cells(one, old, width, several=several), style="dim" if glimpse.lost else "")
+    for variable in shown:
+        table.add_row(*_cells(variable, old, width, several=several), style="dim" if glimpse.lost else "")
     return table
 
 
-def _cells(one: Answer, old: Mapping[Any, Any], width: int, *, several: bool) -> Iterator[Text]:
-    towards = one["direction"] == "input"
+def _cells(variable: Answer, old: Mapping[Any, Any], width: int, *, several: bool) -> Iterator[Text]:
+    towards = variable["direction"] == "input"
     colour = "cyan" if towards else "green"
-    name = f"{one['cell']}:{one['name']}" if several else one["name"]
+    name = f"{variable['cell']}:{variable['name']}" if several else variable["name"]
     yield Text(" → " if towards else " ← ", f"bold {colour}").append(name, "bold default")
-    changed = old.get((one["cell"], one["name"]), one["value"]) != one["value"]
-    yield Text(value(one["value"], one["unit"]), "bold yellow" if changed else "bold")
-    yield Text(phrases.quality(one["quality"]), _QUALITY_STYLES.get(one["quality"], ""))
-    yield Text(age(one["age"]), "dim")
-    style = "magenta" if one["forced"] or one["owner"] == "operator" else "yellow" if one["lease"] else ""
-    yield Text(phrases.owner(one), style if towards or one["forced"] else "dim")
+    changed = old.get((variable["cell"], variable["name"]), variable["value"]) != variable["value"]
+    yield Text(value(variable["value"], variable["unit"]), "bold yellow" if changed else "bold")
+    yield Text(phrases.quality(variable["quality"]), QUALITY_COLOURS[quality(variable["quality"])])
+    yield Text(age(variable["age"]), "dim")
+    style = (
+        "magenta"
+        if variable["forced"] or variable["owner"] == "operator"
+        else "yellow"
+        if variable["lease"]
+        else ""
+    )
+    yield Text(phrases.owner(variable), style if towards or variable["forced"] else "dim")
     if width >= _WIDE:
-        yield Text(phrases.places(one), "dim")
+        yield Text(phrases.places(variable), "dim")
     if width >= _SPACIOUS:
-        yield Text(one["robot"], "dim")
+        yield Text(variable["robot"], "dim")
 
 
 def _range(top: int, shown: int, found: int, view: View) -> Text:
@@ -259,9 +257,9 @@ def _range(top: int, shown: int, found: int, view: View) -> Text:
 
 def _events(glimpse: Glimpse) -> Iterator[Text]:
     latest = glimpse.events[-_EVENTS:]
-    for one in latest:
-        text = Text(f" {phrases.clock(one['time'])} ", "dim", no_wrap=True, overflow="ellipsis")
-        yield text.append(one["text"], "yellow" if one["bad"] else "default")
+    for event in latest:
+        text = Text(f" {phrases.clock(event['time'])} ", "dim", no_wrap=True, overflow="ellipsis")
+        yield text.append(event["text"], "yellow" if event["bad"] else "default")
     yield from (Text("") for _ in range(_EVENTS - len(latest)))
 
 

@@ -15,12 +15,9 @@ from fnmatch import fnmatchcase
 from typing import Any, Protocol
 
 from gatewayd import __version__
-from gatewayd.audit import Audit, Record, utc
 from gatewayd.control.views import (
-    Json,
-    StationView,
+    Declarations,
     cell_view,
-    declared_view,
     event_view,
     lock_view,
     record_view,
@@ -28,17 +25,19 @@ from gatewayd.control.views import (
 )
 from gatewayd.core.definition import Value, ValueKind
 from gatewayd.core.refusal import Reason, Refusal
-from gatewayd.mapping.plan import Plan
+from gatewayd.report.schema import EventMessage, Json, LockStatus, Status, VersionInfo
+from gatewayd.report.verdict import ServedCell
+from gatewayd.service.audit import Audit, Record, utc
 
-__all__ = ["API_VERSION", "LONGEST_FORCE", "STALE_ACT", "Api", "ApiError", "Cursor", "Gateway", "Moment"]
+__all__ = ["API_VERSION", "MAX_FORCE", "STALE_ACT", "Api", "ApiError", "Cursor", "Gateway", "Moment"]
 
 API_VERSION = 1
 STALE_ACT = 0.5
 """Seconds that an act of the operator may have waited while the gateway stood still."""
-LONGEST_FORCE = 24 * 3600.0
+MAX_FORCE = 24 * 3600.0
 """Seconds that a force may last at most; it can be renewed."""
-_GREATEST = sys.float_info.max
-_MOST = 1000
+_MAX_VALUE = sys.float_info.max
+_MAX_ANSWER = 1000
 """Events or records in one answer."""
 
 
@@ -58,7 +57,7 @@ class Gateway(Protocol):
     """What the interface needs to know of the daemon."""
 
     @property
-    def stations(self) -> Sequence[StationView]:
+    def runtimes(self) -> Sequence[ServedCell]:
         """The cells that are served now."""
 
     def troubles(self) -> Sequence[str]:
@@ -99,30 +98,29 @@ class Api:
         self._gateway = gateway
         self._audit = audit
         self._notes = notes
-        self._declared: dict[str, tuple[Plan, tuple[Json, ...]]] = {}
-        """What the mappings say of their variables, by cell: worked out once for each plan."""
+        self._declarations = Declarations()
 
     # -- questions -----------------------------------------------------------------------------------------------
 
-    def version(self) -> Json:
+    def version(self) -> VersionInfo:
         """Versions of the interface and of the program."""
-        return {"api": API_VERSION, "version": __version__, "pid": os.getpid()}
+        return VersionInfo(api=API_VERSION, version=__version__, pid=os.getpid())
 
-    def status(self, moment: Moment) -> Json:
+    def status(self, moment: Moment) -> Status:
         """Everything at a glance."""
-        stations = self._gateway.stations
-        cells = [cell_view(station, moment.now) for station in stations]
+        runtimes = self._gateway.runtimes
+        cells = [cell_view(runtime, self._declarations.of(runtime.plan), moment.now) for runtime in runtimes]
         troubles = [*self._notes(), *self._gateway.troubles()]
         troubles += [f"{cell['name']}: {problem}" for cell in cells for problem in cell["problems"]]
-        started = min((station.cell.health.started for station in stations), default=math.inf)
-        return {
+        started = min((runtime.cell.health.started for runtime in runtimes), default=math.inf)
+        return Status(
             **self.version(),
-            "time": utc(moment.wall),
-            "uptime": round(max(0.0, moment.now - started), 3) if math.isfinite(started) else 0.0,
-            "healthy": not troubles,
-            "problems": troubles,
-            "cells": cells,
-        }
+            time=utc(moment.wall),
+            uptime=round(max(0.0, moment.now - started), 3) if math.isfinite(started) else 0.0,
+            healthy=not troubles,
+            problems=troubles,
+            cells=cells,
+        )
 
     def variables(self, query: Mapping[str, str], moment: Moment) -> Json:
         """All variables; `cell` and `name` (with * and ?) choose some."""
@@ -130,9 +128,9 @@ class Api:
         return {
             "time": utc(moment.wall),
             "variables": [
-                self._view(station, index, moment)
-                for station in self._stations(query.get("cell"))
-                for index, variable in enumerate(station.cell.definition.variables)
+                self._view(runtime, index, moment)
+                for runtime in self._runtimes(query.get("cell"))
+                for index, variable in enumerate(runtime.cell.definition.variables)
                 if fnmatchcase(variable.name, pattern) or variable.name == pattern
             ],
         }
@@ -142,45 +140,45 @@ class Api:
         return {
             "time": utc(moment.wall),
             "locks": [
-                lock_view(station.cell, index, moment.now)
-                for station in self._stations(query.get("cell"))
-                for index in range(len(station.cell.definition.locks))
+                lock_view(runtime.cell, index, moment.now)
+                for runtime in self._runtimes(query.get("cell"))
+                for index in range(len(runtime.cell.definition.locks))
             ],
         }
 
     def events(self, query: Mapping[str, str], moment: Moment) -> Json:
         """The last events, oldest first; `cell`, `limit` (100), and `after` with a sequence number of that cell."""
-        limit, after = _count(query, "limit", 100), _count(query, "after", 0, greatest=2**53)
-        stations = self._stations(query.get("cell"))
-        if after and len(stations) > 1:
+        limit, after = _count(query, "limit", 100), _count(query, "after", 0, most=2**53)
+        runtimes = self._runtimes(query.get("cell"))
+        if after and len(runtimes) > 1:
             raise ApiError(400, "bad_query", "`after` counts the events of one cell: say which with `cell`")
-        found = [one for station in stations for one in _events(station, after, moment)]
-        found.sort(key=lambda one: (one[0], one[1]["seq"]))
+        found = [numbered for runtime in runtimes for numbered in _events(runtime, after, moment)]
+        found.sort(key=lambda numbered: (numbered[0], numbered[1]["seq"]))
         return {
             "time": utc(moment.wall),
             "events": [event for _time, event in found[max(0, len(found) - limit) :]],
         }
 
-    def new_events(self, cursor: Cursor, query: Mapping[str, str], moment: Moment) -> list[Json]:
+    def new_events(self, cursor: Cursor, query: Mapping[str, str], moment: Moment) -> list[EventMessage]:
         """What happened since the cursor was used last, and move it. A fresh cursor begins now.
 
         The ring is the only buffer: who asks too seldom misses what it has forgotten, and sees it by `seq`.
         """
-        found: list[tuple[float, Json]] = []
-        for station in self._stations(query.get("cell")):
-            ring, name = station.cell.events, station.cell.definition.name
+        found: list[tuple[float, EventMessage]] = []
+        for runtime in self._runtimes(query.get("cell")):
+            ring, name = runtime.cell.events, runtime.cell.definition.name
             read = cursor.read.get(name, ring.count)
             if read != ring.count:
-                found += _events(station, read if read < ring.count else 0, moment)
+                found += _events(runtime, read if read < ring.count else 0, moment)
             cursor.read[name] = ring.count
-        found.sort(key=lambda one: (one[0], one[1]["seq"]))
+        found.sort(key=lambda numbered: (numbered[0], numbered[1]["seq"]))
         return [event for _time, event in found]
 
     def audit(self, query: Mapping[str, str], moment: Moment) -> Json:
         """The last records, oldest first; `cell`, `variable`, `writer` and `limit` (100) choose some."""
         limit = _count(query, "limit", 100)
         if "cell" in query:
-            self._stations(query["cell"])
+            self._runtimes(query["cell"])
         found = [record for record in self._audit if _is_wanted(record, query)]
         latest = found[max(0, len(found) - limit) :]
         return {"time": utc(moment.wall), "records": [record_view(record) for record in latest]}
@@ -198,77 +196,75 @@ class Api:
                 503, "stood_still", f"the gateway stood still for {seconds:.1f} s; repeat the command"
             )
 
-    def take(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
+    def take(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> LockStatus:
         """Take a lock; `for` seconds, or until it is released. The lock as it is then."""
-        station, lock = self._lock(name, body)
+        runtime, lock = self._lock(name, body)
         seconds = _seconds(body, required=False)
-        station.cell.operator.take_lock(lock, moment.now, moment.now + seconds, who)
-        return lock_view(station.cell, lock, moment.now)
+        runtime.cell.operator.take_lock(lock, moment.now, moment.now + seconds, who)
+        return lock_view(runtime.cell, lock, moment.now)
 
-    def release(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
+    def release(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> LockStatus:
         """Release a lock, whoever holds it. The lock as it is then."""
-        station, lock = self._lock(name, body)
-        if not station.cell.operator.free_lock(lock, moment.now, who):
+        runtime, lock = self._lock(name, body)
+        if not runtime.cell.operator.free_lock(lock, moment.now, who):
             raise ApiError(409, "not_owned", f"nobody owns {name}")
-        return lock_view(station.cell, lock, moment.now)
+        return lock_view(runtime.cell, lock, moment.now)
 
     def force(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
         """Force a variable to `value` `for` some seconds. The variable as it is then."""
-        station, index = self._variable(name, body)
-        cell = station.cell
+        runtime, index = self._variable(name, body)
+        cell = runtime.cell
         variable = cell.definition.variables[index]
         value = _value(variable.kind, body.get("value"))
         seconds = _seconds(body, required=True)
         refusal = cell.operator.force(index, value, moment.now, moment.now + seconds, who)
         if refusal is not None:
-            raise ApiError(409, _CODES[refusal.reason], f"{name} cannot be forced: {_why(refusal, station)}")
-        return self._view(station, index, moment)
+            raise ApiError(409, _CODES[refusal.reason], f"{name} cannot be forced: {_why(refusal, runtime)}")
+        return self._view(runtime, index, moment)
 
     def unforce(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> Json:
         """End a force. The variable as it is then."""
-        station, index = self._variable(name, body)
-        if not station.cell.operator.unforce(index, moment.now, who):
+        runtime, index = self._variable(name, body)
+        if not runtime.cell.operator.unforce(index, moment.now, who):
             raise ApiError(409, "not_forced", f"{name} is not forced")
-        return self._view(station, index, moment)
+        return self._view(runtime, index, moment)
 
     # -- inside --------------------------------------------------------------------------------------------------
 
-    def _stations(self, cell: str | None) -> Sequence[StationView]:
+    def _runtimes(self, cell: str | None) -> Sequence[ServedCell]:
         if cell is None:
-            return self._gateway.stations
-        found = [one for one in self._gateway.stations if one.cell.definition.name == cell]
+            return self._gateway.runtimes
+        found = [runtime for runtime in self._gateway.runtimes if runtime.cell.definition.name == cell]
         if not found:
-            names = ", ".join(one.cell.definition.name for one in self._gateway.stations)
+            names = ", ".join(runtime.cell.definition.name for runtime in self._gateway.runtimes)
             raise ApiError(404, "no_such_cell", f"there is no cell {cell}; there is {names}")
         return found
 
-    def _view(self, station: StationView, index: int, moment: Moment) -> Json:
-        plan = station.plan
-        plan_then, declared = self._declared.get(plan.cell.name, (None, ()))
-        if plan_then is not plan:
-            declared = declared_view(plan)
-            self._declared[plan.cell.name] = plan, declared
-        return variable_view(declared[index], station.cell, index, moment.now)
+    def _view(self, runtime: ServedCell, index: int, moment: Moment) -> Json:
+        declared = self._declarations.of(runtime.plan).variables[index]
+        return variable_view(declared, runtime.cell, index, moment.now)
 
-    def _variable(self, name: str, body: Mapping[str, Any]) -> tuple[StationView, int]:
+    def _variable(self, name: str, body: Mapping[str, Any]) -> tuple[ServedCell, int]:
         found = [
-            (station, index)
-            for station in self._stations(_text(body, "cell"))
-            for index, variable in enumerate(station.cell.definition.variables)
+            (runtime, index)
+            for runtime in self._runtimes(_text(body, "cell"))
+            for index, variable in enumerate(runtime.cell.definition.variables)
             if variable.name == name
         ]
         return _only(found, "variable", name)
 
-    def _lock(self, name: str, body: Mapping[str, Any]) -> tuple[StationView, int]:
+    def _lock(self, name: str, body: Mapping[str, Any]) -> tuple[ServedCell, int]:
         """By the lock's own name, or by that of a variable that it guards."""
         found = []
-        for station in self._stations(_text(body, "cell")):
-            definition = station.cell.definition
+        for runtime in self._runtimes(_text(body, "cell")):
+            definition = runtime.cell.definition
             named = next((index for index, lock in enumerate(definition.locks) if lock.name == name), None)
-            guarding = next((one.lock for one in definition.variables if one.name == name), None)
+            guarding = next(
+                (variable.lock for variable in definition.variables if variable.name == name), None
+            )
             lock = named if named is not None else guarding
             if lock is not None:
-                found.append((station, lock))
+                found.append((runtime, lock))
         return _only(found, "lock", name)
 
 
@@ -279,46 +275,46 @@ _CODES = {
 }
 
 
-def _why(refusal: Refusal, station: StationView) -> str:
+def _why(refusal: Refusal, runtime: ServedCell) -> str:
     limits = (
-        station.cell.definition.variables[refusal.variable].limits if refusal.variable is not None else None
+        runtime.cell.definition.variables[refusal.variable].limits if refusal.variable is not None else None
     )
     if refusal.reason is Reason.OUT_OF_LIMITS and limits is not None:
         return f"{refusal.reason.text}, {limits.low:g}..{limits.high:g}"
     return refusal.reason.text
 
 
-def _only(found: list[tuple[StationView, int]], what: str, name: str) -> tuple[StationView, int]:
+def _only(found: list[tuple[ServedCell, int]], what: str, name: str) -> tuple[ServedCell, int]:
     if not found:
         raise ApiError(404, f"no_such_{what}", f"there is no {what} {name}")
     if len(found) > 1:
-        cells = ", ".join(station.cell.definition.name for station, _index in found)
+        cells = ", ".join(runtime.cell.definition.name for runtime, _index in found)
         raise ApiError(409, "ambiguous", f"{name} is in several cells ({cells}): say which with `cell`")
     return found[0]
 
 
-def _events(station: StationView, after: int, moment: Moment) -> Iterator[tuple[float, Json]]:
+def _events(runtime: ServedCell, after: int, moment: Moment) -> Iterator[tuple[float, EventMessage]]:
     """The events that the ring still has, with sequence numbers beyond `after`."""
-    ring, cell = station.cell.events, station.cell
+    ring, cell = runtime.cell.events, runtime.cell
     for seq, event in enumerate(ring, ring.count - len(ring) + 1):
         if seq > after:
             yield event.time, event_view(cell, seq, event, moment.now, moment.wall)
 
 
 def _is_wanted(record: Record, query: Mapping[str, str]) -> bool:
-    told = record.happening
+    event = record.event
     return all(
         query.get(name, its) == its
-        for name, its in (("cell", record.cell), ("variable", told.variable), ("writer", told.writer))
+        for name, its in (("cell", record.cell), ("variable", event.variable), ("writer", event.writer))
     )
 
 
-def _count(query: Mapping[str, str], name: str, default: int, greatest: int = _MOST) -> int:
+def _count(query: Mapping[str, str], name: str, default: int, most: int = _MAX_ANSWER) -> int:
     text = query.get(name)
     if text is None:
         return default
-    if not (text.isascii() and text.isdigit()) or len(text) > 16 or int(text) > greatest:
-        raise ApiError(400, "bad_query", f"`{name}` must be a whole number from 0 to {greatest}")
+    if not (text.isascii() and text.isdigit()) or len(text) > 16 or int(text) > most:
+        raise ApiError(400, "bad_query", f"`{name}` must be a whole number from 0 to {most}")
     return int(text)
 
 
@@ -333,10 +329,8 @@ def _seconds(body: Mapping[str, Any], *, required: bool) -> float:
     value = body.get("for")
     if value is None and not required:
         return math.inf
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= LONGEST_FORCE:
-        raise ApiError(
-            400, "bad_request", f"`for` must be seconds, more than 0 and at most {LONGEST_FORCE:.0f}"
-        )
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= MAX_FORCE:
+        raise ApiError(400, "bad_request", f"`for` must be seconds, more than 0 and at most {MAX_FORCE:.0f}")
     return float(value)
 
 
@@ -344,7 +338,7 @@ def _value(kind: ValueKind, value: object) -> Value:
     """The JSON value as one of the variable's kind: true is 1 for a bit only, 3.0 is 3 for an integer."""
     if kind is ValueKind.BOOL and value in (False, True):
         return bool(value)
-    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _GREATEST:
+    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _MAX_VALUE:
         if kind is ValueKind.FLOAT:
             return float(value)
         if kind is ValueKind.INT and value == int(value):

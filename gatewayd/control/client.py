@@ -118,8 +118,8 @@ class Client:
         finally:
             connection.close()
         if response.status >= http.client.BAD_REQUEST:
-            told = found.get("error") or {}
-            code, message = told.get("code", "http"), told.get("message", f"HTTP {response.status}")
+            failure = found.get("error") or {}
+            code, message = failure.get("code", "http"), failure.get("message", f"HTTP {response.status}")
             raise ControlError(response.status, code, message, found)
         return dict(found)
 

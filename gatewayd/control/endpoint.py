@@ -1,6 +1,6 @@
 """The Unix socket under the control interface: had when the gateway serves, kept while it runs, removed at its end.
 
-Trouble with it never stops the gateway: it is told once, and tried again. File permissions are the access control.
+Trouble with it never stops the gateway: it is reported once, and tried again. File permissions are the access control.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gatewayd.control.api import Api
-from gatewayd.logs import fields
+from gatewayd.logs.records import fields
+from gatewayd.loop.retry import reason_of, until_done
 
 __all__ = ["MODE", "RETRY_PERIOD", "Endpoint", "Reload", "Reloaded", "SocketTaken", "bind"]
 
@@ -44,7 +45,7 @@ class Reloaded(Protocol):
         """0 if what runs now is what the files say."""
 
     def as_object(self) -> Mapping[str, Any]:
-        """What is told to whoever asked for it."""
+        """What whoever asked for it reads."""
 
 
 Reload = Callable[[bool], Awaitable[Reloaded]]
@@ -69,25 +70,17 @@ class Endpoint:
         """Serve until cancelled. A defect is logged, and the interface started again."""
         while not self._is_serving():  # noqa: ASYNC110 - nobody's event
             await asyncio.sleep(_SERVING_SOON)
-        told = ""
         while True:
-            try:
-                await self._serve()
-                told = ""
-                log.warning(
-                    "the control socket was removed, making a new one", extra=fields(socket=str(self.path))
-                )
-                continue
-            except (OSError, ImportError) as error:
-                reason = getattr(error, "strerror", None) or str(error)
-                if reason != told:
-                    told = reason
-                    log.error("no control socket", extra=fields(socket=str(self.path), reason=reason))  # noqa: TRY400 - the reason says it all
-            except Exception as error:
-                if str(error) != told:
-                    told = str(error)
-                    log.exception("internal error, starting the control interface again")
-            await asyncio.sleep(RETRY_PERIOD)
+            await until_done(self._serve, Exception, self._report, RETRY_PERIOD)
+            log.warning(
+                "the control socket was removed, making a new one", extra=fields(socket=str(self.path))
+            )
+
+    def _report(self, error: Exception) -> None:
+        if isinstance(error, OSError | ImportError):
+            log.error("no control socket", extra=fields(socket=str(self.path), reason=reason_of(error)))
+        else:
+            log.exception("internal error, starting the control interface again")  # noqa: LOG004 - called by a handler
 
     async def _serve(self) -> None:
         """Serve until somebody removes the socket's file."""

@@ -15,7 +15,7 @@ SYSTEM_SOCKET = Path("/run/gatewayd/control.sock")
 
 
 def default_socket(environ: Mapping[str, str]) -> Path | None:
-    """Where a daemon listens that was not told where; None if there is no place that only its own user can change.
+    """Where a daemon listens for which nobody said where; None if there is no place that only its own user can change.
 
     Under systemd the first of its runtime directories, in a session the user's.
     """
@@ -29,7 +29,7 @@ def default_socket(environ: Mapping[str, str]) -> Path | None:
 
 
 def candidates(environ: Mapping[str, str]) -> list[Path]:
-    """Where a command looks for a daemon that it was not told the socket of, in this order.
+    """Where a command looks for a daemon whose socket nobody named, in this order.
 
     As a part of a service (ExecReload=) at that of the service alone.
     """

@@ -9,24 +9,23 @@ import pwd
 import socket
 import struct
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from functools import lru_cache
 from typing import Any
 
 from aiohttp import web
 
-from gatewayd import clock
-from gatewayd.aside import aside
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
-from gatewayd.control.views import Json
-from gatewayd.logs import fields
-from gatewayd.printable import json_text
+from gatewayd.logs.records import fields
+from gatewayd.loop import clock
+from gatewayd.loop.threads import in_daemon_thread
+from gatewayd.report.printable import json_text
 
-__all__ = ["ALIVE_PERIOD", "FOLLOWERS", "GREATEST_BODY", "application", "serving"]
+__all__ = ["ALIVE_PERIOD", "FOLLOWERS", "MAX_BODY", "application", "serving"]
 
-GREATEST_BODY = 64 * 1024
+MAX_BODY = 64 * 1024
 """Bytes of a request's body."""
 REQUESTS = 64
 """Requests under way at one time, those that follow events included."""
@@ -43,8 +42,8 @@ _PEER_CREDENTIALS = struct.Struct("iII")
 log = logging.getLogger("gatewayd.control")
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
-_Act = Callable[[str, Mapping[str, Any], str, Moment], Json]
-_Question = Callable[[Mapping[str, str], Moment], Json]
+_Act = Callable[[str, Mapping[str, Any], str, Moment], Mapping[str, object]]
+_Question = Callable[[Mapping[str, str], Moment], Mapping[str, object]]
 
 
 @asynccontextmanager
@@ -64,15 +63,19 @@ async def serving(listening: socket.socket, api: Api, reload: Reload | None) -> 
 def application(api: Api, reload: Reload | None) -> web.Application:
     """The routes."""
     routes = _Routes(api, reload)
-    found = web.Application(client_max_size=GREATEST_BODY, middlewares=[routes.guard])
+    found = web.Application(client_max_size=MAX_BODY, middlewares=[routes.guard])
     found.router.add_get("/v1/version", routes.version)
     found.router.add_get("/v1/status", routes.status)
     for name, question in (("variables", api.variables), ("locks", api.locks), ("audit", api.audit)):
         found.router.add_get(f"/v1/{name}", routes.answer(question))
     found.router.add_get("/v1/events", routes.events)
-    for name, act in (("locks/{name}/take", api.take), ("locks/{name}/release", api.release)):
-        found.router.add_post(f"/v1/{name}", routes.act(act))
-    for name, act in (("variables/{name}/force", api.force), ("variables/{name}/unforce", api.unforce)):
+    acts: dict[str, _Act] = {
+        "locks/{name}/take": api.take,
+        "locks/{name}/release": api.release,
+        "variables/{name}/force": api.force,
+        "variables/{name}/unforce": api.unforce,
+    }
+    for name, act in acts.items():
         found.router.add_post(f"/v1/{name}", routes.act(act))
     found.router.add_post("/v1/reload", routes.reload)
     return found
@@ -155,13 +158,15 @@ class _Routes:
         finally:
             self._followers -= 1
 
-    async def _follow(self, request: web.Request, cursor: Cursor, found: list[Json]) -> web.StreamResponse:
+    async def _follow(
+        self, request: web.Request, cursor: Cursor, found: Sequence[Mapping[str, object]]
+    ) -> web.StreamResponse:
         response = web.StreamResponse(
             headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"}
         )
         await response.prepare(request)
         sent_at = clock.now()
-        # A follower that is gone, or that leaves too much unread, is told nothing more.
+        # A follower that is gone, or that leaves too much unread, gets nothing more.
         with suppress(ConnectionError, TimeoutError):
             while True:
                 if found or clock.now() - sent_at >= ALIVE_PERIOD:
@@ -176,7 +181,7 @@ class _Routes:
 _HTTP_ERRORS = {
     404: ApiError(404, "no_such_path", "there is nothing at this path"),
     405: ApiError(405, "wrong_method", "this path has another method"),
-    413: ApiError(413, "too_large", f"a request has {GREATEST_BODY} bytes at most"),
+    413: ApiError(413, "too_large", f"a request has {MAX_BODY} bytes at most"),
 }
 
 
@@ -184,11 +189,11 @@ def _moment() -> Moment:
     return Moment(clock.now(), time.time())
 
 
-def _line(event: Json) -> str:
+def _line(event: Mapping[str, object]) -> str:
     return json_text(json.dumps(event, ensure_ascii=False, separators=(",", ":"))) + "\n"
 
 
-def _json(value: Json, status: int = 200) -> web.Response:
+def _json(value: Mapping[str, object], status: int = 200) -> web.Response:
     headers = {"Cache-Control": "no-store"}
     return web.Response(text=_line(value), status=status, content_type="application/json", headers=headers)
 
@@ -223,7 +228,7 @@ async def _who(request: web.Request) -> str:
     raw = sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER_CREDENTIALS.size)
     _pid, user, _group = _PEER_CREDENTIALS.unpack(raw)
     # The user database may be on the network, and asyncio's own threads would be waited for at the gateway's end.
-    return f"by {await aside(lambda: _user_name(user), 'user name')}"
+    return f"by {await in_daemon_thread(lambda: _user_name(user), 'user name')}"
 
 
 @lru_cache(maxsize=32)

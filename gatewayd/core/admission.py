@@ -182,8 +182,8 @@ class Admission:
         return None
 
 
-def _graver(told: Refusal | None, other: Refusal | None) -> Refusal | None:
-    """Which of two refusals is told; of equal ones the first."""
-    if told is None or other is None:
-        return told or other
-    return other if PRECEDENCE[other.reason] < PRECEDENCE[told.reason] else told
+def _graver(first: Refusal | None, other: Refusal | None) -> Refusal | None:
+    """Which of two refusals is reported; of equal ones the first."""
+    if first is None or other is None:
+        return first or other
+    return other if PRECEDENCE[other.reason] < PRECEDENCE[first.reason] else first

@@ -14,13 +14,13 @@ from enum import Enum
 from gatewayd.core.definition import FallbackKind
 from gatewayd.core.image import ProcessImage
 
-__all__ = ["Adoption", "Step", "adopted", "named", "would_fall_back"]
+__all__ = ["Adoption", "AdoptionStep", "adopted", "named", "would_fall_back"]
 
 _NAMED = 8
 """Variables that an event names one by one."""
 
 
-class Step(Enum):
+class AdoptionStep(Enum):
     """What a look at the clock brought."""
 
     NOTHING = "nothing"
@@ -42,19 +42,19 @@ class Adoption:
         self.over = False
         """Whether it has ended: inputs are adopted for owners alone."""
 
-    def look(self, now: float, *, adopted: bool) -> Step:
+    def look(self, now: float, *, adopted: bool) -> AdoptionStep:
         """Notice that the count begins or ends; `adopted`: the robot is there and its inputs were taken over."""
         if self.over or self.adopt_for is None:
-            return Step.NOTHING
+            return AdoptionStep.NOTHING
         if math.isinf(self.began):
             if not (adopted and self.reachable):
-                return Step.NOTHING
+                return AdoptionStep.NOTHING
             self.began = now
-            return Step.BEGIN
+            return AdoptionStep.BEGIN
         if now - self.began < self.adopt_for:
-            return Step.NOTHING
+            return AdoptionStep.NOTHING
         self.over = True
-        return Step.END
+        return AdoptionStep.END
 
     def left(self, now: float) -> float:
         """Seconds until it ends; 0 while it does not run."""

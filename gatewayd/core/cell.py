@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from gatewayd.core.admission import Admission, Change
-from gatewayd.core.adoption import Adoption, Step, adopted, named
+from gatewayd.core.adoption import Adoption, AdoptionStep, adopted, named
 from gatewayd.core.definition import CellDefinition, Direction, Value
 from gatewayd.core.delivery import Delivery
 from gatewayd.core.events import Event, EventKind, EventRing
@@ -264,7 +264,7 @@ class Cell:
         """The link has copied a package's values into the image: they are good from now on, and as old as they are."""
         if self.freshness.state is not Source.FRESH:
             return
-        self.image.outputs_told(min(now, self.freshness.last_progress))
+        self.image.outputs_stored(min(now, self.freshness.last_progress))
         self._notify(Direction.OUTPUT)
 
     def lag_doubtful(self, now: float) -> bool:
@@ -297,7 +297,7 @@ class Cell:
         first = not self.delivery.ready
         self.forcing.lift()
         for index, value in values.items():
-            self.image.tell(index, value, now)
+            self.image.store(index, value, now)
         entered = self.delivery.adopted(values.keys())
         if first:
             detail = adopted(self.image, len(values), self.delivery.unread)
@@ -386,7 +386,7 @@ class Cell:
         self.writers.succeed(former.writers, match.writers)
         self.freshness.succeed(former.freshness)
         self.lag.succeed(former.lag)
-        self.health = replace(former.health)
+        self.health = replace(former.health, words={})
         self.events.succeed(former.events, match)
         last = former.last_refusal
         self.last_refusal = last.translated(match) if last is not None else None
@@ -418,16 +418,16 @@ class Cell:
     def _count_adoption(self, now: float) -> None:
         """What nobody has claimed by the end of `adopt_for` falls back."""
         step, left = self.adoption.look(now, adopted=self.delivery.ready), self.adoption.left(now)
-        pending = self._fallbacks.of_nobody(self.image.inputs) if left or step is Step.END else []
+        pending = self._fallbacks.of_nobody(self.image.inputs) if left or step is AdoptionStep.END else []
         self.health.adoption = left if pending else 0.0
-        if step is Step.BEGIN and pending:
+        if step is AdoptionStep.BEGIN and pending:
             detail = f"in {left:g} s, without an owner by then: {named(self.image, pending)}"
             self.events.append(Event(now, EventKind.ADOPTION_ENDS, detail=detail))
-        elif step is Step.END and self.delivery.ready:
+        elif step is AdoptionStep.END and self.delivery.ready:
             self.fall_back(pending, now)
 
     def _set_inputs(self, values: Sequence[tuple[int, Value]], now: float) -> None:
-        self.image.tell_all(values, now)
+        self.image.store_all(values, now)
         self.delivery.give(values, now)
         self._notify(Direction.INPUT)
 

@@ -143,7 +143,7 @@ class Delivery:
         for index, value in held.items():
             old = self._image.values[index]
             self._report(Event(now, EventKind.FOLLOWED, variable=index, old=old, new=value))
-        self._image.tell_all(held.items(), now)
+        self._image.store_all(held.items(), now)
 
     def succeed(
         self,

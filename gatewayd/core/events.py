@@ -1,4 +1,4 @@
-"""What happened, kept in a ring and told to whoever listens."""
+"""What happened, kept in a ring and passed to whoever listens."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class EventKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One happening. Indices are those of the cell's definition; fields that do not apply are None."""
+    """Something that happened. Indices are those of the cell's definition; fields that do not apply are None."""
 
     time: float
     """Monotonic seconds."""
@@ -59,7 +59,7 @@ class Event:
     old: Value | None = None
     new: Value | None = None
     repeats: int = 0
-    """Refusals like this one that were counted but not told since the last."""
+    """Refusals like this one that were counted but not reported since the last."""
     detail: str = ""
     peer: str = ""
     """Address of the peer in a refusal, where no writer was declared for it."""
@@ -77,7 +77,7 @@ class EventRing:
         self.listeners: list[Callable[[Event], None]] = []
 
     def append(self, event: Event) -> None:
-        """Keep the event and tell the listeners."""
+        """Keep the event and call the listeners."""
         self._events.append(event)
         self.count += 1
         for listener in self.listeners:

@@ -48,7 +48,7 @@ class Fallbacks:
                 continue
             old = image.values[index]
             new = variable.on_release.apply(old, variable.kind)
-            image.tell(index, new, now)
+            image.store(index, new, now)
             delivery.release(index, new, now)
             if new != old:
                 self._record(Event(now, EventKind.FALLBACK, variable=index, old=old, new=new))
@@ -61,7 +61,7 @@ class Fallbacks:
         for index in variables:
             variable = self._definition.variables[index]
             value = variable.on_release.apply(variable.kind.zero, variable.kind)
-            self._image.tell(index, value, now)
+            self._image.store(index, value, now)
             self._delivery.give(((index, value),), now)
             self._record(Event(now, EventKind.FALLBACK, variable=index, new=value, detail=_NOT_READABLE))
 

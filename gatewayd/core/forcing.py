@@ -19,7 +19,7 @@ __all__ = ["Force", "Forcing"]
 
 @dataclass(frozen=True, slots=True)
 class Force:
-    """A value that the local operator put in place of what a variable's source tells."""
+    """A value that the local operator put in place of what a variable's source reports."""
 
     value: Value
     since: float

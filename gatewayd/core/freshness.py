@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from enum import Enum, IntEnum
 
-__all__ = ["TRANSITIONS", "Freshness", "Happening", "Source"]
+__all__ = ["TRANSITIONS", "Freshness", "Source", "SourceSignal"]
 
 
 class Source(IntEnum):
@@ -24,7 +24,7 @@ class Source(IntEnum):
     """Packages come, but what they report is older than `stale_after`."""
 
 
-class Happening(Enum):
+class SourceSignal(Enum):
     """What moves the state."""
 
     CONNECTED = "connected"
@@ -35,28 +35,28 @@ class Happening(Enum):
     LOST = "connection lost"
 
 
-TRANSITIONS: dict[tuple[Source, Happening], Source] = {
-    (Source.LOST, Happening.CONNECTED): Source.WAITING,
-    (Source.WAITING, Happening.PROGRESS): Source.FRESH,
-    (Source.WAITING, Happening.NO_PROGRESS): Source.FROZEN,
-    (Source.WAITING, Happening.TOO_LATE): Source.LATE,
-    (Source.WAITING, Happening.LOST): Source.LOST,
-    (Source.FRESH, Happening.NO_PACKAGE): Source.SILENT,
-    (Source.FRESH, Happening.NO_PROGRESS): Source.FROZEN,
-    (Source.FRESH, Happening.TOO_LATE): Source.LATE,
-    (Source.FRESH, Happening.LOST): Source.LOST,
-    (Source.SILENT, Happening.PROGRESS): Source.FRESH,
-    (Source.SILENT, Happening.NO_PROGRESS): Source.FROZEN,
-    (Source.SILENT, Happening.TOO_LATE): Source.LATE,
-    (Source.SILENT, Happening.LOST): Source.LOST,
-    (Source.FROZEN, Happening.PROGRESS): Source.FRESH,
-    (Source.FROZEN, Happening.NO_PACKAGE): Source.SILENT,
-    (Source.FROZEN, Happening.TOO_LATE): Source.LATE,
-    (Source.FROZEN, Happening.LOST): Source.LOST,
-    (Source.LATE, Happening.PROGRESS): Source.FRESH,
-    (Source.LATE, Happening.NO_PACKAGE): Source.SILENT,
-    (Source.LATE, Happening.NO_PROGRESS): Source.FROZEN,
-    (Source.LATE, Happening.LOST): Source.LOST,
+TRANSITIONS: dict[tuple[Source, SourceSignal], Source] = {
+    (Source.LOST, SourceSignal.CONNECTED): Source.WAITING,
+    (Source.WAITING, SourceSignal.PROGRESS): Source.FRESH,
+    (Source.WAITING, SourceSignal.NO_PROGRESS): Source.FROZEN,
+    (Source.WAITING, SourceSignal.TOO_LATE): Source.LATE,
+    (Source.WAITING, SourceSignal.LOST): Source.LOST,
+    (Source.FRESH, SourceSignal.NO_PACKAGE): Source.SILENT,
+    (Source.FRESH, SourceSignal.NO_PROGRESS): Source.FROZEN,
+    (Source.FRESH, SourceSignal.TOO_LATE): Source.LATE,
+    (Source.FRESH, SourceSignal.LOST): Source.LOST,
+    (Source.SILENT, SourceSignal.PROGRESS): Source.FRESH,
+    (Source.SILENT, SourceSignal.NO_PROGRESS): Source.FROZEN,
+    (Source.SILENT, SourceSignal.TOO_LATE): Source.LATE,
+    (Source.SILENT, SourceSignal.LOST): Source.LOST,
+    (Source.FROZEN, SourceSignal.PROGRESS): Source.FRESH,
+    (Source.FROZEN, SourceSignal.NO_PACKAGE): Source.SILENT,
+    (Source.FROZEN, SourceSignal.TOO_LATE): Source.LATE,
+    (Source.FROZEN, SourceSignal.LOST): Source.LOST,
+    (Source.LATE, SourceSignal.PROGRESS): Source.FRESH,
+    (Source.LATE, SourceSignal.NO_PACKAGE): Source.SILENT,
+    (Source.LATE, SourceSignal.NO_PROGRESS): Source.FROZEN,
+    (Source.LATE, SourceSignal.LOST): Source.LOST,
 }
 """A pair that is not listed leaves the state as it is."""
 
@@ -84,11 +84,11 @@ class Freshness:
 
     def connected(self) -> None:
         """A session with the controller has begun. One that was frozen and still is does not pass for fresh by it."""
-        self._move(Happening.CONNECTED)
+        self._move(SourceSignal.CONNECTED)
 
     def lost(self) -> None:
         """The session has ended."""
-        self._move(Happening.LOST)
+        self._move(SourceSignal.LOST)
 
     def package(self, timestamp: float | None, now: float, lag: float = 0.0) -> bool:
         """A package came, `lag` seconds late. Whether it reports anything to be shown: new and not too old.
@@ -101,13 +101,13 @@ class Freshness:
         self.last_package = now
         if timestamp is not None and (timestamp == self.timestamp or not math.isfinite(timestamp)):
             if self.state is Source.WAITING:
-                self._move(Happening.NO_PROGRESS)
+                self._move(SourceSignal.NO_PROGRESS)
             return False
         self.timestamp = timestamp
         self.last_arrival = now
         self.last_progress = now - lag
         limit = self.stale_after / 2 if self.state is Source.LATE else self.stale_after
-        self._move(Happening.TOO_LATE if lag > limit else Happening.PROGRESS)
+        self._move(SourceSignal.TOO_LATE if lag > limit else SourceSignal.PROGRESS)
         return self.state is Source.FRESH
 
     def tick(self, now: float) -> None:
@@ -116,11 +116,11 @@ class Freshness:
         if self.state in (Source.LOST, Source.WAITING) or now - self.last_progress <= limit:
             return
         if self.last_arrival - self.last_progress > limit / 2 and now - self.last_arrival <= limit:
-            self._move(Happening.TOO_LATE)
+            self._move(SourceSignal.TOO_LATE)
         elif self.last_package > self.last_arrival and now - self.last_package <= limit:
-            self._move(Happening.NO_PROGRESS)
+            self._move(SourceSignal.NO_PROGRESS)
         else:
-            self._move(Happening.NO_PACKAGE)
+            self._move(SourceSignal.NO_PACKAGE)
 
     def succeed(self, former: Freshness) -> None:
         """Go on where `former` stands, with this one's own `stale_after`."""
@@ -130,5 +130,5 @@ class Freshness:
         self.last_arrival = former.last_arrival
         self.last_progress = former.last_progress
 
-    def _move(self, happening: Happening) -> None:
-        self.state = TRANSITIONS.get((self.state, happening), self.state)
+    def _move(self, signal: SourceSignal) -> None:
+        self.state = TRANSITIONS.get((self.state, signal), self.state)

@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-__all__ = ["CAN_BUS", "NMT_STATES", "Health"]
-
-CAN_BUS = ("", "absent", "down", "bus-off", "passive", "warning", "active")
-"""What `Health.can_bus` means; the last one is well."""
-NMT_STATES = {0: "initialising", 4: "stopped", 5: "operational", 127: "pre-operational"}
-"""What `Health.nmt_state` means."""
+__all__ = ["Health"]
 
 
 @dataclass(slots=True)
@@ -20,7 +15,7 @@ class Health:
     started: float = math.inf
     """Monotonic time of the first tick; infinity before it."""
     heartbeat: int = 0
-    """Counts up every `HEARTBEAT_PERIOD` while the core turns."""
+    """Counts up every `HEARTBEAT_PERIOD` while the core works."""
     packages: int = 0
     skipped: int = 0
     """Packages the controller left out, seen from its timestamps."""
@@ -45,13 +40,5 @@ class Health:
     watchdog_fed: bool = False
     writes_accepted: int = 0
     writes_refused: int = 0
-    modbus_connections: int = 0
-    can_bus: int = 0
-    """0: the cell has no CANopen side; else 1 absent, 2 down, 3 bus-off, 4 passive, 5 warning, 6 active."""
-    nmt_state: int = 0
-    """As in the heartbeat: 0 initialising, 4 stopped, 5 operational, 127 pre-operational."""
-
-    @property
-    def can_trouble(self) -> str:
-        """What is wrong with the CAN bus; empty where nothing is, or where there is none."""
-        return "" if self.can_bus == len(CAN_BUS) - 1 else CAN_BUS[self.can_bus]
+    words: dict[str, int] = field(default_factory=dict)
+    """Numbers of the status block that links tell, by name (`LinkKind.status_fields`)."""

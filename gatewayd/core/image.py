@@ -55,7 +55,7 @@ class ProcessImage:
         "_covered",
         "_exceptions",
         "_held",
-        "_outputs_told",
+        "_outputs_stored",
         "_restricted",
         "_running_only",
         "_stopped",
@@ -107,13 +107,13 @@ class ProcessImage:
         )
         self.unreadable = self._exceptions
         """Outputs whose policy is `exception` and whose value is neither good nor forced now."""
-        self._outputs_told = False
+        self._outputs_stored = False
         for index in self.outputs:
             self._show_fallback(index)
         self._hold_shown()
 
     def time_of(self, index: int) -> float:
-        """When the source told the value; minus infinity if it never did."""
+        """When the source had the value; minus infinity if it never did."""
         if self.variables[index].direction is Direction.INPUT or self.quality[index] is Quality.FORCED:
             return self.times[index]
         if self.quality[index] not in _REPORTED:
@@ -121,18 +121,18 @@ class ProcessImage:
         return self.running_time if self.variables[index].valid_running else self.output_time
 
     def age(self, index: int, now: float) -> float:
-        """Seconds since the source told the value; infinity if it never did."""
+        """Seconds since the source had the value; infinity if it never did."""
         return now - self.time_of(index)
 
-    def tell(self, index: int, value: Value, now: float) -> None:
+    def store(self, index: int, value: Value, now: float) -> None:
         """Set an input: it was written, fell back, or was adopted."""
-        self.tell_all(((index, value),), now)
+        self.store_all(((index, value),), now)
 
-    def tell_all(self, told: Iterable[tuple[int, Value]], now: float) -> None:
+    def store_all(self, changes: Iterable[tuple[int, Value]], now: float) -> None:
         """Set several inputs of one moment."""
         values, times, quality, available = self.values, self.times, self.quality, self.available
         good, bounds = Quality.GOOD, self._bounds
-        for index, value in told:
+        for index, value in changes:
             values[index] = value
             times[index] = now
             if available[index]:
@@ -149,14 +149,14 @@ class ProcessImage:
                 self.values[index] = value
             self._covered.clear()
 
-    def outputs_told(self, now: float) -> None:
+    def outputs_stored(self, now: float) -> None:
         """The values of a package were copied into `values`, after `uncover`; they were so at `now`."""
         self.output_time = now
         if self.running:
             self.running_time = now
-        changed = not self._outputs_told
+        changed = not self._outputs_stored
         if changed:
-            self._outputs_told = True
+            self._outputs_stored = True
             for index in self.outputs:
                 if self.available[index]:
                     self.quality[index] = Quality.GOOD
@@ -168,8 +168,8 @@ class ProcessImage:
             self.find_unreadable()
 
     def outputs_lost(self) -> None:
-        """The robot has stopped telling: outputs show their fallbacks until `outputs_told`."""
-        self._outputs_told = False
+        """The robot has stopped telling: outputs show their fallbacks until `outputs_stored`."""
+        self._outputs_stored = False
         self._covered.clear()
         for index in self.outputs:
             self._show_fallback(index)
@@ -177,14 +177,14 @@ class ProcessImage:
         self.find_unreadable()
 
     def set_available(self, index: int, available: bool) -> None:
-        """The controller gave or refused the field. What it gave is not good before it was told."""
+        """The controller gave or refused the field. What it gave is not good before it was stored."""
         if available:
             self.quality[index] = Quality.NEVER if self.time_of(index) == -math.inf else Quality.STALE
         else:
             self.quality[index] = Quality.UNAVAILABLE
         self.available[index] = available
         if self.variables[index].direction is Direction.OUTPUT:
-            self._outputs_told = False
+            self._outputs_stored = False
             self._covered.pop(index, None)
             self._show_fallback(index)
             self.find_unreadable()

@@ -1,4 +1,4 @@
-"""The local operator: takes and frees locks, and puts values in place of what their sources tell.
+"""The local operator: takes and frees locks, and puts values in place of what their sources report.
 
 He stands above every writer: what he takes nobody else gets, whatever lease or priority the mapping declares.
 """
@@ -69,7 +69,7 @@ class Operator:
     def force(
         self, variable: int, value: Value, now: float, until: float, detail: str = ""
     ) -> Refusal | None:
-        """The local operator puts `value` in place of what the variable's source tells, at the latest until `until`.
+        """The local operator puts `value` in place of what the variable's source reports, at the latest until `until`.
 
         The robot gets a forced input as the operator's, who holds its lock so long; the fieldbus sees a forced output.
         The other members of its lock take their release fallback, as `take_lock` says.
@@ -142,7 +142,7 @@ class Operator:
     # -- inside --------------------------------------------------------------------------------------------------
 
     def _give(self, variable: int, value: Value, now: float) -> None:
-        self._image.tell(variable, value, now)
+        self._image.store(variable, value, now)
         self._delivery.give(((variable, value),), now)
 
     def _hold(self, lock: int, now: float, detail: str, forced: int | None = None) -> bool:

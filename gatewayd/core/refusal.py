@@ -76,8 +76,8 @@ PRECEDENCE = {
     Reason.HELD: 9,
     Reason.NOT_MEANT: 10,
 }
-"""Which reason is told when several apply: what can never work first, what may pass soon last. A lost heartbeat stands
-before the robot's absence, which leaves an owner its lease: who is not heard keeps nothing alive."""
+"""Which reason is reported when several apply: what can never work first, what may pass soon last. A lost heartbeat
+stands before the robot's absence, which leaves an owner its lease: who is not heard keeps nothing alive."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,175 +10,46 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from enum import IntEnum
+from operator import itemgetter
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
-from gatewayd.core.program import STATES
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
+from gatewayd.core.status_layout import (
+    FIELDS,
+    HEADER_WORDS,
+    LAYOUT_VERSION,
+    RELEASE,
+    RELEASE_ALL,
+    REQUEST,
+    TABLES,
+    StatusField,
+)
 
-__all__ = [
-    "BASE",
-    "FIELDS",
-    "LAYOUT_VERSION",
-    "LENGTH",
-    "MAX_VARIABLES",
-    "MAX_WRITERS",
-    "RELEASE",
-    "RELEASE_ALL",
-    "REQUEST",
-    "TABLES",
-    "StatusBlock",
-    "StatusField",
-    "StatusTable",
-]
-
-LAYOUT_VERSION = 1
-BASE = 60000
-"""Protocol address of the first word, in holding and in input registers."""
-MAX_VARIABLES = 1024
-MAX_WRITERS = 32
-REQUEST = 40
-"""Offset of the word into which a writer puts the number of a variable whose lock it wants."""
-RELEASE = 41
-"""Offset of the word into which a writer puts the number of a variable whose lock it gives back."""
-RELEASE_ALL = 0xFFFF
-"""Written to `RELEASE`: give back every lock I own."""
+__all__ = ["StatusBlock"]
 
 _U16 = 0xFFFF
 _U32 = 0xFFFF_FFFF
-
-
-def _numbered(numbers: Iterable[IntEnum]) -> str:
-    return ", ".join(f"{number.value} {number.name.lower().replace('_', ' ')}" for number in numbers)
-
-
-def _program_states() -> str:
-    return ", ".join(f"{state + 1} {name}" for state, (name, _) in STATES.items())
-
-
-@dataclass(frozen=True, slots=True)
-class StatusField:
-    """One number of the header, `offset` words after `BASE`, `words` long."""
-
-    offset: int
-    words: int
-    name: str
-    meaning: str
-
-
-@dataclass(frozen=True, slots=True)
-class StatusTable:
-    """A table with one entry for each variable or writer, `offset` words after `BASE`."""
-
-    offset: int
-    words: int
-    name: str
-    meaning: str
-
-
-FIELDS = (
-    StatusField(0, 1, "layout", "version of this layout, 1"),
-    StatusField(
-        1,
-        1,
-        "flags",
-        "bit 0 robot values fresh, 1 robot connected and writable, 2 every variable good, 3 some lock is owned, "
-        "4 something was refused since the start, 5 read-back differed since the start, 6 robot watchdog is fed",
-    ),
-    StatusField(2, 2, "fingerprint", "32 bits that change with the meaning of the mapping"),
-    StatusField(4, 1, "heartbeat", "counts up every 100 ms while the gateway lives, wraps"),
-    StatusField(5, 1, "variables", "number of variables"),
-    StatusField(6, 1, "writers", "number of declared writers"),
-    StatusField(7, 1, "robot_state", _numbered(Source)),
-    StatusField(8, 2, "uptime", "seconds since the gateway started"),
-    StatusField(10, 2, "robot_age", "age of the newest package that reported anything new, in milliseconds"),
-    StatusField(12, 1, "frequency", "packages per second, measured, in 0.1 Hz"),
-    StatusField(13, 1, "sessions", "sessions with the controller since the start, wraps"),
-    StatusField(14, 2, "packages", "packages received"),
-    StatusField(16, 2, "skipped", "packages that the controller left out"),
-    StatusField(18, 2, "late", "packages that came late"),
-    StatusField(20, 2, "accepted", "write requests applied"),
-    StatusField(22, 2, "refused", "requests refused"),
-    StatusField(24, 2, "mismatches", "inputs whose read-back differed from what was written"),
-    StatusField(26, 1, "modbus_connections", "open Modbus connections to this unit's listener"),
-    StatusField(
-        27, 1, "can_bus", "0 no CANopen, 1 absent, 2 down, 3 bus-off, 4 passive, 5 warning, 6 active"
-    ),
-    StatusField(28, 1, "nmt_state", "0 initialising, 4 stopped, 5 operational, 127 pre-operational"),
-    StatusField(30, 1, "refusal_reason", "last refusal: " + ", ".join(f"{r.value} {r.text}" for r in Reason)),
-    StatusField(31, 1, "refusal_variable", "number of the variable in the last refusal"),
-    StatusField(
-        32,
-        1,
-        "refusal_writer",
-        "number of the writer that was refused; 0 if it is not declared, 255 the local operator",
-    ),
-    StatusField(33, 1, "refusal_holder", "number of the writer that held it; 255 the local operator"),
-    StatusField(34, 2, "refusal_age", "milliseconds since the last refusal"),
-    StatusField(REQUEST, 1, "request", "write a variable's number to take its lock; reads 0"),
-    StatusField(
-        RELEASE, 1, "release", "write a variable's number to give its lock back, 65535 for all; reads 0"
-    ),
-    StatusField(42, 1, "unadopted", "inputs whose content in the robot is not known"),
-    StatusField(43, 1, "differing", "inputs for which the robot holds something else than it was given"),
-    StatusField(
-        44,
-        2,
-        "lag",
-        "milliseconds by which the newest package came later than the quickest ones; part of ages",
-    ),
-    StatusField(
-        46,
-        1,
-        "adoption",
-        "seconds until adopted inputs that nobody owns fall back; 0: they have, or never will",
-    ),
-    StatusField(47, 1, "program", f"state of the robot program: 0 unknown, {_program_states()}"),
-    StatusField(48, 1, "gaps", "times that the gateway stood still, wraps"),
-)
-HEADER_WORDS = 64
-TABLES = (
-    StatusTable(
-        64, 64, "good", "one bit for each variable, 1 = good; variable n is bit (n-1)%16 of word (n-1)/16"
-    ),
-    StatusTable(128, 64, "writers_alive", "one word for each writer: 1 = connected and heard in time"),
-    StatusTable(
-        192,
-        MAX_VARIABLES,
-        "owner",
-        "one word for each variable: number of the writer that owns it; 255 the local operator",
-    ),
-    StatusTable(
-        1216, MAX_VARIABLES, "lease", "one word for each variable: milliseconds of its owner's lease left"
-    ),
-    StatusTable(2240, MAX_VARIABLES, "age", "one word for each variable: age of its value in milliseconds"),
-    StatusTable(
-        3264,
-        MAX_VARIABLES,
-        "quality",
-        f"one word for each variable: {_numbered(Quality)}",
-    ),
-)
-LENGTH = 4288
-"""Words of the whole block."""
-
-_HEADER = struct.Struct(">HHIHHHHIIHHIIIIIIHHH2xHHHHI8x4xHHIHHH")
-"""The fields of the header in order; what lies between them, `request` and `release` among it, reads 0."""
-
+_CODES = {1: "H", 2: "I"}
+"""By words of a field."""
+_MAX = {1: _U16, 2: _U32}
 
 _Entries = Callable[[range, float], Iterable[int]]
 """The words of some entries of a table at one time."""
 
 
 class StatusBlock:
-    """The status block of one cell."""
+    """The status block of one cell. `fields` are the core's and those whose numbers are in `Cell.health.words`."""
 
-    def __init__(self, cell: Cell) -> None:
+    def __init__(self, cell: Cell, fields: Sequence[StatusField] = FIELDS) -> None:
         self._cell = cell
+        self._words = [field for field in fields if field not in FIELDS]
+        numbers = {field.name: number for number, field in enumerate((*FIELDS, *self._words))}
+        in_order = sorted(fields, key=lambda field: field.offset)
+        self._in_order = itemgetter(*(numbers[field.name] for field in in_order))
+        self._pack = struct.Struct(_format(in_order)).pack
         variables, writers = len(cell.definition.variables), len(cell.definition.writers)
         good, alive, owner, lease, age, quality = TABLES
         self._tables: tuple[tuple[int, int, _Entries], ...] = (
@@ -243,7 +114,7 @@ class StatusBlock:
         cell, health = self._cell, self._cell.health
         last = cell.last_refusal
         refusal = last.refusal if last is not None else None
-        return _HEADER.pack(
+        own = (
             LAYOUT_VERSION,
             self._flags(),
             cell.definition.fingerprint,
@@ -261,14 +132,13 @@ class StatusBlock:
             health.writes_accepted & _U32,
             health.writes_refused & _U32,
             health.read_back_mismatches & _U32,
-            min(_U16, health.modbus_connections),
-            health.can_bus,
-            health.nmt_state,
             refusal.reason if refusal is not None else 0,
             _number(refusal.variable) if refusal is not None else 0,
             _number(last.writer) if last is not None else 0,
             _number(refusal.holder) if refusal is not None else 0,
             _milliseconds(now - last.time, _U32) if last is not None else _U32,
+            0,
+            0,
             min(_U16, health.unadopted),
             min(_U16, health.differing),
             _milliseconds(health.lag, _U32),
@@ -276,6 +146,9 @@ class StatusBlock:
             0 if health.program is None else min(_U16, health.program + 1),
             health.gaps & _U16,
         )
+        words = health.words
+        others = (min(_MAX[field.words], words.get(field.name, 0)) for field in self._words)
+        return self._pack(*self._in_order((*own, *others)))
 
     def _flags(self) -> int:
         cell, health = self._cell, self._cell.health
@@ -319,6 +192,15 @@ class StatusBlock:
     def _locks(self, entries: range) -> Iterable[int | None]:
         variables = self._cell.definition.variables
         return (variables[index].lock for index in entries)
+
+
+def _format(fields: Iterable[StatusField]) -> str:
+    """What lies between the fields reads 0."""
+    found, end = ">", 0
+    for field in fields:
+        found += f"{2 * (field.offset - end)}x{_CODES[field.words]}"
+        end = field.offset + field.words
+    return found
 
 
 def _milliseconds(seconds: float, greatest: int) -> int:

@@ -30,7 +30,7 @@ def succeed(old: Cell, definition: CellDefinition, now: float) -> Succession:
     """The cell that goes on with `definition` where `old` stands now. `old` must not be used for anything afterwards.
 
     Releases and last fallbacks happen in `old`, whose listeners hear of them: let the robot have them before it is
-    told of the new cell.
+    handed the new cell.
     """
     match = Match(old.definition, definition)
     stranded = _release(old, match, now)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 import can
 
-from gatewayd import clock
+from gatewayd.loop import clock
 
 __all__ = [
     "CHECKS",

@@ -8,30 +8,35 @@ import socket
 from collections import deque
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from gatewayd import clock
 from gatewayd.core.cell import Cell
-from gatewayd.daemon import Daemon
 from gatewayd.demo.master import Master
 from gatewayd.demo.plc import FORCE_SHARE, Plc
-from gatewayd.mapping.loader import load
-from gatewayd.mapping.table import Row, rows
+from gatewayd.loop import clock
+from gatewayd.mapping.loader import Loaded, load
+from gatewayd.report.layout import Row
+from gatewayd.report.table import rows
+from gatewayd.service.daemon import Daemon
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import parse
 from gatewayd.simulator.server import SimulatedController
 
-__all__ = ["HOST", "MAPPING", "PLC_ADDRESS", "PORT", "Scene", "free_port"]
+__all__ = ["CHANNEL", "HOST", "LINE", "MAPPING", "PLC_ADDRESS", "PORT", "Scene", "free_port", "mapping"]
 
 HOST = "127.0.0.1"
 PORT = 1502
 """The gateway's port, if it is free."""
+ROBOT_PORT = 30004
 PLC_ADDRESS = "127.0.0.2"
 """Where the PLC's connection comes from, so that the gateway can tell it from whatever else this machine starts."""
 MAPPING = "demo.yaml"
+CHANNEL = "gatewayd-demo"
+"""The bus inside this process, as the mapping names it."""
+LINE = "line"
+"""The writer that the CANopen master is."""
 
 ROBOT_PROGRAM = f"""\
 output_bit_register_0 = input_bit_register_0 for 400ms        # busy
@@ -46,14 +51,19 @@ _FULL_SPEED = 100.0
 _PROBLEMS = 4
 
 
+def mapping(robot_port: int = ROBOT_PORT, port: int = PORT) -> Loaded:
+    """The mapping of the demonstration, with its robot and its Modbus server at these ports."""
+    text = files(__package__).joinpath(MAPPING).read_text()
+    text = text.replace(f"host: {HOST}\n", f"host: {HOST}\n  port: {robot_port}\n")
+    return load(text.replace(f"listen: {HOST}:{PORT}", f"listen: {HOST}:{port}").encode(), MAPPING)
+
+
 class Scene:
     """The four parties and what can be seen of them. `port` 0 takes a free one."""
 
     def __init__(self, port: int) -> None:
-        loaded = load(files(__package__).joinpath(MAPPING).read_bytes(), MAPPING)
+        loaded = mapping()
         assert loaded.plan is not None
-        assert loaded.plan.modbus is not None
-        assert loaded.plan.canopen is not None
         self.rows: tuple[Row, ...] = rows(loaded.cell)
         self.port = port or free_port(HOST)
         self.started = clock.now()
@@ -62,10 +72,9 @@ class Scene:
         self.robot = SimulatedController(Controller(program=parse(ROBOT_PROGRAM, "robot program")), host=HOST)
         self.robot.set("input_double_register_1", _FULL_SPEED)
         self.plc = Plc(HOST, self.port, PLC_ADDRESS)
-        self.master = Master(loaded.plan.canopen.channel)
-        self.can_writer = loaded.plan.canopen.rpdo_writer
+        self.master = Master(CHANNEL)
+        self.can_writer = [writer.name for writer in loaded.plan.cell.writers].index(LINE)
         """Index of the writer that the master is."""
-        self._plan = replace(loaded.plan, modbus=replace(loaded.plan.modbus, host=HOST, port=self.port))
         self._daemon: Daemon | None = None
         self._state = TemporaryDirectory(prefix="gatewayd-demo-")
 
@@ -73,15 +82,16 @@ class Scene:
     def cell(self) -> Cell:
         """The gateway's cell."""
         assert self._daemon is not None
-        return self._daemon.stations[0].cell
+        return self._daemon.runtimes[0].cell
 
     @asynccontextmanager
     async def playing(self) -> AsyncIterator[None]:
         """Everything runs inside the block. What follows it sees the parties as they ended."""
         stop = asyncio.Event()
         async with self.robot:
-            robot = replace(self._plan.robot, host=HOST, port=self.robot.port)
-            self._daemon = Daemon([replace(self._plan, robot=robot)], Path(self._state.name))
+            plan = mapping(self.robot.port, self.port).plan
+            assert plan is not None
+            self._daemon = Daemon([plan], Path(self._state.name))
             line = asyncio.create_task(self.master.run())
             gateway = asyncio.create_task(self._daemon.run(stop))
             plc = asyncio.create_task(self.plc.run())

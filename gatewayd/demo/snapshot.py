@@ -13,16 +13,17 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
 from gatewayd.demo.scene import Scene
-from gatewayd.figures import age, value
-from gatewayd.happening import BAD, STRANGER, Happening
-from gatewayd.mapping.table import Row
+from gatewayd.report.event_text import BAD, UNDECLARED_PEER, EventRecord
+from gatewayd.report.format import age, value
+from gatewayd.report.layout import Row
+from gatewayd.report.words import SOURCES
 
 __all__ = [
     "PDO_REFUSAL_SHOWN",
     "REFUSAL_SHOWN",
     "Line",
+    "ShownEvent",
     "Snapshot",
-    "Told",
     "describe",
     "snapshot",
 ]
@@ -65,14 +66,6 @@ _STATES = {
     5: "operational",
     127: "pre-operational",
 }
-_SOURCES = {
-    Source.LOST: "not connected",
-    Source.WAITING: "connected",
-    Source.FRESH: "fresh",
-    Source.SILENT: "silent",
-    Source.FROZEN: "frozen",
-    Source.LATE: "late",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +89,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class ShownEvent:
     """One event in words."""
 
     clock: str
@@ -110,7 +103,7 @@ class Snapshot:
 
     elapsed: float
     robot: str
-    """State of the robot link in one word."""
+    """State of the robot in a few words."""
     fresh: bool
     frequency: float
     packages: int
@@ -136,7 +129,7 @@ class Snapshot:
     accepted: int
     refused: int
     lines: tuple[Line, ...]
-    happenings: tuple[Told, ...]
+    events: tuple[ShownEvent, ...]
     """The latest last."""
 
 
@@ -144,18 +137,18 @@ def snapshot(scene: Scene, now: float) -> Snapshot:
     """All that is shown, at monotonic time `now`."""
     cell, plc, master = scene.cell, scene.plc, scene.master
     health, program = cell.health, plc.program
-    events = [event for event in cell.events if event.kind not in _UNTOLD][-EVENTS_KEPT:]
+    latest = [event for event in cell.events if event.kind not in _LEFT_OUT][-EVENTS_KEPT:]
     started_at = time.time() - now
-    happenings = [
-        Told(
+    events = [
+        ShownEvent(
             _clock(started_at + event.time), describe(event, cell, scene.can_writer), event.kind.value in BAD
         )
-        for event in events
+        for event in latest
     ]
-    happenings += [Told(_clock(started_at + now), problem, bad=True) for problem in scene.problems]
+    events += [ShownEvent(_clock(started_at + now), problem, bad=True) for problem in scene.problems]
     return Snapshot(
         elapsed=now - scene.started,
-        robot=_SOURCES[cell.freshness.state],
+        robot=SOURCES[cell.freshness.state],
         fresh=cell.freshness.state is Source.FRESH,
         frequency=health.frequency,
         packages=health.packages,
@@ -176,22 +169,22 @@ def snapshot(scene: Scene, now: float) -> Snapshot:
         accepted=health.writes_accepted,
         refused=health.writes_refused,
         lines=tuple(_line(cell, row, scene.can_writer, now) for row in scene.rows),
-        happenings=tuple(happenings),
+        events=tuple(events),
     )
 
 
 def describe(event: Event, cell: Cell, can_writer: int | None = None) -> str:
     """The event in words: `you wrote part_number = 7: refused with exception 06, held by plc`.
 
-    `can_writer` is told of refusals by EMCY, everybody else by exceptions.
+    `can_writer` hears of refusals by EMCY, everybody else by exceptions.
     """
-    happening = Happening.of(event, cell.definition)
+    record = EventRecord.of(event, cell.definition)
     if event.reason is None:
-        return happening.sentence()
-    return happening.sentence(f"refused with {_answer(event.reason, event.writer, can_writer)}")
+        return record.text()
+    return record.text(f"refused with {_answer(event.reason, event.writer, can_writer)}")
 
 
-_UNTOLD = {EventKind.AVAILABLE}
+_LEFT_OUT = {EventKind.AVAILABLE}
 
 
 def _answer(reason: Reason, writer: int | None, can_writer: int | None) -> str:
@@ -212,9 +205,9 @@ def _line(cell: Cell, row: Row, can_writer: int | None, now: float) -> Line:
             lease = f"{left:.1f} s" if left < math.inf else ""
     return Line(
         row=row,
-        address=f"{row.address}" if row.bit is None else f"{row.address}.{row.bit}",
-        object=row.object,
-        cob_id=row.cob_id,
+        address=f"{row['address']}" if row["bit"] is None else f"{row['address']}.{row['bit']}",
+        object=row["object"],
+        cob_id=row["cob_id"],
         value=value(cell.image.values[index], row.unit),
         quality=cell.image.quality[index],
         age=age(cell.image.age(index, now)),
@@ -231,7 +224,7 @@ def _refused(cell: Cell, index: int, can_writer: int | None, now: float) -> str:
     by_pdo = last.writer is not None and last.writer == can_writer
     if now - last.time > (PDO_REFUSAL_SHOWN if by_pdo else REFUSAL_SHOWN):
         return ""
-    writer = cell.definition.writer_name(last.writer) if last.writer is not None else STRANGER
+    writer = cell.definition.writer_name(last.writer) if last.writer is not None else UNDECLARED_PEER
     if by_pdo:
         return f"{writer}: {_EMERGENCIES.get(last.refusal.reason, 'refused')}"
     return f"{writer} refused: {_EXCEPTIONS[last.refusal.reason]}"

@@ -9,29 +9,19 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from gatewayd.core.image import Quality
 from gatewayd.demo.snapshot import Line, Snapshot
+from gatewayd.report.words import QUALITY_COLOURS
 
 __all__ = ["Poke", "commands", "plain", "screen"]
 
 Poke = tuple[str, str]
 """What a command shows, and the command."""
 
-_QUALITY_STYLES = {
-    Quality.GOOD: "green",
-    Quality.STALE: "yellow",
-    Quality.UNAVAILABLE: "red",
-    Quality.NEVER: "dim",
-    Quality.FORCED: "magenta",
-    Quality.DIFFERS: "red",
-    Quality.OUT_OF_RANGE: "yellow",
-    Quality.NOT_RUNNING: "yellow",
-}
 _WIDE = 98
 """Columns of a terminal that has room for the CANopen side too."""
 _SPACIOUS = 115
 """Columns of one that has room for everything, the 4xxxxx form among it."""
-_LEAST_EVENTS, _MOST_EVENTS = 3, 8
+_MIN_EVENTS, _MOST_EVENTS = 3, 8
 _LINES_OF_LINKS = 2
 _FRAME_OF_TABLE = 5
 """Lines of the table that are no variables: title, rules and blank ones."""
@@ -60,10 +50,10 @@ def screen(shot: Snapshot, before: Snapshot | None, pokes: Sequence[Poke], width
     wide, spacious = width >= _WIDE, width >= _SPACIOUS
     table = _table(shot.lines, old, wide=wide, spacious=spacious)
     fixed = _LINES_OF_LINKS + _FRAME_OF_TABLE + len(shot.lines)
-    shown = list(pokes) if height >= fixed + _LEAST_EVENTS + len(pokes) + _FRAME_OF_POKES else []
+    shown = list(pokes) if height >= fixed + _MIN_EVENTS + len(pokes) + _FRAME_OF_POKES else []
     room = height - fixed - (len(shown) + _FRAME_OF_POKES if shown else 0) - _ABOVE
     # A small window gives one event's line to the hint.
-    events = min(max(room, _LEAST_EVENTS) - (not shown), _MOST_EVENTS)
+    events = min(max(room, _MIN_EVENTS) - (not shown), _MOST_EVENTS)
     links = _links(shot, wide=spacious), _canopen(shot)
     parts: list[RenderableType] = [*links, table, *_events(shot, events)]
     if shown:
@@ -83,13 +73,13 @@ def plain(shot: Snapshot) -> str:
         f"line {shot.rpdos} RPDOs, {shot.line_verified} values verified, {shot.emergencies} EMCY"
     )
     lines = [
-        f"  {'->' if line.row.direction == 'input' else '<-'} {line.row.name:<12} {line.row.robot:<25} "
-        f"{line.address:>6} {line.row.notation:<9} {line.object:<8} {line.cob_id:<5}"
+        f"  {'->' if line.row.direction == 'input' else '<-'} {line.row.name:<12} {line.row['robot']:<25} "
+        f"{line.address:>6} {line.row['notation']:<9} {line.object:<8} {line.cob_id:<5}"
         f"{line.value:>9}  {line.quality.name.lower():<12}"
         f"{line.age:>7}  {_owner(line)}".rstrip()
         for line in shot.lines
     ]
-    return "\n".join([links, *lines, *(f"  {one.clock} {one.text}" for one in shot.happenings[-3:]), ""])
+    return "\n".join([links, *lines, *(f"  {event.clock} {event.text}" for event in shot.events[-3:]), ""])
 
 
 def _links(shot: Snapshot, *, wide: bool) -> Text:
@@ -144,15 +134,15 @@ def _cells(line: Line, *, changed: bool, wide: bool, spacious: bool) -> Iterator
     towards = line.row.direction == "input"
     colour = "cyan" if towards else "green"
     yield Text(" → " if towards else " ← ", f"bold {colour}").append(line.row.name, "bold default")
-    yield Text(line.row.robot, colour)
+    yield Text(line.row["robot"], colour)
     yield Text(line.address)
     if spacious:
-        yield Text(line.row.notation, "dim")
+        yield Text(line.row["notation"], "dim")
     if wide:
         yield Text(line.object)
         yield Text(line.cob_id or ("SDO" if line.object else ""), "dim")
     yield Text(line.value, "bold yellow" if changed and line.row.name != "tool_height" else "bold")
-    yield Text(line.quality.name.lower(), _QUALITY_STYLES[line.quality])
+    yield Text(line.quality.name.lower(), QUALITY_COLOURS[line.quality])
     yield Text(line.age, "dim")
     if line.refused:
         yield Text(line.refused, "bold red")
@@ -168,12 +158,10 @@ def _owner(line: Line) -> str:
 
 def _events(shot: Snapshot, count: int) -> Iterator[Text]:
     """`count` lines, empty ones above, so that the picture keeps its height."""
-    latest = (
-        shot.happenings[len(shot.happenings) - count :] if count < len(shot.happenings) else shot.happenings
-    )
-    for one in latest:
-        text = Text(f" {one.clock} ", "dim", no_wrap=True, overflow="ellipsis")
-        yield text.append(one.text, "bold red" if one.bad else "default")
+    latest = shot.events[max(0, len(shot.events) - count) :]
+    for event in latest:
+        text = Text(f" {event.clock} ", "dim", no_wrap=True, overflow="ellipsis")
+        yield text.append(event.text, "bold red" if event.bad else "default")
     yield from (Text("") for _ in range(count - len(latest)))
 
 

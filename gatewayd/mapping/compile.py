@@ -13,7 +13,6 @@ from enum import Enum
 from ipaddress import IPv4Network, IPv6Network
 from typing import Any, Final
 
-from gatewayd.canopen.plan import CanopenPlan, Consumer, PdoEntry, PdoPlan, SyncPlan
 from gatewayd.core.definition import (
     CellDefinition,
     Direction,
@@ -26,34 +25,27 @@ from gatewayd.core.definition import (
     Variable,
     Writer,
 )
-from gatewayd.mapping.can_expand import CanopenCell, ConcretePdo
-from gatewayd.mapping.codec import Codec
-from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
-from gatewayd.mapping.model import ADOPT_FOR, Modbus, Robot, WriterSpec
-from gatewayd.mapping.plan import ModbusPlan, Network, Placement, Plan, RobotPlan, WatchdogPlan
+from gatewayd.links.registry import definer, languages
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
+from gatewayd.mapping.model import WriterSpec
+from gatewayd.mapping.plan import Plan
 from gatewayd.mapping.shown import Shown, shown_of
-from gatewayd.rtde.catalogue import Series
 
-__all__ = ["PROGRAM_STATE", "compile_plan", "fingerprint", "package_period"]
+__all__ = ["compile_plan", "fingerprint"]
 
-_STALE_PERIODS: Final = 5
-_LEAST_STALE_AFTER: Final = 0.1
 _CASTS: Final[dict[ValueKind, Callable[[Value], Value]]] = {
     ValueKind.BOOL: bool,
     ValueKind.INT: round,
     ValueKind.FLOAT: float,
 }
-_TIMESTAMP: Final = "timestamp"
-PROGRAM_STATE: Final = "runtime_state"
-"""The field that says whether the robot program runs."""
 
 
 def compile_plan(cell: ExpandedCell) -> Plan:
     """Compile a cell that passed all rules; ValueError for one with parts that could not be read or expanded."""
-    document = cell.document
-    if document.robot is None or not document.cell or not cell.is_complete:
+    document, sections, settings = cell.document, cell.document.sections, cell.settings
+    missing = [one.key for one in languages() if one.required and one.key not in sections]
+    if missing or not document.cell or not cell.is_complete:
         raise ValueError(f"{document.source.name} has errors and cannot be compiled")
-    robot = document.robot.spec
     writers = {name: index for index, name in enumerate(document.writers)}
     definition = CellDefinition(
         name=document.cell,
@@ -71,30 +63,16 @@ def compile_plan(cell: ExpandedCell) -> Plan:
             for lock in cell.locks
         ),
         writers=tuple(_writer(name, part.spec) for name, part in document.writers.items()),
-        stale_after=robot.stale_after or max(_STALE_PERIODS * package_period(robot), _LEAST_STALE_AFTER),
-        clear_on_connect=robot.on_connect == "fallback",
-        adopt_for=robot.adopt_for,
+        stale_after=settings.stale_after,
+        clear_on_connect=settings.clear_on_connect,
+        adopt_for=settings.adopt_for,
     )
-    modbus = _modbus(cell, document.modbus.spec) if document.modbus is not None else None
-    canopen = _canopen(cell, cell.canopen) if cell.canopen is not None else None
-    plan = Plan(document.source.name, definition, _robot(cell, robot, writers), modbus, canopen)
+    links = {one.key: one.compile(cell) for one in languages() if one.key in sections}
+    plan = Plan(document.source.name, definition, links)
     return dataclasses.replace(plan, cell=dataclasses.replace(definition, fingerprint=fingerprint(plan)))
 
 
-def package_period(robot: Robot) -> float:
-    """Seconds between output packages: the controller divides its base rate by a whole number.
-
-    Where the series is not known the slowest that may answer counts: CB3 with 125 Hz for its own rate.
-    """
-    if robot.frequency == 0:
-        return 1 / (Series.from_word(robot.series) if robot.series is not None else Series.CB3).base_rate
-    if robot.series is None:
-        return 1 / robot.frequency
-    base = Series.from_word(robot.series).base_rate
-    return max(int(base / robot.frequency), 1) / base
-
-
-def _variable(variable: ConcreteVariable, shown: Shown) -> Variable:
+def _variable(variable: ExpandedVariable, shown: Shown) -> Variable:
     spec, kind = variable.spec, variable.kind
     is_input = variable.direction is Direction.INPUT
     return Variable(
@@ -102,7 +80,7 @@ def _variable(variable: ConcreteVariable, shown: Shown) -> Variable:
         name=variable.name,
         direction=variable.direction,
         kind=kind,
-        field=variable.field.name,
+        field=variable.field,
         bit=variable.bit,
         element=variable.element,
         low=variable.low,
@@ -126,7 +104,7 @@ def _writer(name: str, spec: WriterSpec) -> Writer:
         timeout=spec.timeout,
         grace=spec.grace or 0.0,
         counts_writes=spec.timeout_counts == "writes",
-        heartbeat=spec.heartbeat if spec.node is not None else None,
+        heartbeat=next((time for one in languages() if (time := one.silence(spec)) is not None), None),
     )
 
 
@@ -137,128 +115,12 @@ def _fallback(fallback: Fallback, kind: ValueKind) -> Fallback:
     return Fallback(FallbackKind.VALUE, value)
 
 
-def _robot(cell: ExpandedCell, robot: Robot, writers: dict[str, int]) -> RobotPlan:
-    watchdog = robot.watchdog
-    return RobotPlan(
-        host=robot.host,
-        port=robot.port,
-        frequency=robot.frequency,
-        outputs=tuple(name for name in _subscribed(cell) if name != _TIMESTAMP),
-        inputs=_fields(cell, Direction.INPUT),
-        verify=robot.verify,
-        watchdog=None
-        if watchdog is None
-        else WatchdogPlan(
-            watchdog.field,
-            watchdog.frequency,
-            tuple(writers[name] for name in dict.fromkeys(watchdog.requires or ())),
-        ),
-    )
-
-
-def _subscribed(cell: ExpandedCell) -> tuple[str, ...]:
-    """Fields of outputs, and what says whether the program runs where the quality of one hangs on it."""
-    fields = _fields(cell, Direction.OUTPUT)
-    if not any(variable.valid_running for variable in cell.variables):
-        return fields
-    return tuple(dict.fromkeys((*fields, PROGRAM_STATE)))
-
-
-def _fields(cell: ExpandedCell, direction: Direction) -> tuple[str, ...]:
-    names = (variable.field.name for variable in cell.variables if variable.direction is direction)
-    return tuple(dict.fromkeys(names))
-
-
-def _modbus(cell: ExpandedCell, modbus: Modbus) -> ModbusPlan:
-    peers = [
-        (network, index)
-        for index, writer in enumerate(cell.document.writers.values())
-        for network in writer.spec.modbus
-    ]
-    return ModbusPlan(
-        host=modbus.listen.host,
-        port=modbus.listen.port,
-        unit=modbus.unit,
-        allow=modbus.allow,
-        connections=modbus.connections,
-        idle_timeout=modbus.idle_timeout,
-        fill_gaps=modbus.gaps == "zero",
-        placements=tuple(
-            Placement(placed.variable.index, placed.area, placed.address, placed.bit, placed.codec)
-            for placed in cell.placements
-        ),
-        writers=tuple(sorted(peers, key=lambda peer: (_host_bits(peer[0]), peer[0].version, str(peer[0])))),
-    )
-
-
-def _host_bits(network: Network) -> int:
-    return network.max_prefixlen - network.prefixlen
-
-
-def _canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
-    spec = node.part.spec
-    writers = [part.spec for part in cell.document.writers.values()]
-    return CanopenPlan(
-        interface=spec.interface,
-        channel=spec.channel,
-        bitrate=spec.bitrate,
-        node=spec.node,
-        autostart=spec.autostart,
-        heartbeat=_ticks(spec.heartbeat, 1000),
-        sync=SyncPlan(
-            spec.sync.cob_id, spec.sync.producer, _ticks(spec.sync.period, 1_000_000), spec.sync.counter
-        ),
-        consumers=tuple(
-            Consumer(writer.node, _ticks(writer.heartbeat, 1000), index)
-            for index, writer in enumerate(writers)
-            if writer.node is not None and writer.heartbeat is not None
-        ),
-        objects=tuple(one.plan for one in node.objects),
-        pdos=tuple(_pdo(pdo) for pdo in node.pdos),
-        rpdo_writer=next((index for index, writer in enumerate(writers) if writer.by_rpdo), None),
-        sdo_writer=next((index for index, writer in enumerate(writers) if writer.by_sdo), None),
-    )
-
-
-def _pdo(pdo: ConcretePdo) -> PdoPlan:
-    assert pdo.slot.cob_id is not None
-    return PdoPlan(
-        number=pdo.slot.number,
-        direction=pdo.direction,
-        cob_id=pdo.slot.cob_id,
-        predefined=pdo.slot.predefined,
-        transmission=pdo.transmission,
-        inhibit=_ticks(pdo.inhibit, 10_000),
-        event=_ticks(pdo.event, 1000),
-        entries=(
-            *(
-                PdoEntry(None, word.index, word.subindex, word.type.bits, word.quality_of)
-                for word in pdo.status
-            ),
-            *(
-                PdoEntry(one.variable, one.plan.index, one.plan.subindex, one.plan.type.bits)
-                for one in pdo.entries
-            ),
-        ),
-        sync_start=pdo.sync_start,
-        name=pdo.name,
-    )
-
-
-def _ticks(seconds: float | None, per_second: int) -> int:
-    """A time as CANopen counts it; 0 for none."""
-    return 0 if seconds is None else round(seconds * per_second)
-
-
 _FOR_PEOPLE: Final = frozenset({"comment", "source", "fingerprint"})
 _DERIVED: Final = {
     Variable: frozenset({"shown", "shows_nan"}),
     Writer: frozenset({"heartbeat"}),
 }
 """Fields that follow from others, which count: places, and the consumers of CANopen."""
-_DEFAULTS: Final = {(CellDefinition, "adopt_for"): ADOPT_FOR}
-"""What a field is where the file says nothing, as far as the core's default is another."""
-_CODEC_MEANING: Final = ("type", "order", "scale", "offset")
 
 
 def fingerprint(plan: Plan) -> int:
@@ -273,8 +135,10 @@ def fingerprint(plan: Plan) -> int:
 
 def _meaning(thing: Any) -> Any:
     match thing:
-        case Codec():
-            return [getattr(thing, name) for name in _CODEC_MEANING]
+        case Plan():
+            absent = dict.fromkeys(language.key for language in languages() if language.counts_absent)
+            links = {name: _meaning(link) for name, link in thing.links.items()}
+            return {"cell": _meaning(thing.cell)} | absent | links
         case Enum():
             return thing.name
         case IPv4Network() | IPv6Network():
@@ -283,6 +147,9 @@ def _meaning(thing: Any) -> Any:
             return [_meaning(item) for item in thing]
     if not dataclasses.is_dataclass(thing):
         return thing
+    meaning = getattr(thing, "meaning", None)
+    if meaning is not None:
+        return meaning
     return {
         name: _meaning(value)
         for name, default in _fields_of(type(thing))
@@ -296,9 +163,10 @@ _known_fields: dict[type, tuple[tuple[str, Any], ...]] = {}
 def _fields_of(kind: type[Any]) -> tuple[tuple[str, Any], ...]:
     """Names and defaults of the fields that carry meaning."""
     if kind not in _known_fields:
+        unwritten = definer().unwritten if kind is CellDefinition else {}
         without = _FOR_PEOPLE | _DERIVED.get(kind, frozenset())
         _known_fields[kind] = tuple(
-            (field.name, _DEFAULTS.get((kind, field.name), field.default))
+            (field.name, unwritten.get(field.name, field.default))
             for field in dataclasses.fields(kind)
             if field.name not in without
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from enum import Enum
+from importlib.resources import files
 
 __all__ = [
     "FAMILIES",
@@ -26,10 +27,11 @@ FAMILIES = {
     5: "ownership",
     6: "fail-safe",
     7: "lossy conversion",
+    8: "other links",
 }
 """Rule families by the hundreds digit of their ids."""
 
-_ID = re.compile(r"GW[1-7]\d\d")
+_ID = re.compile(r"GW[1-8]\d\d")
 _SLUG = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 
 
@@ -71,13 +73,23 @@ class Rule:
     severity: Severity
     summary: str
     """One line without a full stop."""
-    why: str
-    """What goes wrong in the plant and how to put it right: Markdown, shown by `gatewayd check --explain`."""
+    home: str
+    """Package that has the rule's folder: `why.md` beside an example that breaks it and one that does not."""
 
     @property
     def family(self) -> str:
         """Name of the family the id belongs to."""
         return FAMILIES[int(self.id[2])]
+
+    @property
+    def folder(self) -> str:
+        """Name of the rule's folder."""
+        return f"{self.id}-{self.slug}"
+
+    @property
+    def why(self) -> str:
+        """What goes wrong in the plant and how to put it right: Markdown, shown by `gatewayd check --explain`."""
+        return files(self.home).joinpath(self.folder, "why.md").read_text("utf-8").strip()
 
     def at(
         self,
@@ -114,8 +126,9 @@ def declare(
     rule_id: str,
     slug: str,
     summary: str,
-    why: str,
     severity: Severity = Severity.ERROR,
+    *,
+    home: str = "gatewayd.mapping.syntax",
 ) -> Rule:
     """Enter a rule into the catalogue. Raises ValueError for a malformed or a used id or slug."""
     if not _ID.fullmatch(rule_id) or not _SLUG.fullmatch(slug):
@@ -123,7 +136,7 @@ def declare(
     for known in _rules.values():
         if rule_id == known.id or slug == known.slug:
             raise ValueError(f"rule {rule_id} {slug} clashes with {known.id} {known.slug}")
-    rule = Rule(rule_id, slug, severity, summary, why.strip())
+    rule = Rule(rule_id, slug, severity, summary, home)
     _rules[rule_id] = rule
     return rule
 

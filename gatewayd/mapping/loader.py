@@ -11,11 +11,12 @@ from pathlib import Path
 
 from gatewayd.mapping.compile import compile_plan
 from gatewayd.mapping.diagnostics import Diagnostic, Severity
-from gatewayd.mapping.document import read_document
-from gatewayd.mapping.expand import ExpandedCell, expand
+from gatewayd.mapping.expand import expand
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.plan import Plan
+from gatewayd.mapping.reader import read_document
 from gatewayd.mapping.rules.run import check_cell, check_plant
-from gatewayd.mapping.source import MAXIMUM_BYTES, parse
+from gatewayd.mapping.source import MAX_BYTES, parse
 
 __all__ = ["Loaded", "load", "load_together", "read_bytes"]
 
@@ -42,7 +43,7 @@ class Loaded:
 def read_bytes(path: Path) -> bytes:
     """Read a mapping file; what exceeds the size limit is left out, so that `load` refuses it. Raises OSError."""
     with path.open("rb") as file:
-        return file.read(MAXIMUM_BYTES + 1)
+        return file.read(MAX_BYTES + 1)
 
 
 def load(data: bytes, name: str) -> Loaded:

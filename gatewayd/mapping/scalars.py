@@ -1,4 +1,5 @@
-"""The small languages inside a mapping: durations, addresses, robot references, networks, versions, policies.
+"""The small languages inside a mapping: durations, names, networks, policies. Those of one kind of link
+lie with it.
 
 Each reader takes what YAML made of a value and gives a typed one. What cannot be read raises
 `PydanticCustomError` whose type is the slug of the rule that it breaks and whose context holds the remedy.
@@ -10,35 +11,32 @@ import math
 import re
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
-from typing import Annotated, Any, Final, Literal, NoReturn
+from typing import Annotated, Any, Final, Literal, NoReturn, TypeAlias
 
 from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf
 from pydantic_core import PydanticCustomError
 
 from gatewayd.core.definition import Fallback, FallbackKind
+from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Rule
-from gatewayd.mapping.plan import Network
-from gatewayd.mapping.rules import syntax
 from gatewayd.mapping.source import RealNumber, WholeNumber
+from gatewayd.report.format import address as address_text
 
 __all__ = [
     "OPTIONAL_DURATION_SCHEMA",
-    "Address",
     "CellName",
     "Duration",
-    "Endpoint",
     "Host",
     "Listen",
+    "ListenAddress",
     "Name",
     "Names",
+    "Network",
     "Networks",
     "OptionalDuration",
     "OutputPolicy",
     "Real",
-    "Reference",
     "ReleasePolicy",
-    "RobotReference",
-    "Version",
     "Whole",
     "one_or_many",
     "optional_duration",
@@ -52,23 +50,13 @@ _DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?")
 _NUMBER_LIKE = re.compile(r"[-+]?[0-9.][0-9a-fA-FxXoO_.,:+-]*")
 _DURATION = re.compile(r"([0-9]+(?:\.[0-9]+)?)[ ]?(ms|s|min|h)")
 _SECONDS: Final = {"ms": 0.001, "s": 1.0, "min": 60.0, "h": 3600.0}
-_LONGEST: Final = 24 * 3600.0
-_ADDRESS = re.compile(r"(0|[1-9][0-9]*)(?:\.(0|[1-9][0-9]*))?")
-_GREATEST_ADDRESS: Final = 0xFFFF
-_GREATEST_BIT: Final = 15
-_REFERENCE = re.compile(
-    r"(?P<field>[A-Za-z][A-Za-z0-9_]*?)"
-    r"(?:(?P<first>[0-9]{1,4})\.\.(?P<last>[0-9]{1,4})"
-    r"|(?P<element>\[(?P<element_first>[0-9]{1,4})(?:\.\.(?P<element_last>[0-9]{1,4}))?\])?"
-    r"(?:\.(?P<bit_first>[0-9]{1,4})(?:\.\.(?P<bit_last>[0-9]{1,4}))?)?)"
-)
+_MAX_SECONDS: Final = 24 * 3600.0
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _CELL_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
-_LONGEST_NAME: Final = 64
-_VERSION = re.compile(r"([0-9]{1,4})(?:\.([0-9]{1,4}))?(?:\.([0-9]{1,9}))?(?:\.[0-9]{1,9})?")
+_MAX_NAME: Final = 64
 _LISTEN = re.compile(r"(?:\[(?P<six>[0-9A-Fa-f:.%a-z]+)\]|(?P<four>[^:\[\]\s]+)):(?P<port>[0-9]{1,5})")
 _NUMBERS = re.compile(r"[0-9.]+")
-_GREATEST_PORT: Final = 65535
+_MAX_PORT: Final = 65535
 
 
 def refuse(rule: Rule, message: str, hint: str) -> NoReturn:
@@ -134,7 +122,7 @@ def _duration(value: object) -> float:
             )
         refuse(syntax.BAD_DURATION, f"`{text}` is not a duration", hint)
     seconds = float(match[1]) * _SECONDS[match[2]]
-    if not 0 < seconds <= _LONGEST:
+    if not 0 < seconds <= _MAX_SECONDS:
         refuse(
             syntax.OUT_OF_RANGE,
             f"the duration `{text}` is not between 1ms and 24h",
@@ -163,7 +151,7 @@ OptionalDuration = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class Endpoint:
+class ListenAddress:
     """Where a listener listens."""
 
     host: str
@@ -172,11 +160,11 @@ class Endpoint:
 
     def __str__(self) -> str:
         """`host:port`, with brackets around IPv6."""
-        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+        return address_text(self.host, self.port)
 
 
-def _listen(value: object) -> Endpoint:
-    if isinstance(value, Endpoint):
+def _listen(value: object) -> ListenAddress:
+    if isinstance(value, ListenAddress):
         return value
     hint = "write host:port, for example 127.0.0.1:1502, 0.0.0.0:502 or [::1]:502"
     text = scalar(value, "a listen address", hint)
@@ -191,13 +179,13 @@ def _listen(value: object) -> Endpoint:
     if (match["six"] is not None) != isinstance(address, IPv6Address):
         refuse(syntax.BAD_NETWORK, f"`{text}` is not a listen address", hint)
     port = int(match["port"])
-    if not 0 < port <= _GREATEST_PORT:
+    if not 0 < port <= _MAX_PORT:
         refuse(syntax.OUT_OF_RANGE, f"port {port} is not between 1 and 65535", hint)
-    return Endpoint(str(address), port)
+    return ListenAddress(str(address), port)
 
 
 Listen = Annotated[
-    InstanceOf[Endpoint],
+    InstanceOf[ListenAddress],
     BeforeValidator(
         _listen,
         json_schema_input_type=Annotated[
@@ -234,6 +222,9 @@ Host = Annotated[
     AfterValidator(_host),
 ]
 """A host name or a literal IP address."""
+
+
+Network: TypeAlias = IPv4Network | IPv6Network
 
 
 def _network(value: object) -> Network:
@@ -278,17 +269,15 @@ def _name(value: object) -> str:
     text = scalar(value, "a name", hint)
     if not _NAME.fullmatch(text):
         refuse(syntax.BAD_NAME, f"`{text}` is not a name", hint)
-    if len(text) > _LONGEST_NAME:
-        refuse(
-            syntax.BAD_NAME, f"the name `{text}` has {len(text)} characters", f"use at most {_LONGEST_NAME}"
-        )
+    if len(text) > _MAX_NAME:
+        refuse(syntax.BAD_NAME, f"the name `{text}` has {len(text)} characters", f"use at most {_MAX_NAME}")
     return text
 
 
 def _cell_name(value: object) -> str:
     hint = "use small letters, digits and `-`, for example press-3"
     text = scalar(value, "a name", hint)
-    if not _CELL_NAME.fullmatch(text) or len(text) > _LONGEST_NAME:
+    if not _CELL_NAME.fullmatch(text) or len(text) > _MAX_NAME:
         refuse(syntax.BAD_NAME, f"`{text}` is not a name of a cell", hint)
     return text
 
@@ -311,109 +300,6 @@ Names = Annotated[
 """A name or a list of names."""
 
 
-def _version(value: object) -> tuple[int, int, int]:
-    hint = "write the controller software as PolyScope shows it, for example 5.12 or 10.7.0"
-    if isinstance(value, tuple):
-        return value
-    text = scalar(value, "a version", hint)
-    match = _VERSION.fullmatch(text)
-    if match is None:
-        refuse(syntax.BAD_NUMBER, f"`{text}` is not a version", hint)
-    return int(match[1]), int(match[2] or 0), int(match[3] or 0)
-
-
-Version = Annotated[
-    tuple[int, int, int],
-    BeforeValidator(
-        _version,
-        json_schema_input_type=float
-        | Annotated[str, Field(pattern=r"^[0-9]+(\.[0-9]+){0,3}$", examples=["5.12.0"])],
-    ),
-]
-"""Version of the controller software: major, minor, bugfix."""
-
-
-def _address(value: object) -> tuple[int, int | None]:
-    if isinstance(value, tuple):
-        return value
-    hint = "write a register (100) or a bit of a register (100.3), counted from 0"
-    text = scalar(value, "an address", hint)
-    match = _ADDRESS.fullmatch(text)
-    if match is None:
-        refuse(syntax.BAD_ADDRESS, f"`{text}` is not an address", hint)
-    address = int(match[1])
-    if address > _GREATEST_ADDRESS:
-        refuse(
-            syntax.OUT_OF_RANGE,
-            f"the address {address} is greater than 65535",
-            _notation_hint(match[1]) or hint,
-        )
-    bit = int(match[2]) if match[2] is not None else None
-    if bit is not None and bit > _GREATEST_BIT:
-        hint = "bit 0 is the least significant of the register, bit 15 the most"
-        refuse(syntax.OUT_OF_RANGE, f"the register has no bit {bit}", hint)
-    return address, bit
-
-
-def _notation_hint(digits: str) -> str | None:
-    """Explain 400101 and the like, without guessing."""
-    areas = {"0": "coil", "1": "discrete", "3": "input", "4": "holding"}
-    if len(digits) != 6 or digits[0] not in areas or int(digits[1:]) == 0:
-        return None
-    return f"addresses count from 0: where a manual says {digits}, write {{{areas[digits[0]]}: {int(digits[1:]) - 1}}}"
-
-
-Address = Annotated[
-    tuple[int, int | None],
-    BeforeValidator(
-        _address,
-        json_schema_input_type=float | Annotated[str, Field(pattern=r"^[0-9]{1,5}(\.[0-9]{1,2})?$")],
-    ),
-    Field(strict=False),
-]
-"""Protocol address from 0 and, after a dot, the bit of the register."""
-
-
-@dataclass(frozen=True, slots=True)
-class Reference:
-    """What a `robot:` key names: a field, elements of a vector, bits of an integer, or numbered registers."""
-
-    text: str
-    field: str
-    """Name of the field; for numbered registers without the number (`output_int_register_`)."""
-    registers: range | None = None
-    """Numbers of the registers; None when the field is named in full."""
-    elements: range | None = None
-    """Elements of a vector field."""
-    bits: range | None = None
-    """Bits of an integer field."""
-    many: bool = False
-    """Written as a range, so that it makes a numbered family of variables even where it holds one."""
-
-    def __str__(self) -> str:
-        """As written."""
-        return self.text
-
-
-def _reference(value: object) -> Reference:
-    if isinstance(value, Reference):
-        return value
-    hint = (
-        "write a field (actual_TCP_pose), 'field[0]', field.3, or a range such as output_int_register_0..23"
-    )
-    text = scalar(value, "the name of an RTDE field", hint)
-    match = _REFERENCE.fullmatch(text)
-    if match is None:
-        refuse(syntax.BAD_REFERENCE, f"`{text}` does not name an RTDE field", hint)
-    registers = span(text, match, "first", "last")
-    elements = span(text, match, "element_first", "element_last")
-    bits = span(text, match, "bit_first", "bit_last")
-    ranges = sum(match[key] is not None for key in ("last", "element_last", "bit_last"))
-    if ranges > 1:
-        refuse(syntax.BAD_REFERENCE, f"`{text}` holds more than one range", hint)
-    return Reference(text, match["field"], registers, elements, bits, many=ranges > 0)
-
-
 def span(text: str, match: re.Match[str], first: str, last: str) -> range | None:
     """The numbers from one group of a match to another, both included; None where there are none."""
     if match[first] is None:
@@ -424,22 +310,6 @@ def span(text: str, match: re.Match[str], first: str, last: str) -> range | None
         hint = f"write {text.replace(f'{match[first]}..{match[last]}', f'{high}..{low}')}"
         refuse(syntax.BAD_RANGE, f"the range of `{text}` runs backwards", hint)
     return range(low, high + 1)
-
-
-RobotReference = Annotated[
-    InstanceOf[Reference],
-    BeforeValidator(
-        _reference,
-        json_schema_input_type=Annotated[
-            str,
-            Field(
-                pattern=r"^[A-Za-z][A-Za-z0-9_]*([0-9]\.\.[0-9]+)?(\[[0-9]+(\.\.[0-9]+)?\])?(\.[0-9]+(\.\.[0-9]+)?)?$",
-                examples=["input_bit_register_0", "output_double_register_0..23", "actual_TCP_pose[0]"],
-            ),
-        ],
-    ),
-]
-"""What a variable is in the robot."""
 
 
 def _policy(value: Any, words: tuple[str, ...]) -> Fallback:

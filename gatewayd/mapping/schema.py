@@ -10,7 +10,7 @@ import json
 import sys
 from typing import Any, Final
 
-from gatewayd.mapping.model import MappingFile
+from gatewayd.mapping.language import FILE
 
 __all__ = ["mapping_schema", "schema_text"]
 
@@ -19,7 +19,7 @@ _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 def mapping_schema() -> dict[str, Any]:
     """Return the schema of a mapping file. Deterministic."""
-    schema: dict[str, Any] = _tidy(MappingFile.model_json_schema())
+    schema: dict[str, Any] = _tidy(FILE.model_json_schema())
     return {"$schema": _DIALECT, "title": "gatewayd mapping, version 1", **schema}
 
 

@@ -25,27 +25,27 @@ from ruamel.yaml.events import (
 )
 from ruamel.yaml.reader import ReaderError
 
+from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule
-from gatewayd.mapping.rules import syntax
 
 __all__ = [
-    "MAXIMUM_BYTES",
-    "MAXIMUM_DEPTH",
-    "Entry",
+    "MAX_BYTES",
+    "MAX_DEPTH",
     "Items",
+    "MappingText",
     "Node",
     "RealNumber",
     "Scalar",
-    "Source",
     "Table",
+    "TableEntry",
     "WholeNumber",
     "parse",
     "plain",
 ]
 
-MAXIMUM_BYTES: Final = 1 << 20
+MAX_BYTES: Final = 1 << 20
 """Greatest size of a mapping file."""
-MAXIMUM_DEPTH: Final = 16
+MAX_DEPTH: Final = 16
 """Greatest nesting of tables and lists; a mapping needs five."""
 
 _BEGIN: Final = "begin with `gatewayd: 1`"
@@ -90,7 +90,7 @@ class Scalar:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class TableEntry:
     """One `key: value` of a table."""
 
     key: Scalar
@@ -102,7 +102,7 @@ class Table:
     """A YAML mapping, in file order; of a repeated key only the first entry."""
 
     position: Position
-    entries: dict[str, Entry] = field(default_factory=dict)
+    entries: dict[str, TableEntry] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ Node: TypeAlias = Scalar | Table | Items
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class MappingText:
     """One mapping file, read."""
 
     name: str
@@ -144,23 +144,23 @@ def plain(node: Node) -> object:
             return {key: plain(entry.value) for key, entry in node.entries.items()}
 
 
-def parse(data: bytes, name: str) -> Source:
+def parse(data: bytes, name: str) -> MappingText:
     """Read the bytes of a mapping file; `name` is the path that positions show.
 
     Never raises. Syntax errors, wrong encodings, and the parts of YAML that a mapping may not use become
     findings.
     """
-    if len(data) > MAXIMUM_BYTES:
-        message = f"the file has more than {MAXIMUM_BYTES} bytes"
+    if len(data) > MAX_BYTES:
+        message = f"the file has more than {MAX_BYTES} bytes"
         hint = "one file describes one robot cell"
-        return Source(name, None, (syntax.TOO_LARGE.at(Position(name, 1, 1), message, hint=hint),))
+        return MappingText(name, None, (syntax.TOO_LARGE.at(Position(name, 1, 1), message, hint=hint),))
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        return Source(name, None, (_not_utf8(data, error, name),))
+        return MappingText(name, None, (_not_utf8(data, error, name),))
     reader = _Reader(name)
     root = reader.read(text)
-    return Source(name, root, tuple(reader.findings), tuple(text.splitlines()))
+    return MappingText(name, root, tuple(reader.findings), tuple(text.splitlines()))
 
 
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
@@ -208,7 +208,7 @@ class _Reader:
         try:
             root = self._document(YAML(typ="safe", pure=True).parse(text))
         except _TooDeepError as error:
-            message = f"more than {MAXIMUM_DEPTH} tables or lists lie in one another"
+            message = f"more than {MAX_DEPTH} tables or lists lie in one another"
             self._find(syntax.TOO_LARGE, message, error.position, "a mapping needs no more than five levels")
             return None
         except MarkedYAMLError as error:
@@ -257,7 +257,7 @@ class _Reader:
 
     def _node(self, event: Any, events: Iterator[Any], depth: int) -> Node:
         position = self._at(event)
-        if depth > MAXIMUM_DEPTH:
+        if depth > MAX_DEPTH:
             raise _TooDeepError(position)
         self._refuse_decorations(event, position)
         if isinstance(event, AliasEvent):
@@ -288,7 +288,7 @@ class _Reader:
             message = f"the key `{_shown(key.text)}` is given twice in one table"
             self._find(syntax.DUPLICATE_KEY, message, key.position, "remove one of the two", related)
         else:
-            table.entries[key.text] = Entry(key, value)
+            table.entries[key.text] = TableEntry(key, value)
 
     def _refuse_decorations(self, event: Any, position: Position) -> None:
         if isinstance(event, AliasEvent):

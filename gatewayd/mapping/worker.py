@@ -1,4 +1,4 @@
-"""The process that compiles mapping files for another one (`gatewayd.compilation`): one pickled `Compiled` to standard
+"""The process that compiles mapping files for another one (`service.compilation`): one pickled `Compiled` to standard
 output, and the end. For people there is `gatewayd check`.
 """
 

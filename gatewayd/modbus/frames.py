@@ -10,25 +10,25 @@ from typing import NamedTuple
 
 __all__ = [
     "BUFFER_SIZE",
-    "GREATEST_FRAME",
     "HEADER_SIZE",
-    "Frame",
+    "MAX_FRAME",
     "FrameBuffer",
     "FramingError",
+    "ModbusFrame",
     "encode",
     "split",
 ]
 
 HEADER_SIZE = 7
 """Bytes before the PDU."""
-GREATEST_PDU = 253
+MAX_PDU = 253
 """Bytes (Application Protocol V1.1b3, 4.1)."""
-GREATEST_FRAME = HEADER_SIZE + GREATEST_PDU
+MAX_FRAME = HEADER_SIZE + MAX_PDU
 BUFFER_SIZE = 1024
 """Bytes taken from a connection at a time; bounds what one peer can make us do before the next has its turn."""
 
-_LEAST_LENGTH = 2
-_GREATEST_LENGTH = GREATEST_PDU + 1
+_MIN_LENGTH = 2
+_MAX_LENGTH = MAX_PDU + 1
 _PREFIX = 6
 """Bytes up to and with the length, which does not count them."""
 _HEADER = struct.Struct(">HHHB")
@@ -38,7 +38,7 @@ class FramingError(ValueError):
     """Bytes that are no Modbus frame. Where the next one begins cannot be known: the connection must be closed."""
 
 
-class Frame(NamedTuple):
+class ModbusFrame(NamedTuple):
     """One request as it came in."""
 
     transaction: int
@@ -53,7 +53,7 @@ def encode(transaction: int, unit: int, pdu: bytes) -> bytes:
     return _HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu
 
 
-def split(data: bytearray, start: int, end: int) -> Frame | None:
+def split(data: bytearray, start: int, end: int) -> ModbusFrame | None:
     """The frame that begins at `start`, or None if it is not complete at `end`.
 
     Raises FramingError as soon as the protocol id or the length is known to be wrong.
@@ -64,12 +64,12 @@ def split(data: bytearray, start: int, end: int) -> Frame | None:
     length = data[start + 4] << 8 | data[start + 5]
     if protocol:
         raise FramingError(f"protocol id {protocol} instead of 0")
-    if not _LEAST_LENGTH <= length <= _GREATEST_LENGTH:
-        raise FramingError(f"length {length} is not within {_LEAST_LENGTH}..{_GREATEST_LENGTH}")
+    if not _MIN_LENGTH <= length <= _MAX_LENGTH:
+        raise FramingError(f"length {length} is not within {_MIN_LENGTH}..{_MAX_LENGTH}")
     behind = start + _PREFIX + length
     if behind > end:
         return None
-    return Frame(
+    return ModbusFrame(
         data[start] << 8 | data[start + 1], data[start + 6], bytes(data[start + HEADER_SIZE : behind]), behind
     )
 
@@ -80,7 +80,7 @@ class FrameBuffer:
     __slots__ = ("_view", "data", "end", "space")
 
     def __init__(self, size: int = BUFFER_SIZE) -> None:
-        self.data = bytearray(max(size, 2 * GREATEST_FRAME))
+        self.data = bytearray(max(size, 2 * MAX_FRAME))
         self.end = 0
         """Position behind the last byte that came in."""
         self._view = memoryview(self.data)

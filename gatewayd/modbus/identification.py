@@ -14,8 +14,8 @@ MEI_TYPE = 14
 
 _HEAD_SIZE = 7
 _OBJECT_HEAD_SIZE = 2
-_GREATEST_PDU = 253
-_GREATEST_OBJECT = _GREATEST_PDU - _HEAD_SIZE - _OBJECT_HEAD_SIZE
+_MAX_PDU = 253
+_MAX_OBJECT = _MAX_PDU - _HEAD_SIZE - _OBJECT_HEAD_SIZE
 _REQUEST_SIZE = 4
 _MORE_FOLLOWS = 0xFF
 _CONFORMITY = 0x83
@@ -51,7 +51,7 @@ class Identification:
     """The identification objects of one unit."""
 
     def __init__(self, cell: str, fingerprint: int, application: str = "") -> None:
-        """`cell` is told as model name; `fingerprint`, in hexadecimal, tells which mapping is loaded."""
+        """`cell` is the model name; `fingerprint`, in hexadecimal, says which mapping is loaded."""
         texts = {
             ObjectId.VENDOR_NAME: "gatewayd",
             ObjectId.PRODUCT_CODE: "gatewayd",
@@ -85,7 +85,7 @@ class Identification:
         body = bytearray()
         count = more = following = 0
         for key, content in objects:
-            if _HEAD_SIZE + len(body) + _OBJECT_HEAD_SIZE + len(content) > _GREATEST_PDU:
+            if _HEAD_SIZE + len(body) + _OBJECT_HEAD_SIZE + len(content) > _MAX_PDU:
                 more, following = _MORE_FOLLOWS, key
                 break
             body += bytes((key, len(content))) + content
@@ -94,6 +94,4 @@ class Identification:
 
 
 def _encoded(texts: Mapping[ObjectId, str]) -> dict[int, bytes]:
-    return {
-        int(key): text.encode("ascii", "replace")[:_GREATEST_OBJECT] for key, text in sorted(texts.items())
-    }
+    return {int(key): text.encode("ascii", "replace")[:_MAX_OBJECT] for key, text in sorted(texts.items())}

@@ -14,6 +14,7 @@ import socket
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from gatewayd.loop.progress import wait_with_progress
 from gatewayd.rtde.claims import InputRecipe
 from gatewayd.rtde.connection import ClientHandler, Connection, Tolerances
 from gatewayd.rtde.lists import ListMemory
@@ -23,7 +24,6 @@ from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.resolve import resolve
 from gatewayd.rtde.types import DEFAULT_PORT
-from gatewayd.turning import turning
 
 __all__ = [
     "ClientHandler",
@@ -158,14 +158,16 @@ class RtdeClient:
             if lasted > self._settings.backoff_limit:
                 delay = self._settings.backoff
             self._handler.session_lost(replace(loss, attempts=attempts, retry_in=delay))
-            await turning(asyncio.sleep(delay), self._turn, delay)
+            await wait_with_progress(asyncio.sleep(delay), self._count, delay)
             delay = min(2 * delay, self._settings.backoff_limit)
 
     async def _session(self) -> tuple[Loss, float]:
         """One connection: how it ended, and for how long a session was up."""
         wishes = self._wishes()
         try:
-            connection = await turning(self._connect(wishes), self._turn, self._settings.connect_timeout)
+            connection = await wait_with_progress(
+                self._connect(wishes), self._count, self._settings.connect_timeout
+            )
         except OSError as error:
             return connect_failure(error, self._address), 0.0
         self._connection = connection
@@ -226,8 +228,8 @@ class RtdeClient:
                 with contextlib.suppress(OSError):
                     candidate.setsockopt(socket.IPPROTO_TCP, option, value)
 
-    def _turn(self) -> None:
-        self.statistics.turns += 1
+    def _count(self) -> None:
+        self.statistics.progress += 1
 
     def _wishes(self) -> Wishes:
         settings = self._settings

@@ -20,7 +20,7 @@ from gatewayd.rtde.messages import (
     TextLevel,
     TextMessage,
 )
-from gatewayd.rtde.negotiation import TIMESTAMP, Event, Negotiation, Session, Wishes
+from gatewayd.rtde.negotiation import TIMESTAMP, Negotiation, Notice, Session, Wishes
 from gatewayd.rtde.pace import Pace, Statistics
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.types import DataType
@@ -35,7 +35,7 @@ _GOODBYE = 0.2
 
 
 class ClientHandler(Protocol):
-    """What the user of a client is told, by synchronous calls from the event loop. They must not block.
+    """What the user of a client gets to know, by synchronous calls from the event loop. They must not block.
 
     An exception from one of them ends the client: `RtdeClient.run` raises it.
     """
@@ -331,12 +331,12 @@ class Connection(asyncio.Protocol):
         self._probe = None
         self._guarded(lambda: self._handler.probed(math.inf))
 
-    _EVENTS: ClassVar[dict[Event, Callable[[Connection], None]]] = {
-        Event.STARTED: _started,
-        Event.INPUTS_CHANGED: _inputs_changed,
-        Event.PAUSED: _pause_answered,
-        Event.RESUMED: _pause_answered,
-        Event.PROBED: _probe_answered,
+    _EVENTS: ClassVar[dict[Notice, Callable[[Connection], None]]] = {
+        Notice.STARTED: _started,
+        Notice.INPUTS_CHANGED: _inputs_changed,
+        Notice.PAUSED: _pause_answered,
+        Notice.RESUMED: _pause_answered,
+        Notice.PROBED: _probe_answered,
     }
 
     # sending
@@ -388,7 +388,7 @@ class Connection(asyncio.Protocol):
         self._heard = self._loop.time()
 
     def _watch(self) -> None:
-        self._statistics.turns += 1
+        self._statistics.progress += 1
         now = self._loop.time()
         silence = now - self._heard
         if self._negotiation.running and silence > self._patience:

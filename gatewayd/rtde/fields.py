@@ -72,7 +72,7 @@ class SoftwareVersion(NamedTuple):
     def parse(cls, text: str) -> SoftwareVersion:
         """Read "5.12", "5.12.0" or "5.12.0.1101" (the build is dropped); ValueError for anything else."""
         parts = text.strip().split(".")
-        if not _LEAST_PARTS <= len(parts) <= _MOST_PARTS or not all(
+        if not _MIN_PARTS <= len(parts) <= _MOST_PARTS or not all(
             part.isascii() and part.isdigit() for part in parts
         ):
             msg = f"{text!r} is not a software version like 5.12 or 5.12.0"
@@ -80,7 +80,7 @@ class SoftwareVersion(NamedTuple):
         return cls(*(int(part) for part in parts[: _MOST_PARTS - 1]))
 
 
-_LEAST_PARTS = 2
+_MIN_PARTS = 2
 _MOST_PARTS = 4
 _NEVER = SoftwareVersion(1 << 30, 0)
 

@@ -50,11 +50,11 @@ from gatewayd.rtde.session import (
 __all__ = [
     "TIMESTAMP",
     "TOO_LONG",
-    "Event",
     "Negotiation",
+    "NextStep",
+    "Notice",
     "Session",
     "State",
-    "Step",
     "Unavailable",
     "Wishes",
 ]
@@ -84,7 +84,7 @@ class State(Enum):
     RESUMING = "the answer to the restart"
 
 
-class Event(Enum):
+class Notice(Enum):
     """Something to report to the user of the client."""
 
     STARTED = auto()
@@ -94,14 +94,14 @@ class Event(Enum):
     PROBED = auto()
 
 
-class Step(NamedTuple):
+class NextStep(NamedTuple):
     """What follows from a message."""
 
     send: ExecutableMessage | None = None
-    event: Event | None = None
+    event: Notice | None = None
 
 
-_NOTHING = Step()
+_NOTHING = NextStep()
 _AT_REST = frozenset({State.RUNNING, State.PAUSED})
 _BEFORE_PROBES = frozenset({State.NEW, State.VERSION_2, State.VERSION_1, State.CONTROLLER})
 
@@ -168,7 +168,7 @@ class Negotiation:
         self.state = State.VERSION_2
         return RequestProtocolVersion(2)
 
-    def handle(self, message: ControllerMessage) -> Step:
+    def handle(self, message: ControllerMessage) -> NextStep:
         """Take an answer; a data package out of season is no matter."""
         action = self._TABLE.get((self.state, type(message)))
         if action is not None:
@@ -192,7 +192,7 @@ class Negotiation:
         return None if self.waiting else self.claims.request()
 
     def probe(self) -> ExecutableMessage | None:
-        """Ask for an answer that comes behind everything the controller sent before; `Event.PROBED` when it is there.
+        """Ask for an answer that comes behind everything the controller sent before; `Notice.PROBED` when it is there.
 
         None before the session is complete. An answer that is still due to an earlier probe is waited for first.
         """
@@ -218,7 +218,7 @@ class Negotiation:
         return Start()
 
     def session(self, round_trip: float = 0.0) -> Session:
-        """What has been agreed. Only after `Event.STARTED`."""
+        """What has been agreed. Only after `Notice.STARTED`."""
         assert self.controller is not None
         assert self._agreed is not None
         unread = self._reading.unread(self.claims.types)
@@ -237,24 +237,24 @@ class Negotiation:
 
     # the way to the session
 
-    def _version_2_answered(self, reply: ProtocolVersionReply) -> Step:
+    def _version_2_answered(self, reply: ProtocolVersionReply) -> NextStep:
         if reply.accepted:
             self._version = 2
             return self._go(State.CONTROLLER, GetControllerVersion())
         return self._go(State.VERSION_1, RequestProtocolVersion(1))
 
-    def _version_1_answered(self, reply: ProtocolVersionReply) -> Step:
+    def _version_1_answered(self, reply: ProtocolVersionReply) -> NextStep:
         if not reply.accepted:
             raise HandshakeError("the controller speaks neither protocol version 2 nor 1")
         return self._go(State.CONTROLLER, GetControllerVersion())
 
-    def _controller_answered(self, version: ControllerVersion) -> Step:
+    def _controller_answered(self, version: ControllerVersion) -> NextStep:
         self.controller = version
         if self._wishes.read_back and not self._reading.limited:
             return self._ask_outputs()
         return self._advance()
 
-    def _advance(self, event: Event | None = None) -> Step:
+    def _advance(self, event: Notice | None = None) -> NextStep:
         """The next thing to do while no output runs: claim, read, set up the working recipe, start it."""
         request = self._claim()
         if request is not None:
@@ -286,13 +286,13 @@ class Negotiation:
         """Fields that have a recipe of their own."""
         return frozenset(key for key, held in self.claims.recipes.items() if held.recipe.names == (key,))
 
-    def _ask_outputs(self, event: Event | None = None) -> Step:
+    def _ask_outputs(self, event: Notice | None = None) -> NextStep:
         names = self._agreed.names if self._agreed is not None else self._reading.working()
         if not names:
             raise HandshakeError("the controller offers none of the wanted outputs")
         return self._set_up(State.OUTPUTS, names, event)
 
-    def _set_up(self, state: State, names: tuple[str, ...], event: Event | None) -> Step:
+    def _set_up(self, state: State, names: tuple[str, ...], event: Notice | None) -> NextStep:
         self._asked = names
         return self._go(state, SetupOutputs(names, self._frequency()), event)
 
@@ -307,7 +307,7 @@ class Negotiation:
         self._period = (rate // frequency) / rate
         return frequency
 
-    def _outputs_answered(self, reply: OutputsSetup) -> Step:
+    def _outputs_answered(self, reply: OutputsSetup) -> NextStep:
         names = self._asked
         if reply.recipe == 0 and NOT_FOUND not in reply.types and is_long(names):
             return self._list_refused()
@@ -326,30 +326,30 @@ class Negotiation:
             self.claims.separate(name for name in self._reading.refused if name.startswith("input_"))
         return self._advance()
 
-    def _list_refused(self) -> Step:
+    def _list_refused(self) -> NextStep:
         if self._agreed is not None:
             raise HandshakeError("the controller refuses an output recipe that it had accepted")
         self._reading.limited = True
         self.claims.limit()
         return self._advance()
 
-    def _inputs_answered(self, reply: InputsSetup) -> Step:
+    def _inputs_answered(self, reply: InputsSetup) -> NextStep:
         self._take_claim(reply)
         return self._advance()
 
-    def _started(self, message: StartReply | DataPackage) -> Step:
+    def _started(self, message: StartReply | DataPackage) -> NextStep:
         if isinstance(message, DataPackage):
             assert self._outputs is not None
             if len(message.payload) != self._outputs.size:
                 return _NOTHING
         elif not message.accepted:
             return self._start_refused()
-        event = Event.RESUMED if self.state is State.RESUMING else self._complete()
+        event = Notice.RESUMED if self.state is State.RESUMING else self._complete()
         if not self._run:
             return self._go(State.PAUSING, Pause(), event)
         return self._rest(State.RUNNING, event)
 
-    def _start_refused(self) -> Step:
+    def _start_refused(self) -> NextStep:
         """In version 1 the answer to a list has no place for a refusal: it shows here."""
         if self._agreed is not None or self._outputs is None or not is_long(self._outputs.names):
             raise HandshakeError("the controller refused to start the output")
@@ -357,16 +357,16 @@ class Negotiation:
         self.took_long_list = False
         return self._list_refused()
 
-    def _complete(self) -> Event:
+    def _complete(self) -> Notice:
         """The working recipe is set up and, if wanted, started: what that is to the user."""
         self._agreed = self._outputs
-        event = Event.INPUTS_CHANGED if self._reported else Event.STARTED
+        event = Notice.INPUTS_CHANGED if self._reported else Notice.STARTED
         self._reported = True
         return event
 
     # readings
 
-    def _piece_answered(self, reply: OutputsSetup) -> Step:
+    def _piece_answered(self, reply: OutputsSetup) -> NextStep:
         types, refused = sort_types(self._asked, reply.types)
         if refused:
             self._reading.refuse(refused)
@@ -378,69 +378,69 @@ class Negotiation:
         self._reading.expect(Recipe(self._asked, types))
         return self._go(State.READING_START, Start())
 
-    def _reading_started(self, message: StartReply | DataPackage) -> Step:
+    def _reading_started(self, message: StartReply | DataPackage) -> NextStep:
         """A package before the answer proves the start; the reading is the next, which surely is of this piece."""
         if isinstance(message, StartReply) and not message.accepted:
             raise HandshakeError("the controller refused to start the output of a reading")
         return self._go(State.READING, None)
 
-    def _read(self, package: DataPackage) -> Step:
+    def _read(self, package: DataPackage) -> NextStep:
         if not self._reading.take(package.payload):
             return _NOTHING
         return self._go(State.READING_PAUSE, Pause())
 
-    def _reading_paused(self, _: PauseReply) -> Step:
+    def _reading_paused(self, _: PauseReply) -> NextStep:
         return self._advance()
 
     # while there is a session
 
-    def _more_inputs_answered(self, reply: InputsSetup) -> Step:
+    def _more_inputs_answered(self, reply: InputsSetup) -> NextStep:
         self._take_claim(reply)
         return self._settle()
 
-    def _settle(self, event: Event | None = None) -> Step:
+    def _settle(self, event: Notice | None = None) -> NextStep:
         """Go on with claims; when there are no more, read what is new, or report the change."""
         if self.claims.busy:
-            return Step(self.claims.request(), event)
+            return NextStep(self.claims.request(), event)
         request = self._claim()
         if request is not None:
-            return Step(request, event)
+            return NextStep(request, event)
         if not self._reading.piece(self.claims.types):
             changed = event is None and self.claims.take_change()
-            return Step(None, Event.INPUTS_CHANGED if changed else event)
+            return NextStep(None, Notice.INPUTS_CHANGED if changed else event)
         if self.state is State.RUNNING:
             return self._go(State.READING_PAUSE, Pause(), event)
-        return self._advance(event) if self.state is State.PAUSED else Step(None, event)
+        return self._advance(event) if self.state is State.PAUSED else NextStep(None, event)
 
-    def _rest(self, state: State, event: Event) -> Step:
+    def _rest(self, state: State, event: Notice) -> NextStep:
         """Nothing is due but what has come up meanwhile."""
         self.state = state
         return self._settle(event)
 
-    def _started_late(self, message: StartReply) -> Step:
+    def _started_late(self, message: StartReply) -> NextStep:
         if not message.accepted:
             raise HandshakeError("the controller refused to start the output")
         return _NOTHING
 
-    def _paused(self, _: PauseReply) -> Step:
+    def _paused(self, _: PauseReply) -> NextStep:
         if self._run:
-            return self._go(State.RESUMING, Start(), Event.PAUSED)
-        return self._rest(State.PAUSED, Event.PAUSED)
+            return self._go(State.RESUMING, Start(), Notice.PAUSED)
+        return self._rest(State.PAUSED, Notice.PAUSED)
 
-    def _probed(self, version: ControllerVersion) -> Step:
+    def _probed(self, version: ControllerVersion) -> NextStep:
         if not self._probes:
             raise self._misplaced(version)
         self._probes -= 1
-        return _NOTHING if self._probes else Step(None, Event.PROBED)
+        return _NOTHING if self._probes else NextStep(None, Notice.PROBED)
 
     def _take_claim(self, reply: InputsSetup) -> None:
         asked = self.claims.asked
         self.claims.answer(reply)
         self.took_long_list |= bool(reply.recipe) and is_long(asked)
 
-    def _go(self, state: State, send: ExecutableMessage | None, event: Event | None = None) -> Step:
+    def _go(self, state: State, send: ExecutableMessage | None, event: Notice | None = None) -> NextStep:
         self.state = state
-        return Step(send, event)
+        return NextStep(send, event)
 
     def _misplaced(self, message: ControllerMessage) -> HandshakeError:
         return HandshakeError(
@@ -460,7 +460,7 @@ class Negotiation:
         ]
         return (*outputs, *inputs)
 
-    _TABLE: ClassVar[Mapping[tuple[State, type], Callable[..., Step]]] = {
+    _TABLE: ClassVar[Mapping[tuple[State, type], Callable[..., NextStep]]] = {
         (State.VERSION_2, ProtocolVersionReply): _version_2_answered,
         (State.VERSION_1, ProtocolVersionReply): _version_1_answered,
         (State.CONTROLLER, ControllerVersion): _controller_answered,

@@ -28,7 +28,7 @@ class Statistics:
     """Input packages sent."""
     frequency: float = 0.0
     """Packages per second, measured lately."""
-    turns: int = 0
+    progress: int = 0
     """Moves several times a second while the client works, whatever the controller does."""
 
 

@@ -51,7 +51,7 @@ _UINT16 = struct.Struct(">H")
 _VERSION = struct.Struct(">4I")
 _DOUBLE = struct.Struct(">d")
 _MAX_TEXT = 0xFF
-_LEAST_TEXT = 3
+_MIN_TEXT = 3
 
 
 class MalformedPayloadError(Exception):
@@ -88,7 +88,7 @@ def _joined(names: tuple[str, ...]) -> bytes:
 
 
 def _decode_text(payload: bytes) -> TextMessage:
-    _at_least(payload, _LEAST_TEXT)
+    _at_least(payload, _MIN_TEXT)
     end = 1 + payload[0]
     if end >= len(payload):
         msg = f"message length {payload[0]} reaches beyond the package"

@@ -6,7 +6,7 @@ import socket
 from contextlib import suppress
 from functools import partial
 
-from gatewayd.aside import aside
+from gatewayd.loop.threads import in_daemon_thread
 
 __all__ = ["SocketAddress", "resolve"]
 
@@ -28,7 +28,7 @@ async def resolve(host: str, port: int) -> _Found:
     """
     with suppress(socket.gaierror):
         return _lookup(host, port, socket.AI_NUMERICHOST)
-    return await aside(partial(_lookup, host, port), f"resolve {host}")
+    return await in_daemon_thread(partial(_lookup, host, port), f"resolve {host}")
 
 
 def _lookup(host: str, port: int, flags: int = 0) -> _Found:

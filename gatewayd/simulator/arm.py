@@ -14,8 +14,8 @@ from typing import NamedTuple
 __all__ = [
     "ELBOW",
     "FLANGE",
+    "ControllerMoment",
     "Frames",
-    "Moment",
     "Vector",
     "acceleration",
     "frames",
@@ -34,7 +34,7 @@ FLANGE = 6
 """Index of the tool flange's frame."""
 
 
-class Moment(NamedTuple):
+class ControllerMoment(NamedTuple):
     """A point in time of the simulated controller."""
 
     step: int

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
 
-__all__ = ["Claims"]
+__all__ = ["ControllerClaims"]
 
 
-class Claims:
+class ControllerClaims:
     """The claims of one controller."""
 
     def __init__(self) -> None:

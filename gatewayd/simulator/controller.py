@@ -10,13 +10,13 @@ from collections.abc import Hashable, Iterable, Sequence
 
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series, SoftwareVersion
 from gatewayd.rtde.types import DataType
-from gatewayd.simulator.arm import Moment
-from gatewayd.simulator.claims import Claims
+from gatewayd.simulator.arm import ControllerMoment
+from gatewayd.simulator.claims import ControllerClaims
 from gatewayd.simulator.faults import ADAPTER_FIELDS, ADAPTERS, Faults
 from gatewayd.simulator.interpreter import Interpreter
-from gatewayd.simulator.program import Rule
+from gatewayd.simulator.program import ProgramRule
 from gatewayd.simulator.signals import CYCLE_FIELDS, INITIAL, SIGNALS
-from gatewayd.simulator.store import Scalar, Store
+from gatewayd.simulator.store import FieldStore, Scalar
 
 __all__ = ["DEFAULT_UPTIME", "DEFAULT_VERSIONS", "INTERNAL", "Controller"]
 
@@ -53,7 +53,7 @@ class Controller:
         *,
         frequency: float | None = None,
         uptime: float | None = None,
-        program: Iterable[Rule] = (),
+        program: Iterable[ProgramRule] = (),
         faults: Faults | None = None,
     ) -> None:
         self.series = series
@@ -65,8 +65,8 @@ class Controller:
         """Control cycles per second."""
         self.cycle = 0
         """Cycles run. Unlike the step counter it goes on while the controller is frozen."""
-        self.claims = Claims()
-        self.store = Store(
+        self.claims = ControllerClaims()
+        self.store = FieldStore(
             {name: field.type for name, field in {**INPUTS, **OUTPUTS}.items()}, SIGNALS, INITIAL
         )
         self._overwritten: dict[str, tuple[Scalar, ...]] = {}
@@ -206,4 +206,4 @@ class Controller:
         return running
 
     def _set_step(self, step: int, path: float, rate: float) -> None:
-        self.store.moment = Moment(step, step / self.rate, path, rate)
+        self.store.moment = ControllerMoment(step, step / self.rate, path, rate)

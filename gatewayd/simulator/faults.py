@@ -17,10 +17,10 @@ __all__ = [
     "STRICT_LIST_BYTES",
     "DropAt",
     "DroppedError",
+    "FaultStep",
     "Faults",
     "LongLists",
     "Mangler",
-    "Step",
 ]
 
 STRICT_LIST_BYTES = 2048
@@ -64,7 +64,7 @@ class LongLists(Enum):
     """Close the connection."""
 
 
-class Step(Enum):
+class FaultStep(Enum):
     """A step of a connection: a request, by what it asks for, or the sending of a data package."""
 
     VERSION = "version"
@@ -82,7 +82,7 @@ class Step(Enum):
 class DropAt(NamedTuple):
     """The step at which connections are closed, before it is answered or sent."""
 
-    step: Step
+    step: FaultStep
     number: int = 1
     """Which one of its kind on a connection."""
 
@@ -90,7 +90,7 @@ class DropAt(NamedTuple):
     def parse(cls, text: str) -> DropAt:
         """Read "outputs" or "outputs:2"; ValueError names what is possible."""
         word, _, number = text.partition(":")
-        steps = {step.value: step for step in Step}
+        steps = {step.value: step for step in FaultStep}
         if word not in steps or not (number or "1").isdecimal() or int(number or "1") < 1:
             message = f"{text!r} is not STEP or STEP:NUMBER with a step out of {', '.join(steps)}"
             raise ValueError(message)
@@ -144,7 +144,7 @@ class Faults:
     silence: bool = False
     """No data packages; everything else is answered."""
 
-    def drops(self, step: Step, number: int) -> bool:
+    def drops(self, step: FaultStep, number: int) -> bool:
         """Whether the connection is to be closed at this step, its `number`th of the kind; counts those closed."""
         if self.drop_at != (step, number) or self.drop_times < 1:
             return False

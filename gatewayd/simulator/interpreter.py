@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Callable, Container, Iterable
 
 from gatewayd.rtde.types import DataType
-from gatewayd.simulator.program import Operation, Reference, Rule
+from gatewayd.simulator.program import FieldReference, ProgramRule, RuleOperation
 from gatewayd.simulator.signals import CYCLE_FIELDS
-from gatewayd.simulator.store import Scalar, Store, fitting
+from gatewayd.simulator.store import FieldStore, Scalar, fitting
 
 __all__ = ["Interpreter"]
 
@@ -29,7 +29,7 @@ class Interpreter:
     """
 
     def __init__(
-        self, rules: Iterable[Rule], store: Store, base_rate: float, protected: Container[str]
+        self, rules: Iterable[ProgramRule], store: FieldStore, base_rate: float, protected: Container[str]
     ) -> None:
         self._store = store
         self._cells = store.cells
@@ -62,7 +62,7 @@ class Interpreter:
             step()
         self._store.edition += 1
 
-    def _copy(self, rule: Rule) -> _Copy | None:
+    def _copy(self, rule: ProgramRule) -> _Copy | None:
         """Where a rule copies between equal cells, if that is all it does."""
         target, source = self._target(rule.target), rule.input
         if source is None or not rule.plain or rule.target.of_bit or source.of_bit:
@@ -85,18 +85,18 @@ class Interpreter:
 
         return step
 
-    def _assignment(self, rule: Rule) -> Callable[[], None]:
+    def _assignment(self, rule: ProgramRule) -> Callable[[], None]:
         value, write = self._value(rule), self._writer(rule.target)
         return lambda: write(value())
 
-    def _value(self, rule: Rule) -> _Read:
-        if rule.operation is Operation.CONSTANT:
+    def _value(self, rule: ProgramRule) -> _Read:
+        if rule.operation is RuleOperation.CONSTANT:
             return lambda: rule.offset
-        if rule.operation in (Operation.COUNT, Operation.TOGGLE):
+        if rule.operation in (RuleOperation.COUNT, RuleOperation.TOGGLE):
             return self._edges(rule)
         assert rule.input is not None
         read = self._reader(rule.input)
-        if rule.operation is Operation.NOT:
+        if rule.operation is RuleOperation.NOT:
             read = _inverted(read)
         elif rule.scale != 1 or rule.offset:
             read = _scaled(read, rule.scale, rule.offset)
@@ -104,11 +104,11 @@ class Interpreter:
             read = self._delayed(read, self._cycles(rule.after))
         return self._pulse(read, self._cycles(rule.pulse)) if rule.pulse else read
 
-    def _edges(self, rule: Rule) -> _Read:
+    def _edges(self, rule: ProgramRule) -> _Read:
         """Counts or toggles from the target's own value, so that writing it from outside sets the counter."""
         own = self._reader(rule.target)
         happened = self._rising(self._reader(rule.input)) if rule.input else self._interval(rule.every)
-        if rule.operation is Operation.TOGGLE:
+        if rule.operation is RuleOperation.TOGGLE:
             return lambda: not own() if happened() else own()
         greatest = 0x7FFF_FFFF
         return lambda: ((own() + 1) if own() < greatest else 0) if happened() else own()
@@ -165,13 +165,13 @@ class Interpreter:
     def _cycles(self, seconds: float) -> int:
         return max(1, round(seconds * self._rate))
 
-    def _reader(self, reference: Reference) -> _Read:
+    def _reader(self, reference: FieldReference) -> _Read:
         cells, at, bit = self._cells, self._cell(reference), reference.part
         if reference.of_bit:
             return lambda: int(cells[at]) >> (bit or 0) & 1
         return lambda: cells[at]
 
-    def _writer(self, reference: Reference) -> _Write:
+    def _writer(self, reference: FieldReference) -> _Write:
         cells, at, code = self._cells, self._target(reference), self._type(reference).code
         if not reference.of_bit:
 
@@ -186,7 +186,7 @@ class Interpreter:
 
         return write_bit
 
-    def _target(self, reference: Reference) -> int:
+    def _target(self, reference: FieldReference) -> int:
         at = self._cell(reference)
         if reference.field in self._protected:
             raise reference.error(f"{reference.field} is a controller input: only clients write it")
@@ -196,12 +196,12 @@ class Interpreter:
             self._store.pin(reference.field, self._store.read(reference.field))
         return at
 
-    def _type(self, reference: Reference) -> DataType:
+    def _type(self, reference: FieldReference) -> DataType:
         if reference.field not in self._store:
             raise reference.error(f"the controller has no field {reference.field!r}")
         return self._store.type(reference.field)
 
-    def _cell(self, reference: Reference) -> int:
+    def _cell(self, reference: FieldReference) -> int:
         kind, part = self._type(reference), reference.part
         start = self._store.place(reference.field).start
         if part is None or reference.of_bit:

@@ -7,10 +7,10 @@ from collections import deque
 
 from gatewayd.simulator.faults import Faults
 
-__all__ = ["Line"]
+__all__ = ["OutgoingLine"]
 
 
-class Line:
+class OutgoingLine:
     """Hands bytes to a transport in their order; `faults.delay` counts when they are written."""
 
     def __init__(self, transport: asyncio.Transport, faults: Faults) -> None:

@@ -10,11 +10,11 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 
 from gatewayd.rtde.companions import COMPANIONS
-from gatewayd.simulator.store import Store
+from gatewayd.simulator.store import FieldStore
 
 __all__ = ["Effect", "effects"]
 
-Effect = Callable[[Store], None]
+Effect = Callable[[FieldStore], None]
 """Makes the outputs follow the inputs that the store now holds."""
 
 _MILLIAMPERES = (4.0, 16.0)  # at ratio 0, and the span to ratio 1
@@ -27,16 +27,16 @@ def effects(fields: Iterable[str]) -> tuple[Effect, ...]:
     return tuple(dict.fromkeys(_EFFECTS[field] for field in fields if field in _EFFECTS))
 
 
-def _integer(store: Store, field: str) -> int:
+def _integer(store: FieldStore, field: str) -> int:
     return int(store.read(field)[0]) if field in store else 0
 
 
-def _take_bits(store: Store, field: str, mask: int, bits: int) -> None:
+def _take_bits(store: FieldStore, field: str, mask: int, bits: int) -> None:
     if field in store:
         store.write(field, ((_integer(store, field) & ~mask) | (bits & mask),))
 
 
-def _speed_slider(store: Store) -> None:
+def _speed_slider(store: FieldStore) -> None:
     fraction = store.read("speed_slider_fraction")[0]
     if _integer(store, "speed_slider_mask") & 1 and not math.isnan(fraction):
         store.write("target_speed_fraction", (min(max(fraction, 0.0), 1.0),))
@@ -45,7 +45,7 @@ def _speed_slider(store: Store) -> None:
 def _digital(kind: str, shift: int, width: int, own_field: str | None = None) -> Effect:
     """Outputs of one kind, at bit `shift` of actual_digital_output_bits and from bit 0 of `own_field`."""
 
-    def effect(store: Store) -> None:
+    def effect(store: FieldStore) -> None:
         mask = _integer(store, f"{kind}_digital_output_mask") & ((1 << width) - 1)
         bits = _integer(store, f"{kind}_digital_output")
         _take_bits(store, "actual_digital_output_bits", mask << shift, bits << shift)
@@ -55,7 +55,7 @@ def _digital(kind: str, shift: int, width: int, own_field: str | None = None) ->
     return effect
 
 
-def _analog(store: Store) -> None:
+def _analog(store: FieldStore) -> None:
     mask = _integer(store, "standard_analog_output_mask")
     volts = _integer(store, "standard_analog_output_type")
     for number in (0, 1):

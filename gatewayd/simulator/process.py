@@ -1,4 +1,4 @@
-"""The simulator as a process of its own: signals, the line that tells the port, commands from standard input."""
+"""The simulator as a process of its own: signals, the line with the port, commands from standard input."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
-__all__ = ["DEMO", "Operation", "ProgramError", "Reference", "Rule", "parse"]
+__all__ = ["DEMO", "FieldReference", "ProgramError", "ProgramRule", "RuleOperation", "parse"]
 
 DEMO = """\
 output_bit_registers0_to_31 = input_bit_registers0_to_31
@@ -49,7 +49,7 @@ class ProgramError(ValueError):
         """Column of the line, from 1."""
 
 
-class Operation(Enum):
+class RuleOperation(Enum):
     """What a rule makes of its source."""
 
     ECHO = "echo"
@@ -60,7 +60,7 @@ class Operation(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class FieldReference:
     """One value a rule reads or writes."""
 
     field: str
@@ -77,12 +77,12 @@ class Reference:
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class ProgramRule:
     """One assignment. Durations in seconds, 0 = none."""
 
-    target: Reference
-    operation: Operation
-    input: Reference | None = None
+    target: FieldReference
+    operation: RuleOperation
+    input: FieldReference | None = None
     """What is read; None for a constant and for `every`."""
     scale: float = 1.0
     offset: float = 0.0
@@ -95,12 +95,12 @@ class Rule:
     def plain(self) -> bool:
         """Whether the source is passed on as it is."""
         altered = self.scale != 1 or self.offset != 0 or self.after or self.pulse
-        return self.operation is Operation.ECHO and not altered
+        return self.operation is RuleOperation.ECHO and not altered
 
 
-def parse(text: str, source: str = "program") -> tuple[Rule, ...]:
+def parse(text: str, source: str = "program") -> tuple[ProgramRule, ...]:
     """The rules of `text`, ranges expanded. `source` names it in a ProgramError."""
-    rules: list[Rule] = []
+    rules: list[ProgramRule] = []
     for number, line in enumerate(text.splitlines(), 1):
         start = 0
         for statement in line.split("#", 1)[0].split(";"):
@@ -133,7 +133,7 @@ class _Statement:
         self._tokens = list(self._tokenize(text, start))
         self._at = 0
 
-    def rules(self) -> Iterator[Rule]:
+    def rules(self) -> Iterator[ProgramRule]:
         targets = self._references("a target")
         self._sign("=", needed=True)
         shape, inputs = self._expression(targets)
@@ -142,23 +142,25 @@ class _Statement:
         for target, item in zip(targets, inputs, strict=True):
             yield replace(shape, target=target, input=item)
 
-    def _expression(self, targets: list[Reference]) -> tuple[Rule, Sequence[Reference | None]]:
+    def _expression(
+        self, targets: list[FieldReference]
+    ) -> tuple[ProgramRule, Sequence[FieldReference | None]]:
         """A rule for the first target, and the source of each target."""
         first, count = targets[0], len(targets)
         nothing = [None] * count
-        for word in (Operation.COUNT, Operation.TOGGLE):
+        for word in (RuleOperation.COUNT, RuleOperation.TOGGLE):
             if self._word(word.value):
                 if self._word("every"):
-                    return Rule(first, word, every=self._duration()), nothing
-                return Rule(first, word), self._inputs(count)
+                    return ProgramRule(first, word, every=self._duration()), nothing
+                return ProgramRule(first, word), self._inputs(count)
         if self._kind() in ("number", "sign"):
-            return Rule(first, Operation.CONSTANT, offset=self._signed()), nothing
-        operation = Operation.NOT if self._word("not") else Operation.ECHO
+            return ProgramRule(first, RuleOperation.CONSTANT, offset=self._signed()), nothing
+        operation = RuleOperation.NOT if self._word("not") else RuleOperation.ECHO
         inputs = self._inputs(count)
-        scale, offset = (1.0, 0.0) if operation is Operation.NOT else self._line_equation()
+        scale, offset = (1.0, 0.0) if operation is RuleOperation.NOT else self._line_equation()
         after = self._duration() if self._word("after") else 0.0
         pulse = self._duration() if self._word("for") else 0.0
-        return Rule(first, operation, scale=scale, offset=offset, after=after, pulse=pulse), inputs
+        return ProgramRule(first, operation, scale=scale, offset=offset, after=after, pulse=pulse), inputs
 
     def _line_equation(self) -> tuple[float, float]:
         scale = self._signed() if self._sign("*") else 1.0
@@ -166,7 +168,7 @@ class _Statement:
             return scale, self._signed()
         return scale, -self._signed() if self._sign("-") else 0.0
 
-    def _inputs(self, count: int) -> list[Reference]:
+    def _inputs(self, count: int) -> list[FieldReference]:
         column = self._column()
         inputs = self._references("a source")
         if len(inputs) != count:
@@ -174,7 +176,7 @@ class _Statement:
             raise ProgramError(self._source, self._line, column, message)
         return inputs
 
-    def _references(self, wanted: str) -> list[Reference]:
+    def _references(self, wanted: str) -> list[FieldReference]:
         if self._kind() != "name" or self._text() in _WORDS:
             raise self._error(f"expected {wanted}" + (f", not {self._text()!r}" if self._kind() else ""))
         parts = _NAME.fullmatch(self._text())
@@ -190,14 +192,14 @@ class _Statement:
         numbers = [first or ""] if last is None else [str(n) for n in range(int(first), int(last) + 1)]
         return [self._reference(stem + number, parts["element"], parts["bit"], column) for number in numbers]
 
-    def _reference(self, name: str, element: str | None, bit: str | None, column: int) -> Reference:
+    def _reference(self, name: str, element: str | None, bit: str | None, column: int) -> FieldReference:
         reserved = _RESERVED_BIT.fullmatch(name)
         if reserved and int(reserved[2]) < 64 and bit is None and element is None:
             word, number = divmod(int(reserved[2]), 32)
             name = f"{reserved[1]}_bit_registers{32 * word}_to_{32 * word + 31}"
-            return Reference(name, number, True, self._source, self._line, column)
+            return FieldReference(name, number, True, self._source, self._line, column)
         part = element if bit is None else bit
-        return Reference(
+        return FieldReference(
             name, None if part is None else int(part), bit is not None, self._source, self._line, column
         )
 

@@ -18,15 +18,15 @@ from gatewayd.rtde.messages import TextLevel
 from gatewayd.rtde.types import DEFAULT_PORT
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import DroppedError, Faults, Mangler
-from gatewayd.simulator.line import Line
-from gatewayd.simulator.session import Session
+from gatewayd.simulator.line import OutgoingLine
+from gatewayd.simulator.session import SimulatorSession
 from gatewayd.simulator.store import Scalar
 
-__all__ = ["DEFAULT_PORT", "MAKE_UP", "MOST_CONNECTIONS", "SimulatedController"]
+__all__ = ["DEFAULT_PORT", "MAKE_UP", "MAX_CONNECTIONS", "SimulatedController"]
 
 MAKE_UP = 25
 """Cycles of lateness that are made up for."""
-MOST_CONNECTIONS = 16
+MAX_CONNECTIONS = 16
 """Clients served at a time unless told otherwise."""
 
 _SHORTEST_CYCLE = 0.75  # of a period, before the timer's error
@@ -50,7 +50,7 @@ class SimulatedController:
         *,
         host: str = "127.0.0.1",
         port: int = 0,
-        connections: int = MOST_CONNECTIONS,
+        connections: int = MAX_CONNECTIONS,
     ) -> None:
         self.controller = controller or Controller()
         self.host = host
@@ -240,9 +240,11 @@ class _Connection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.Transport", transport)
         self._socket = cast("socket.socket", transport.get_extra_info("socket"))
-        self._line = Line(self._transport, self._server.faults)
+        self._line = OutgoingLine(self._transport, self._server.faults)
         peer = transport.get_extra_info("peername") or ("?", 0)
-        self._session = Session(self._server.controller, f"client {self._number} ({peer[0]}:{peer[1]})")
+        self._session = SimulatorSession(
+            self._server.controller, f"client {self._number} ({peer[0]}:{peer[1]})"
+        )
         if not self._server.enter(self._number, self):
             self.abort("too many connections")
             return

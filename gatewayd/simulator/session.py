@@ -37,11 +37,11 @@ from gatewayd.rtde.messages import (
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.controller import Controller
-from gatewayd.simulator.faults import STRICT_LIST_BYTES, DroppedError, LongLists, Step
+from gatewayd.simulator.faults import STRICT_LIST_BYTES, DroppedError, FaultStep, LongLists
 from gatewayd.simulator.masks import Effect, effects
-from gatewayd.simulator.store import Store, View
+from gatewayd.simulator.store import FieldStore, RecipeView
 
-__all__ = ["MOST_INPUT_RECIPES", "SOURCE", "Session"]
+__all__ = ["MOST_INPUT_RECIPES", "SOURCE", "SimulatorSession"]
 
 MOST_INPUT_RECIPES = 255
 """Per connection; ids count from 1, 0 says refused."""
@@ -50,14 +50,14 @@ SOURCE = "URControl"
 
 _OUTPUT_RECIPE = 1
 _DATA_HEAD = 4
-_STEPS: Mapping[type, Step] = {
-    RequestProtocolVersion: Step.VERSION,
-    GetControllerVersion: Step.CONTROLLER,
-    SetupOutputs: Step.OUTPUTS,
-    SetupInputs: Step.INPUTS,
-    Start: Step.START,
-    Pause: Step.PAUSE,
-    DataPackage: Step.WRITE,
+_STEPS: Mapping[type, FaultStep] = {
+    RequestProtocolVersion: FaultStep.VERSION,
+    GetControllerVersion: FaultStep.CONTROLLER,
+    SetupOutputs: FaultStep.OUTPUTS,
+    SetupInputs: FaultStep.INPUTS,
+    Start: FaultStep.START,
+    Pause: FaultStep.PAUSE,
+    DataPackage: FaultStep.WRITE,
 }
 _log = logging.getLogger(__name__)
 
@@ -70,7 +70,7 @@ class _InputRecipe:
     cells: tuple[int, ...]
     effects: tuple[Effect, ...]
 
-    def apply(self, payload: bytes, store: Store) -> None:
+    def apply(self, payload: bytes, store: FieldStore) -> None:
         """ProtocolError if the payload has not the recipe's length; nothing is written then."""
         cells = store.cells
         for cell, value in zip(self.cells, self.recipe.unpack(payload), strict=True):
@@ -80,7 +80,7 @@ class _InputRecipe:
             effect(store)
 
 
-class Session:
+class SimulatorSession:
     """The protocol state of one connection. Owner of its claims; `str` names it in the log."""
 
     def __init__(self, controller: Controller, name: str) -> None:
@@ -88,10 +88,10 @@ class Session:
         self._name = name
         self._protocol = ControllerProtocol()
         self._inputs: list[_InputRecipe] = []
-        self._view: View | None = None
+        self._view: RecipeView | None = None
         self._period = 1
         self._started = False
-        self._steps: Counter[Step] = Counter()
+        self._steps: Counter[FaultStep] = Counter()
         self._out: list[bytes] = []
 
     def __str__(self) -> str:
@@ -131,7 +131,7 @@ class Session:
             return b""
         if controller.cycle % self._period:
             return b""
-        self._pass(Step.DATA)
+        self._pass(FaultStep.DATA)
         recipe = _OUTPUT_RECIPE if self._protocol.version > 1 else None
         return self._protocol.send(DataPackage(recipe, self._view.payload()))
 
@@ -139,7 +139,7 @@ class Session:
         """Give up every claim."""
         self._controller.claims.release(self)
 
-    def _pass(self, step: Step) -> None:
+    def _pass(self, step: FaultStep) -> None:
         self._steps[step] += 1
         if self._controller.faults.drops(step, self._steps[step]):
             message = f"fault at {step.value}:{self._steps[step]}"

@@ -11,11 +11,21 @@ import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from gatewayd.simulator.arm import ELBOW, Moment, Vector, acceleration, frames, joints, pose, thrust, twist
+from gatewayd.simulator.arm import (
+    ELBOW,
+    ControllerMoment,
+    Vector,
+    acceleration,
+    frames,
+    joints,
+    pose,
+    thrust,
+    twist,
+)
 
 __all__ = ["CYCLE_FIELDS", "INITIAL", "SIGNALS", "Signal"]
 
-Signal = Callable[[Moment], Vector]
+Signal = Callable[[ControllerMoment], Vector]
 """The elements of a field's value at a moment; a scalar has one."""
 
 CYCLE_FIELDS = frozenset({"timestamp", "control_step"})
@@ -33,36 +43,36 @@ _TRACKING_ERROR = 2e-5  # rad
 _SENSOR_RIPPLE = 0.35  # N, Nm/10
 
 
-def _ripple(moment: Moment, number: int) -> float:
+def _ripple(moment: ControllerMoment, number: int) -> float:
     """Repeatable noise of amplitude 1, different for each `number`."""
     phase = moment.time * (41.0 + 7.3 * number) + number
     return 0.6 * math.sin(phase) + 0.4 * math.sin(2.7 * phase)
 
 
-def _target_q(moment: Moment) -> Vector:
+def _target_q(moment: ControllerMoment) -> Vector:
     return joints(moment.path)[0]
 
 
-def _target_qd(moment: Moment) -> Vector:
+def _target_qd(moment: ControllerMoment) -> Vector:
     rate = moment.rate
     return tuple(speed * rate for speed in joints(moment.path)[1])
 
 
-def _target_qdd(moment: Moment) -> Vector:
+def _target_qdd(moment: ControllerMoment) -> Vector:
     square = moment.rate * moment.rate
     return tuple(change * square for change in joints(moment.path)[2])
 
 
-def _actual_q(moment: Moment) -> Vector:
+def _actual_q(moment: ControllerMoment) -> Vector:
     return tuple(q + _TRACKING_ERROR * _ripple(moment, n) for n, q in enumerate(_target_q(moment)))
 
 
-def _actual_qd(moment: Moment) -> Vector:
+def _actual_qd(moment: ControllerMoment) -> Vector:
     return tuple(qd + 0.001 * moment.rate * _ripple(moment, 6 + n) for n, qd in enumerate(_target_qd(moment)))
 
 
 @lru_cache(4)
-def _torques(moment: Moment) -> Vector:
+def _torques(moment: ControllerMoment) -> Vector:
     """Joint torques in Nm: gravity by the horizontal reach, inertia and friction."""
     (_, lift, elbow, wrist, *_), qd, qdd = _target_q(moment), _target_qd(moment), _target_qdd(moment)
     lever = (0.0, math.cos(lift), math.cos(lift + elbow), math.cos(lift + elbow + wrist), 0.3, 0.0)
@@ -70,40 +80,40 @@ def _torques(moment: Moment) -> Vector:
     return tuple(g * c + i * a + f * v for g, c, i, a, f, v in parts)
 
 
-def _target_current(moment: Moment) -> Vector:
+def _target_current(moment: ControllerMoment) -> Vector:
     return tuple(torque / k for torque, k in zip(_torques(moment), _TORQUE_CONSTANT, strict=True))
 
 
-def _actual_current(moment: Moment) -> Vector:
+def _actual_current(moment: ControllerMoment) -> Vector:
     return tuple(a + 0.02 * _ripple(moment, 12 + n) for n, a in enumerate(_target_current(moment)))
 
 
-def _actual_current_as_torque(moment: Moment) -> Vector:
+def _actual_current_as_torque(moment: ControllerMoment) -> Vector:
     return tuple(a * k for a, k in zip(_actual_current(moment), _TORQUE_CONSTANT, strict=True))
 
 
-def _pose(moment: Moment) -> Vector:
+def _pose(moment: ControllerMoment) -> Vector:
     return _pose_at(moment.path)
 
 
 _pose_at = lru_cache(2)(pose)
 
 
-def _actual_pose(moment: Moment) -> Vector:
+def _actual_pose(moment: ControllerMoment) -> Vector:
     return tuple(x + 1e-5 * _ripple(moment, 18 + n) for n, x in enumerate(_pose(moment)))
 
 
-def _tcp_speed(moment: Moment) -> Vector:
+def _tcp_speed(moment: ControllerMoment) -> Vector:
     return twist(moment.path, moment.rate)
 
 
 @lru_cache(2)
-def _tcp_acceleration(moment: Moment) -> Vector:
+def _tcp_acceleration(moment: ControllerMoment) -> Vector:
     return acceleration(moment.path, moment.rate)
 
 
 @lru_cache(2)
-def _wrench(moment: Moment) -> Vector:
+def _wrench(moment: ControllerMoment) -> Vector:
     """Force and torque at the tool beyond its payload: what the payload's inertia makes of the acceleration."""
     inertia = (-_PAYLOAD,) * 3 + (-0.02,) * 3
     ripple = (_SENSOR_RIPPLE,) * 3 + (_SENSOR_RIPPLE / 10,) * 3
@@ -111,47 +121,47 @@ def _wrench(moment: Moment) -> Vector:
     return tuple(m * a + r * _ripple(moment, 24 + n) for n, (m, a, r) in enumerate(parts))
 
 
-def _raw_wrench(moment: Moment) -> Vector:
+def _raw_wrench(moment: ControllerMoment) -> Vector:
     x, y, z, *torque = _wrench(moment)
     return (x, y, z - _PAYLOAD * _GRAVITY, *torque)
 
 
-def _force(moment: Moment) -> Vector:
+def _force(moment: ControllerMoment) -> Vector:
     return (math.hypot(*_wrench(moment)[:3]),)
 
 
-def _accelerometer(moment: Moment) -> Vector:
+def _accelerometer(moment: ControllerMoment) -> Vector:
     """Acceleration plus gravity's reaction, turned into the flange's frame."""
     ax, ay, az, *_ = thrust(moment.path, moment.rate)
     az += _GRAVITY
     return tuple(ax * x + ay * y + az * z for x, y, z in frames(moment.path).rotation)
 
 
-def _momentum(moment: Moment) -> Vector:
+def _momentum(moment: ControllerMoment) -> Vector:
     return (0.4 * _ARM_MASS * math.hypot(*twist(moment.path, moment.rate, ELBOW)[:3]),)
 
 
-def _power(moment: Moment) -> float:
+def _power(moment: ControllerMoment) -> float:
     """Electrical power in W: standby plus what the joints do."""
     return 85.0 + sum(abs(t * v) for t, v in zip(_torques(moment), _target_qd(moment), strict=True))
 
 
-def _temperatures(moment: Moment) -> Vector:
+def _temperatures(moment: ControllerMoment) -> Vector:
     warm = 1 - math.exp(-moment.time / 1800)
     return tuple(24 + (w - 24) * warm + 0.05 * _ripple(moment, n) for n, w in enumerate(_WARMTH))
 
 
-def _digital_inputs(moment: Moment) -> Vector:
+def _digital_inputs(moment: ControllerMoment) -> Vector:
     """A light running over the standard inputs, another over the configurable ones, tool input 0 blinking."""
     second = int(moment.path)
     return (1 << second % 8 | 1 << 8 + second // 2 % 8 | (second // 4 & 1) << 16,)
 
 
-def _configurable_inputs(moment: Moment) -> Vector:
+def _configurable_inputs(moment: ControllerMoment) -> Vector:
     return (int(_digital_inputs(moment)[0]) >> 8 & 0xFF,)
 
 
-def _base_wrench(moment: Moment) -> Vector:
+def _base_wrench(moment: ControllerMoment) -> Vector:
     """What the mounting carries: the arm's weight, and its inertia along the flange's acceleration."""
     x, y, z, *torque = thrust(moment.path, moment.rate)
     share = 0.4 * _ARM_MASS

@@ -1,7 +1,8 @@
 """The variables of the simulated controller: one flat list of numbers, every field a fixed slice of it.
 
-Fields that move by themselves are computed when somebody looks and at most once a moment. A `View` is the compiled
-way to the packed values of a recipe; equal recipes share one, so a package is made once however many clients get it.
+Fields that move by themselves are computed when somebody looks and at most once a moment. A `RecipeView` is the
+compiled way to the packed values of a recipe; equal recipes share one, so a package is made once however many clients
+get it.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from weakref import WeakValueDictionary
 
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
-from gatewayd.simulator.arm import Moment, Vector
+from gatewayd.simulator.arm import ControllerMoment, Vector
 from gatewayd.simulator.signals import Signal
 
-__all__ = ["RANGES", "Scalar", "Store", "View", "fitting"]
+__all__ = ["RANGES", "FieldStore", "RecipeView", "Scalar", "fitting"]
 
 Scalar = int | float
 """An element of a value; BOOL is bool, an int."""
@@ -42,7 +43,7 @@ def fitting(value: Scalar, code: str) -> Scalar:
     return round(min(max(value, least), greatest))
 
 
-class Store:
+class FieldStore:
     """The values of all fields at one moment."""
 
     def __init__(
@@ -51,14 +52,14 @@ class Store:
         signals: Mapping[str, Signal],
         initial: Mapping[str, float | Vector],
     ) -> None:
-        self.moment = Moment(0, 0.0, 0.0, 0.0)
+        self.moment = ControllerMoment(0, 0.0, 0.0, 0.0)
         """Now. Whoever sets it makes the moving fields follow."""
         self.edition = 0
         """Changes whenever a value may have: part of the key under which packages are kept."""
         self._types = dict(types)
         self._signals = {name: signal for name, signal in signals.items() if name in types}
         self._places: dict[str, slice] = {}
-        self._views: WeakValueDictionary[tuple[str, ...], View] = WeakValueDictionary()
+        self._views: WeakValueDictionary[tuple[str, ...], RecipeView] = WeakValueDictionary()
         end = 0
         for name, kind in types.items():
             self._places[name] = slice(end, end + kind.count)
@@ -124,23 +125,23 @@ class Store:
         """Place and source of those of `names` that move by themselves."""
         return [(self._places[name], self._signals[name]) for name in names if name in self._signals]
 
-    def view(self, names: tuple[str, ...]) -> View:
+    def view(self, names: tuple[str, ...]) -> RecipeView:
         """The packed values of `names`, all of them fields. Keep it as long as it is needed."""
         view = self._views.get(names)
         if view is None:
-            view = self._views[names] = View(self, names)
+            view = self._views[names] = RecipeView(self, names)
         return view
 
 
-class View:
+class RecipeView:
     """The values of one output recipe."""
 
-    def __init__(self, store: Store, names: tuple[str, ...]) -> None:
+    def __init__(self, store: FieldStore, names: tuple[str, ...]) -> None:
         self.names = names
         """The recipe."""
         self._store = store
         self._recipe = Recipe(names, [store.type(name) for name in names])
-        self._made: tuple[Moment, int] | None = None
+        self._made: tuple[ControllerMoment, int] | None = None
         self._payload = b""
         self.compile()
 

@@ -19,13 +19,14 @@ import can
 import canopen
 from can.interfaces.socketcan import socketcan as stock_socketcan
 
-from gatewayd.canopen import link as link_module
-from gatewayd.canopen.eds import eds_text, objects_of, sheet_of
-from gatewayd.canopen.link import CanLink
 from gatewayd.canopen.socketcan import SocketCanBus
-from gatewayd.canopen.storage import MemoryStore
-from gatewayd.canopen.supervision import Event
+from gatewayd.canopen.supervision import BusSignal
 from gatewayd.core.cell import Cell
+from gatewayd.links.canopen_node import runtime as link_module
+from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.canopen_node.runtime import CanLink
+from gatewayd.links.canopen_node.storage import MemoryStore
 from gatewayd.mapping.loader import load
 
 __all__ = ["NODE"]
@@ -66,7 +67,7 @@ class PairBus(SocketCanBus):
         self._pair.setblocking(False)
         self._socket = self._pair
         self._loop.add_reader(self._pair, self._readable)
-        self._feed(Event.ACTIVE, time.monotonic(), "a pair of sockets")
+        self._feed(BusSignal.ACTIVE, time.monotonic(), "a pair of sockets")
 
     def set_filters(self, can_ids: Any, remote_ids: Any = ()) -> None:
         """The other end sends what this one listens to."""
@@ -81,7 +82,7 @@ class Gateway:
         plan = _plan()
         self.cell = Cell(plan.cell)
         setattr(link_module, "make_bus", lambda *_: PairBus(pair, self.link))  # noqa: B010 - mypy refuses the other way
-        self.link = CanLink(plan.canopen, self.cell, MemoryStore())
+        self.link = CanLink(plan.the(CanopenPlan), self.cell, MemoryStore())
         self.names = {one.name: index for index, one in enumerate(plan.cell.variables)}
 
     async def run(self) -> None:
@@ -130,7 +131,9 @@ class Stock:
 
     def __init__(self, pair: socket.socket) -> None:
         plan = _plan()
-        sheet = io.StringIO(eds_text(objects_of(plan.canopen, plan.cell), sheet_of(plan.canopen, plan.cell)))
+        sheet = io.StringIO(
+            eds_text(objects_of(plan.the(CanopenPlan), plan.cell), sheet_of(plan.the(CanopenPlan), plan.cell))
+        )
         sheet.name = "bench.eds"
         setattr(stock_socketcan, "create_socket", lambda: pair)  # noqa: B010
         setattr(stock_socketcan, "bind_socket", lambda *_: None)  # noqa: B010

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from gatewayd.canopen.clock import TimeConsumer, time_of_day
 from gatewayd.canopen.dictionary import AbortCode
 from gatewayd.canopen.frame import Frame
-from tests.canopen.wire import Client
+from tests.links.canopen_node.wire import Client
 
 
 class Clock:

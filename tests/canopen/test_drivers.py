@@ -9,7 +9,7 @@ from pathlib import Path
 from gatewayd.canopen.drivers import make_bus
 from gatewayd.canopen.pythoncan import PythonCanBus
 from gatewayd.canopen.socketcan import SocketCanBus
-from tests.canopen.recorder import Recorder
+from tests.links.canopen_node.recorder import Recorder
 
 
 def test_socketcan_has_a_path_of_its_own_and_the_rest_goes_through_python_can() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from gatewayd.canopen.dictionary import Abort, AbortCode
 from gatewayd.canopen.emergency import CAPACITY, HISTORY, Emergency, ErrorCode, Register, register_of
 from gatewayd.canopen.frame import Frame
-from tests.canopen.wire import Client, Wire
+from tests.links.canopen_node.wire import Client, Wire
 
 
 class Errors:

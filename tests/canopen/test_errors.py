@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.canopen.errors import Controller, ErrorClass, Violation, decode
+from gatewayd.canopen.errors import ControllerFlags, ErrorClass, Violation, decode
 
 ERROR_FLAG = 0x2000_0000
 
@@ -15,7 +15,7 @@ def test_controller_report_with_counters() -> None:
     """slcan's `sw100120`: warning, 100 transmit and 120 receive errors."""
     error = decode(ERROR_FLAG | 0x204, bytes([0, 0x0C, 0, 0, 0, 0, 100, 120]))
     assert error.classes == ErrorClass.CONTROLLER | ErrorClass.COUNTERS
-    assert error.controller == Controller.RX_WARNING | Controller.TX_WARNING
+    assert error.controller == ControllerFlags.RX_WARNING | ControllerFlags.TX_WARNING
     assert (error.tx_errors, error.rx_errors) == (100, 120)
     assert str(error) == "controller, rx warning, tx warning, 100 transmit and 120 receive errors"
 

@@ -5,7 +5,7 @@ import math
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.guarding import NodeGuarding
 from gatewayd.canopen.nmt import NmtState
-from tests.canopen.wire import Client, Wire
+from tests.links.canopen_node.wire import Client, Wire
 
 ASK = Frame(0x705, remote=True, length=1)
 

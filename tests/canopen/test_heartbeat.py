@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 
 from gatewayd.canopen.dictionary import AbortCode
 from gatewayd.canopen.frame import Frame
-from gatewayd.canopen.heartbeat import LEAST_CONSUMERS, HeartbeatConsumer, HeartbeatProducer, Watch
+from gatewayd.canopen.heartbeat import MIN_CONSUMERS, Consumer, HeartbeatConsumer, HeartbeatProducer, Watch
 from gatewayd.canopen.nmt import NmtState
-from gatewayd.canopen.plan import Consumer
-from tests.canopen.wire import Client, Wire
+from tests.links.canopen_node.wire import Client, Wire
 
 
 class Producer:
@@ -192,7 +191,7 @@ def test_entries_of_1016h_name_a_node_and_nothing_else(value: int) -> None:
 
 
 def test_1016h_has_eight_entries_or_as_many_as_needed() -> None:
-    assert Watcher().client.read(0x1016) == LEAST_CONSUMERS
+    assert Watcher().client.read(0x1016) == MIN_CONSUMERS
     assert Watcher(*(Consumer(node, 100, None) for node in range(1, 13))).client.read(0x1016) == 12
 
 

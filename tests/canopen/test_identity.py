@@ -13,7 +13,7 @@ from gatewayd.canopen.identity import (
     revision,
 )
 from gatewayd.canopen.nmt import NmtCommand, NmtState
-from tests.canopen.wire import Client
+from tests.links.canopen_node.wire import Client
 
 
 @pytest.fixture

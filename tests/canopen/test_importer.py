@@ -6,8 +6,8 @@ import pytest
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Dictionary, Entry, Pdo, array, variable
-from gatewayd.canopen.eds import Sheet, eds_text
 from gatewayd.canopen.importer import differences
+from gatewayd.links.canopen_node.eds import Sheet, eds_text
 
 NODE = 9
 DICTIONARY = Dictionary(

@@ -8,7 +8,7 @@ from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.identity import Identity
 from gatewayd.canopen.lss import Command, LssSlave, LssState
 from gatewayd.canopen.nmt import UNCONFIGURED
-from tests.canopen.wire import Wire
+from tests.links.canopen_node.wire import Wire
 
 IDENTITY = Identity(0, 0x4757_4401, 0x0001_0002, 0xCAFE_F00D)
 ADDRESS = (IDENTITY.vendor, IDENTITY.product, IDENTITY.revision, IDENTITY.serial)

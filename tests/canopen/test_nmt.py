@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.nmt import ALLOWED, TRANSITIONS, UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
-from tests.canopen.wire import Wire
+from tests.links.canopen_node.wire import Wire
 
 NODE = 5
 BOOT_UP = Frame(0x705, b"\0")

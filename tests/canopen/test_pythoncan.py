@@ -16,7 +16,7 @@ import pytest
 from gatewayd.canopen.bus import BusError, BusState
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.pythoncan import PythonCanBus
-from tests.canopen.recorder import Recorder, until
+from tests.links.canopen_node.recorder import Recorder, until
 
 
 class Adapter:

@@ -14,8 +14,8 @@ from gatewayd.canopen.errors import ErrorClass
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.interface import ControllerState, Interface
 from gatewayd.canopen.socketcan import SocketCanBus, filters, pack, seen
-from gatewayd.canopen.supervision import Event
-from tests.canopen.recorder import Recorder
+from gatewayd.canopen.supervision import BusSignal
+from tests.links.canopen_node.recorder import Recorder
 
 
 def test_frame_layout() -> None:
@@ -41,14 +41,14 @@ def test_more_filters_than_the_kernel_takes_become_one() -> None:
 @pytest.mark.parametrize(
     "interface, event",
     [
-        (None, Event.GONE),
-        (Interface(3, True, False, True, ControllerState.STOPPED), Event.DOWN),
-        (Interface(3, True, True, False, ControllerState.BUS_OFF), Event.OFF),
-        (Interface(3, True, True, True, ControllerState.PASSIVE), Event.PASSIVE),
-        (Interface(3, True, True, True), Event.UP),
+        (None, BusSignal.GONE),
+        (Interface(3, True, False, True, ControllerState.STOPPED), BusSignal.DOWN),
+        (Interface(3, True, True, False, ControllerState.BUS_OFF), BusSignal.OFF),
+        (Interface(3, True, True, True, ControllerState.PASSIVE), BusSignal.PASSIVE),
+        (Interface(3, True, True, True), BusSignal.UP),
     ],
 )
-def test_what_a_look_means(interface: Interface | None, event: Event) -> None:
+def test_what_a_look_means(interface: Interface | None, event: BusSignal) -> None:
     assert seen(interface) is event
 
 
@@ -60,7 +60,7 @@ def wire() -> Iterator[tuple[SocketCanBus, Recorder, socket.socket]]:
     recorder = Recorder()
     bus = SocketCanBus("can0", recorder)
     bus._socket = ours
-    bus._supervisor.feed(Event.UP, 0.0)
+    bus._supervisor.feed(BusSignal.UP, 0.0)
     with contextlib.closing(ours), contextlib.closing(theirs):
         yield bus, recorder, theirs
 

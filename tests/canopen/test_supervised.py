@@ -12,8 +12,8 @@ import pytest
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.errors import decode
 from gatewayd.canopen.supervised import ROOM_RETRY, SupervisedBus
-from gatewayd.canopen.supervision import Event
-from tests.canopen.recorder import Recorder, until
+from gatewayd.canopen.supervision import BusSignal
+from tests.links.canopen_node.recorder import Recorder, until
 
 BUS_OFF = 0x2000_0040
 NOBODY_TELLS = -1
@@ -28,7 +28,7 @@ def recorder() -> Recorder:
 async def bus(recorder: Recorder) -> SupervisedBus:
     bus = SupervisedBus(recorder)
     bus._loop = asyncio.get_running_loop()
-    bus._feed(Event.UP, 0.0, "up")
+    bus._feed(BusSignal.UP, 0.0, "up")
     return bus
 
 
@@ -76,7 +76,7 @@ async def test_a_bus_that_carries_nothing_is_not_waited_for(
     ours, theirs = socket.socketpair()
     with contextlib.closing(ours), contextlib.closing(theirs):
         bus._wait_for_room(ours.fileno() if kernel_tells else NOBODY_TELLS)
-        bus._feed(Event.OFF, 1.0, "off")
+        bus._feed(BusSignal.OFF, 1.0, "off")
         await asyncio.sleep(5 * ROOM_RETRY)
     assert (bus._full, recorder.writable) == (False, 0)
 
@@ -93,5 +93,5 @@ async def test_an_error_frame_is_counted_and_told_with_the_state_that_follows(
 
 
 async def test_a_state_is_told_when_it_changes(bus: SupervisedBus, recorder: Recorder) -> None:
-    bus._feed(Event.UP, 1.0, "still up")
+    bus._feed(BusSignal.UP, 1.0, "still up")
     assert (recorder.states, recorder.reasons) == ([BusState.ACTIVE], ["up"])

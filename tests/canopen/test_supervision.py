@@ -12,17 +12,17 @@ from gatewayd.canopen.supervision import (
     RETRY,
     RETRY_LIMIT,
     TRANSITIONS,
-    Event,
+    BusSignal,
     Supervisor,
     event_of_errno,
     event_of_error,
 )
 
-SEEN = [Event.GONE, Event.DOWN, Event.OFF, Event.PASSIVE, Event.WARNING, Event.ACTIVE]
-TOLD = [Event.TOLD_OFF, Event.TOLD_PASSIVE, Event.TOLD_WARNING, Event.TOLD_ACTIVE]
+SEEN = [BusSignal.GONE, BusSignal.DOWN, BusSignal.OFF, BusSignal.PASSIVE, BusSignal.WARNING, BusSignal.ACTIVE]
+TOLD = [BusSignal.TOLD_OFF, BusSignal.REPORTED_PASSIVE, BusSignal.REPORTED_WARNING, BusSignal.REPORTED_ACTIVE]
 
 
-def after(*events: Event) -> BusState:
+def after(*events: BusSignal) -> BusState:
     supervisor = Supervisor()
     for event in events:
         supervisor.feed(event, 0.0)
@@ -30,57 +30,57 @@ def after(*events: Event) -> BusState:
 
 
 @pytest.mark.parametrize("event", SEEN)
-def test_what_is_seen_counts_in_every_state(event: Event) -> None:
+def test_what_is_seen_counts_in_every_state(event: BusSignal) -> None:
     assert len({TRANSITIONS[state, event] for state in BusState}) == 1
 
 
 @pytest.mark.parametrize("event", TOLD)
 @pytest.mark.parametrize("state", [BusState.ABSENT, BusState.DOWN, BusState.BUS_OFF])
-def test_late_report_does_not_revive_a_bus_that_carries_nothing(state: BusState, event: Event) -> None:
+def test_late_report_does_not_revive_a_bus_that_carries_nothing(state: BusState, event: BusSignal) -> None:
     assert (state, event) not in TRANSITIONS
 
 
 def test_controller_gets_worse_and_better() -> None:
-    assert after(Event.UP) is BusState.ACTIVE
-    assert after(Event.UP, Event.TOLD_WARNING) is BusState.WARNING
-    assert after(Event.UP, Event.TOLD_WARNING, Event.TOLD_PASSIVE) is BusState.PASSIVE
-    assert after(Event.UP, Event.TOLD_PASSIVE, Event.TOLD_OFF) is BusState.BUS_OFF
-    assert after(Event.UP, Event.TOLD_OFF, Event.TOLD_RESTARTED) is BusState.ACTIVE
-    assert after(Event.UP, Event.TOLD_PASSIVE, Event.TOLD_ACTIVE) is BusState.ACTIVE
+    assert after(BusSignal.UP) is BusState.ACTIVE
+    assert after(BusSignal.UP, BusSignal.REPORTED_WARNING) is BusState.WARNING
+    assert after(BusSignal.UP, BusSignal.REPORTED_WARNING, BusSignal.REPORTED_PASSIVE) is BusState.PASSIVE
+    assert after(BusSignal.UP, BusSignal.REPORTED_PASSIVE, BusSignal.TOLD_OFF) is BusState.BUS_OFF
+    assert after(BusSignal.UP, BusSignal.TOLD_OFF, BusSignal.TOLD_RESTARTED) is BusState.ACTIVE
+    assert after(BusSignal.UP, BusSignal.REPORTED_PASSIVE, BusSignal.REPORTED_ACTIVE) is BusState.ACTIVE
 
 
 def test_look_that_tells_nothing_of_the_controller_leaves_the_report_standing() -> None:
-    assert after(Event.UP, Event.TOLD_PASSIVE, Event.UP) is BusState.PASSIVE
-    assert after(Event.UP, Event.TOLD_OFF, Event.UP) is BusState.ACTIVE
+    assert after(BusSignal.UP, BusSignal.REPORTED_PASSIVE, BusSignal.UP) is BusState.PASSIVE
+    assert after(BusSignal.UP, BusSignal.TOLD_OFF, BusSignal.UP) is BusState.ACTIVE
 
 
 def test_only_a_change_is_one() -> None:
     supervisor = Supervisor()
-    assert supervisor.feed(Event.ACTIVE, 3.0)
-    assert not supervisor.feed(Event.ACTIVE, 4.0)
+    assert supervisor.feed(BusSignal.ACTIVE, 3.0)
+    assert not supervisor.feed(BusSignal.ACTIVE, 4.0)
     assert supervisor.since == 3.0
 
 
 @pytest.mark.parametrize(
     "can_id, data, event",
     [
-        (0x040, bytes(8), Event.TOLD_OFF),
-        (0x100, bytes(8), Event.TOLD_RESTARTED),
-        (0x204, bytes([0, 0x08, 0, 0, 0, 0, 100, 0]), Event.TOLD_WARNING),
-        (0x204, bytes([0, 0x30, 0, 0, 0, 0, 130, 140]), Event.TOLD_PASSIVE),
-        (0x204, bytes([0, 0x40, 0, 0, 0, 0, 1, 2]), Event.TOLD_ACTIVE),
+        (0x040, bytes(8), BusSignal.TOLD_OFF),
+        (0x100, bytes(8), BusSignal.TOLD_RESTARTED),
+        (0x204, bytes([0, 0x08, 0, 0, 0, 0, 100, 0]), BusSignal.REPORTED_WARNING),
+        (0x204, bytes([0, 0x30, 0, 0, 0, 0, 130, 140]), BusSignal.REPORTED_PASSIVE),
+        (0x204, bytes([0, 0x40, 0, 0, 0, 0, 1, 2]), BusSignal.REPORTED_ACTIVE),
         (0x004, bytes([0, 0x01, 0, 0, 0, 0, 0, 0]), None),
         (0x088, bytes([0, 0, 4, 0, 0, 0, 0, 0]), None),
     ],
 )
-def test_what_an_error_frame_tells(can_id: int, data: bytes, event: Event | None) -> None:
+def test_what_an_error_frame_tells(can_id: int, data: bytes, event: BusSignal | None) -> None:
     assert event_of_error(decode(can_id, data)) is event
 
 
 def test_what_a_failed_send_tells() -> None:
-    assert event_of_errno(errno.ENETDOWN) is Event.DOWN
-    assert event_of_errno(errno.ENXIO) is Event.GONE
-    assert event_of_errno(errno.ENODEV) is Event.GONE
+    assert event_of_errno(errno.ENETDOWN) is BusSignal.DOWN
+    assert event_of_errno(errno.ENXIO) is BusSignal.GONE
+    assert event_of_errno(errno.ENODEV) is BusSignal.GONE
     assert event_of_errno(errno.ENOBUFS) is None
 
 

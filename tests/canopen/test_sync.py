@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from gatewayd.canopen.dictionary import AbortCode
 from gatewayd.canopen.frame import Frame
-from gatewayd.canopen.plan import SyncPlan
-from gatewayd.canopen.sync import PRODUCER, Sync
-from tests.canopen.wire import Client, Wire
+from gatewayd.canopen.sync import PRODUCER, SyncPlan, SyncService
+from tests.links.canopen_node.wire import Client, Wire
 
 
 class Cycle:
@@ -22,7 +21,7 @@ class Cycle:
         self.heard: list[int | None] = []
         self.wrong: list[int] = []
         self.announced = 0
-        self.service = Sync(
+        self.service = SyncService(
             self.wire.send,
             plan or SyncPlan(),
             allowed=lambda: self.allowed,

@@ -15,9 +15,9 @@ from click.testing import CliRunner, Result
 from gatewayd.cli.check import command
 
 ROOT = Path(__file__).parents[2]
-GOOD = ROOT / "docs/reference/rules/GW214-register-overlap/good.yaml"
-BAD = ROOT / "docs/reference/rules/GW214-register-overlap/bad.yaml"
-WARNED = ROOT / "docs/reference/rules/GW217-open-listener/bad.yaml"
+GOOD = ROOT / "gatewayd/links/modbus_server/rules/GW214-register-overlap/good.yaml"
+BAD = ROOT / "gatewayd/links/modbus_server/rules/GW214-register-overlap/bad.yaml"
+WARNED = ROOT / "gatewayd/links/modbus_server/rules/GW217-open-listener/bad.yaml"
 GOLDEN = sorted((ROOT / "tests/golden").glob("*.golden"))
 RULE_OFF = "----------\n"
 NEXT_FILE = re.compile(r"^===== (\S+)\n", re.MULTILINE)

@@ -1,4 +1,4 @@
-"""`gatewayd diff`: its exit codes and forms. What it tells: tests/mapping/test_diff.py."""
+"""`gatewayd diff`: its exit codes and forms. What it tells: tests/report/test_diff.py."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gatewayd.cli.diff import command
 
 ROOT = Path(__file__).parents[2]
 SMALL, PLCS = ROOT / "mappings" / "small-cell.yaml", ROOT / "mappings" / "two-plcs.yaml"
-BROKEN = ROOT / "docs/reference/rules/GW214-register-overlap/bad.yaml"
+BROKEN = ROOT / "gatewayd/links/modbus_server/rules/GW214-register-overlap/bad.yaml"
 
 
 def diff(*args: str | Path, content: str | None = None) -> Result:

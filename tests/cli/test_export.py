@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 TWO_BUSES = ROOT / "mappings" / "two-buses.yaml"
 MODBUS_ONLY = ROOT / "mappings" / "full-image.yaml"
 WATCHED = ROOT / "mappings" / "small-cell.yaml"
-BROKEN = ROOT / "docs/reference/rules/GW402-pdo-too-long/bad.yaml"
+BROKEN = ROOT / "gatewayd/links/canopen_node/rules/GW402-pdo-too-long/bad.yaml"
 
 
 def export(*args: str | Path, content: str | None = None) -> Result:

@@ -28,6 +28,8 @@ def test_owners(variable: dict[str, Any], text: str) -> None:
 
 def test_places() -> None:
     assert places({"modbus": [{"notation": "400101"}, {"notation": "300008"}]}) == "400101 300008"
+    assert places({"modbus": [], "canopen": {"object": "2010h:01", "type": "REAL32"}}) == "2010h:01"
+    assert places({"modbus": [], "canopen": None}) == ""
 
 
 def test_the_clock_has_no_date() -> None:

@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from gatewayd.audit import Audit
 from gatewayd.cli.reload import command
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import bind
 from gatewayd.control.server import serving
-from gatewayd.daemon import Daemon
-from gatewayd.reload import Outcome
-from gatewayd.reload import Result as Ended
+from gatewayd.service.audit import Audit
+from gatewayd.service.daemon import Daemon
+from gatewayd.service.reload import ReloadOutcome
+from gatewayd.service.reload import Result as Ended
 
 CHANGE = "press: 1 variable added"
 DETAIL = "+ more: direction output"
@@ -28,10 +28,10 @@ Reloading = Callable[..., Awaitable[Result]]
 def reloading(tmp_path: Path) -> Reloading:
     """`gatewayd reload ARGS` against a control socket behind which a reload ends so."""
 
-    async def run(outcome: Outcome | None, *args: str) -> Result:
+    async def run(outcome: ReloadOutcome | None, *args: str) -> Result:
         asked: list[bool] = []
 
-        async def reload(force: bool) -> Outcome:
+        async def reload(force: bool) -> ReloadOutcome:
             asked.append(force)
             assert outcome is not None
             return outcome
@@ -51,25 +51,28 @@ def reloading(tmp_path: Path) -> Reloading:
 
 
 @pytest.mark.parametrize("outcome, code, said", [
-    (Outcome(Ended.UNCHANGED), 0, "nothing has changed\n"),
-    (Outcome(Ended.APPLIED, (), (), 0.0042, (CHANGE, DETAIL)), 0, f"reloaded in 4.2 ms\n  {CHANGE}\n  {DETAIL}\n"),
-    (Outcome(Ended.REFUSED, ("press: `x` is owned",), details=(CHANGE,)), 1,
+    (ReloadOutcome(Ended.UNCHANGED), 0, "nothing has changed\n"),
+    (ReloadOutcome(Ended.APPLIED, (), (), 0.0042, (CHANGE, DETAIL)), 0,
+     f"reloaded in 4.2 ms\n  {CHANGE}\n  {DETAIL}\n"),
+    (ReloadOutcome(Ended.REFUSED, ("press: `x` is owned",), details=(CHANGE,)), 1,
      f"refused, the old mapping runs on; --force applies it all the same:\n  press: `x` is owned\n  {CHANGE}\n"),
-    (Outcome(Ended.FAILED, ("a.yaml:1:1: GW001 syntax: bad", "b.yaml cannot be read")), 1,
+    (ReloadOutcome(Ended.FAILED, ("a.yaml:1:1: GW001 syntax: bad", "b.yaml cannot be read")), 1,
      "failed, the old mapping runs on:\n  a.yaml:1:1: GW001 syntax: bad\n  b.yaml cannot be read\n"),
 ])  # fmt: skip
-async def test_every_ending_is_told(reloading: Reloading, outcome: Outcome, code: int, said: str) -> None:
+async def test_every_ending_is_told(
+    reloading: Reloading, outcome: ReloadOutcome, code: int, said: str
+) -> None:
     done = await reloading(outcome)
     assert (done.exit_code, done.output) == (code, said)
     assert bool(done.stdout) == (code == 0), "what was not done is told on standard error"
 
 
 async def test_force_is_passed_on(reloading: Reloading) -> None:
-    assert (await reloading(Outcome(Ended.APPLIED), "--force")).exit_code == 0
+    assert (await reloading(ReloadOutcome(Ended.APPLIED), "--force")).exit_code == 0
 
 
 async def test_json_is_the_answer(reloading: Reloading) -> None:
-    done = await reloading(Outcome(Ended.REFUSED, ("why",), (CHANGE,)), "--json")
+    done = await reloading(ReloadOutcome(Ended.REFUSED, ("why",), (CHANGE,)), "--json")
     assert done.exit_code == 1
     assert json.loads(done.output) == {
         "result": "refused",

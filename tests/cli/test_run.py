@@ -10,9 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.cli.run import _socket
-from gatewayd.control import paths
-
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
 BROKEN = "gatewayd: 1\ncell: [\n"
@@ -56,19 +53,6 @@ def test_nothing_that_can_be_served(run: Run, tmp_path: Path, contents: str | No
     assert str(path) in done.stderr
     assert done.stdout == ""
     assert "Traceback" not in done.stderr
-
-
-def test_without_a_place_for_the_socket_the_log_says_what_to_do(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, tmp_path: Path
-) -> None:
-    """`sudo gatewayd run` has no session: `gatewayd status` would say that nothing runs here."""
-    monkeypatch.setattr(paths, "SYSTEM_SOCKET", tmp_path / "missing" / "control.sock")
-    for name in ("RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
-        monkeypatch.delenv(name, raising=False)
-    assert _socket(None) is None
-    assert "--control" in str(caplog.records[0].__dict__["fields"])
-    assert _socket(Path("none")) is None
-    assert len(caplog.records) == 1, "who asked for none is not told"
 
 
 def test_json_is_one_object_per_line(run: Run, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from gatewayd.cli.show import command
 ROOT = Path(__file__).parents[2]
 MAPPINGS = sorted((ROOT / "mappings").glob("*.yaml"))
 FULL = ROOT / "mappings" / "full-image.yaml"
-BROKEN = ROOT / "docs/reference/rules/GW214-register-overlap/bad.yaml"
+BROKEN = ROOT / "gatewayd/links/modbus_server/rules/GW214-register-overlap/bad.yaml"
 
 
 def show(*args: str | Path, content: str | None = None, **environment: str) -> Result:

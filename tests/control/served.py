@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from gatewayd.control.api import Moment
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
+from gatewayd.links.contract import Link, LinkHealth
 from gatewayd.mapping.loader import load_together
 from gatewayd.mapping.plan import Plan
 
@@ -40,26 +41,39 @@ START, LIMIT, SPEED, PATH, CYCLES = range(5)
 
 
 @dataclass
-class ServedRobot:
-    """A link to a controller."""
+class ServedLink(Link):
+    """A link that says of itself what a test has it say."""
 
-    trouble: str = ""
+    state: LinkHealth
+
+    def health(self) -> LinkHealth:
+        return self.state
 
 
 @dataclass
 class Served:
-    """A station."""
+    """A cell with its links."""
 
     plan: Plan
     cell: Cell
-    robot: ServedRobot = field(default_factory=ServedRobot)
+
+    def __post_init__(self) -> None:
+        self.source = ServedLink(LinkHealth(figures={"address": "192.168.1.10:30004", "watchdog": False}))
+        unit = LinkHealth(
+            "Modbus 127.0.0.1:1502", words="listening, no connections", figures={"connections": 0}
+        )
+        self.links: dict[str, Link] = {"robot": self.source, "modbus": ServedLink(unit)}
+
+    def without_session(self, why: str) -> None:
+        """The robot link cannot reach the controller."""
+        self.source.state = replace(self.source.state, problems=(why,))
 
 
 @dataclass
 class FixedGateway:
     """What `Api` asks of a daemon."""
 
-    stations: Sequence[Served]
+    runtimes: Sequence[Served]
     wrong: list[str] = field(default_factory=list)
 
     def troubles(self) -> Sequence[str]:

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from gatewayd.audit import Audit
 from gatewayd.control.api import Api, ApiError, Cursor
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import OPERATOR
 from gatewayd.core.events import EventKind
 from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
+from gatewayd.service.audit import Audit
 from tests.control.served import LIMIT, SPEED, FixedGateway, Served, at, bring_up, plan
 
 PLC = 0

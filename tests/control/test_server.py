@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
-from gatewayd.audit import Audit
 from gatewayd.control import server
 from gatewayd.control.api import Api
 from gatewayd.control.client import Client, ControlError
 from gatewayd.control.endpoint import bind
+from gatewayd.service.audit import Audit
 from tests.control.served import CYCLES, LIMIT, FixedGateway, Served
 
 
@@ -150,7 +150,7 @@ async def test_a_body_that_is_no_object(path: Path, body: bytes, code: str) -> N
 
 
 async def test_a_body_is_bounded(client: Client) -> None:
-    body = {"x": "y" * server.GREATEST_BODY}
+    body = {"x": "y" * server.MAX_BODY}
     assert await refused(lambda: client.post("/v1/reload", body)) == (413, "too_large")
 
 

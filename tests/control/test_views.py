@@ -10,14 +10,18 @@ from typing import Any
 
 import pytest
 
-from gatewayd.control import documented
+from gatewayd.canopen.bus import BusState
 from gatewayd.control.api import Api
-from gatewayd.control.views import cell_view, declared_view, problems
+from gatewayd.control.views import cell_view, declare
 from gatewayd.core.cell import Change
 from gatewayd.core.requester import Requester
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
+from gatewayd.links.canopen_node.runtime import CanLink
 from gatewayd.mapping.loader import load
-from gatewayd.sentence import sentence
-from gatewayd.station import Station
+from gatewayd.report.schema import documented
+from gatewayd.report.summary import summary
+from gatewayd.report.verdict import verdict_of
+from gatewayd.service.cell_runtime import CellRuntime
 from tests.control.served import CYCLES, LIMIT, SPEED, Served, at
 
 PLC, HMI = 0, 1
@@ -27,18 +31,20 @@ def test_the_status_has_the_documented_fields(api: Api, press: Served) -> None:
     assert press.cell.write(Requester(PLC), [Change(LIMIT, 999.0)], 0.5) is not None
     status = api.status(at(1.0))
     (cell,) = status["cells"]
-    assert status.keys() == documented.STATUS.keys()
-    assert cell.keys() == documented.CELL.keys()
-    assert cell["robot"].keys() == documented.ROBOT.keys()
-    assert cell["modbus"].keys() == documented.MODBUS.keys()
-    assert cell["writers"][0].keys() == documented.WRITER.keys()
-    assert cell["last_refusal"].keys() == documented.REFUSAL.keys()
-    assert api.version().keys() == documented.VERSION.keys()
+    assert status.keys() == documented()["status"].keys()
+    assert cell.keys() == documented()["cell"].keys()
+    assert cell["robot"].keys() == documented()["robot"].keys()
+    assert cell["modbus"].keys() == documented()["modbus"].keys()
+    assert cell["writers"][0].keys() == documented()["writer"].keys()
+    assert cell["last_refusal"].keys() == documented()["refusal"].keys()
+    assert api.version().keys() == documented()["version"].keys()
 
 
 def test_variables_and_locks_have_the_documented_fields(api: Api) -> None:
-    assert all(one.keys() == documented.VARIABLE.keys() for one in api.variables({}, at(1.0))["variables"])
-    assert all(one.keys() == documented.LOCK.keys() for one in api.locks({}, at(1.0))["locks"])
+    assert all(
+        one.keys() == documented()["variable"].keys() for one in api.variables({}, at(1.0))["variables"]
+    )
+    assert all(one.keys() == documented()["lock"].keys() for one in api.locks({}, at(1.0))["locks"])
 
 
 def test_events_and_records_have_documented_fields_only(api: Api, press: Served) -> None:
@@ -51,7 +57,7 @@ def test_events_and_records_have_documented_fields_only(api: Api, press: Served)
     events = api.events({}, at(2.0))["events"]
     records = api.audit({}, at(2.0))["records"]
     assert len(events) > 6
-    for told, fields, always in ((events, documented.EVENT, 4), (records, documented.AUDIT, 4)):
+    for told, fields, always in ((events, documented()["event"], 4), (records, documented()["audit"], 4)):
         for one in told:
             assert one.keys() <= fields.keys()
             assert list(one)[:always] == list(fields)[:always]
@@ -109,33 +115,37 @@ def test_a_force_is_told_with_what_is_left_of_it(api: Api, press: Served) -> Non
     assert found["forced"] == {"value": 7, "remaining": 7.0}
 
 
+def problems(served: Served, now: float) -> list[str]:
+    return list(verdict_of(served, now).problems)
+
+
 class TestProblems:
     def test_a_good_cell_has_none(self, press: Served) -> None:
-        assert problems(press.cell, 0.01) == []
+        assert problems(press, 0.01) == []
 
     def test_a_lost_robot_and_for_how_long(self, press: Served) -> None:
         press.cell.robot_lost("gone", 1.0)
-        assert problems(press.cell, 8.0) == ["robot not connected for 8 s"]
+        assert problems(press, 8.0) == ["robot not connected for 8 s"]
 
     def test_why_the_robot_cannot_be_reached(self, api: Api, press: Served) -> None:
-        """Cause and remedy, without the address that stands beside it."""
+        """Cause and remedy."""
         press.cell.robot_lost("gone", 1.0)
-        press.robot.trouble = "192.168.1.10:30004: connection refused: the robot is booting"
+        press.without_session("connection refused: the robot is booting")
         (cell,) = api.status(at(8.0))["cells"]
         assert cell["problems"] == ["robot not connected for 8 s: connection refused: the robot is booting"]
 
     def test_inputs_that_are_not_adopted(self, press: Served) -> None:
         press.cell.robot_connected(1.0)
         assert press.cell.package_arrived(1.0, 1.0)
-        assert problems(press.cell, 1.0) == ["the robot's inputs are not adopted yet, nothing can be written"]
+        assert problems(press, 1.0) == ["the robot's inputs are not adopted yet, nothing can be written"]
 
     def test_what_is_unavailable_by_name(self, press: Served) -> None:
         press.cell.set_availability(range(5), False, "in use", 1.0)
-        assert problems(press.cell, 0.0) == ["5 of 12 variables unavailable: start, limit, speed and 2 more"]
+        assert problems(press, 0.0) == ["5 of 12 variables unavailable: start, limit, speed and 2 more"]
 
     def test_what_the_operator_left_behind(self, press: Served) -> None:
         assert press.cell.operator.force(SPEED, 1.0, 0.0, 9.0) is None
-        assert problems(press.cell, 0.0) == [
+        assert problems(press, 0.0) == [
             "forced by the local operator: speed",
             "locks held by the local operator: motion",
         ]
@@ -143,7 +153,7 @@ class TestProblems:
     def test_a_writer_that_was_there_but_not_one_that_never_came(self, press: Served) -> None:
         press.cell.writer_connected(Requester(HMI), 0.0)
         press.cell.writer_disconnected(Requester(HMI), 0.0, "closed")
-        assert problems(press.cell, 0.0) == ["writer hmi lost for 0 s"]
+        assert problems(press, 0.0) == ["writer hmi lost for 0 s"]
 
 
 def _texts(value: object) -> list[object]:
@@ -157,7 +167,7 @@ def _texts(value: object) -> list[object]:
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
 def test_odd_reals_are_still_json(api: Api, press: Served, odd: float) -> None:
     assert press.cell.write(Requester(PLC), [Change(SPEED, odd)], 1.0) is None
-    answers: list[dict[str, Any]] = [
+    answers: list[Mapping[str, Any]] = [
         api.status(at(1.0)),
         api.variables({}, at(1.0)),
         api.events({}, at(1.0)),
@@ -170,10 +180,10 @@ def test_a_variable_on_canopen_tells_its_object_and_pdo() -> None:
     mapping = Path(__file__).parents[2] / "mappings" / "two-buses.yaml"
     plan = load(mapping.read_bytes(), mapping.name).plan
     assert plan is not None
-    assert plan.canopen is not None
-    found = {one["name"]: one["canopen"] for one in declared_view(plan)}
-    carried = {entry.variable for pdo in plan.canopen.pdos for entry in pdo.entries}
-    for one in plan.canopen.objects:
+    assert canopen_of(plan) is not None
+    found = {one["name"]: one["canopen"] for one in declare(plan).variables}
+    carried = {entry.variable for pdo in plan.the(CanopenPlan).pdos for entry in pdo.entries}
+    for one in plan.the(CanopenPlan).objects:
         told = found[plan.cell.variables[one.variable].name]
         assert told["object"] == f"{one.index:04X}h:{one.subindex:02X}"
         assert told["type"] == one.type.name
@@ -185,12 +195,26 @@ def test_a_bus_that_does_not_carry_is_a_problem(tmp_path: Path) -> None:
     mapping = Path(__file__).parents[2] / "mappings" / "two-buses.yaml"
     plan = load(mapping.read_bytes(), mapping.name).plan
     assert plan is not None
-    station = Station(plan, tmp_path)
-    told = cell_view(station, 1.0)
-    assert told["canopen"].keys() == documented.CANOPEN.keys()
+    runtime = CellRuntime(plan, tmp_path, 0.0)
+    told = cell_view(runtime, declare(plan), 1.0)
+    assert told["canopen"].keys() == documented()["canopen"].keys()
     assert (told["canopen"]["bus"], told["canopen"]["nmt_state"]) == ("absent", "initialising")
     assert "CAN bus absent" in told["problems"]
-    assert "CAN bus absent" in sentence([station.cell])
-    station.cell.health.can_bus = 6
-    assert not any("CAN" in problem for problem in problems(station.cell, 1.0))
-    assert "CAN" not in sentence([station.cell])
+    assert "CAN bus absent" in summary([(runtime.cell, verdict_of(runtime, 1.0))])
+    link = runtime.links["canopen"]
+    assert isinstance(link, CanLink)
+    link.node.bus = BusState.ACTIVE
+    assert not any("CAN" in problem for problem in verdict_of(runtime, 1.0).problems)
+    assert "CAN" not in summary([(runtime.cell, verdict_of(runtime, 1.0))])
+
+
+def test_every_link_is_told_in_words(api: Api) -> None:
+    robot, modbus = api.status(at(0.0))["cells"][0]["links"]
+    assert robot.keys() == documented()["link"].keys()
+    assert (robot["name"], robot["address"], robot["words"]) == (
+        "robot",
+        "192.168.1.10:30004",
+        "fresh and writable",
+    )
+    assert (modbus["title"], modbus["level"]) == ("Modbus TCP server", "good")
+    assert (modbus["address"], modbus["words"]) == ("127.0.0.1:1502 unit 1", "listening, no connections")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gatewayd.core.adoption import Adoption, Step, adopted, named, would_fall_back
+from gatewayd.core.adoption import Adoption, AdoptionStep, adopted, named, would_fall_back
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.events import EventKind
@@ -27,22 +27,22 @@ def connected(definition: CellDefinition, now: float = 0.0) -> Cell:
 
 def test_it_counts_once_from_when_a_writer_could_claim() -> None:
     adoption = Adoption(10.0)
-    assert adoption.look(0.0, adopted=True) is Step.NOTHING
+    assert adoption.look(0.0, adopted=True) is AdoptionStep.NOTHING
     adoption.reachable = True
-    assert adoption.look(1.0, adopted=False) is Step.NOTHING
+    assert adoption.look(1.0, adopted=False) is AdoptionStep.NOTHING
     assert adoption.left(1.0) == 0.0
-    assert adoption.look(2.0, adopted=True) is Step.BEGIN
+    assert adoption.look(2.0, adopted=True) is AdoptionStep.BEGIN
     assert adoption.left(5.0) == 7.0
-    assert adoption.look(11.9, adopted=False) is Step.NOTHING
-    assert adoption.look(12.0, adopted=False) is Step.END
-    assert adoption.look(99.0, adopted=True) is Step.NOTHING
+    assert adoption.look(11.9, adopted=False) is AdoptionStep.NOTHING
+    assert adoption.look(12.0, adopted=False) is AdoptionStep.END
+    assert adoption.look(99.0, adopted=True) is AdoptionStep.NOTHING
     assert adoption.left(99.0) == 0.0
 
 
 def test_none_means_for_good() -> None:
     adoption = Adoption(None)
     adoption.reachable = True
-    assert adoption.look(1e9, adopted=True) is Step.NOTHING
+    assert adoption.look(1e9, adopted=True) is AdoptionStep.NOTHING
     assert adoption.left(1e9) == 0.0
 
 

@@ -30,7 +30,8 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
-from gatewayd.core.status import LENGTH, RELEASE, RELEASE_ALL, REQUEST, StatusBlock
+from gatewayd.core.status import StatusBlock
+from gatewayd.core.status_layout import LENGTH, RELEASE, RELEASE_ALL, REQUEST
 
 CLEAR, HOLD = Fallback(), Fallback(FallbackKind.HOLD)
 LOW, HIGH = -(2.0**31), 2.0**31 - 1

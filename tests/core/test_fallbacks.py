@@ -24,7 +24,7 @@ class Bench:
         self.delivery = Delivery(self.image, Health(), self.events.append)
         self.fallbacks = Fallbacks(definition, self.image, self.ownership, self.delivery, self.events.append)
         for index in self.image.inputs:
-            self.image.tell(index, definition.variables[index].kind.zero, 0.0)
+            self.image.store(index, definition.variables[index].kind.zero, 0.0)
         self.image.values[START] = True
 
 

@@ -5,31 +5,31 @@ import math
 
 import pytest
 
-from gatewayd.core.freshness import TRANSITIONS, Freshness, Happening, Source
+from gatewayd.core.freshness import TRANSITIONS, Freshness, Source, SourceSignal
 
 IGNORED = {
-    (Source.LOST, Happening.PROGRESS),
-    (Source.LOST, Happening.NO_PACKAGE),
-    (Source.LOST, Happening.NO_PROGRESS),
-    (Source.LOST, Happening.TOO_LATE),
-    (Source.LOST, Happening.LOST),
-    (Source.WAITING, Happening.CONNECTED),
-    (Source.WAITING, Happening.NO_PACKAGE),
-    (Source.FRESH, Happening.CONNECTED),
-    (Source.FRESH, Happening.PROGRESS),
-    (Source.SILENT, Happening.CONNECTED),
-    (Source.SILENT, Happening.NO_PACKAGE),
-    (Source.FROZEN, Happening.CONNECTED),
-    (Source.FROZEN, Happening.NO_PROGRESS),
-    (Source.LATE, Happening.CONNECTED),
-    (Source.LATE, Happening.TOO_LATE),
+    (Source.LOST, SourceSignal.PROGRESS),
+    (Source.LOST, SourceSignal.NO_PACKAGE),
+    (Source.LOST, SourceSignal.NO_PROGRESS),
+    (Source.LOST, SourceSignal.TOO_LATE),
+    (Source.LOST, SourceSignal.LOST),
+    (Source.WAITING, SourceSignal.CONNECTED),
+    (Source.WAITING, SourceSignal.NO_PACKAGE),
+    (Source.FRESH, SourceSignal.CONNECTED),
+    (Source.FRESH, SourceSignal.PROGRESS),
+    (Source.SILENT, SourceSignal.CONNECTED),
+    (Source.SILENT, SourceSignal.NO_PACKAGE),
+    (Source.FROZEN, SourceSignal.CONNECTED),
+    (Source.FROZEN, SourceSignal.NO_PROGRESS),
+    (Source.LATE, SourceSignal.CONNECTED),
+    (Source.LATE, SourceSignal.TOO_LATE),
 }
 """Pairs that change nothing."""
 
 
 def test_every_pair_of_state_and_happening_is_decided() -> None:
     assert TRANSITIONS.keys().isdisjoint(IGNORED)
-    assert TRANSITIONS.keys() | IGNORED == set(itertools.product(Source, Happening))
+    assert TRANSITIONS.keys() | IGNORED == set(itertools.product(Source, SourceSignal))
 
 
 def test_every_state_can_be_reached_and_every_listed_move_goes_somewhere() -> None:
@@ -38,10 +38,10 @@ def test_every_state_can_be_reached_and_every_listed_move_goes_somewhere() -> No
 
 
 def test_only_progress_makes_fresh_and_a_loss_always_ends_it() -> None:
-    assert {happening for (_, happening), after in TRANSITIONS.items() if after is Source.FRESH} == {
-        Happening.PROGRESS
+    assert {signal for (_, signal), after in TRANSITIONS.items() if after is Source.FRESH} == {
+        SourceSignal.PROGRESS
     }
-    lost = {before for (before, happening), after in TRANSITIONS.items() if after is Source.LOST}
+    lost = {before for (before, signal), after in TRANSITIONS.items() if after is Source.LOST}
     assert lost == set(Source) - {Source.LOST}
 
 

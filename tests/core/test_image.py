@@ -41,16 +41,16 @@ def test_losing_what_was_never_told_leaves_it_never(image: ProcessImage) -> None
 
 
 def test_outputs_share_the_time_of_the_last_package(image: ProcessImage) -> None:
-    image.outputs_told(1.0)
-    image.outputs_told(2.0)
+    image.outputs_stored(1.0)
+    image.outputs_stored(2.0)
     assert image.times[CYCLES] == -math.inf
     assert (image.age(CYCLES, 5.0), image.age(ALARM, 5.0)) == (3.0, 3.0)
     assert image.unreadable == frozenset()
 
 
 def test_a_stale_value_keeps_the_time_it_was_told(image: ProcessImage) -> None:
-    image.tell(START, True, 1.0)
-    image.outputs_told(1.0)
+    image.store(START, True, 1.0)
+    image.outputs_stored(1.0)
     image.inputs_lost()
     image.outputs_lost()
     assert (image.age(START, 5.0), image.age(LEVEL, 5.0)) == (4.0, 4.0)
@@ -58,21 +58,21 @@ def test_a_stale_value_keeps_the_time_it_was_told(image: ProcessImage) -> None:
 
 
 def test_an_output_that_is_gone_shows_its_policy_and_no_age(image: ProcessImage) -> None:
-    image.outputs_told(1.0)
+    image.outputs_stored(1.0)
     image.values[MODE] = 3
     image.set_available(MODE, available=False)
-    image.outputs_told(2.0)
+    image.outputs_stored(2.0)
     assert (image.values[MODE], image.quality[MODE]) == (99, Quality.UNAVAILABLE)
     assert image.time_of(MODE) == -math.inf
 
 
 def test_an_output_that_comes_back_is_good_with_the_next_package(image: ProcessImage) -> None:
     image.set_available(ALARM, available=False)
-    image.outputs_told(1.0)
+    image.outputs_stored(1.0)
     image.set_available(ALARM, available=True)
     assert (image.quality[ALARM], image.quality[CYCLES]) == (Quality.NEVER, Quality.GOOD)
     assert image.unreadable == {ALARM}
-    image.outputs_told(1.1)
+    image.outputs_stored(1.1)
     assert image.quality[ALARM] is Quality.GOOD
     assert image.unreadable == frozenset()
 
@@ -81,7 +81,7 @@ def test_what_the_controller_holds_in_a_register_of_somebody_else_is_shown_but_n
     image: ProcessImage,
 ) -> None:
     image.set_available(PART, available=False)
-    image.tell(PART, 17, 1.0)
+    image.store(PART, 17, 1.0)
     assert (image.values[PART], image.quality[PART]) == (17, Quality.UNAVAILABLE)
     image.set_available(PART, available=True)
     assert image.quality[PART] is Quality.STALE
@@ -107,7 +107,7 @@ def test_an_output_that_a_place_cannot_show_is_not_good(
     image = restricted(press, LEVEL)
     for present in (value, 0.0, value):
         image.values[LEVEL] = present
-        image.outputs_told(1.0)
+        image.outputs_stored(1.0)
         good = fits or present == 0.0
         assert image.quality[LEVEL] is (Quality.GOOD if good else Quality.OUT_OF_RANGE)
         assert image.values[LEVEL] == present
@@ -122,8 +122,8 @@ def test_what_is_no_number_is_good_where_every_place_can_show_it(
 ) -> None:
     image = restricted(press, LEVEL, SPEED, nan=nan)
     image.values[LEVEL] = value
-    image.outputs_told(1.0)
-    image.tell(SPEED, value, 1.0)
+    image.outputs_stored(1.0)
+    image.store(SPEED, value, 1.0)
     expected = Quality.GOOD if nan else Quality.OUT_OF_RANGE
     assert (image.quality[LEVEL], image.quality[SPEED]) == (expected, expected)
 
@@ -134,21 +134,21 @@ def test_a_range_that_shows_no_nan_need_not_be_bounded(press: CellDefinition) ->
     qualities = []
     for value in (1e308, math.inf, math.nan, 0.0):
         image.values[LEVEL] = value
-        image.outputs_told(1.0)
+        image.outputs_stored(1.0)
         qualities.append(image.quality[LEVEL])
     assert qualities == [Quality.GOOD, Quality.OUT_OF_RANGE, Quality.OUT_OF_RANGE, Quality.GOOD]
 
 
 def test_an_input_that_a_place_cannot_show_is_not_good(press: CellDefinition) -> None:
     image = restricted(press, PART)
-    image.tell(PART, 101, 1.0)
+    image.store(PART, 101, 1.0)
     assert image.quality[PART] is Quality.OUT_OF_RANGE
     image.inputs_lost()
     assert image.quality[PART] is Quality.STALE
-    image.tell(PART, 99, 2.0)
+    image.store(PART, 99, 2.0)
     assert image.quality[PART] is Quality.GOOD
     image.set_available(PART, available=False)
-    image.tell(PART, 101, 3.0)
+    image.store(PART, 101, 3.0)
     assert image.quality[PART] is Quality.UNAVAILABLE
 
 
@@ -156,7 +156,7 @@ def test_stale_and_unavailable_say_more_than_out_of_range(press: CellDefinition)
     image = restricted(press, LEVEL, CYCLES)
     image.values[LEVEL] = image.values[CYCLES] = 500
     image.set_available(CYCLES, available=False)
-    image.outputs_told(1.0)
+    image.outputs_stored(1.0)
     assert (image.quality[LEVEL], image.quality[CYCLES]) == (Quality.OUT_OF_RANGE, Quality.UNAVAILABLE)
     image.outputs_lost()
     assert (image.quality[LEVEL], image.quality[CYCLES]) == (Quality.STALE, Quality.UNAVAILABLE)
@@ -166,7 +166,7 @@ def test_an_exception_output_that_cannot_be_shown_cannot_be_read(press: CellDefi
     image = restricted(press, ALARM)
     for value, unreadable in ((True, frozenset[int]()), (1000, {ALARM}), (False, frozenset[int]())):
         image.values[ALARM] = value
-        image.outputs_told(1.0)
+        image.outputs_stored(1.0)
         assert image.unreadable == unreadable
 
 
@@ -183,7 +183,7 @@ def show(image: ProcessImage, values: list[Value], now: float, *, running: bool)
     image.uncover()
     image.values[CYCLES:] = values
     image.running = running
-    image.outputs_told(now)
+    image.outputs_stored(now)
 
 
 def test_outputs_of_a_program_that_does_not_run_show_their_policies(program: ProcessImage) -> None:
@@ -279,7 +279,7 @@ def test_only_what_the_robot_means_and_every_place_shows_is_good(steps: list[Ste
             if available:
                 image.values[0] = value
             image.running = running
-            image.outputs_told(float(now))
+            image.outputs_stored(float(now))
             if running:
                 since = now
             if available and running:

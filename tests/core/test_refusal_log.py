@@ -67,4 +67,4 @@ def test_nothing_is_remembered_of_what_is_over() -> None:
     for variable in range(1000):
         log.add(refusal(0.0, variable=variable))
     log.tick(REFUSAL_INTERVAL)
-    assert not log._told
+    assert not log._reported

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import struct
-from itertools import pairwise
 
 import pytest
 
@@ -9,17 +8,14 @@ from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
-from gatewayd.core.status import (
-    BASE,
+from gatewayd.core.status import StatusBlock
+from gatewayd.core.status_layout import (
     FIELDS,
-    HEADER_WORDS,
-    LAYOUT_VERSION,
     LENGTH,
     RELEASE,
     RELEASE_ALL,
     REQUEST,
     TABLES,
-    StatusBlock,
     StatusField,
     StatusTable,
 )
@@ -28,52 +24,6 @@ PLC, HMI, AUX = range(3)
 START, LAMP, PART, FORCE, SPEED, PATH, CYCLES = range(7)
 ENTRIES: list[StatusField | StatusTable] = [*FIELDS, *TABLES]
 OFFSETS = {entry.name: entry.offset for entry in ENTRIES}
-
-HEADER = (
-    (0, 1, "layout"),
-    (1, 1, "flags"),
-    (2, 2, "fingerprint"),
-    (4, 1, "heartbeat"),
-    (5, 1, "variables"),
-    (6, 1, "writers"),
-    (7, 1, "robot_state"),
-    (8, 2, "uptime"),
-    (10, 2, "robot_age"),
-    (12, 1, "frequency"),
-    (13, 1, "sessions"),
-    (14, 2, "packages"),
-    (16, 2, "skipped"),
-    (18, 2, "late"),
-    (20, 2, "accepted"),
-    (22, 2, "refused"),
-    (24, 2, "mismatches"),
-    (26, 1, "modbus_connections"),
-    (27, 1, "can_bus"),
-    (28, 1, "nmt_state"),
-    (30, 1, "refusal_reason"),
-    (31, 1, "refusal_variable"),
-    (32, 1, "refusal_writer"),
-    (33, 1, "refusal_holder"),
-    (34, 2, "refusal_age"),
-    (40, 1, "request"),
-    (41, 1, "release"),
-    (42, 1, "unadopted"),
-    (43, 1, "differing"),
-    (44, 2, "lag"),
-    (46, 1, "adoption"),
-    (47, 1, "program"),
-    (48, 1, "gaps"),
-)
-"""The header as PLC programs have it built in: entries are only appended, and 5F00h counts them in this order."""
-BLOCKS = (
-    (64, 64, "good"),
-    (128, 64, "writers_alive"),
-    (192, 1024, "owner"),
-    (1216, 1024, "lease"),
-    (2240, 1024, "age"),
-    (3264, 1024, "quality"),
-)
-"""Likewise the tables, 5F01h and the following."""
 
 
 @pytest.fixture
@@ -89,18 +39,6 @@ def long(status: StatusBlock, name: str, now: float) -> int:
     (number,) = struct.unpack(">I", status.read(OFFSETS[name], 2, now))
     assert isinstance(number, int)
     return number
-
-
-def test_the_layout_is_a_contract() -> None:
-    assert (BASE, LAYOUT_VERSION, LENGTH) == (60000, 1, 4288)
-    assert tuple((field.offset, field.words, field.name) for field in FIELDS) == HEADER
-    assert tuple((table.offset, table.words, table.name) for table in TABLES) == BLOCKS
-
-
-def test_fields_and_tables_lie_one_after_the_other() -> None:
-    assert all(one.offset + one.words <= next_one.offset for one, next_one in pairwise(ENTRIES))
-    assert FIELDS[-1].offset < HEADER_WORDS == TABLES[0].offset
-    assert TABLES[-1].offset + TABLES[-1].words == LENGTH
 
 
 def test_any_part_is_a_slice_of_the_whole(cell: Cell, status: StatusBlock) -> None:
@@ -141,6 +79,19 @@ def test_the_appended_words_show_what_the_health_says(cell: Cell, status: Status
     assert words(status, "refusal_reason", 0.0, 12) == (0, 0, 0, 0, 0xFFFF, 0xFFFF, 0, 0, 0, 0, 0, 0)
     health.program, health.adoption = 0, 1e9
     assert words(status, "adoption", 0.0, 2) == (0xFFFF, 1)
+
+
+def test_the_numbers_of_links_lie_between_the_cores(cell: Cell) -> None:
+    more = (StatusField(29, 1, "valve", ""), StatusField(50, 2, "shots", ""))
+    status = StatusBlock(cell, (*more, *FIELDS))
+    assert status.read(0, LENGTH, 1.0) == StatusBlock(cell).read(0, LENGTH, 1.0)
+    cell.health.words.update(valve=7, shots=0x1_0002, unknown=3)
+    assert struct.unpack(">HHH", status.read(28, 3, 1.0)) == (0, 7, 0)
+    assert struct.unpack(">HHI", status.read(48, 4, 1.0)) == (0, 0, 0x1_0002)
+    cell.health.words.update(valve=1 << 16, shots=1 << 40)
+    assert struct.unpack(">H", status.read(29, 1, 1.0)) == (0xFFFF,)
+    assert struct.unpack(">I", status.read(50, 2, 1.0)) == (0xFFFF_FFFF,)
+    assert status.read(0, 28, 1.0) == StatusBlock(cell).read(0, 28, 1.0)
 
 
 def test_flags_follow_the_state_bit_by_bit(cell: Cell, status: StatusBlock) -> None:

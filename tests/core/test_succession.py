@@ -28,7 +28,8 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
-from gatewayd.core.status import LENGTH, StatusBlock
+from gatewayd.core.status import StatusBlock
+from gatewayd.core.status_layout import LENGTH
 from gatewayd.core.succession import succeed
 
 PLC, HMI, AUX = range(3)

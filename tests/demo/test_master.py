@@ -8,6 +8,7 @@ from gatewayd.core.definition import Direction
 from gatewayd.demo import master
 from gatewayd.demo.master import FEEDS, Feeder
 from gatewayd.demo.scene import MAPPING
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.mapping.loader import load
 
 HELD = 0xFF01
@@ -87,16 +88,16 @@ def test_what_was_before_a_boot_does_not_count() -> None:
 def test_master_knows_the_node_as_the_mapping_makes_it() -> None:
     plan = load(files("gatewayd.demo").joinpath(MAPPING).read_bytes(), MAPPING).plan
     assert plan is not None
-    assert plan.canopen is not None
+    assert canopen_of(plan) is not None
     names = [one.name for one in plan.cell.variables]
     carried = {
         pdo.cob_id: (
             pdo.direction,
             [names[entry.variable] for entry in pdo.entries if entry.variable is not None],
         )
-        for pdo in plan.canopen.pdos
+        for pdo in plan.the(CanopenPlan).pdos
     }
-    assert plan.canopen.node == master.NODE
+    assert plan.the(CanopenPlan).node == master.NODE
     assert carried == {
         master.SET_FEED: (Direction.INPUT, ["feed"]),
         master.MEASURED: (Direction.OUTPUT, ["force", "feed_now"]),

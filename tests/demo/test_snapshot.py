@@ -25,14 +25,14 @@ async def test_everything_shown_is_what_the_gateway_knows(scene: Scene, until) -
     lines = {line.row.name: line for line in shot.lines}
     assert shot.plc_connected
     assert lines["start"].owner == "plc"
-    assert (lines["start"].address, lines["start"].row.notation) == ("0.0", "400001.0")
+    assert (lines["start"].address, lines["start"].row["notation"]) == ("0.0", "400001.0")
     assert lines["part_number"].lease.endswith(" s")
     assert lines["part_number"].refused == "you refused: 06"
     assert lines["busy"].owner == "robot"
     assert (lines["busy"].object, lines["busy"].cob_id) == ("2400h:01", "0x290")
     assert (lines["start"].object, lines["start"].cob_id) == ("", "")
-    assert "wrote part_number = 7: refused with exception 06, held by plc" in shot.happenings[-1].text
-    assert shot.happenings[-1].bad
+    assert "wrote part_number = 7: refused with exception 06, held by plc" in shot.events[-1].text
+    assert shot.events[-1].bad
 
 
 async def test_every_kind_of_event_has_words(scene: Scene) -> None:
@@ -52,7 +52,7 @@ async def test_contention_of_the_buses_is_told_on_both(scene: Scene, until) -> N
     assert (line.row.name, line.value) == ("feed", "20 %")
     assert line.owner == "plc"
     assert "line: FF01h" in line.refused
-    texts = [one.text for one in shot.happenings]
+    texts = [one.text for one in shot.events]
     assert "plc took feed over from line" in texts
     refused = "line wrote feed = 60 %: refused with EMCY FF01h, held by plc"
     assert any(text.startswith(refused) for text in texts)

@@ -10,25 +10,27 @@ from pathlib import Path
 
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.cob_ids import Function
-from gatewayd.canopen.communication_errors import OVERRUN_TIME
 from gatewayd.canopen.dictionary import Entry, Object, Pdo
-from gatewayd.canopen.eds import objects_of
 from gatewayd.canopen.emergency import ErrorCode, register_of
 from gatewayd.canopen.identity import REACTIONS
 from gatewayd.canopen.lss import Command
 from gatewayd.canopen.nmt import ALLOWED, NmtState, Service
-from gatewayd.canopen.robot_errors import QUIET
-from gatewayd.canopen.status_objects import HEADER, TABLE_INDICES
-from gatewayd.canopen.variables import ABORT_OF
 from gatewayd.core.refusal import Reason
-from gatewayd.core.status import FIELDS, TABLES
-from gatewayd.mapping.bus_load import BIT_RATES, frame_bits
+from gatewayd.core.status_layout import TABLES
+from gatewayd.links.canopen_node.bus_load import BIT_RATES, frame_bits
+from gatewayd.links.canopen_node.communication_errors import OVERRUN_TIME
+from gatewayd.links.canopen_node.eds import objects_of
+from gatewayd.links.canopen_node.pdo_table import load_by_bit_rate, pdo_rows
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
+from gatewayd.links.canopen_node.robot_errors import QUIET
+from gatewayd.links.canopen_node.status_objects import HEADER, TABLE_INDICES
+from gatewayd.links.canopen_node.variables import ABORT_OF
+from gatewayd.links.registry import status_fields
 from gatewayd.mapping.loader import load
-from gatewayd.mapping.pdo_table import load_by_bit_rate, pdo_rows
 
 __all__ = ["PARTS", "table"]
 
-_CANOPEN = Path(__file__).parent.parent.parent / "gatewayd" / "canopen"
+_NODE = Path(__file__).parents[2] / "gatewayd" / "links" / "canopen_node"
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
@@ -41,7 +43,7 @@ def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 
 def _docstring_table(module: str) -> str:
     """The table in the docstring of a module."""
-    text = ast.get_docstring(ast.parse((_CANOPEN / module).read_text())) or ""
+    text = ast.get_docstring(ast.parse((_NODE / module).read_text())) or ""
     return "\n".join(line for line in text.splitlines() if line.startswith("|"))
 
 
@@ -123,8 +125,8 @@ _COLUMNS = ("index", "sub", "name", "type", "access", "stored", "meaning")
 def _sample() -> tuple[Object, ...]:
     plan = load(_SAMPLE, "sample").plan
     assert plan is not None
-    assert plan.canopen is not None
-    return tuple(objects_of(plan.canopen, plan.cell))
+    assert canopen_of(plan) is not None
+    return tuple(objects_of(plan.the(CanopenPlan), plan.cell))
 
 
 def communication_objects() -> str:
@@ -184,7 +186,7 @@ def status_objects() -> str:
     by_index = {one.index: one for one in _sample()}
     header = by_index[HEADER]
     rows: list[tuple[object, ...]] = []
-    for entry, field in zip(header.entries[1:], FIELDS, strict=True):
+    for entry, field in zip(header.entries[1:], status_fields(), strict=True):
         assert entry.name == field.name
         rows.append(
             (f"{HEADER:04X}h", f"{entry.subindex:02X}", f"`{entry.name}`", *_facts(entry)[:2], field.meaning)
@@ -431,7 +433,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "nmt-services": nmt_services,
     "connection-set": connection_set,
     "emergencies": emergencies,
-    "node-happenings": happenings,
+    "node-events": happenings,
     "received-pdos": received_pdos,
     "pdo-changes": pdo_changes,
     "error-behaviour": error_behaviour,

@@ -20,21 +20,22 @@ from typing import Any
 import click
 
 from gatewayd.cli import COMMANDS
-from gatewayd.control import documented
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.program import STATES
 from gatewayd.core.refusal import PRECEDENCE, Reason
-from gatewayd.core.status import BASE, FIELDS, TABLES
-from gatewayd.eventlog import LEVELS
-from gatewayd.logs import LEVELS as LEVEL_NAMES
-from gatewayd.mapping.plan import Area
+from gatewayd.core.status_layout import BASE, TABLES
+from gatewayd.links.modbus_server.functions import EXCEPTION_OF, ExceptionCode
+from gatewayd.links.registry import kinds, status_fields
+from gatewayd.logs.events import LEVELS
+from gatewayd.logs.records import LEVELS as LEVEL_NAMES
 from gatewayd.mapping.schema import mapping_schema
-from gatewayd.modbus.functions import EXCEPTION_OF, ExceptionCode
+from gatewayd.modbus.areas import Area
+from gatewayd.report.schema import documented
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series
-from gatewayd.status.histogram import BOUNDS
-from gatewayd.status.metrics import METRICS, PROCESS_METRICS
+from gatewayd.web.histogram import BOUNDS
+from gatewayd.web.metrics import METRICS, PROCESS_METRICS
 from tests.docs import canopen
 from tests.docs.canopen import table
 
@@ -163,7 +164,7 @@ def command_names() -> list[str]:
         command = import_module(f"gatewayd.cli.{name}").command
         names.append(name)
         if isinstance(command, click.Group):
-            names += [f"{name} {inner}" for inner in command.commands]
+            names += [f"{name} {inner}" for inner in command.list_commands(click.Context(command))]
     return names
 
 
@@ -212,7 +213,7 @@ def _places(offset: int, words: int) -> tuple[str, str]:
 
 def status_header() -> str:
     """The numbers of the status block."""
-    rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in FIELDS]
+    rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in status_fields()]
     return table(("address", "4xxxxx", "name", "meaning"), rows)
 
 
@@ -321,28 +322,26 @@ def histogram_bounds() -> str:
 # -- control interface ------------------------------------------------------------------------------------------------
 
 _OBJECTS = {
-    "STATUS": "Status",
-    "CELL": "Cell (`cells` of the status)",
-    "ROBOT": "Robot (`robot` of a cell)",
-    "MODBUS": "Modbus (`modbus` of a cell)",
-    "CANOPEN": "CANopen (`canopen` of a cell)",
-    "WRITER": "Writer (`writers` of a cell)",
-    "REFUSAL": "Refusal (`last_refusal` of a cell)",
-    "VARIABLE": "Variable",
-    "LOCK": "Lock",
-    "EVENT": "Event",
-    "AUDIT": "Record of the audit",
-    "VERSION": "Version",
+    "status": "Status",
+    "cell": "Cell (`cells` of the status)",
+    "link": "Link (`links` of a cell)",
+    **{kind.key: f"{kind.title} (`{kind.key}` of a cell)" for kind in kinds()},
+    "writer": "Writer (`writers` of a cell)",
+    "refusal": "Refusal (`last_refusal` of a cell)",
+    "variable": "Variable",
+    "lock": "Lock",
+    "event": "Event",
+    "audit": "Record of the audit",
+    "version": "Version",
 }
 
 
 def control_fields() -> str:
     """Every field that the control interface answers."""
-    assert set(_OBJECTS) == set(documented.__all__)
     return "\n\n".join(
-        f"### {title}\n\n"
-        + table(("field", "meaning"), ((f"`{one}`", text) for one, text in getattr(documented, name).items()))
-        for name, title in _OBJECTS.items()
+        f"### {_OBJECTS[name]}\n\n"
+        + table(("field", "meaning"), ((f"`{field}`", meaning) for field, meaning in fields.items()))
+        for name, fields in documented().items()
     )
 
 

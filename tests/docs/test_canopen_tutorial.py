@@ -13,8 +13,10 @@ from pathlib import Path
 import can
 import pytest
 
-from gatewayd.daemon import Daemon
+from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.mapping.loader import load
+from gatewayd.service.daemon import Daemon
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import DEMO, parse
 from gatewayd.simulator.server import SimulatedController
@@ -80,12 +82,12 @@ async def running(state: Path) -> AsyncIterator[Hand]:
     assert MAPPING
     plan = load(MAPPING[1].encode(), "line-cell.yaml").plan
     assert plan is not None
-    assert plan.canopen is not None
+    assert canopen_of(plan) is not None
     hand = Hand("tutorial")
     stop = asyncio.Event()
     async with SimulatedController(Controller(program=parse(DEMO)), host=HOST) as robot:
-        canopen = replace(plan.canopen, interface="virtual", channel="tutorial")
-        here = replace(plan, robot=replace(plan.robot, host=HOST, port=robot.port), canopen=canopen)
+        canopen = replace(plan.the(CanopenPlan), interface="virtual", channel="tutorial")
+        here = plan.with_links(robot=replace(robot_of(plan), host=HOST, port=robot.port), canopen=canopen)
         gateway = asyncio.create_task(Daemon([here], state).run(stop))
         try:
             yield hand

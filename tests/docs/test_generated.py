@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.modbus.functions import _FUNCTIONS
+from gatewayd.links.modbus_server.functions import _FUNCTIONS
 from tests.docs.generated import DOCS, PARTS, ROOT, pages, renewed
 
 every_page = pytest.mark.parametrize("page", pages(), ids=lambda page: page.relative_to(DOCS).as_posix())

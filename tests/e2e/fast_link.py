@@ -12,8 +12,9 @@ import time
 from pathlib import Path
 
 from gatewayd.core.cell import Cell
+from gatewayd.links.robot.plan import robot_of
+from gatewayd.links.robot.runtime import RobotLink
 from gatewayd.mapping.loader import load
-from gatewayd.robot.link import RobotLink
 from gatewayd.rtde.client import ClientSettings, Loss, RtdeClient
 
 __all__ = ["resident_kilobytes"]
@@ -36,8 +37,8 @@ class FastLink(RobotLink):
         plan = load(path.read_bytes(), str(path)).plan
         assert plan is not None
         self.cell = Cell(plan.cell)
-        super().__init__(plan.robot, self.cell)
-        robot = plan.robot
+        super().__init__(robot_of(plan), self.cell)
+        robot = robot_of(plan)
         settings = ClientSettings(
             robot.host,
             robot.port,

@@ -175,19 +175,22 @@ def test_events_are_followed_as_they_come(cell: Cell) -> None:
         "--follow",
         "--json",
         "-n",
-        "0",
+        "1",
         "--socket",
         str(socket),
     ]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as following:
+    following = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
         assert following.stdout is not None
-        # The command has to be there first: what it sees then is what comes from now on.
-        time.sleep(0.7)
+        # The newest event so far shows that the command is there.
+        assert json.loads(following.stdout.readline())["event"]
         assert plc.write_integers(0, 11) == 0
         assert json.loads(following.stdout.readline())["event"] == "lock acquired"
         simulator.kill()
         assert "robot lost" in json.loads(following.stdout.readline())["event"]
-        following.terminate()
+    finally:
+        following.kill()
+        following.communicate()
 
 
 def test_a_command_that_waited_while_the_gateway_stood_still_is_not_carried_out(cell: Cell) -> None:

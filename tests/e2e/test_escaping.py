@@ -14,7 +14,7 @@ from tests.e2e.plant import Plant
 from tests.e2e.plc import PLC
 from tests.e2e.processes import HOST, Daemon, free_port, wait_for
 from tests.e2e.test_control import gatewayd
-from tests.status.browser import CHROMIUM, browsing
+from tests.web.browser import CHROMIUM, browsing
 
 WORD = "\x1b[31mINT\x07"
 TEXT = "ok\x1b]0;owned\x07\r\n2026-01-01T00:00:00.000Z info  fake=line \x9b2J \u202eevil\u2066 zero\u200bwidth <b>&"

@@ -57,10 +57,10 @@ runpy.run_module("gatewayd", run_name="__main__")
 """The daemon on a machine that was suspended for as many seconds as a file says: CLOCK_MONOTONIC stood still."""
 
 WALL_CLOCK = {
-    "audit": "the time of a record",
     "control/server": "the time in answers",
     "demo/snapshot": "the time on the screen",
-    "status/view": "the time on the page",
+    "service/audit": "the time of a record",
+    "web/view": "the time on the page",
 }
 """The only modules that may ask the wall clock, and what for."""
 WALL_CLOCK_CALLS = {("time", "time"), ("time", "time_ns"), ("datetime", "now"), ("datetime", "utcnow")}

@@ -53,6 +53,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Outbox(config, INSIDE))
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Put these tests last, so that what runs before them covers the boot, and start it."""
     ours = [item for item in items if HERE in item.path.parents]

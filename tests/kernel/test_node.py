@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.canopen.recorder import until
 from tests.e2e.can_plant import NODE, start_master
 from tests.e2e.plant import Plant
 from tests.e2e.plc import PLC, Plc
 from tests.e2e.processes import Daemon, Simulator, wait_for
 from tests.kernel.bench import Peer, SerialAdapter, ip
+from tests.links.canopen_node.recorder import until
 
 CELL = f"""\
 canopen: {{{{channel: {{channel}}, bitrate: 500000, node: {NODE}, autostart: true, heartbeat: 100ms}}}}

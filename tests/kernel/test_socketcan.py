@@ -14,14 +14,14 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd import clock
 from gatewayd.canopen.bus import BusError, BusState
 from gatewayd.canopen.errors import ErrorClass
 from gatewayd.canopen.frame import Frame, Priority
 from gatewayd.canopen.queue import Transmitter
 from gatewayd.canopen.socketcan import SEND_BUFFER, SocketCanBus
-from tests.canopen.recorder import Recorder, until
+from gatewayd.loop import clock
 from tests.kernel.bench import Peer, SerialAdapter, ip
+from tests.links.canopen_node.recorder import Recorder, until
 
 SATURATED = 9009
 """Frames that a bus of 1 Mbit/s carries in a second: eight bytes, 111 bits without stuffing."""

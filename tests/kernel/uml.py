@@ -20,14 +20,16 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
-__all__ = ["LIMIT", "REPORTS", "Boot", "place_of_memory", "without_xstate"]
+__all__ = ["LIMIT", "REPORTS", "TUNABLES", "Boot", "launch"]
 
-LIMIT = 90
+LIMIT = 180
 """Seconds for one boot with everything that runs in it."""
 REPORTS = "GATEWAYD_KERNEL_REPORTS"
 """Environment variable that names the file for reports; set inside."""
+TUNABLES = "glibc.cpu.hwcaps=-AVX2,-AVX,-AVX512F,-AVX512VL,-ERMS,-AVX_Fast_Unaligned_Load,-XSAVEC,-XSAVE"
+"""GLIBC_TUNABLES inside: between processes the kernel keeps no more of the vector registers than SSE has."""
 MEMORY = 512 << 20
 _STARTED, _ENDED, _REPORTS, _CONSOLE = "started", "ended", "reports.jsonl", "console.log"
 _MODULES = (
@@ -43,8 +45,7 @@ _INIT = """\
 #!/bin/sh
 exec >{console} 2>&1 </dev/null
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/run TMPDIR=/run PYTHONDONTWRITEBYTECODE=1 {variable}={reports}
-# Between processes the kernel keeps no more of the vector registers than SSE has (see uml.py).
-export GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-AVX,-AVX512F,-AVX512VL,-ERMS,-AVX_Fast_Unaligned_Load,-XSAVEC,-XSAVE
+export GLIBC_TUNABLES={tunables}
 mount -t proc proc /proc; mount -t sysfs sys /sys; mount -t tmpfs tmp /run
 mount -t devtmpfs dev /dev 2>/dev/null; mkdir -p /dev/pts /dev/shm; mount -t devpts pts /dev/pts
 cd {tree} || halt -f
@@ -99,6 +100,7 @@ class Boot:
         insert.write_text(_INSERT)
         init.write_text(
             _INIT.format(
+                tunables=TUNABLES,
                 console=self._directory / _CONSOLE,
                 variable=REPORTS,
                 reports=self._directory / _REPORTS,
@@ -114,12 +116,7 @@ class Boot:
         kernel += ["con=null", "con0=null,fd:1", "quiet"]
         # The shell outlives the kernel, whatever becomes of that, and says so.
         script = f'timeout -k 2 {LIMIT} "$@" >"$0/kernel.log" 2>&1 </dev/null; echo $? >"$0/{_ENDED}"'
-        self._process = subprocess.Popen(
-            ["/bin/sh", "-c", script, str(self._directory), *kernel],
-            preexec_fn=without_xstate,  # noqa: PLW1509 - tests start no threads
-            start_new_session=True,
-            env={**os.environ, "TMPDIR": place_of_memory(MEMORY)},
-        )
+        self._process = launch(["/bin/sh", "-c", script, str(self._directory), *kernel], MEMORY)
 
     def reports(self, test: str) -> Iterator[dict[str, Any]]:
         """The inner reports on one test, waited for. Fewer than three if the kernel ended before the test did."""
@@ -165,7 +162,20 @@ def _kill_all_with(argument: str) -> None:
                 os.kill(int(entry.name), signal.SIGKILL)
 
 
-def place_of_memory(size: int) -> str:
+def launch(command: Sequence[str], memory: int, output: IO[bytes] | None = None) -> subprocess.Popen[bytes]:
+    """Start a kernel with so many bytes of memory, in a session of its own."""
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=subprocess.STDOUT if output is not None else None,
+        preexec_fn=_without_xstate,  # noqa: PLW1509 - tests start no threads
+        start_new_session=True,
+        env={**os.environ, "TMPDIR": _place_of_memory(memory)},
+    )
+
+
+def _place_of_memory(size: int) -> str:
     """Where a kernel's memory may lie: in shared memory if there is enough, of which containers have little."""
     with contextlib.suppress(OSError):
         place = os.statvfs("/dev/shm")  # noqa: S108 - the question is how big it is
@@ -174,7 +184,7 @@ def place_of_memory(size: int) -> str:
     return "/tmp"  # noqa: S108 - the same
 
 
-def without_xstate() -> None:
+def _without_xstate() -> None:
     """Let this process and its children see a machine without PTRACE_GETREGSET (seccomp, no privilege needed).
 
     Linux 6.1 as user-mode-linux asks for 2.7 kB of extended registers and dies on processors that have more of them

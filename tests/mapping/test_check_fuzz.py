@@ -13,18 +13,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gatewayd.canopen.eds import eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.plan import canopen_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together
-from gatewayd.mapping.report import Outcome, as_github, as_json, as_text
 from gatewayd.mapping.source import parse, plain
-from gatewayd.mapping.table import as_csv, as_markdown, rows
-from gatewayd.mapping.table import as_json as table_as_json
+from gatewayd.report.findings import CheckOutcome, as_github, as_json, as_text
+from gatewayd.report.table import as_csv, as_markdown, rows
+from gatewayd.report.table import as_json as table_as_json
 
 ROOT = Path(__file__).parents[2]
 SEEDS = [
     *sorted((ROOT / "mappings").glob("*.yaml")),
-    *sorted((ROOT / "docs/reference/rules").glob("*/*.yaml")),
+    *sorted((ROOT / "gatewayd").rglob("GW*/*.yaml")),
 ]
 SLOW = 5.0
 """Seconds; a thousand times what a check takes, for a machine that does something else."""
@@ -40,7 +41,7 @@ def examine(data: bytes) -> Loaded:
     """Check, report and, where it passes, show: the whole way of a file."""
     started = time.perf_counter()
     loaded = load(data, "cell.yaml")
-    outcome = Outcome(("cell.yaml",), loaded.diagnostics)
+    outcome = CheckOutcome(("cell.yaml",), loaded.diagnostics)
     lines = data.count(b"\n") + data.count(b"\r") + data.count(b"\x85") + data.count(b"\xe2\x80") + 2
     for finding in loaded.diagnostics:
         assert 1 <= finding.position.line <= lines
@@ -56,7 +57,7 @@ def examine(data: bytes) -> Loaded:
         assert as_csv(table)
         assert as_markdown(loaded.plan, loaded.cell, table)
         assert table_as_json(loaded.plan, loaded.cell, table)
-        canopen = loaded.plan.canopen
+        canopen = canopen_of(loaded.plan)
         if canopen is not None:
             cell = loaded.plan.cell
             assert eds_text(objects_of(canopen, cell), sheet_of(canopen, cell)).isascii()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.plan import CanopenPlan, Consumer, ObjectPlan, PdoEntry, PdoPlan, SyncPlan
+from gatewayd.canopen.heartbeat import Consumer
+from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import (
     Direction,
     Fallback,
@@ -16,11 +17,15 @@ from gatewayd.core.definition import (
     Variable,
     Writer,
 )
+from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, PdoPlan, canopen_of
+from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
+from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan, robot_of
 from gatewayd.mapping.compile import compile_plan
-from gatewayd.mapping.document import read_document
 from gatewayd.mapping.expand import expand
-from gatewayd.mapping.plan import Area, Plan, WatchdogPlan
+from gatewayd.mapping.plan import Plan
+from gatewayd.mapping.reader import read_document
 from gatewayd.mapping.source import parse
+from gatewayd.modbus.areas import Area
 
 FINGERPRINT = 0x3DE7_CFA4
 """Of `GOOD`, since the first version of the language."""
@@ -104,7 +109,7 @@ def test_locks_and_writers_by_index() -> None:
 
 def test_robot_plan_lists_fields_by_first_variable() -> None:
     """Without the timestamp, which the link asks for in any case, and without the watchdog's register."""
-    robot = compiled().robot
+    robot = compiled().the(RobotPlan)
     assert robot.outputs == ("robot_mode", "output_bit_registers0_to_31")
     assert robot.inputs == (
         "input_bit_registers32_to_63",
@@ -117,7 +122,7 @@ def test_robot_plan_lists_fields_by_first_variable() -> None:
 
 def test_modbus_plan() -> None:
     """Placements by variable; peers from the most specific network to the widest."""
-    modbus = compiled().modbus
+    modbus = compiled().the(ModbusPlan)
     assert modbus is not None
     assert (modbus.host, modbus.port, modbus.unit, modbus.fill_gaps) == ("127.0.0.1", 1502, 1, False)
     assert [str(network) for network in modbus.allow] == ["192.168.1.0/24"]
@@ -171,7 +176,7 @@ variables:
 
 
 def node(text: str = CANOPEN) -> CanopenPlan:
-    found = compiled(text).canopen
+    found = compiled(text).the(CanopenPlan)
     assert found is not None
     return found
 
@@ -265,13 +270,13 @@ def test_fingerprint_stays_with_the_meaning_of_the_canopen_side(old: str, new: s
 
 def test_a_canopen_section_changes_nothing_for_those_without() -> None:
     """Fingerprints that PLCs have stored stay what they were."""
-    assert compiled().canopen is None
+    assert compiled().links.get("canopen") is None
     assert compiled().cell.fingerprint == FINGERPRINT
 
 
 def test_without_a_modbus_section_there_is_no_modbus_plan() -> None:
     text = "gatewayd: 1\ncell: c\nrobot: {host: r}\nvariables: {a: {robot: robot_mode}}"
-    assert compiled(text).modbus is None
+    assert modbus_of(compiled(text)) is None
 
 
 @pytest.mark.parametrize(
@@ -403,7 +408,7 @@ def test_outputs_that_hang_on_the_program() -> None:
     cell = keyed(("  series: e\n", "  series: e\n  valid: running\n"))
     assert [v.name for v in cell.cell.variables if v.valid_running] == ["lamps[0]", "lamps[1]"]
     for plan in (one, cell):
-        assert plan.robot.outputs == ("robot_mode", "output_bit_registers0_to_31", "runtime_state")
+        assert robot_of(plan).outputs == ("robot_mode", "output_bit_registers0_to_31", "runtime_state")
         assert plan.cell.fingerprint != FINGERPRINT
 
 
@@ -421,8 +426,8 @@ def test_status_words_are_entries_of_a_tpdo() -> None:
         "pdos: {state: {status: [lag, quality of clock], variables: lamps}}}\nwriters:\n"
     )
     plan = keyed(("writers:\n", section))
-    assert plan.canopen is not None
-    (pdo,) = plan.canopen.pdos
+    assert canopen_of(plan) is not None
+    (pdo,) = plan.the(CanopenPlan).pdos
     assert pdo.direction is Direction.OUTPUT
     assert pdo.entries == (
         PdoEntry(None, 0x5F00, 30, 32),

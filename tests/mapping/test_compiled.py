@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.mapping.codec import ORDERS, TYPES
+from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.compiled import Compiled, CompiledFile, Unreadable
 from gatewayd.mapping.loader import load
+from gatewayd.modbus.codec import ORDERS, TYPES
 
 MAPPINGS = sorted((Path(__file__).parents[2] / "mappings").glob("*.yaml"))
 HEAD = "gatewayd: 1\ncell: all\nrobot: {host: 10.0.0.1}\nmodbus: {listen: '127.0.0.1:1502'}\nvariables:\n"
@@ -48,9 +49,9 @@ def test_every_kind_of_number_arrives_with_functions_that_do_the_same() -> None:
     sent = Compiled((compiled((HEAD + "".join(lines)).encode(), "all.yaml"),))
     assert not sent.files[0].errors
     for here, there in zip(sent.plans, travelled(sent).plans, strict=True):
-        assert here.modbus is not None
-        assert there.modbus is not None
-        for one, other in zip(here.modbus.placements, there.modbus.placements, strict=True):
+        assert here.the(ModbusPlan) is not None
+        assert there.the(ModbusPlan) is not None
+        for one, other in zip(here.the(ModbusPlan).placements, there.the(ModbusPlan).placements, strict=True):
             assert one.codec is not None
             assert other.codec is not None
             raw = one.codec.encode(7.5)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.mapping import diagnostics
+from gatewayd.mapping import diagnostics, syntax
 from gatewayd.mapping.diagnostics import Position, Related, Severity, rule_of
-from gatewayd.mapping.rules import syntax
 
 
 def test_position_reads_as_editors_follow_it() -> None:
@@ -47,9 +46,9 @@ def test_unknown_rule_is_none() -> None:
 
 @pytest.mark.parametrize(
     "rule_id,slug",
-    [("GW801", "new"), ("GW1", "new"), ("GW199", "Not Kebab"), ("GW101", "new"), ("GW199", "yaml-syntax")],
+    [("GW901", "new"), ("GW1", "new"), ("GW199", "Not Kebab"), ("GW101", "new"), ("GW199", "yaml-syntax")],
 )
 def test_malformed_and_used_ids_are_refused(rule_id: str, slug: str) -> None:
     """Ids and slugs are well formed and unique."""
     with pytest.raises(ValueError, match=rule_id):
-        diagnostics.declare(rule_id, slug, "summary", "why")
+        diagnostics.declare(rule_id, slug, "summary")

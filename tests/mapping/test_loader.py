@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gatewayd.core.definition import Direction
+from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together, read_bytes
-from gatewayd.mapping.source import MAXIMUM_BYTES
+from gatewayd.mapping.source import MAX_BYTES
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
 
 MAPPINGS = Path(__file__).parents[2] / "mappings"
@@ -64,9 +65,9 @@ def test_cells_that_share_a_listener_are_checked_against_each_other() -> None:
 def test_reading_stops_at_the_limit(tmp_path: Path) -> None:
     """A device or a log file named by mistake does not fill the memory."""
     path = tmp_path / "big.yaml"
-    path.write_bytes(b"#" * (MAXIMUM_BYTES + 10))
+    path.write_bytes(b"#" * (MAX_BYTES + 10))
     data = read_bytes(path)
-    assert len(data) == MAXIMUM_BYTES + 1
+    assert len(data) == MAX_BYTES + 1
     assert [finding.rule.slug for finding in load(data, str(path)).diagnostics] == ["too-large"]
 
 
@@ -176,8 +177,8 @@ def test_plans_are_consistent(made: list[tuple[str, str, int, str, str]]) -> Non
         assert all(owner < len(cell.writers) for owner in lock.owners)
     for variable in cell.variables:
         assert (variable.lock is not None) == (variable.direction is Direction.INPUT)
-    assert plan.modbus is not None
-    for placement in plan.modbus.placements:
+    assert modbus_of(plan) is not None
+    for placement in plan.the(ModbusPlan).placements:
         variable = cell.variables[placement.variable]
         if placement.codec is not None:
             assert len(placement.codec.encode(variable.kind.zero)) == 2 * placement.words

@@ -7,8 +7,11 @@ from pathlib import Path
 import pytest
 
 from gatewayd.core.definition import Direction
+from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
 from gatewayd.mapping.loader import Loaded, load, load_together
-from gatewayd.mapping.plan import Area, Plan
+from gatewayd.mapping.plan import Plan
+from gatewayd.modbus.areas import Area
 
 MAPPINGS = Path(__file__).parents[2] / "mappings"
 NAMES = [path.name for path in sorted(MAPPINGS.glob("*.yaml"))]
@@ -57,7 +60,7 @@ def test_keeps_its_fingerprint(name: str) -> None:
 def test_listens_on_loopback_and_says_how_to_change_it(name: str) -> None:
     text = (MAPPINGS / name).read_text()
     assert text.startswith("# yaml-language-server: $schema=schema.json\n")
-    modbus = plan(name).modbus
+    modbus = modbus_of(plan(name))
     assert (modbus is None) == (name == "canopen-only.yaml")
     if modbus is not None:
         assert modbus.host == "127.0.0.1"
@@ -67,7 +70,7 @@ def test_listens_on_loopback_and_says_how_to_change_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["canopen-only.yaml", "two-buses.yaml"])
 def test_names_a_bus_to_try_it_on(name: str) -> None:
-    canopen = plan(name).canopen
+    canopen = plan(name).the(CanopenPlan)
     assert canopen is not None
     assert (canopen.interface, canopen.channel) == ("socketcan", "can0")
     assert "vcan0" in (MAPPINGS / name).read_text()
@@ -94,8 +97,8 @@ def test_full_image_is_full() -> None:
         for kind in ("int", "double"):
             assert {f"{side}_{kind}_register_{number}" for number in range(24)} <= set(fields)
         assert len(fields) == 64 + 24 + 24
-    assert found.modbus is not None
-    areas = [placement.area for placement in found.modbus.placements]
+    assert found.the(ModbusPlan) is not None
+    areas = [placement.area for placement in found.the(ModbusPlan).placements]
     assert (areas.count(Area.COIL), areas.count(Area.DISCRETE)) == (64, 64)
 
 
@@ -115,10 +118,10 @@ def test_full_image_has_the_documented_addresses(name: str, address: int, bit: i
     """The table in the file's head and in the reference; PLC programs are built on it."""
     found = plan("full-image.yaml")
     index = next(variable.number - 1 for variable in found.cell.variables if variable.name == name)
-    assert found.modbus is not None
+    assert found.the(ModbusPlan) is not None
     places = [
         (placement.address, placement.bit)
-        for placement in found.modbus.placements
+        for placement in found.the(ModbusPlan).placements
         if placement.variable == index and placement.area is Area.HOLDING
     ]
     assert places == [(address, bit)]
@@ -126,7 +129,7 @@ def test_full_image_has_the_documented_addresses(name: str, address: int, bit: i
 
 def test_canopen_only_has_the_documented_objects_and_pdos() -> None:
     """The table in the file's head: masters are configured by it."""
-    canopen = plan("canopen-only.yaml").canopen
+    canopen = plan("canopen-only.yaml").the(CanopenPlan)
     assert canopen is not None
     ends: dict[int, int] = {}
     for one in canopen.objects:
@@ -146,9 +149,9 @@ def test_canopen_only_has_the_documented_objects_and_pdos() -> None:
 def test_two_buses_contend_for_one_variable() -> None:
     found = plan("two-buses.yaml")
     lock = next(lock for lock in found.cell.locks if lock.name == "lamp")
-    assert found.canopen is not None
+    assert found.the(CanopenPlan) is not None
     assert [found.cell.writers[owner].name for owner in lock.owners] == ["plc", "line"]
-    assert found.canopen.rpdo_writer == lock.owners[1]
+    assert found.the(CanopenPlan).rpdo_writer == lock.owners[1]
 
 
 def test_two_plcs_share_by_priority() -> None:

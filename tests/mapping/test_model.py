@@ -8,18 +8,20 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from gatewayd.core.definition import Fallback
-from gatewayd.mapping import model
-from gatewayd.mapping.plan import Area
+from gatewayd.links.modbus_server.sections import Modbus, PlacementSpec
+from gatewayd.links.robot.sections import Robot, Watchdog
+from gatewayd.mapping.language import FILE, VARIABLE, WRITER
+from gatewayd.mapping.model import Group
 
 SECTIONS = [
-    model.MappingFile,
-    model.Robot,
-    model.Watchdog,
-    model.Modbus,
-    model.WriterSpec,
-    model.Group,
-    model.VariableSpec,
-    model.PlacementSpec,
+    FILE,
+    Robot,
+    Watchdog,
+    Modbus,
+    WRITER,
+    Group,
+    VARIABLE,
+    PlacementSpec,
 ]
 
 
@@ -36,60 +38,23 @@ def test_unknown_keys_are_refused(section: type[BaseModel]) -> None:
     assert any(error["type"] == "extra_forbidden" for error in caught.value.errors())
 
 
-def placements(value: Any) -> list[tuple[Area, int, int | None]]:
-    spec = model.VariableSpec.model_validate({"robot": "x", "modbus": value})
-    return [(placed.area, placed.address, placed.bit) for placed in spec.modbus]
-
-
-def test_placements_have_short_forms() -> None:
-    """A number, a text, a table, or a list of these."""
-    assert placements(100) == [(Area.HOLDING, 100, None)]
-    assert placements("100.10") == [(Area.HOLDING, 100, 10)]
-    assert placements({"input": 7}) == [(Area.INPUT, 7, None)]
-    assert placements(["0.3", {"coil": 3}, {"discrete": 4}]) == [
-        (Area.HOLDING, 0, 3),
-        (Area.COIL, 3, None),
-        (Area.DISCRETE, 4, None),
-    ]
-
-
-@pytest.mark.parametrize(
-    "value",
-    [
-        {},
-        {"type": "int16"},
-        {"holding": 1, "coil": 1},
-        {"coil": "1.3"},
-        {"discrete": "1.0"},
-        None,
-        True,
-        [[1]],
-    ],
-)
-def test_placement_names_exactly_one_area(value: Any) -> None:
-    """Coils and discrete inputs are bits already."""
-    with pytest.raises(ValidationError) as caught:
-        placements(value)
-    assert {error["type"] for error in caught.value.errors()} <= {"bad-address", "wrong-type"}
-
-
 @pytest.mark.parametrize(
     "section, value",
     [
-        (model.Robot, {"host": "r", "port": 0}),
-        (model.Robot, {"host": "r", "frequency": 501}),
-        (model.Robot, {"host": ""}),
-        (model.Robot, {"host": "no host"}),
-        (model.Robot, {"host": "r", "verify": "yes"}),
-        (model.Robot, {"host": "r", "port": "30004"}),
-        (model.Modbus, {"unit": 0}),
-        (model.Modbus, {"unit": 248}),
-        (model.Modbus, {"connections": 0}),
-        (model.VariableSpec, {"robot": "x", "limits": [0]}),
-        (model.VariableSpec, {"robot": "x", "limits": [0, 1, 2]}),
-        (model.VariableSpec, {"robot": "x", "deadband": -1}),
-        (model.VariableSpec, {"robot": "x", "unit": 5}),
-        (model.VariableSpec, {"robot": "x", "owner": []}),
+        (Robot, {"host": "r", "port": 0}),
+        (Robot, {"host": "r", "frequency": 501}),
+        (Robot, {"host": ""}),
+        (Robot, {"host": "no host"}),
+        (Robot, {"host": "r", "verify": "yes"}),
+        (Robot, {"host": "r", "port": "30004"}),
+        (Modbus, {"unit": 0}),
+        (Modbus, {"unit": 248}),
+        (Modbus, {"connections": 0}),
+        (VARIABLE, {"robot": "x", "limits": [0]}),
+        (VARIABLE, {"robot": "x", "limits": [0, 1, 2]}),
+        (VARIABLE, {"robot": "x", "deadband": -1}),
+        (VARIABLE, {"robot": "x", "unit": 5}),
+        (VARIABLE, {"robot": "x", "owner": []}),
     ],
 )
 def test_values_out_of_their_range_are_refused(section: type[BaseModel], value: Any) -> None:
@@ -99,15 +64,15 @@ def test_values_out_of_their_range_are_refused(section: type[BaseModel], value: 
 
 def test_defaults_are_the_documented_ones() -> None:
     """The contract names these; changing one changes the meaning of every file that relies on it."""
-    robot = model.Robot.model_validate({"host": "r"})
+    robot = Robot.model_validate({"host": "r"})
     assert (robot.port, robot.frequency, robot.on_connect, robot.verify) == (30004, 0, "adopt", True)
-    modbus = model.Modbus()
+    modbus = Modbus()
     assert (str(modbus.listen), modbus.unit, modbus.allow, modbus.connections) == ("127.0.0.1:502", 1, (), 32)
     assert (modbus.idle_timeout, modbus.gaps, modbus.order) == (60.0, "refuse", "ABCD")
-    variable = model.VariableSpec.model_validate({"robot": "x"})
+    variable = VARIABLE.model_validate({"robot": "x"})
     assert (variable.on_release, variable.on_stale, variable.clamp) == (Fallback(), Fallback(), False)
 
 
 def test_models_are_immutable() -> None:
     with pytest.raises(ValidationError):
-        model.Modbus().unit = 2
+        Modbus().unit = 2

@@ -11,29 +11,10 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
 from gatewayd.core.definition import Fallback, FallbackKind
+from gatewayd.links.modbus_server.scalars import Address
+from gatewayd.links.robot.scalars import RobotReference, Version
 from gatewayd.mapping import scalars
-from gatewayd.mapping.source import parse, plain
-
-
-def written(text: str) -> object:
-    """What YAML makes of the text of a value."""
-    source = parse(f"a: {text}".encode(), "f")
-    assert source.root is not None, source.findings
-    value = plain(source.root)
-    assert isinstance(value, dict)
-    return value["a"]
-
-
-def read(kind: Any, text: str) -> Any:
-    return TypeAdapter(kind).validate_python(written(text), strict=True)
-
-
-def refused(kind: Any, text: str) -> tuple[str, str, str]:
-    """Rule, message and hint of the refusal."""
-    with pytest.raises(ValidationError) as caught:
-        read(kind, text)
-    details = caught.value.errors()[0]
-    return details["type"], details["ctx"]["message"], details["ctx"]["hint"]
+from tests.mapping.values import read, refused
 
 
 @pytest.mark.parametrize(
@@ -75,69 +56,6 @@ def test_no_duration() -> None:
 
 
 @pytest.mark.parametrize(
-    "text, address",
-    [("0", (0, None)), ("65535", (65535, None)), ("0.10", (0, 10)), ("0.1", (0, 1)), ("'12.15'", (12, 15))],
-)
-def test_addresses(text: str, address: tuple[int, int | None]) -> None:
-    """The text counts: `0.10` is bit 10, not bit 1."""
-    assert read(scalars.Address, text) == address
-
-
-@pytest.mark.parametrize(
-    "text, slug",
-    [
-        ("-1", "bad-address"),
-        ("0x10", "bad-address"),
-        ("010", "bad-address"),
-        ("1e2", "bad-address"),
-        ("0.01", "bad-address"),
-        ("first", "bad-address"),
-        ("1.2.3", "bad-address"),
-        ("65536", "out-of-range"),
-        ("0.16", "out-of-range"),
-        ("{a: 1}", "wrong-type"),
-    ],
-)
-def test_refused_addresses(text: str, slug: str) -> None:
-    assert refused(scalars.Address, text)[0] == slug
-
-
-@pytest.mark.parametrize(
-    "digits, hint", [("400101", "{holding: 100}"), ("300001", "{input: 0}"), ("100008", "{discrete: 7}")]
-)
-def test_six_digit_notation_is_explained(digits: str, hint: str) -> None:
-    """4xxxxx is never guessed, but the finding says what to write."""
-    assert hint in refused(scalars.Address, digits)[2]
-
-
-def test_references() -> None:
-    one = read(scalars.RobotReference, "input_int_register_0")
-    assert (one.field, one.registers, one.many) == ("input_int_register_0", None, False)
-    family = read(scalars.RobotReference, "output_double_register_0..23")
-    assert (family.field, family.registers, family.many) == ("output_double_register_", range(24), True)
-    element = read(scalars.RobotReference, "'actual_TCP_pose[2]'")
-    assert (element.field, element.elements, element.many) == ("actual_TCP_pose", range(2, 3), False)
-    bits = read(scalars.RobotReference, "actual_digital_input_bits.0..7")
-    assert (bits.field, bits.bits, bits.many) == ("actual_digital_input_bits", range(8), True)
-
-
-@pytest.mark.parametrize(
-    "text, slug",
-    [
-        ("5", "bad-robot-reference"),
-        ("'x[a]'", "bad-robot-reference"),
-        ("x..3", "bad-robot-reference"),
-        ("'x[0..1].0..3'", "bad-robot-reference"),
-        ("a b", "bad-robot-reference"),
-        ("x_7..3", "bad-range"),
-        ("[x]", "wrong-type"),
-    ],
-)
-def test_refused_references(text: str, slug: str) -> None:
-    assert refused(scalars.RobotReference, text)[0] == slug
-
-
-@pytest.mark.parametrize(
     "text, host, port", [("127.0.0.1:1502", "127.0.0.1", 1502), ("'[::1]:502'", "::1", 502)]
 )
 def test_listen_addresses(text: str, host: str, port: int) -> None:
@@ -174,15 +92,6 @@ def test_networks() -> None:
 )
 def test_refused_networks(text: str, hint: str) -> None:
     assert hint in refused(scalars.Networks, text)[2]
-
-
-@pytest.mark.parametrize(
-    "text, version",
-    [("5.12", (5, 12, 0)), ("5.10", (5, 10, 0)), ("10", (10, 0, 0)), ("'5.9.4.1031110'", (5, 9, 4))],
-)
-def test_versions(text: str, version: tuple[int, int, int]) -> None:
-    """5.10 is version ten, not one."""
-    assert read(scalars.Version, text) == version
 
 
 @pytest.mark.parametrize(
@@ -231,7 +140,9 @@ def test_refused_names(text: str) -> None:
 
 
 KINDS: list[Any] = [
-    scalars.Address,
+    Address,
+    RobotReference,
+    Version,
     scalars.CellName,
     scalars.Duration,
     scalars.Listen,
@@ -242,8 +153,6 @@ KINDS: list[Any] = [
     scalars.OutputPolicy,
     scalars.Real,
     scalars.ReleasePolicy,
-    scalars.RobotReference,
-    scalars.Version,
     scalars.Whole,
 ]
 ADAPTERS: list[TypeAdapter[Any]] = [TypeAdapter(kind) for kind in KINDS]

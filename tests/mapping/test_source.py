@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.mapping.diagnostics import Position
-from gatewayd.mapping.source import MAXIMUM_BYTES, Items, RealNumber, Scalar, Source, Table, parse, plain
+from gatewayd.mapping.source import MAX_BYTES, Items, MappingText, RealNumber, Scalar, Table, parse, plain
 
 
-def read(text: str) -> Source:
+def read(text: str) -> MappingText:
     return parse(text.encode(), "cell.yaml")
 
 
-def found(source: Source) -> list[tuple[str, int, int]]:
+def found(source: MappingText) -> list[tuple[str, int, int]]:
     return [
         (finding.rule.slug, finding.position.line, finding.position.column) for finding in source.findings
     ]
@@ -168,7 +168,7 @@ def test_syntax_error_names_what_it_is_part_of() -> None:
 
 def test_huge_file_is_refused_unread() -> None:
     """More than a mebibyte is no mapping."""
-    assert found(parse(b"#" * (MAXIMUM_BYTES + 1), "f")) == [("too-large", 1, 1)]
+    assert found(parse(b"#" * (MAX_BYTES + 1), "f")) == [("too-large", 1, 1)]
 
 
 @given(st.binary(max_size=300))

@@ -4,10 +4,10 @@ import pytest
 
 from gatewayd.modbus.frames import (
     BUFFER_SIZE,
-    GREATEST_FRAME,
-    Frame,
+    MAX_FRAME,
     FrameBuffer,
     FramingError,
+    ModbusFrame,
     encode,
     split,
 )
@@ -20,8 +20,8 @@ def test_encodes_the_example_of_the_messaging_guide() -> None:
 
 
 def test_splits_a_frame_off() -> None:
-    assert split(bytearray(READ + READ), 0, 24) == Frame(0x1501, 0xFF, READ[7:], 12)
-    assert split(bytearray(READ + READ), 12, 24) == Frame(0x1501, 0xFF, READ[7:], 24)
+    assert split(bytearray(READ + READ), 0, 24) == ModbusFrame(0x1501, 0xFF, READ[7:], 12)
+    assert split(bytearray(READ + READ), 12, 24) == ModbusFrame(0x1501, 0xFF, READ[7:], 24)
 
 
 @pytest.mark.parametrize("end", range(len(READ)))
@@ -61,7 +61,7 @@ def test_the_buffer_moves_the_rest_to_the_front() -> None:
 def test_the_buffer_never_grows_and_never_fills_up() -> None:
     """The rest is always less than a frame."""
     buffer = FrameBuffer(1)
-    assert len(buffer.data) == 2 * GREATEST_FRAME
-    buffer.discard(0, GREATEST_FRAME - 1)
-    assert len(buffer.space[0]) == GREATEST_FRAME + 1
-    assert len(buffer.data) == 2 * GREATEST_FRAME
+    assert len(buffer.data) == 2 * MAX_FRAME
+    buffer.discard(0, MAX_FRAME - 1)
+    assert len(buffer.space[0]) == MAX_FRAME + 1
+    assert len(buffer.data) == 2 * MAX_FRAME

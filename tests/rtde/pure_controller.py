@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
-from gatewayd.rtde.negotiation import Event, Negotiation, Step
+from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import Session
 from gatewayd.rtde.types import DataType
@@ -103,7 +103,7 @@ class Conversation:
     def __init__(self, negotiation: Negotiation, controller: PureController) -> None:
         self.negotiation = negotiation
         self.controller = controller
-        self.events: list[Event] = []
+        self.events: list[Notice] = []
         self.sessions: list[Session] = []
         self.shown: list[dict[str, Scalar]] = []
         """The inputs that each session has made known by readings and its first package."""
@@ -140,10 +140,10 @@ class Conversation:
                     name: values[slots[name]][0] for name in self.negotiation.claims.types if name in slots
                 }
 
-    def _follow(self, step: Step) -> None:
+    def _follow(self, step: NextStep) -> None:
         if step.event is not None:
             self.events.append(step.event)
-        if step.event in {Event.STARTED, Event.INPUTS_CHANGED}:
+        if step.event in {Notice.STARTED, Notice.INPUTS_CHANGED}:
             session = self.negotiation.session()
             self.sessions.append(session)
             self.shown.append({name: values[0] for name, values in session.held.items()})

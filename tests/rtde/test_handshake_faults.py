@@ -15,7 +15,7 @@ from gatewayd.rtde.client import LossReason, RtdeClient
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.controller import Controller
-from gatewayd.simulator.faults import DropAt, Faults, LongLists, Step
+from gatewayd.simulator.faults import DropAt, Faults, FaultStep, LongLists
 from gatewayd.simulator.server import SimulatedController
 
 if TYPE_CHECKING:
@@ -28,13 +28,13 @@ INPUT_REGISTERS = (*WORDS, *(f"input_{kind}_register_{n}" for kind in ("int", "d
 OUTPUT_REGISTERS = tuple(name.replace("input", "output") for name in INPUT_REGISTERS)
 TARGET, FREED = "input_double_register_23", "input_double_register_22"
 STEPS = [
-    DropAt(Step.VERSION),
-    DropAt(Step.CONTROLLER),
-    *(DropAt(Step.OUTPUTS, number) for number in (1, 2, 3)),
-    *(DropAt(Step.INPUTS, number) for number in (1, 2)),
-    *(DropAt(Step.START, number) for number in (1, 2)),
-    DropAt(Step.PAUSE),
-    *(DropAt(Step.DATA, number) for number in (1, 2)),
+    DropAt(FaultStep.VERSION),
+    DropAt(FaultStep.CONTROLLER),
+    *(DropAt(FaultStep.OUTPUTS, number) for number in (1, 2, 3)),
+    *(DropAt(FaultStep.INPUTS, number) for number in (1, 2)),
+    *(DropAt(FaultStep.START, number) for number in (1, 2)),
+    DropAt(FaultStep.PAUSE),
+    *(DropAt(FaultStep.DATA, number) for number in (1, 2)),
 ]
 
 
@@ -93,7 +93,7 @@ async def test_a_connection_lost_at_any_step_costs_no_register(
             "backoff_limit": 0.05,
         }
         async with connected(port=simulated.port, **settings) as (client, seen):
-            if drop_at.step is Step.DATA:
+            if drop_at.step is FaultStep.DATA:
                 await until(lambda: not faults.drop_times and seen.losses, 15.0)
             await until(lambda: seen.packages, 15.0)
             assert seen.sessions[-1].unread == frozenset()
@@ -105,7 +105,7 @@ async def test_a_long_list_that_comes_to_nothing_is_no_reason_to_leave_inputs_un
     answer: str, connected: Connected, until: Until
 ) -> None:
     times = {"dropped twice": 2.0, "always dropped": float("inf"), "late": 0.0}[answer]
-    faults = Faults(drop_at=DropAt(Step.OUTPUTS), drop_times=times)
+    faults = Faults(drop_at=DropAt(FaultStep.OUTPUTS), drop_times=times)
     if answer == "always dropped":
         faults = Faults(long_lists=LongLists.CLOSE)
     async with SimulatedController(Controller(faults=faults)) as simulated:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.claims import HandshakeError
-from gatewayd.rtde.negotiation import Event, Negotiation, State, Step, Wishes
+from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice, State, Wishes
 from tests.rtde.pure_controller import PureController
 
 E_SERIES = m.ControllerVersion(5, 12, 0, 1101)
@@ -23,9 +23,9 @@ TO_START = (*TO_INPUTS, m.InputsSetup(1, ("INT32",)))
 TO_RUNNING = (*TO_START, m.StartReply(True))
 
 
-def talk(wishes: Wishes, replies: Sequence[m.ControllerMessage]) -> tuple[Negotiation, list[Step]]:
+def talk(wishes: Wishes, replies: Sequence[m.ControllerMessage]) -> tuple[Negotiation, list[NextStep]]:
     negotiation = Negotiation(wishes)
-    steps = [Step(negotiation.begin())]
+    steps = [NextStep(negotiation.begin())]
     steps += [negotiation.handle(reply) for reply in replies]
     return negotiation, steps
 
@@ -38,7 +38,7 @@ def test_the_whole_way_in_version_2() -> None:
         (m.SetupOutputs(("timestamp", "output_int_register_0", "input_int_register_0"), 500.0), None),
         (m.SetupInputs(("input_int_register_0",)), None),
         (m.Start(), None),
-        (None, Event.STARTED),
+        (None, Notice.STARTED),
     ]
     session = negotiation.session()
     assert (session.protocol, session.series, session.controller) == (2, Series.E, E_SERIES)
@@ -138,7 +138,7 @@ def test_claimed_later_the_session_has_the_new_recipe() -> None:
     assert negotiation.waiting
     assert negotiation.retry_claims() is None
     assert negotiation.handle(DATA) == (None, None)
-    assert negotiation.handle(m.InputsSetup(1, ("INT32",))) == (None, Event.INPUTS_CHANGED)
+    assert negotiation.handle(m.InputsSetup(1, ("INT32",))) == (None, Notice.INPUTS_CHANGED)
     assert negotiation.session().inputs["registers"].id == 1
     assert negotiation.session().unavailable == ()
     assert before.inputs == {}
@@ -153,7 +153,7 @@ def test_retried_in_vain_nothing_is_told() -> None:
 
 def test_data_is_as_good_as_the_answer_to_a_start() -> None:
     negotiation, steps = talk(WISHES, (*TO_START, DATA))
-    assert steps[-1] == (None, Event.STARTED)
+    assert steps[-1] == (None, Notice.STARTED)
     assert negotiation.handle(m.StartReply(True)) == (None, None)
 
 
@@ -193,32 +193,32 @@ def test_pause_and_resume() -> None:
     negotiation, _ = talk(WISHES, TO_RUNNING)
     assert negotiation.pause() == m.Pause()
     assert negotiation.handle(DATA) == (None, None)
-    assert negotiation.handle(m.PauseReply(True)) == (None, Event.PAUSED)
+    assert negotiation.handle(m.PauseReply(True)) == (None, Notice.PAUSED)
     assert negotiation.pause() is None
     assert not negotiation.running
     assert negotiation.resume() == m.Start()
-    assert negotiation.handle(m.StartReply(True)) == (None, Event.RESUMED)
+    assert negotiation.handle(m.StartReply(True)) == (None, Notice.RESUMED)
     assert negotiation.running
 
 
 def test_a_pause_during_the_set_up_is_kept() -> None:
     negotiation, _ = talk(WISHES, TO_INPUTS)
     assert negotiation.pause() is None
-    assert negotiation.handle(m.InputsSetup(1, ("INT32",))) == (None, Event.STARTED)
+    assert negotiation.handle(m.InputsSetup(1, ("INT32",))) == (None, Notice.STARTED)
     assert negotiation.state is State.PAUSED
 
 
 def test_a_pause_while_starting_and_a_resume_while_pausing_are_kept() -> None:
     negotiation, _ = talk(WISHES, TO_START)
     assert negotiation.pause() is None
-    assert negotiation.handle(m.StartReply(True)) == (m.Pause(), Event.STARTED)
+    assert negotiation.handle(m.StartReply(True)) == (m.Pause(), Notice.STARTED)
     assert negotiation.resume() is None
-    assert negotiation.handle(m.PauseReply(True)) == (m.Start(), Event.PAUSED)
+    assert negotiation.handle(m.PauseReply(True)) == (m.Start(), Notice.PAUSED)
 
 
 def test_a_session_can_begin_paused() -> None:
     negotiation, steps = talk(Wishes(running=False), (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",))))
-    assert steps[-1] == (None, Event.STARTED)
+    assert steps[-1] == (None, Notice.STARTED)
     assert negotiation.state is State.PAUSED
 
 
@@ -227,7 +227,7 @@ def test_inputs_can_be_claimed_while_paused() -> None:
     replies = (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE", "INT32")), m.InputsSetup(0, ("IN_USE",)))
     negotiation, _ = talk(wishes, replies)
     assert negotiation.retry_claims()
-    assert negotiation.handle(m.InputsSetup(1, ("INT32",))).event is Event.INPUTS_CHANGED
+    assert negotiation.handle(m.InputsSetup(1, ("INT32",))).event is Notice.INPUTS_CHANGED
 
 
 def test_what_is_awaited_is_put_in_words() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.catalogue import INPUTS
 from gatewayd.rtde.claims import OLD_LIST_LIMIT, REGISTERS_KEY
-from gatewayd.rtde.negotiation import Event, Negotiation, State, Wishes
+from gatewayd.rtde.negotiation import Negotiation, Notice, State, Wishes
 from gatewayd.rtde.reading import Reading, fitting
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.session import Session
@@ -85,7 +85,7 @@ def test_a_refused_list_costs_no_reading(limited: bool) -> None:
     assert session.unread == frozenset()
     assert conversation.shown[-1] == controller.held
     assert {name for one in session.inputs.values() for name in one.recipe.names} == set(inputs)
-    assert conversation.events == [Event.STARTED]
+    assert conversation.events == [Notice.STARTED]
     assert conversation.negotiation.running
     kept = [name for name in session.outputs.names if name in INPUTS]
     assert kept
@@ -154,7 +154,7 @@ def test_a_late_claim_is_read_before_it_is_reported() -> None:
     controller.in_use.clear()
     conversation.say(negotiation.retry_claims())
     conversation.settle()
-    assert conversation.events == [Event.STARTED, Event.INPUTS_CHANGED]
+    assert conversation.events == [Notice.STARTED, Notice.INPUTS_CHANGED]
     latest = conversation.sessions[-1]
     assert latest.held[DOUBLES[40]] == (99.5,)
     assert latest.outputs is first.outputs
@@ -176,7 +176,7 @@ def test_a_pause_during_a_late_reading_is_kept(resume: bool) -> None:
     if resume:
         assert negotiation.resume() is None
     conversation.settle()
-    assert conversation.events[-1] is Event.INPUTS_CHANGED
+    assert conversation.events[-1] is Notice.INPUTS_CHANGED
     assert negotiation.state is (State.RUNNING if resume else State.PAUSED)
     assert negotiation.session().held.keys() == set(INTS[:2])
 
@@ -208,9 +208,9 @@ def test_an_answer_to_an_abandoned_probe_is_not_taken_for_that_to_the_next() -> 
     conversation.say(negotiation.probe())
     conversation.say(negotiation.probe())
     conversation.hear(conversation.controller.out.popleft())
-    assert Event.PROBED not in conversation.events
+    assert Notice.PROBED not in conversation.events
     conversation.hear(conversation.controller.out.popleft())
-    assert conversation.events[-1] is Event.PROBED
+    assert conversation.events[-1] is Notice.PROBED
 
 
 def test_no_probe_before_the_session() -> None:

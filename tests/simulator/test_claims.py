@@ -5,13 +5,13 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.simulator.claims import Claims
+from gatewayd.simulator.claims import ControllerClaims
 
 FIELDS = ["a", "b", "c"]
 
 
 def test_a_claim_is_all_or_nothing() -> None:
-    claims = Claims()
+    claims = ControllerClaims()
     assert claims.claim("one", ["b"]) == frozenset()
     assert claims.claim("two", ["a", "b", "c"]) == {"b"}
     assert claims.owner("a") is None
@@ -19,14 +19,14 @@ def test_a_claim_is_all_or_nothing() -> None:
 
 
 def test_an_owner_may_claim_again_what_it_holds() -> None:
-    claims = Claims()
+    claims = ControllerClaims()
     claims.claim("one", ["a", "b"])
     assert claims.claim("one", ["b", "c"]) == frozenset()
     assert claims.held("one") == ("a", "b", "c")
 
 
 def test_release_frees_only_the_owners_fields() -> None:
-    claims = Claims()
+    claims = ControllerClaims()
     claims.claim("one", ["a", "b"])
     claims.claim("two", ["c"])
     claims.release("one", ["a", "c"])
@@ -42,7 +42,7 @@ def test_release_frees_only_the_owners_fields() -> None:
     )
 )
 def test_a_field_never_changes_hands_without_a_release(steps: list[tuple[bool, str, list[str]]]) -> None:
-    claims = Claims()
+    claims = ControllerClaims()
     for claim, owner, fields in steps:
         before = {field: claims.owner(field) for field in FIELDS}
         if claim:

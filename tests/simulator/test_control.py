@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.simulator.control import Control
-from gatewayd.simulator.faults import DropAt, Step
+from gatewayd.simulator.faults import DropAt, FaultStep
 from gatewayd.simulator.server import SimulatedController
 
 
@@ -80,7 +80,7 @@ async def test_faults_of_lines_and_connections(control: Control, simulator: Simu
     for line in ("delay 0.25", "drop-at inputs:3", "creep on"):
         assert await control.execute(line) == "ok"
     faults = simulator.faults
-    assert (faults.delay, faults.drop_at, faults.creep) == (0.25, DropAt(Step.INPUTS, 3), True)
+    assert (faults.delay, faults.drop_at, faults.creep) == (0.25, DropAt(FaultStep.INPUTS, 3), True)
     answer = await control.execute("drop-at nowhere")
     assert answer.startswith(
         "error 'nowhere' is not STEP or STEP:NUMBER with a step out of version, controller"

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from gatewayd.rtde.catalogue import INPUTS
-from gatewayd.simulator.faults import ADAPTER_FIELDS, DropAt, Faults, Mangler, Step
+from gatewayd.simulator.faults import ADAPTER_FIELDS, DropAt, Faults, FaultStep, Mangler
 
 PACKAGES = [bytes([n]) * 8 for n in range(200)]
 
@@ -58,9 +58,9 @@ def test_an_adapter_claims_inputs_that_exist() -> None:
 @pytest.mark.parametrize(
     "text, parsed",
     [
-        ("outputs", DropAt(Step.OUTPUTS)),
-        ("inputs:2", DropAt(Step.INPUTS, 2)),
-        ("data:10", DropAt(Step.DATA, 10)),
+        ("outputs", DropAt(FaultStep.OUTPUTS)),
+        ("inputs:2", DropAt(FaultStep.INPUTS, 2)),
+        ("data:10", DropAt(FaultStep.DATA, 10)),
     ],
 )
 def test_a_step_to_drop_at(text: str, parsed: DropAt) -> None:
@@ -75,7 +75,7 @@ def test_no_step_to_drop_at(text: str) -> None:
 
 @pytest.mark.parametrize("times", [0, 1, 2, math.inf])
 def test_a_drop_comes_as_often_as_it_should(times: float) -> None:
-    faults = Faults(drop_at=DropAt(Step.START, 2), drop_times=times)
-    assert not faults.drops(Step.START, 1)
-    assert not faults.drops(Step.PAUSE, 2)
-    assert [faults.drops(Step.START, 2) for _ in range(3)] == [times >= n for n in (1, 2, 3)]
+    faults = Faults(drop_at=DropAt(FaultStep.START, 2), drop_times=times)
+    assert not faults.drops(FaultStep.START, 1)
+    assert not faults.drops(FaultStep.PAUSE, 2)
+    assert [faults.drops(FaultStep.START, 2) for _ in range(3)] == [times >= n for n in (1, 2, 3)]

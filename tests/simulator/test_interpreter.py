@@ -8,14 +8,14 @@ from gatewayd.rtde.catalogue import INPUTS
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.interpreter import Interpreter
 from gatewayd.simulator.program import DEMO, ProgramError, parse
-from gatewayd.simulator.store import Scalar, Store
+from gatewayd.simulator.store import FieldStore, Scalar
 
 
 class Machine:
     """A program at 100 cycles per second: 10 ms are one cycle."""
 
     def __init__(self, program: str) -> None:
-        self.store: Store = Controller().store
+        self.store: FieldStore = Controller().store
         self.interpreter = Interpreter(parse(program), self.store, 100, INPUTS)
 
     def put(self, name: str, value: Scalar) -> None:

@@ -6,21 +6,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.simulator.program import DEMO, Operation, ProgramError, Reference, Rule, parse
+from gatewayd.simulator.program import DEMO, FieldReference, ProgramError, ProgramRule, RuleOperation, parse
 
 
-def one(text: str) -> Rule:
+def one(text: str) -> ProgramRule:
     (rule,) = parse(text)
     return rule
 
 
-def name(reference: Reference | None) -> tuple[str, int | None] | None:
+def name(reference: FieldReference | None) -> tuple[str, int | None] | None:
     return None if reference is None else (reference.field, reference.part)
 
 
 def test_an_echo_with_scale_and_offset() -> None:
     rule = one("output_double_register_1 = input_int_register_0 * -2.5 - 1e3 # raw to mm")
-    assert (rule.operation, name(rule.target)) == (Operation.ECHO, ("output_double_register_1", None))
+    assert (rule.operation, name(rule.target)) == (RuleOperation.ECHO, ("output_double_register_1", None))
     assert (name(rule.input), rule.scale, rule.offset) == (("input_int_register_0", None), -2.5, -1000.0)
     assert not rule.plain
 
@@ -31,11 +31,11 @@ def test_a_plain_echo() -> None:
 
 def test_delay_and_pulse() -> None:
     rule = one("output_bit_register_64 = not input_bit_register_64 after 200ms for 1.5s")
-    assert (rule.operation, rule.after, rule.pulse) == (Operation.NOT, 0.2, 1.5)
+    assert (rule.operation, rule.after, rule.pulse) == (RuleOperation.NOT, 0.2, 1.5)
 
 
-@pytest.mark.parametrize("word,operation", [("count", Operation.COUNT), ("toggle", Operation.TOGGLE)])
-def test_edges_and_intervals(word: str, operation: Operation) -> None:
+@pytest.mark.parametrize("word,operation", [("count", RuleOperation.COUNT), ("toggle", RuleOperation.TOGGLE)])
+def test_edges_and_intervals(word: str, operation: RuleOperation) -> None:
     by_source = one(f"output_int_register_0 = {word} input_bit_register_64")
     by_time = one(f"output_int_register_0 = {word} every 20ms")
     assert (by_source.operation, name(by_source.input)) == (operation, ("input_bit_register_64", None))
@@ -44,7 +44,7 @@ def test_edges_and_intervals(word: str, operation: Operation) -> None:
 
 def test_a_constant() -> None:
     rule = one("safety_status = 3")
-    assert (rule.operation, rule.offset) == (Operation.CONSTANT, 3.0)
+    assert (rule.operation, rule.offset) == (RuleOperation.CONSTANT, 3.0)
 
 
 def test_reserved_bits_are_bits_of_words() -> None:

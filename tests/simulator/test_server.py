@@ -21,7 +21,7 @@ from gatewayd.rtde.messages import (
     TextMessage,
 )
 from gatewayd.simulator.controller import Controller
-from gatewayd.simulator.faults import DropAt, Faults, Step
+from gatewayd.simulator.faults import DropAt, Faults, FaultStep
 from gatewayd.simulator.program import DEMO, parse
 from gatewayd.simulator.server import SimulatedController
 
@@ -252,7 +252,7 @@ async def test_a_pause_stops_everything_and_leaves_the_clock_behind(
 
 
 async def test_a_dropped_connection_gives_its_claims_back(client: type[Client]) -> None:
-    async with served(Faults(drop_at=DropAt(Step.START), drop_times=math.inf)) as simulator:
+    async with served(Faults(drop_at=DropAt(FaultStep.START), drop_times=math.inf)) as simulator:
         for _ in range(2):
             async with client(simulator.port) as one:
                 await one.negotiate()

@@ -30,8 +30,8 @@ from gatewayd.rtde.messages import (
     TextMessage,
 )
 from gatewayd.simulator.controller import Controller
-from gatewayd.simulator.faults import DropAt, DroppedError, Faults, LongLists, Step
-from gatewayd.simulator.session import Session
+from gatewayd.simulator.faults import DropAt, DroppedError, Faults, FaultStep, LongLists
+from gatewayd.simulator.session import SimulatorSession
 
 INT = "input_int_register_{}".format
 
@@ -41,7 +41,7 @@ class Peer:
 
     def __init__(self, controller: Controller, version: int = 2) -> None:
         self.controller = controller
-        self.session = Session(controller, "peer")
+        self.session = SimulatorSession(controller, "peer")
         self.protocol = ClientProtocol()
         if version == 2:
             assert self.ask(RequestProtocolVersion(2)) == [ProtocolVersionReply(accepted=True)]
@@ -221,7 +221,7 @@ def test_a_list_beyond_2048_bytes_ends_the_connection() -> None:
 
 
 def test_a_connection_is_dropped_at_the_step_that_was_named() -> None:
-    peer = Peer(Controller(faults=Faults(drop_at=DropAt(Step.OUTPUTS, 2))))
+    peer = Peer(Controller(faults=Faults(drop_at=DropAt(FaultStep.OUTPUTS, 2))))
     assert peer.ask(SetupOutputs(("timestamp",), 0.0), Start())
     with pytest.raises(DroppedError, match="fault at outputs:2"):
         peer.ask(SetupOutputs(("timestamp",), 0.0))
@@ -229,7 +229,7 @@ def test_a_connection_is_dropped_at_the_step_that_was_named() -> None:
 
 
 def test_a_connection_is_dropped_in_place_of_a_package() -> None:
-    peer = Peer(Controller(faults=Faults(drop_at=DropAt(Step.DATA, 2))))
+    peer = Peer(Controller(faults=Faults(drop_at=DropAt(FaultStep.DATA, 2))))
     peer.ask(SetupOutputs(("timestamp",), 0.0), Start())
     assert len(peer.cycle()) == 1
     with pytest.raises(DroppedError, match="fault at data:2"):
@@ -290,7 +290,7 @@ def test_bytes_that_are_no_rtde_are_an_error(peer: Peer) -> None:
 
 @given(st.lists(st.binary(max_size=40), max_size=6))
 def test_any_payloads_are_answered_or_refused(payloads: list[bytes]) -> None:
-    session = Session(Controller(), "fuzz")
+    session = SimulatorSession(Controller(), "fuzz")
     try:
         for number, payload in enumerate(payloads):
             kind = b"VvMUOISP"[(number + len(payload)) % 8]

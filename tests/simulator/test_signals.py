@@ -8,11 +8,13 @@ import struct
 import pytest
 
 from gatewayd.rtde.catalogue import OUTPUTS
-from gatewayd.simulator.arm import Moment
+from gatewayd.simulator.arm import ControllerMoment
 from gatewayd.simulator.signals import INITIAL, SIGNALS
 
 MOMENTS = [
-    Moment(step, step / 500, step / 700, rate) for step in (0, 1, 50_000, 10**9) for rate in (0.0, 1.0)
+    ControllerMoment(step, step / 500, step / 700, rate)
+    for step in (0, 1, 50_000, 10**9)
+    for rate in (0.0, 1.0)
 ]
 
 
@@ -49,10 +51,12 @@ def test_a_field_without_a_value_of_its_own_is_a_register_or_rests_at_zero() -> 
 
 @pytest.mark.parametrize("name", ["actual_q", "actual_TCP_pose", "actual_TCP_force", "joint_temperatures"])
 def test_values_move(name: str) -> None:
-    assert SIGNALS[name](Moment(0, 0.0, 0.0, 1.0)) != SIGNALS[name](Moment(500, 1.0, 1.0, 1.0))
+    assert SIGNALS[name](ControllerMoment(0, 0.0, 0.0, 1.0)) != SIGNALS[name](
+        ControllerMoment(500, 1.0, 1.0, 1.0)
+    )
 
 
 def test_a_standing_arm_has_no_speed() -> None:
-    standing = Moment(500, 1.0, 1.0, 0.0)
+    standing = ControllerMoment(500, 1.0, 1.0, 0.0)
     for name in ("actual_qd", "target_qd", "actual_TCP_speed", "elbow_velocity", "actual_TCP_acceleration"):
         assert not any(SIGNALS[name](standing)), name

@@ -8,8 +8,8 @@ import struct
 import pytest
 
 from gatewayd.rtde.types import DataType
-from gatewayd.simulator.arm import Moment
-from gatewayd.simulator.store import Scalar, Store, fitting
+from gatewayd.simulator.arm import ControllerMoment
+from gatewayd.simulator.store import FieldStore, Scalar, fitting
 
 TYPES = {
     "clock": DataType.DOUBLE,
@@ -21,8 +21,8 @@ TYPES = {
 }
 
 
-def make() -> Store:
-    return Store(TYPES, {"clock": lambda moment: (moment.time,)}, {"whole": 7, "place": (1.0, 2.0, 3.0)})
+def make() -> FieldStore:
+    return FieldStore(TYPES, {"clock": lambda moment: (moment.time,)}, {"whole": 7, "place": (1.0, 2.0, 3.0)})
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_value_is_made_to_fit(value: Scalar, code: str, held: Scalar) -> None:
 
 def test_moving_fields_follow_the_moment() -> None:
     store = make()
-    store.moment = Moment(1, 0.5, 0.0, 0.0)
+    store.moment = ControllerMoment(1, 0.5, 0.0, 0.0)
     assert store.read("clock") == (0.5,)
     assert store.read("place") == (1.0, 2.0, 3.0)
 
@@ -63,7 +63,7 @@ def test_equal_recipes_share_a_view_that_packs_once_a_moment() -> None:
     assert store.view(("clock", "whole")) is view
     first = view.payload()
     assert view.payload() is first
-    store.moment = Moment(1, 0.002, 0.0, 0.0)
+    store.moment = ControllerMoment(1, 0.002, 0.0, 0.0)
     assert view.payload() != first
 
 
@@ -80,7 +80,7 @@ def test_a_pinned_field_moves_no_more_in_views_that_exist() -> None:
     view = store.view(("clock",))
     view.payload()
     store.pin("clock", (9.0,))
-    store.moment = Moment(1, 0.002, 0.0, 0.0)
+    store.moment = ControllerMoment(1, 0.002, 0.0, 0.0)
     assert view.payload() == struct.pack(">d", 9.0)
     assert not store.moves("clock")
 

@@ -21,7 +21,7 @@ SHARED = 8
 """Register that both PLCs write: whose lock is free takes it, the other is refused."""
 SHARED_FIELD = "input_int_register_2"
 _RETRY = 0.1
-_GREATEST = 30_000
+_MAX = 30_000
 _STATUS = 60000
 
 
@@ -44,7 +44,7 @@ def _main(host: str, source: str, *figures: str) -> None:
             plc = Plc(port, source, host=host)
             try:
                 while True:
-                    number = number % _GREATEST + 1
+                    number = number % _MAX + 1
                     _cycle(plc, places, echo, number, journal)
                     time.sleep(pause)
             finally:

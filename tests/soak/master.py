@@ -31,7 +31,7 @@ _PAIR = struct.Struct("<ii")
 _LOST = 1.0
 """Seconds without a heartbeat of the node after which the bus is opened anew: an adapter need not tell of its end."""
 _RETRY = 0.1
-_GREATEST = 30_000
+_MAX = 30_000
 
 
 class _Node:
@@ -81,7 +81,7 @@ def _serve(bus: can.BusABC, number: int, pause: float, fields: Sequence[str], jo
         node.supervise()
         if time.monotonic() >= due:
             due = time.monotonic() + pause
-            counter = counter % _GREATEST + 1
+            counter = counter % _MAX + 1
             _cycle(bus, node, counter, fields, journal)
 
 

@@ -13,7 +13,7 @@ __all__ = ["Starvation"]
 
 _LOOK = 0.02
 """Seconds between two looks."""
-_LEAST = 0.02
+_MIN = 0.02
 """Seconds of waiting between two looks from which on it counts."""
 
 
@@ -32,7 +32,7 @@ class Starvation(threading.Thread):
         while not self._over.wait(_LOOK):
             waited = {pid: _waited(pid) for pid in self._pids()}
             now = time.monotonic()
-            if any(value - self._waited.get(pid, value) > _LEAST for pid, value in waited.items()):
+            if any(value - self._waited.get(pid, value) > _MIN for pid, value in waited.items()):
                 self._stops.append(Stop(before, now))
             before, self._waited = now, waited
 

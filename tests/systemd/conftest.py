@@ -1,66 +1,74 @@
-"""The Debian package of this tree, built once for all tests and all processes of a run."""
+"""The Debian package of this tree and a machine that it is tried on: both made once for all processes of a run.
+
+The machine boots as soon as the tests are collected, and goes on beside the others.
+"""
 
 from __future__ import annotations
 
-import fcntl
 import os
-import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-SYSTEM_PYTHON = Path("/usr/bin/python3")
+from tests.systemd import machine
+
+HERE = Path(__file__).parent
+MACHINE = pytest.StashKey["subprocess.Popen[bytes]"]()
 
 
-@pytest.fixture(scope="session")
-def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def directory_of_run(config: pytest.Config) -> Path:
     """A directory that all processes of this run share."""
-    base = tmp_path_factory.getbasetemp()
+    base: Path = getattr(config, "_tmp_path_factory").getbasetemp()  # noqa: B009 - fixtures do not exist yet
     found = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / "systemd"
     found.mkdir(exist_ok=True)
     return found
 
 
-@contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """One process at a time."""
-    with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Put what the machine is asked for last, and have it made."""
+    ours = [item for item in items if item.path == HERE / "test_boot.py"]
+    if not ours or machine.missing() or config.option.collectonly:
+        return
+    items[:] = [item for item in items if item not in set(ours)] + ours
+    shared = directory_of_run(config)
+    if any(character.isspace() for character in str(shared)) or machine.interpreter_with_pip() is None:
+        return
+    try:
+        (shared / "begun").touch(exist_ok=False)
+    except FileExistsError:
+        return
+    with (shared / "machine.log").open("wb") as log:
+        config.stash[MACHINE] = subprocess.Popen(
+            [sys.executable, "-m", "tests.systemd.machine", shared],
+            cwd=machine.ROOT,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+        )
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Others may still wait for the machine that this process has made."""
+    running = session.config.stash.get(MACHINE, None)
+    if running is not None:
+        if exitstatus == pytest.ExitCode.INTERRUPTED or session.shouldfail or session.shouldstop:
+            running.terminate()
+        running.wait()
 
 
 @pytest.fixture(scope="session")
-def python_with_pip() -> Path:
-    """An interpreter whose pip can install into another environment."""
-    for candidate in (Path(sys.executable), Path(sys.base_prefix) / "bin/python3"):
-        if (
-            subprocess.run([candidate, "-m", "pip", "--version"], capture_output=True, check=False).returncode
-            == 0
-        ):
-            return candidate
-    pytest.skip("no pip at hand to build the package with")
+def shared(request: pytest.FixtureRequest) -> Path:
+    """A directory that all processes of this run share."""
+    return directory_of_run(request.config)
 
 
 @pytest.fixture(scope="session")
-def package(shared: Path, python_with_pip: Path) -> Path:
+def package(shared: Path) -> Path:
     """The .deb."""
-    if shutil.which("dpkg-deb") is None:
+    if machine.interpreter_with_pip() is None:
+        pytest.skip("no pip at hand to build the package with")
+    if not machine.has_dpkg_deb():
         pytest.skip("dpkg-deb is missing: this is no Debian")
-    with locked(shared / "package.lock"):
-        found = list(shared.glob("gatewayd_*.deb"))
-        if not found:
-            done = subprocess.run(
-                [ROOT / "packaging/deb", shared, python_with_pip],
-                capture_output=True,
-                text=True,
-                check=False,
-                env={**os.environ, "COMPRESSION": "gzip"},
-            )
-            assert done.returncode == 0, done.stderr
-            found = [Path(done.stdout.strip())]
-    return found[0]
+    return machine.package(shared)

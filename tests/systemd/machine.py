@@ -1,23 +1,34 @@
-"""A machine with systemd as PID 1 to install on, as an ordinary process (user-mode-linux).
+"""A machine with systemd as PID 1 to install on, as an ordinary process (user-mode-linux), and the package to install.
 
-Its root is this machine's own file system, mounted read-only, with an overlay in memory on top: inside, everything can
-be installed, removed and broken, and nothing of it reaches this machine but the directory of the results.
+`python -m tests.systemd.machine DIRECTORY` makes the package there, lets scenario.py try it, and leaves `ended`. The
+machine's root is the file system of this one, mounted read-only, with an overlay in memory on top: inside, everything
+can be installed, removed and broken, and nothing of it reaches this machine but the directory of the results.
 """
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import shlex
 import shutil
 import signal
 import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
-from tests.kernel.uml import Boot, place_of_memory, without_xstate
+from gatewayd import __version__
+from tests.kernel.uml import TUNABLES, Boot, launch
 
-__all__ = ["LIMIT", "boot", "missing"]
+__all__ = ["ENDED", "LIMIT", "NEXT", "ROOT", "has_dpkg_deb", "interpreter_with_pip", "missing", "package"]
 
+ROOT = Path(__file__).parents[2]
+ENDED = "ended"
+"""Name of the file with the kernel's exit status, which comes last."""
+NEXT = f"{__version__}+next"
+"""Version of the package that is installed over the first one."""
 LIMIT = 300
 """Seconds for one boot with everything that runs in it; a machine with nothing else to do needs 60."""
 MEMORY = 1 << 30
@@ -28,9 +39,6 @@ _MODULES = (
     "drivers/net/can/dev/can-dev",
     "drivers/net/can/vcan",
 )
-
-# Between processes the kernel keeps no more of the vector registers than SSE has.
-_TUNABLES = "glibc.cpu.hwcaps=-AVX2,-AVX,-AVX512F,-AVX512VL,-ERMS,-AVX_Fast_Unaligned_Load,-XSAVEC,-XSAVE"
 
 _INIT = """\
 #!/bin/sh
@@ -85,6 +93,60 @@ sys.exit(os.strerror(ctypes.get_errno()) if failed else 0)
 """insmod, for machines without kmod."""
 
 
+@cache
+def interpreter_with_pip() -> Path | None:
+    """An interpreter whose pip can install into another environment."""
+    for candidate in (Path(sys.executable), Path(sys.base_prefix) / "bin/python3"):
+        if (
+            subprocess.run([candidate, "-m", "pip", "--version"], capture_output=True, check=False).returncode
+            == 0
+        ):
+            return candidate
+    return None
+
+
+def has_dpkg_deb() -> bool:
+    """Whether packages can be built."""
+    return shutil.which("dpkg-deb") is not None
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """One process at a time."""
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def package(directory: Path) -> Path:
+    """The Debian package of this tree in a directory that others use too; made if it is not there."""
+    with _locked(directory / "package.lock"):
+        found = list(directory.glob("gatewayd_*.deb"))
+        if not found:
+            done = subprocess.run(
+                [ROOT / "packaging/deb", directory, str(interpreter_with_pip())],
+                capture_output=True,
+                text=True,
+                check=False,
+                env={**os.environ, "COMPRESSION": "gzip"},
+            )
+            assert done.returncode == 0, done.stderr
+            found = [Path(done.stdout.strip())]
+    return found[0]
+
+
+def _make_next(package: Path, results: Path) -> None:
+    """The same package under a later version."""
+    tree = results / "next"
+    subprocess.run(["dpkg-deb", "--raw-extract", package, tree], check=True)
+    control = tree / "DEBIAN/control"
+    control.write_text(control.read_text().replace(f"Version: {__version__}\n", f"Version: {NEXT}\n"))
+    target = results / "gatewayd-next.deb"
+    build = ["dpkg-deb", "--root-owner-group", "-Zgzip", "-z1", "--build"]
+    subprocess.run([*build, tree, target], check=True, capture_output=True)
+    shutil.rmtree(tree)
+
+
 def missing() -> str:
     """Why there can be no boot; empty if there can."""
     kernel = Boot.missing()
@@ -99,7 +161,7 @@ def missing() -> str:
     return ""
 
 
-def boot(results: Path, scenario: Path) -> int:
+def _boot(results: Path, scenario: Path) -> int:
     """Boot, run the program `scenario` as root with `results` as its argument, halt. Returns the kernel's exit status.
 
     `results` must be a path without spaces; init.log, scenario.log and kernel.log in it tell what happened.
@@ -111,7 +173,7 @@ def boot(results: Path, scenario: Path) -> int:
     init.write_text(
         _INIT.format(
             results=results,
-            tunables=_TUNABLES,
+            tunables=TUNABLES,
             python="/usr/bin/python3",
             modules=shlex.join(_MODULES),
             masked=_MASKED,
@@ -121,15 +183,7 @@ def boot(results: Path, scenario: Path) -> int:
     kernel = ["linux.uml", f"mem={MEMORY >> 20}M", "rootfstype=hostfs", "ro", f"init={init}", "quiet"]
     kernel += ["con=null", "con0=null,fd:1"]
     with (results / "kernel.log").open("wb") as log:
-        machine = subprocess.Popen(
-            kernel,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            preexec_fn=without_xstate,  # noqa: PLW1509 - tests start no threads
-            start_new_session=True,
-            env={**os.environ, "TMPDIR": place_of_memory(MEMORY)},
-        )
+        machine = launch(kernel, MEMORY, log)
     try:
         return machine.wait(LIMIT)
     except subprocess.TimeoutExpired:
@@ -138,3 +192,22 @@ def boot(results: Path, scenario: Path) -> int:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(machine.pid, signal.SIGKILL)
         machine.wait()
+
+
+def main(directory: Path) -> None:
+    """Everything, as said above; `results` in the directory is what the scenario sees and fills."""
+    results = directory / "results"
+    results.mkdir()
+    status = "no boot"
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    try:
+        found = package(directory)
+        shutil.copy(found, results / "gatewayd.deb")
+        _make_next(found, results)
+        status = str(_boot(results, Path(__file__).with_name("scenario.py")))
+    finally:
+        (directory / ENDED).write_text(status)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -39,10 +39,20 @@ BROKEN = MAPPING + "  cycles: {robot: output_int_register_0, modbus: 100}\n"
 BROKEN_OTHERWISE = MAPPING + "  other:  {robot: no_such_register, modbus: 120}\n"
 """Another mistake, so that its reason in the status is not the one that stands there already."""
 
-DPKG = (
-    "dpkg --force-unsafe-io --force-confold "
-    # A third of the files, which the service never opens.
-    "--path-exclude='/usr/lib/gatewayd/lib/*/pygments/lexers/*' --path-exclude='/usr/share/doc/gatewayd/reference/*'"
+DPKG = "dpkg --force-unsafe-io --force-confold " + " ".join(
+    # Half of the files, which the service never opens.
+    f"--path-exclude='{path}/*'"
+    for path in (
+        "/usr/share/doc/gatewayd/reference",
+        "/usr/lib/gatewayd/lib/*/rules/GW*",
+        "/usr/lib/gatewayd/lib/*/site-packages/can",
+        "/usr/lib/gatewayd/lib/*/site-packages/canopen",
+        "/usr/lib/gatewayd/lib/*/site-packages/markdown_it",
+        "/usr/lib/gatewayd/lib/*/site-packages/pydantic/v1",
+        "/usr/lib/gatewayd/lib/*/site-packages/pygments",
+        "/usr/lib/gatewayd/lib/*/site-packages/rich",
+        "/usr/lib/gatewayd/lib/*/site-packages/*.dist-info",
+    )
 )
 
 Facts = dict[str, Any]
@@ -71,7 +81,7 @@ def wait_for(condition: Callable[[], bool], seconds: float = 15) -> bool:
     while time.monotonic() < end:
         if condition():
             return True
-        time.sleep(0.1)
+        time.sleep(0.2)
     return False
 
 

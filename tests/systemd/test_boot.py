@@ -4,17 +4,15 @@ what it saw is judged here."""
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
-import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gatewayd import __version__
+from tests.e2e.processes import wait_for
 from tests.systemd import machine
-from tests.systemd.conftest import locked
+from tests.systemd.machine import NEXT
 
 Facts = dict[str, Any]
 
@@ -23,49 +21,31 @@ pytestmark = [
     pytest.mark.skipif(bool(machine.missing()), reason=f"no machine to boot: {machine.missing()}"),
 ]
 
-NEXT = f"{__version__}+next"
-
 
 @pytest.fixture(scope="session")
 def steps(package: Path, shared: Path) -> Facts:
     """What each step saw."""
     if any(character.isspace() for character in str(shared)):
         pytest.skip("the kernel's command line takes no path with a space")
+    assert package.exists()
+    wait_for((shared / machine.ENDED).exists, "the machine to end", machine.LIMIT + 30)
     results = shared / "results"
-    with locked(shared / "boot.lock"):
-        if not results.exists():
-            results.mkdir()
-            shutil.copy(package, results / "gatewayd.deb")
-            _make_next(package, results)
-            began = time.monotonic()
-            status = machine.boot(results, Path(__file__).with_name("scenario.py"))
-            (results / "kernel.log").open("a").write(
-                f"\nended with {status} after {time.monotonic() - began:.0f} s\n"
-            )
     try:
         found: Facts = json.loads((results / "steps.json").read_text())
     except FileNotFoundError:
-        pytest.fail(_story(results))
+        pytest.fail(_story(shared))
     for name, facts in found.items():
-        assert "defect" not in facts, f"{name}: {facts['defect']}\n{_story(results)}"
-    assert "purge" in found, _story(results)
+        assert "defect" not in facts, f"{name}: {facts['defect']}\n{_story(shared)}"
+    assert "purge" in found, _story(shared)
     return found
 
 
-def _make_next(package: Path, results: Path) -> None:
-    """The same package under a later version."""
-    tree = results / "next"
-    subprocess.run(["dpkg-deb", "--raw-extract", package, tree], check=True)
-    control = tree / "DEBIAN/control"
-    control.write_text(control.read_text().replace(f"Version: {__version__}\n", f"Version: {NEXT}\n"))
-    target = results / "gatewayd-next.deb"
-    build = ["dpkg-deb", "--root-owner-group", "-Zgzip", "-z1", "--build"]
-    subprocess.run([*build, tree, target], check=True, capture_output=True)
-    shutil.rmtree(tree)
-
-
-def _story(results: Path) -> str:
-    found = [path for name in ("init", "kernel", "scenario") if (path := results / f"{name}.log").exists()]
+def _story(shared: Path) -> str:
+    logs = [
+        shared / "machine.log",
+        *(shared / f"results/{name}.log" for name in ("init", "kernel", "scenario")),
+    ]
+    found = [path for path in logs if path.exists()]
     return "\n".join(f"{path.name}:\n{path.read_text(errors='replace')[-2000:]}" for path in found)
 
 

@@ -17,14 +17,14 @@ from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary
 from gatewayd.canopen.sdo import protocol
 from gatewayd.canopen.sdo.protocol import BLOCK_SEGMENTS, REQUESTS, Request
 from gatewayd.canopen.sdo.transfers import (
-    BLOCK_SEGMENTS_GREATEST,
+    MAX_BLOCK_SEGMENTS,
     BlockDownload,
     BlockUpload,
     Download,
     Upload,
 )
 
-__all__ = ["LONGEST_DOWNLOAD", "SLOWEST_FRAME", "SUB_BLOCK_TIMEOUT", "TIMEOUT", "SdoServer", "State"]
+__all__ = ["LONGEST_DOWNLOAD", "SLOWEST_FRAME", "SUB_BLOCK_TIMEOUT", "TIMEOUT", "SdoServer", "SdoState"]
 
 TIMEOUT = 1.0
 """Seconds without a frame after which a transfer is aborted."""
@@ -44,7 +44,7 @@ _TOGGLE = 0x10
 _CRC_SUPPORTED = 0x04
 
 
-class State(Enum):
+class SdoState(Enum):
     """What the server waits for."""
 
     IDLE = "a transfer"
@@ -86,7 +86,7 @@ class SdoServer:
 
     def reset(self) -> None:
         """Forget the transfer without a word: the node leaves the states in which SDO is served."""
-        self.state = State.IDLE
+        self.state = SdoState.IDLE
         self._download: Download | None = None
         self._upload: Upload | None = None
         self._block_download: BlockDownload | None = None
@@ -97,7 +97,7 @@ class SdoServer:
         if len(data) != _FRAME:
             return []
         state = self.state
-        request = (BLOCK_SEGMENTS if state is State.BLOCK_DOWNLOAD else REQUESTS)[data[0]]
+        request = (BLOCK_SEGMENTS if state is SdoState.BLOCK_DOWNLOAD else REQUESTS)[data[0]]
         self._heard = now
         act = self.IN_ANY_STATE.get(request) or self.TRANSITIONS.get((state, request))
         try:
@@ -117,7 +117,7 @@ class SdoServer:
 
     def next_deadline(self, now: float) -> float:
         """When `tick` will have something to do; infinity without a transfer."""
-        if self.state is State.IDLE:
+        if self.state is SdoState.IDLE:
             return math.inf
         download, upload = self._block_download, self._block_upload
         if download is not None and download.pending:
@@ -128,14 +128,14 @@ class SdoServer:
 
     def _begin(self, data: bytes) -> tuple[int, int]:
         """Index and sub-index of a new transfer; a former one ends without a word, as the client has given it up."""
-        if self.state is not State.IDLE:
+        if self.state is not SdoState.IDLE:
             self.reset()
         self._multiplexer = data[1:4]
         index, subindex = _MULTIPLEXER.unpack(self._multiplexer)
         return index, subindex
 
     def _unexpected(self, data: bytes) -> Abort:
-        if self.state is State.IDLE:
+        if self.state is SdoState.IDLE:
             # Only a command that nobody knows may name an object; segments carry data in its place.
             self._multiplexer = data[1:4] if REQUESTS[data[0]] is Request.UNKNOWN else _NOTHING
         return Abort(AbortCode.UNKNOWN_COMMAND)
@@ -166,7 +166,7 @@ class SdoServer:
         else:
             self._demand_writable(index, subindex)
             self._download = Download(_SIZE.unpack(data)[0] if indicated else None, self._longest)
-            self.state = State.DOWNLOAD
+            self.state = SdoState.DOWNLOAD
         return [protocol.download_initiated(self._multiplexer)]
 
     def _natural_size(self, index: int, subindex: int) -> int:
@@ -198,7 +198,7 @@ class SdoServer:
     def _upload_of(self, value: bytes) -> list[bytes]:
         if not protocol.is_expedited(value):
             self._upload = Upload(value)
-            self.state = State.UPLOAD
+            self.state = SdoState.UPLOAD
         return [protocol.upload_initiated(self._multiplexer, value)]
 
     def _give_segment(self, data: bytes) -> list[bytes]:
@@ -220,10 +220,8 @@ class SdoServer:
         size = _SIZE.unpack(data)[0] if data[0] & 0x02 else None
         checked = bool(data[0] & _CRC_SUPPORTED)
         self._block_download = BlockDownload(Download(size, self._longest), checked=checked)
-        self.state = State.BLOCK_DOWNLOAD
-        return [
-            protocol.block_download_initiated(self._multiplexer, BLOCK_SEGMENTS_GREATEST, checked=checked)
-        ]
+        self.state = SdoState.BLOCK_DOWNLOAD
+        return [protocol.block_download_initiated(self._multiplexer, MAX_BLOCK_SEGMENTS, checked=checked)]
 
     def _take_block_segment(self, data: bytes) -> list[bytes]:
         block = self._block_download
@@ -232,7 +230,7 @@ class SdoServer:
 
     def _acknowledge(self, block: BlockDownload) -> list[bytes]:
         if block.complete:
-            self.state = State.BLOCK_DOWNLOAD_END
+            self.state = SdoState.BLOCK_DOWNLOAD_END
         return [block.acknowledge()]
 
     def _end_block_download(self, data: bytes) -> list[bytes]:
@@ -251,12 +249,12 @@ class SdoServer:
             return self._upload_of(value)
         checked = bool(data[0] & _CRC_SUPPORTED)
         self._block_upload = BlockUpload(value, segments, checked=checked)
-        self.state = State.BLOCK_UPLOAD_START
+        self.state = SdoState.BLOCK_UPLOAD_START
         return [protocol.block_upload_initiated(self._multiplexer, len(value), checked=checked)]
 
     def _start_block_upload(self, _data: bytes) -> list[bytes]:
         assert self._block_upload is not None
-        self.state = State.BLOCK_UPLOAD
+        self.state = SdoState.BLOCK_UPLOAD
         return self._block_upload.sub_block()
 
     def _next_sub_block(self, data: bytes) -> list[bytes]:
@@ -265,7 +263,7 @@ class SdoServer:
         block.acknowledge(data[1], data[2])
         if not block.done:
             return block.sub_block()
-        self.state = State.BLOCK_UPLOAD_END
+        self.state = SdoState.BLOCK_UPLOAD_END
         return [block.end()]
 
     IN_ANY_STATE: ClassVar[dict[Request, Act]] = {
@@ -276,13 +274,13 @@ class SdoServer:
         Request.ABORT: _end,
     }
     """What ends the present transfer, and may begin another. In a sub-block only an abort can be told from data."""
-    TRANSITIONS: ClassVar[dict[tuple[State, Request], Act]] = {
-        (State.DOWNLOAD, Request.DOWNLOAD_SEGMENT): _take_segment,
-        (State.UPLOAD, Request.UPLOAD_SEGMENT): _give_segment,
-        (State.BLOCK_DOWNLOAD, Request.BLOCK_SEGMENT): _take_block_segment,
-        (State.BLOCK_DOWNLOAD_END, Request.BLOCK_DOWNLOAD_END): _end_block_download,
-        (State.BLOCK_UPLOAD_START, Request.BLOCK_UPLOAD_START): _start_block_upload,
-        (State.BLOCK_UPLOAD, Request.BLOCK_UPLOAD_ACKNOWLEDGE): _next_sub_block,
-        (State.BLOCK_UPLOAD_END, Request.BLOCK_UPLOAD_END): _end,
+    TRANSITIONS: ClassVar[dict[tuple[SdoState, Request], Act]] = {
+        (SdoState.DOWNLOAD, Request.DOWNLOAD_SEGMENT): _take_segment,
+        (SdoState.UPLOAD, Request.UPLOAD_SEGMENT): _give_segment,
+        (SdoState.BLOCK_DOWNLOAD, Request.BLOCK_SEGMENT): _take_block_segment,
+        (SdoState.BLOCK_DOWNLOAD_END, Request.BLOCK_DOWNLOAD_END): _end_block_download,
+        (SdoState.BLOCK_UPLOAD_START, Request.BLOCK_UPLOAD_START): _start_block_upload,
+        (SdoState.BLOCK_UPLOAD, Request.BLOCK_UPLOAD_ACKNOWLEDGE): _next_sub_block,
+        (SdoState.BLOCK_UPLOAD_END, Request.BLOCK_UPLOAD_END): _end,
     }
     """What goes on with a transfer; anything else aborts it."""

@@ -12,9 +12,9 @@ from gatewayd.canopen.sdo.protocol import (
     upload_segment,
 )
 
-__all__ = ["BLOCK_SEGMENTS_GREATEST", "BlockDownload", "BlockUpload", "Download", "Upload"]
+__all__ = ["MAX_BLOCK_SEGMENTS", "BlockDownload", "BlockUpload", "Download", "Upload"]
 
-BLOCK_SEGMENTS_GREATEST = 127
+MAX_BLOCK_SEGMENTS = 127
 """Segments of a sub-block."""
 
 _LAST = 0x80
@@ -112,13 +112,13 @@ class BlockDownload:
                 self._last = frame[1:]
             else:
                 self._download.add(frame[1:])
-        return self._taken > 0 and (last or number == BLOCK_SEGMENTS_GREATEST)
+        return self._taken > 0 and (last or number == MAX_BLOCK_SEGMENTS)
 
     def acknowledge(self) -> bytes:
         """The frame that tells how far the sub-block was taken; the next one begins."""
         taken, self._taken = self._taken, 0
         self.pending = False
-        return block_download_acknowledged(taken, BLOCK_SEGMENTS_GREATEST)
+        return block_download_acknowledged(taken, MAX_BLOCK_SEGMENTS)
 
     def whole(self, unused: int, crc: int) -> bytes:
         """All the data; `unused` bytes of the last segment are none. Raises Abort for a wrong size or CRC."""
@@ -180,6 +180,6 @@ class BlockUpload:
 
 
 def _sub_block(segments: int) -> int:
-    if not 1 <= segments <= BLOCK_SEGMENTS_GREATEST:
+    if not 1 <= segments <= MAX_BLOCK_SEGMENTS:
         raise Abort(AbortCode.BLOCK_SIZE)
     return segments

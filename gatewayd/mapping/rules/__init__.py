@@ -1,6 +1,1 @@
-"""The rules of `gatewayd check`, one module per family; `run` knows them all.
-
-This package imports nothing itself, so that the loader can use `rules.syntax` alone.
-"""
-
-from __future__ import annotations
+"""The rules of `gatewayd check` about the language, ownership and what happens when a side is lost; `run` knows all."""

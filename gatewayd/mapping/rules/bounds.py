@@ -1,56 +1,42 @@
-"""Rules GW119 and GW124: how much one cell holds, and what tells cells apart."""
+"""Rules GW119, GW124 and GW221: how much one cell holds, what tells cells apart, and what nobody can see."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule
-from gatewayd.mapping.expand import ExpandedCell
+from gatewayd.links.registry import definer, languages
+from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
+from gatewayd.report.wording import alternatives
 
-__all__ = ["MAXIMUM_VARIABLES", "MAXIMUM_WRITERS"]
+__all__ = ["MAX_VARIABLES", "MAX_WRITERS"]
 
-MAXIMUM_VARIABLES = 1024
+MAX_VARIABLES = 1024
 """The status block has a quality bit and an owner word for so many."""
-MAXIMUM_WRITERS = 32
+MAX_WRITERS = 32
 """The status block has a record for so many."""
 
 
-@cell_rule(
-    "GW119",
-    "too-many",
-    "more variables or writers than one cell can hold",
-    """
-A cell holds at most 1024 variables and 32 writers: the status block has a fixed place for each. Split the
-cell's variables over two mapping files with two units.
-""",
-)
+@cell_rule("GW119", "too-many", "more variables or writers than one cell can hold")
 def too_many(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first variable and the first writer beyond the limit."""
-    if len(cell.variables) > MAXIMUM_VARIABLES:
-        variable = cell.variables[MAXIMUM_VARIABLES]
+    if len(cell.variables) > MAX_VARIABLES:
+        variable = cell.variables[MAX_VARIABLES]
         message = (
-            f"the cell has {len(cell.variables)} variables, the limit is {MAXIMUM_VARIABLES}; "
+            f"the cell has {len(cell.variables)} variables, the limit is {MAX_VARIABLES}; "
             f"`{variable.name}` is one too many"
         )
         hint = "split the variables over two files with two Modbus units"
         yield rule.at(variable.position, message, hint=hint)
     writers = list(cell.document.writers.values())
-    if len(writers) > MAXIMUM_WRITERS:
-        message = f"the cell has {len(writers)} writers, the limit is {MAXIMUM_WRITERS}"
+    if len(writers) > MAX_WRITERS:
+        message = f"the cell has {len(writers)} writers, the limit is {MAX_WRITERS}"
         hint = "let writers with equal rights share one entry with a network or a list of addresses"
-        yield rule.at(writers[MAXIMUM_WRITERS].key, message, hint=hint)
+        yield rule.at(writers[MAX_WRITERS].key, message, hint=hint)
 
 
-@plant_rule(
-    "GW124",
-    "duplicate-cell",
-    "two files describe a cell of the same name",
-    """
-The name of the cell stands in every log line and in the status of the gateway. Two cells of one name
-could not be told apart at 3 a.m.; most often the file was copied and not renamed.
-""",
-)
+@plant_rule("GW124", "duplicate-cell", "two files describe a cell of the same name")
 def duplicate_cell(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Equal names of cells."""
     first: dict[str, ExpandedCell] = {}
@@ -61,3 +47,13 @@ def duplicate_cell(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagno
             related = (Related(other.document.at("cell"), f"`{name}` first used here"),)
             message = f"the cell name `{name}` is used by {other.document.source.name} too"
             yield rule.at(cell.document.at("cell"), message, hint="rename one of the two", related=related)
+
+
+@cell_rule("GW221", "unmapped-variable", "a variable that no fieldbus can see", Severity.WARNING)
+def unmapped_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Lines without a place by any kind of link."""
+    examples = alternatives([language.place_example for language in languages() if language.place_example])
+    for part in cell.document.variables.values():
+        if not any(language.places_of(part, cell.document) for language in languages()):
+            message = f"`{part.name}` ({definer().named(part)}) has no address on any fieldbus"
+            yield rule.at(part.key, message, hint=f"add {examples}, or remove the line")

@@ -1,7 +1,6 @@
-"""The rules as documentation: `python -m gatewayd.mapping.rules.catalogue docs/reference` writes it.
+"""The rules as documentation: `python -m gatewayd.mapping.rules.catalogue docs/reference` writes `rules.md`.
 
-`rules.md` lists them all; `rules/GWnnn-slug/why.md` explains one beside its `bad.yaml` and `good.yaml`. The words
-come from the rules themselves, so that `gatewayd check --explain` says the same without any file.
+The reasons come from the rules' folders, so that `gatewayd check --explain` says the same.
 """
 
 from __future__ import annotations
@@ -13,18 +12,13 @@ from pathlib import Path
 from gatewayd.mapping.diagnostics import FAMILIES, Rule, all_rules
 from gatewayd.mapping.rules import run
 
-__all__ = ["catalogue", "complete", "explanation", "folder", "pages"]
+__all__ = ["catalogue", "complete", "explanation"]
 
 
 def complete() -> tuple[Rule, ...]:
     """Every rule by id."""
-    assert run.FAMILY_MODULES
+    assert run.RULE_MODULES
     return all_rules()
-
-
-def folder(rule: Rule) -> str:
-    """Name of the folder with the rule's examples."""
-    return f"{rule.id}-{rule.slug}"
 
 
 def explanation(rule: Rule) -> str:
@@ -35,17 +29,18 @@ def explanation(rule: Rule) -> str:
 
 
 def catalogue(rules: tuple[Rule, ...]) -> str:
-    """The list of all rules by family, as Markdown."""
+    """All rules by family, then the reason of each one, as Markdown."""
     parts = [_INTRODUCTION]
     for family, group in groupby(rules, key=lambda rule: int(rule.id[2])):
         parts.append(
             f"\n## GW{family}xx: {FAMILIES[family]}\n\n| id | name | severity | finds |\n|---|---|---|---|\n"
         )
         parts.extend(
-            f"| [{rule.id}](rules/{folder(rule)}/why.md) | {rule.slug} | {rule.severity.value} "
-            f"| {rule.summary} |\n"
+            f"| [{rule.id}](#{rule.folder.lower()}) | {rule.slug} | {rule.severity.value} | {rule.summary} |\n"
             for rule in group
         )
+    parts.append("\n## Why\n")
+    parts.extend(f"\n### {rule.folder}\n\n{rule.why}\n" for rule in rules)
     return "".join(parts)
 
 
@@ -54,8 +49,7 @@ _INTRODUCTION = """\
 
 Every finding names the rule that it breaks. Ids and names are stable. An error keeps the gateway from starting; a
 warning does not, unless `--strict` asks for it. `gatewayd check --explain GW214` prints a rule without this page.
-Each rule links to its reason; beside it lie `bad.yaml`, which breaks this rule, and `good.yaml`, which does not.
-Neither has an error of another rule; a warning it may have.
+Each rule links to its reason, further down.
 
 `--format json` writes one document with `version`, `files`, `errors`, `warnings`, `unreadable` and `findings`. A
 finding has `rule`, `slug`, `family`, `severity`, `file`, `line`, `column` (both from 1), `message`, `hint` (or null)
@@ -66,19 +60,5 @@ This page is generated: `python -m gatewayd.mapping.rules.catalogue docs/referen
 """
 
 
-def pages(rules: tuple[Rule, ...]) -> dict[str, str]:
-    """Every generated page by its path below `docs/reference`."""
-    return {"rules.md": catalogue(rules)} | {
-        f"rules/{folder(rule)}/why.md": explanation(rule) for rule in rules
-    }
-
-
-def main(target: Path) -> None:
-    """Write the pages below `target`."""
-    for path, text in pages(complete()).items():
-        (target / path).parent.mkdir(parents=True, exist_ok=True)
-        (target / path).write_text(text, encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    Path(sys.argv[1], "rules.md").write_text(catalogue(complete()), encoding="utf-8")

@@ -6,16 +6,15 @@ import re
 from collections.abc import Iterator
 
 from gatewayd.core.definition import Direction, FallbackKind, ValueKind
-from gatewayd.mapping.compile import package_period
+from gatewayd.links.registry import languages
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
-from gatewayd.mapping.expand import ConcreteVariable, ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.rtde import LEAST_RATE
-from gatewayd.mapping.rules.wording import number, seconds
+from gatewayd.mapping.rules.writers import is_supervised
+from gatewayd.report.wording import number
 
 __all__ = ["silent_motion"]
 
-_MOTION_FIELDS = ("speed_slider_fraction",)
 _MOTION_WORDS = frozenset(
     {
         "drive",
@@ -38,15 +37,7 @@ _MOTION_WORDS = frozenset(
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
 
 
-@cell_rule(
-    "GW601",
-    "fallback-outside-limits",
-    "a fallback value outside the limits",
-    """
-`on_release` is given to the robot when the owner is lost. A value outside `limits` would be refused from
-any writer, and must not come from the gateway itself.
-""",
-)
+@cell_rule("GW601", "fallback-outside-limits", "a fallback value outside the limits")
 def fallback_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`on_release` values beyond `limits`."""
     for variable in _lines(cell):
@@ -63,15 +54,7 @@ def fallback_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
             yield rule.at(variable.at("on_release"), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW602",
-    "fallback-type",
-    "a fallback value that the variable cannot have",
-    """
-A fallback is a value of the robot's own type: true or false for a bit, a whole number within its range
-for an integer, a number for a double.
-""",
-)
+@cell_rule("GW602", "fallback-type", "a fallback value that the variable cannot have")
 def fallback_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Fallback values of another type or beyond the type's range."""
     for variable in _lines(cell):
@@ -86,13 +69,11 @@ def fallback_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                     if isinstance(fallback.value, bool)
                     else number(fallback.value)
                 )
-                message = (
-                    f"`{variable.part.name}` ({variable.target}, {variable.type.word}) cannot be {shown}"
-                )
+                message = f"`{variable.part.name}` ({variable.target}, {variable.type}) cannot be {shown}"
                 yield rule.at(variable.at(key), message, hint=f"write {expected}")
 
 
-def _mismatch(variable: ConcreteVariable, value: float) -> str | None:
+def _mismatch(variable: ExpandedVariable, value: float) -> str | None:
     """What should stand in the place of `value`; None where it fits."""
     if variable.kind is ValueKind.BOOL:
         return None if value in (0, 1) else "true or false"
@@ -104,18 +85,7 @@ def _mismatch(variable: ConcreteVariable, value: float) -> str | None:
     return None if fits else f"a whole number from {variable.low} to {variable.high}"
 
 
-@cell_rule(
-    "GW603",
-    "held-motion",
-    "a motion command that stays on when its owner is lost",
-    """
-The variable looks like a command to move (by its name, or because it is the speed slider), it keeps its
-value when its owner is lost, and nothing supervises the owner: neither a lease nor a `timeout`. A PLC
-that dies with the command set leaves the robot moving. Use `on_release: clear`, or supervise the owner if
-holding is meant.
-""",
-    Severity.WARNING,
-)
+@cell_rule("GW603", "held-motion", "a motion command that stays on when its owner is lost", Severity.WARNING)
 def held_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`hold` at motion commands without supervision."""
     for variable, silent in silent_motion(cell):
@@ -127,17 +97,7 @@ def held_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.at("on_release"), message, hint=hint)
 
 
-@cell_rule(
-    "GW604",
-    "unsupervised-motion",
-    "a motion command whose owner nobody supervises",
-    """
-The variable looks like a command to move, and its owner has neither a lease nor a `timeout`: the owner
-counts as lost only when its connection closes. A PLC whose program hangs keeps the connection, and the
-command stays set. Give the writer a `timeout`, or the variable a `lease`.
-""",
-    Severity.WARNING,
-)
+@cell_rule("GW604", "unsupervised-motion", "a motion command whose owner nobody supervises", Severity.WARNING)
 def unsupervised_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Motion commands without supervision whose fallback would stop the motion."""
     for variable, silent in silent_motion(cell):
@@ -149,34 +109,26 @@ def unsupervised_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.position, message, hint=hint, related=related)
 
 
-def silent_motion(cell: ExpandedCell) -> Iterator[tuple[ConcreteVariable, str]]:
+def silent_motion(cell: ExpandedCell) -> Iterator[tuple[ExpandedVariable, str]]:
     """Motion commands that no lease bounds, and the first owner that could be lost unnoticed."""
     for variable in _lines(cell):
         if variable.lock is None or not _is_motion(variable):
             continue
         lock = cell.locks[variable.lock]
-        silent = [name for name in lock.owners if not cell.document.writers[name].spec.is_supervised]
+        silent = [name for name in lock.owners if not is_supervised(cell.document.writers[name].spec)]
         if lock.lease is None and silent:
             yield variable, silent[0]
 
 
-def _is_motion(variable: ConcreteVariable) -> bool:
+def _is_motion(variable: ExpandedVariable) -> bool:
     words = {word.lower() for word in _WORD.findall(variable.part.name)}
-    return variable.field.name in _MOTION_FIELDS or not words.isdisjoint(_MOTION_WORDS)
+    return variable.moves or not words.isdisjoint(_MOTION_WORDS)
 
 
-@cell_rule(
-    "GW605",
-    "policy-of-other-side",
-    "on_stale or valid at an input, or on_release at an output",
-    """
-`on_stale` is what the fieldbus sees of an output when the robot stops telling, and `valid` when an output is good at
-all; `on_release` is what the robot is given of an input when the owner is lost. At the other side they never act, and
-the policy that does act is the default.
-""",
-)
+@cell_rule("GW605", "policy-of-other-side", "on_stale or valid at an input, or on_release at an output")
 def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Policies that belong to the other direction."""
+    policies = {key: what for one in languages() for key, what in one.output_policies.items()}
     for variable in _lines(cell):
         is_input = variable.direction is Direction.INPUT
         key, other = ("on_stale", "on_release") if is_input else ("on_release", "on_stale")
@@ -186,46 +138,13 @@ def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
                 f"`{key}` never acts on it"
             )
             yield rule.at(variable.part.key_at(key), message, hint=f"write `{other}`, or remove `{key}`")
-        if is_input and "valid" in variable.spec.model_fields_set:
-            message = f"`{variable.part.name}` is an input ({variable.target}); `valid` never acts on it"
-            hint = "remove `valid`: it says when an output is good"
-            yield rule.at(variable.part.key_at("valid"), message, hint=hint)
+        for key, what in policies.items():
+            if is_input and key in variable.spec.model_fields_set:
+                message = f"`{variable.part.name}` is an input ({variable.target}); `{key}` never acts on it"
+                yield rule.at(variable.part.key_at(key), message, hint=f"remove `{key}`: {what}")
 
 
-@cell_rule(
-    "GW607",
-    "stale-too-soon",
-    "stale_after shorter than the time between two packages",
-    """
-Between two packages nothing can be known. With `stale_after` shorter than that, every value would be
-stale before its successor can come, and all fallbacks would act all the time. Leave it out (five periods,
-at least 100ms), or give it several periods.
-""",
-)
-def stale_too_soon(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`stale_after` below the package period."""
-    robot = cell.document.robot
-    if robot is None or robot.spec.stale_after is None or 0 < robot.spec.frequency < LEAST_RATE:
-        return
-    period = package_period(robot.spec)
-    if robot.spec.stale_after < period:
-        message = (
-            f"stale_after {seconds(robot.spec.stale_after)} is shorter than the {seconds(period)} "
-            f"between two packages"
-        )
-        hint = f"leave it out, or write at least {seconds(2 * period)}"
-        yield rule.at(robot.at("stale_after"), message, hint=hint)
-
-
-@cell_rule(
-    "GW608",
-    "limits-inverted",
-    "limits that no value can satisfy",
-    """
-Limits are written `[least, greatest]`. With the greater first no value lies between them, and every write
-would be refused.
-""",
-)
+@cell_rule("GW608", "limits-inverted", "limits that no value can satisfy")
 def limits_inverted(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Limits with the least not below the greatest."""
     for variable in _lines(cell):
@@ -237,15 +156,7 @@ def limits_inverted(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.at("limits"), message, hint=hint)
 
 
-@cell_rule(
-    "GW609",
-    "limits-outside-type",
-    "limits beyond what the robot's register can hold",
-    """
-The robot's register has a range of its own (INT32: -2147483648 to 2147483647). A limit beyond it can
-never act; most likely a digit is too many, or another register was meant.
-""",
-)
+@cell_rule("GW609", "limits-outside-type", "limits beyond what the robot's register can hold")
 def limits_outside_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Limits of integers beyond their type."""
     for variable in _lines(cell):
@@ -263,16 +174,7 @@ def limits_outside_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             )
 
 
-@cell_rule(
-    "GW610",
-    "limits-without-effect",
-    "limits where nothing can be limited",
-    """
-Limits guard what a writer sends. A bit has only two values, so limits say nothing about it. What comes
-from the robot is shown as it is and never clamped; `limits` at an output only state the range that it
-keeps, for the conversion rules (GW703).
-""",
-)
+@cell_rule("GW610", "limits-without-effect", "limits where nothing can be limited")
 def limits_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Limits of bits, and clamping of outputs."""
     for variable in _lines(cell):
@@ -284,17 +186,7 @@ def limits_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
             yield rule.at(variable.part.key_at("clamp"), message, hint="remove `clamp`")
 
 
-@cell_rule(
-    "GW611",
-    "clear-outside-limits",
-    "a fallback of zero that the limits exclude",
-    """
-When the owner is lost, an input is cleared to 0 unless `on_release` says otherwise. Here the limits
-exclude 0, so the robot would be given a value that no writer may send. Say `on_release: hold` or name a
-value.
-""",
-    Severity.WARNING,
-)
+@cell_rule("GW611", "clear-outside-limits", "a fallback of zero that the limits exclude", Severity.WARNING)
 def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`clear` at inputs whose limits exclude 0."""
     for variable in _lines(cell):
@@ -316,15 +208,7 @@ def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
             yield rule.at(variable.at("on_release" if written else "limits"), message, hint=hint)
 
 
-@cell_rule(
-    "GW612",
-    "clamp-without-limits",
-    "clamping without limits",
-    """
-`clamp: true` brings a value outside the limits to the nearer limit instead of refusing it. Without
-`limits` there is nothing to bring it to.
-""",
-)
+@cell_rule("GW612", "clamp-without-limits", "clamping without limits")
 def clamp_without_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`clamp` at inputs without `limits`."""
     for variable in _lines(cell):
@@ -334,7 +218,7 @@ def clamp_without_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
             yield rule.at(variable.part.key_at("clamp"), message, hint=hint)
 
 
-def _lines(cell: ExpandedCell) -> Iterator[ConcreteVariable]:
+def _lines(cell: ExpandedCell) -> Iterator[ExpandedVariable]:
     """The first variable of each line: those of a family are alike in all that these rules judge."""
     for variable in cell.variables:
         if not variable.member:

@@ -5,30 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from gatewayd.core.definition import Direction
+from gatewayd.links.registry import definer, languages
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.document import Document, Part
-from gatewayd.mapping.expand import ConcreteLock, ConcreteVariable, ExpandedCell
-from gatewayd.mapping.model import ANY, Group, VariableSpec, WriterSpec
-from gatewayd.mapping.plan import Network
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock
+from gatewayd.mapping.model import ANY, Group, VariableSpec
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import did_you_mean, seconds
+from gatewayd.mapping.rules.writers import is_supervised
+from gatewayd.report.wording import did_you_mean, seconds
 
 __all__ = ["endless_locks"]
 
-_LEAST_LEASE = 0.1
+_MIN_LEASE = 0.1
 _RESERVED = (ANY, "free", "gateway", "operator", "robot", "undeclared")
 _POLICY = ("owner", "lease", "takeover")
 
 
-@cell_rule(
-    "GW501",
-    "no-writer",
-    "input variables in a file without writers",
-    """
-An input variable is written by a writer, and a writer is known by its address. Without `writers:` every
-peer is unknown, every write is refused, and the inputs can never change.
-""",
-)
+@cell_rule("GW501", "no-writer", "input variables in a file without writers")
 def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first input of a file without writers."""
     if cell.document.declared("writers") or cell.document.writers:
@@ -37,46 +30,33 @@ def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     if inputs:
         more = f" and {len(inputs) - 1} more input{'s' if len(inputs) > 2 else ''}" if len(inputs) > 1 else ""
         message = f"nobody can write `{inputs[0].name}`{more}: the file declares no writers"
-        on_can = cell.document.modbus is None and cell.canopen is not None
-        known_by = "canopen: rpdo, node: 1, heartbeat: 1s" if on_can else "modbus: 192.168.1.20, timeout: 1s"
+        having = [language for language in languages() if language.writer_keys is not None]
+        here = [language for language in having if language.key in cell.document.sections]
+        example = (here or having)[0]
+        known_by = f"{example.writer_example}, {example.supervision_example or 'timeout: 1s'}"
         hint = f"add `writers: {{plc: {{{known_by}}}}}`"
         yield rule.at(inputs[0].position, message, hint=hint)
 
 
-@cell_rule(
-    "GW502",
-    "unknown-writer",
-    "an owner that is not among the writers",
-    """
-Owners, and the writers that a watchdog requires, are named in the section `writers:`. A name that is not
-there can never own anything, and nobody would notice until the wrong one writes.
-""",
-)
+@cell_rule("GW502", "unknown-writer", "an owner that is not among the writers")
 def unknown_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Names of owners and required writers that are not declared."""
     known = cell.document.declared("writers")
-    if not known and cell.document.robot is None:
+    if not known and definer().key not in cell.document.sections:
         return
     for name, position, role in _named_writers(cell.document):
         if name != ANY and name not in known:
             hint = did_you_mean(name, known, f"add `{name}` to the section `writers`")
             yield rule.at(position, f"{role} `{name}` is not among the writers", hint=hint)
-    robot = cell.document.robot
-    if robot is not None and robot.spec.watchdog is not None and ANY in (robot.spec.watchdog.requires or ()):
-        hint = "name the writers, or leave `requires` out"
-        message = f"a watchdog cannot require `{ANY}`"
-        yield rule.at(robot.at("watchdog", "requires"), message, hint=hint)
+    for language in languages():
+        for named in language.names_writers(cell.document):
+            if named.name == ANY and named.no_any and named.whole is not None:
+                hint = "name the writers, or leave `requires` out"
+                yield rule.at(named.whole, named.no_any, hint=hint)
+                break
 
 
-@cell_rule(
-    "GW503",
-    "writer-twice",
-    "a writer that stands twice in one list",
-    """
-The order of the owners is their priority. A writer that stands twice has two priorities; most likely one
-of the two was meant to be another writer.
-""",
-)
+@cell_rule("GW503", "writer-twice", "a writer that stands twice in one list")
 def writer_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Repeated names in lists of owners."""
     for part in _owned(cell.document):
@@ -90,75 +70,7 @@ def writer_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 yield rule.at(part.at("owner", index), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW504",
-    "same-peer",
-    "two writers with the same address",
-    """
-A Modbus client is recognised by its address alone. Two writers with the same address or network could not
-be told apart, and the rights of the second would never act.
-""",
-)
-def same_peer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Equal networks of one or of two writers."""
-    first: dict[Network, tuple[Part[WriterSpec], Position]] = {}
-    for writer, network, position in _peers(cell.document):
-        if network not in first:
-            first[network] = writer, position
-            continue
-        other, place = first[network]
-        whom = "the writer itself" if other is writer else f"the writer `{other.name}`"
-        message = f"{_shown(network)} of the writer `{writer.name}` already stands for {whom}"
-        related = (Related(place, f"{_shown(network)} first used here"),)
-        hint = "give each writer its own address, or make one writer of the two"
-        yield rule.at(position, message, hint=hint, related=related)
-
-
-@cell_rule(
-    "GW505",
-    "overlapping-peers",
-    "the network of one writer holds the address of another",
-    """
-A client is taken for the writer with the most specific network that holds its address: the single address
-wins over the network around it. That is well defined, but easily missed by whoever reads the file.
-Networks that do not overlap say the same without a second thought.
-""",
-    Severity.WARNING,
-)
-def overlapping_peers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Networks of one writer inside those of another."""
-    holders: dict[Network, tuple[Part[WriterSpec], Position]] = {}
-    peers = list(_peers(cell.document))
-    for writer, network, position in peers:
-        holders.setdefault(network, (writer, position))
-    lengths = sorted({network.prefixlen for network in holders}, reverse=True)
-    for writer, network, position in peers:
-        for length in lengths:
-            if length >= network.prefixlen:
-                continue
-            holder = holders.get(network.supernet(new_prefix=length))
-            if holder is not None and holder[0] is not writer:
-                wide = network.supernet(new_prefix=length)
-                message = (
-                    f"{_shown(network)} of the writer `{writer.name}` lies in {wide} of `{holder[0].name}`; "
-                    f"it counts as `{writer.name}`"
-                )
-                related = (Related(holder[1], f"{wide} of `{holder[0].name}`"),)
-                hint = "write networks that do not overlap"
-                yield rule.at(position, message, hint=hint, related=related)
-                break
-
-
-@cell_rule(
-    "GW506",
-    "group-of-one",
-    "a group with a single variable",
-    """
-A group makes several variables owned together. With one member it does nothing that `owner` and `lease`
-at the variable would not do; most likely a second variable was meant to name it.
-""",
-    Severity.WARNING,
-)
+@cell_rule("GW506", "group-of-one", "a group with a single variable", Severity.WARNING)
 def group_of_one(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Groups with one member."""
     if not _is_whole(cell):
@@ -172,15 +84,7 @@ def group_of_one(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(lock.group.key, message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW507",
-    "member-with-own-owner",
-    "a member of a group with an owner or lease of its own",
-    """
-The variables of a group are only ever owned together, so owner, lease and takeover are the group's. A
-second statement at the variable contradicts it, or repeats it and will contradict it one day.
-""",
-)
+@cell_rule("GW507", "member-with-own-owner", "a member of a group with an owner or lease of its own")
 def member_with_own_owner(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`owner`, `lease` or `takeover` beside `group`."""
     for part in cell.document.variables.values():
@@ -197,28 +101,18 @@ def member_with_own_owner(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
                 yield rule.at(part.key_at(key), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW508",
-    "short-lease",
-    "a lease that ends before its owner can count as lost",
-    """
-The lease is how long an owner keeps a variable without writing it. One shorter than the writer's
-`timeout` ends while the writer still counts as alive: between two writes the variable falls back and
-comes again. Below 100ms every hiccup of the network does that.
-""",
-    Severity.WARNING,
-)
+@cell_rule("GW508", "short-lease", "a lease that ends before its owner can count as lost", Severity.WARNING)
 def short_lease(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Leases below 100ms or below a time-out of an owner."""
     for lock in _distinct(cell.locks):
         if lock.lease is None:
             continue
         place = _lease_place(cell, lock)
-        if lock.lease < _LEAST_LEASE:
+        if lock.lease < _MIN_LEASE:
             message = (
                 f"a lease of {seconds(lock.lease)} for `{lock.name}` ends with every hiccup of the network"
             )
-            yield rule.at(place, message, hint=f"use at least {seconds(_LEAST_LEASE)}, better 1s")
+            yield rule.at(place, message, hint=f"use at least {seconds(_MIN_LEASE)}, better 1s")
             continue
         for name in lock.owners:
             writer = cell.document.writers[name]
@@ -233,16 +127,7 @@ def short_lease(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 break
 
 
-@cell_rule(
-    "GW509",
-    "idle-writer",
-    "a writer that may write nothing",
-    """
-The writer is declared, but owns no variable and is required by no watchdog: every write of it is refused.
-Name it as an owner, or remove it.
-""",
-    Severity.WARNING,
-)
+@cell_rule("GW509", "idle-writer", "a writer that may write nothing", Severity.WARNING)
 def idle_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers that no owner list and no watchdog names."""
     if not _is_whole(cell):
@@ -260,14 +145,7 @@ def idle_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.key, message, hint="name it as `owner` of a variable, or remove it")
 
 
-@cell_rule(
-    "GW510",
-    "unknown-group",
-    "a group that is not declared",
-    """
-Groups are declared in the section `groups:` with their owners and their lease.
-""",
-)
+@cell_rule("GW510", "unknown-group", "a group that is not declared")
 def unknown_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`group` with a name that is not declared."""
     known = cell.document.declared("groups")
@@ -278,16 +156,7 @@ def unknown_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.at("group"), f"the group `{name}` of `{part.name}` is not declared", hint=hint)
 
 
-@cell_rule(
-    "GW511",
-    "unused-group",
-    "a group without a member",
-    """
-No variable names the group, so it owns nothing. Most likely its name is misspelt at the variables, or
-they were removed.
-""",
-    Severity.WARNING,
-)
+@cell_rule("GW511", "unused-group", "a group without a member", Severity.WARNING)
 def unused_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Groups that no variable names."""
     if not _is_whole(cell):
@@ -299,16 +168,7 @@ def unused_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(group.key, message, hint=f"write `group: {group.name}` at its variables")
 
 
-@cell_rule(
-    "GW512",
-    "takeover-of-nobody",
-    "takeover where there is no order of owners",
-    """
-`takeover: true` lets a writer named earlier take a variable from one named later. With a single owner, or
-with `any`, nobody is named earlier, so it does nothing.
-""",
-    Severity.WARNING,
-)
+@cell_rule("GW512", "takeover-of-nobody", "takeover where there is no order of owners", Severity.WARNING)
 def takeover_of_nobody(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`takeover: true` without a list."""
     for part in _owned(cell.document):
@@ -321,15 +181,7 @@ def takeover_of_nobody(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.key_at("takeover"), message, hint=hint)
 
 
-@cell_rule(
-    "GW513",
-    "owner-of-output",
-    "an owner of a variable that nobody writes",
-    """
-An output variable flows from the robot to the fieldbus. Nobody writes it, so nobody owns it. If the PLC
-is meant to write it, it must be an input register of the robot.
-""",
-)
+@cell_rule("GW513", "owner-of-output", "an owner of a variable that nobody writes")
 def owner_of_output(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`owner`, `lease`, `takeover` or `group` at an output."""
     seen: set[str] = set()
@@ -340,37 +192,12 @@ def owner_of_output(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         for key in (*_POLICY, "group"):
             if key in variable.spec.model_fields_set:
                 message = f"`{variable.part.name}` comes from the robot ({variable.target}) and has `{key}`"
-                hint = f"remove `{key}`, or map an input such as {_counterpart(variable)}"
+                hint = f"remove `{key}`, or map an input such as {variable.counterpart}"
                 yield rule.at(variable.part.key_at(key), message, hint=hint)
 
 
-_COUNTERPARTS = {
-    "actual_digital_output_bits": "standard_digital_output (with its mask)",
-    "actual_configurable_digital_output_bits": "configurable_digital_output (with its mask)",
-    "standard_analog_output0": "standard_analog_output_0 (with its mask)",
-    "standard_analog_output1": "standard_analog_output_1 (with its mask)",
-    "target_speed_fraction": "speed_slider_fraction (with its mask)",
-}
-"""Outputs that are often taken for the input of nearly the same name."""
-
-
-def _counterpart(variable: ConcreteVariable) -> str:
-    field, target = variable.field.name, variable.target
-    if target.startswith("output_"):
-        return f"input_{target.removeprefix('output_')}"
-    return _COUNTERPARTS.get(field, "input_int_register_0")
-
-
 @cell_rule(
-    "GW514",
-    "endless-lock",
-    "a shared variable that a silent writer can keep for ever",
-    """
-Several writers may own the variable, there is no lease, and one of them has no `timeout`. If that one
-hangs with its connection open, it keeps the variable until somebody pulls the cable. Give the variable a
-lease, or the writer a timeout.
-""",
-    Severity.WARNING,
+    "GW514", "endless-lock", "a shared variable that a silent writer can keep for ever", Severity.WARNING
 )
 def endless_lock(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Shared locks without a lease whose owners are not all supervised."""
@@ -381,23 +208,15 @@ def endless_lock(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(_lease_place(cell, lock), message, hint=hint, related=related)
 
 
-def endless_locks(cell: ExpandedCell) -> Iterator[tuple[ConcreteLock, str]]:
+def endless_locks(cell: ExpandedCell) -> Iterator[tuple[ExpandedLock, str]]:
     """Shared locks without a lease, one of each line, and the first owner that could keep them unnoticed."""
     for lock in _distinct(cell.locks):
-        silent = [name for name in lock.owners if not cell.document.writers[name].spec.is_supervised]
+        silent = [name for name in lock.owners if not is_supervised(cell.document.writers[name].spec)]
         if len(lock.owners) > 1 and lock.lease is None and silent:
             yield lock, silent[0]
 
 
-@cell_rule(
-    "GW516",
-    "any-among-owners",
-    "the word any in a list of owners",
-    """
-`any` stands for all writers, first come first served. Beside named writers it contradicts their order.
-Write `any` alone, or name the writers by priority.
-""",
-)
+@cell_rule("GW516", "any-among-owners", "the word any in a list of owners")
 def any_among_owners(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`any` in lists of more than one owner."""
     for part in _owned(cell.document):
@@ -408,17 +227,7 @@ def any_among_owners(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.at("owner", owners.index(ANY)), message, hint=hint)
 
 
-@cell_rule(
-    "GW517",
-    "reserved-writer-name",
-    "a writer with a name that the gateway uses itself",
-    """
-Log, status, events and audit tell who wrote what by name. `operator` is the local operator, who takes locks and
-forces values by hand; `gateway` is the gateway itself, which applies fallbacks; `robot` is the owner of outputs;
-`undeclared` is a peer that no writer stands for, and `any` and `free` stand where no writer does. A writer of such
-a name could not be told from them.
-""",
-)
+@cell_rule("GW517", "reserved-writer-name", "a writer with a name that the gateway uses itself")
 def reserved_writer_name(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers named like parties that no mapping declares."""
     for writer in cell.document.writers.values():
@@ -439,16 +248,9 @@ def _named_writers(document: Document) -> Iterator[tuple[str, Position, str]]:
     for part in _owned(document):
         for index, name in enumerate(part.spec.owner or ()):
             yield name, part.at("owner", index), f"the owner of `{part.name}`,"
-    robot = document.robot
-    if robot is not None and robot.spec.watchdog is not None:
-        for index, name in enumerate(robot.spec.watchdog.requires or ()):
-            yield name, robot.at("watchdog", "requires", index), "the writer that the watchdog requires,"
-
-
-def _peers(document: Document) -> Iterator[tuple[Part[WriterSpec], Network, Position]]:
-    for writer in document.writers.values():
-        for index, network in enumerate(writer.spec.modbus):
-            yield writer, network, writer.at("modbus", index)
+    for language in languages():
+        for named in language.names_writers(document):
+            yield named.name, named.position, named.role
 
 
 def _is_whole(cell: ExpandedCell) -> bool:
@@ -456,7 +258,7 @@ def _is_whole(cell: ExpandedCell) -> bool:
     return len(cell.document.declared("variables")) == len(cell.document.variables)
 
 
-def _distinct(locks: Iterable[ConcreteLock]) -> Iterator[ConcreteLock]:
+def _distinct(locks: Iterable[ExpandedLock]) -> Iterator[ExpandedLock]:
     """One lock of each line: those of a family are alike."""
     seen: set[Position] = set()
     for lock in locks:
@@ -465,10 +267,6 @@ def _distinct(locks: Iterable[ConcreteLock]) -> Iterator[ConcreteLock]:
             yield lock
 
 
-def _lease_place(cell: ExpandedCell, lock: ConcreteLock) -> Position:
+def _lease_place(cell: ExpandedCell, lock: ExpandedLock) -> Position:
     part = lock.group if lock.group is not None else cell.variables[lock.members[0]].part
     return part.at("lease") if "lease" in part.spec.model_fields_set else lock.position
-
-
-def _shown(network: Network) -> str:
-    return str(network.network_address) if network.num_addresses == 1 else str(network)

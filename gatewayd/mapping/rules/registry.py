@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Final, TypeAlias
 
 from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity, declare
-from gatewayd.mapping.expand import ExpandedCell
+from gatewayd.mapping.expanded import ExpandedCell
 
 __all__ = ["CELL_CHECKS", "PLANT_CHECKS", "CellCheck", "PlantCheck", "cell_rule", "plant_rule"]
 
@@ -20,26 +20,28 @@ PLANT_CHECKS: Final[list[tuple[Rule, PlantCheck]]] = []
 
 
 def cell_rule(
-    rule_id: str, slug: str, summary: str, why: str, severity: Severity = Severity.ERROR
+    rule_id: str, slug: str, summary: str, severity: Severity = Severity.ERROR
 ) -> Callable[[CellCheck], CellCheck]:
     """Declare a rule; the decorated generator finds its breaches in one cell."""
-    rule = declare(rule_id, slug, summary, why, severity)
 
     def enter(check: CellCheck) -> CellCheck:
-        CELL_CHECKS.append((rule, check))
+        CELL_CHECKS.append((declare(rule_id, slug, summary, severity, home=_package(check)), check))
         return check
 
     return enter
 
 
 def plant_rule(
-    rule_id: str, slug: str, summary: str, why: str, severity: Severity = Severity.ERROR
+    rule_id: str, slug: str, summary: str, severity: Severity = Severity.ERROR
 ) -> Callable[[PlantCheck], PlantCheck]:
     """Declare a rule; the decorated generator finds its breaches among several cells."""
-    rule = declare(rule_id, slug, summary, why, severity)
 
     def enter(check: PlantCheck) -> PlantCheck:
-        PLANT_CHECKS.append((rule, check))
+        PLANT_CHECKS.append((declare(rule_id, slug, summary, severity, home=_package(check)), check))
         return check
 
     return enter
+
+
+def _package(check: Callable[..., object]) -> str:
+    return check.__module__.rpartition(".")[0]

@@ -3,48 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 
+from gatewayd.links.registry import languages
 from gatewayd.mapping.diagnostics import Diagnostic
-from gatewayd.mapping.expand import ExpandedCell
-from gatewayd.mapping.rules import (
-    bounds,
-    can_bus,
-    canopen,
-    companions,
-    conversion,
-    failsafe,
-    listener,
-    ownership,
-    pdo_company,
-    pdo_members,
-    pdos,
-    places,
-    rtde,
-    sharing,
-    supervision,
-)
+from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.mapping.rules import bounds, failsafe, ownership, sharing, supervision
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
-__all__ = ["FAMILY_MODULES", "check_cell", "check_plant"]
+__all__ = ["RULE_MODULES", "check_cell", "check_plant"]
 
-FAMILY_MODULES = (
+RULE_MODULES = (
     bounds,
-    places,
-    listener,
-    rtde,
-    companions,
-    canopen,
-    pdos,
-    pdo_members,
-    pdo_company,
-    can_bus,
     ownership,
     sharing,
     failsafe,
     supervision,
-    conversion,
+    *(import_module(name) for language in languages() for name in language.rules),
 )
-"""The modules whose rules are applied."""
+"""The modules whose rules are applied: those of the language, and those of each kind of link."""
 
 
 def check_cell(cell: ExpandedCell) -> tuple[Diagnostic, ...]:

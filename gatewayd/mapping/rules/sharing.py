@@ -1,36 +1,21 @@
-"""Rules GW518 to GW520: what several writers own by turns, in groups and in registers."""
+"""Rules GW518 and GW519: groups that several writers own by turns."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
-from gatewayd.core.definition import Direction, FallbackKind
+from gatewayd.core.definition import FallbackKind
+from gatewayd.links.registry import languages
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
-from gatewayd.mapping.expand import ConcreteLock, ConcretePlacement, ConcreteVariable, ExpandedCell
-from gatewayd.mapping.model import WriterSpec
-from gatewayd.mapping.plan import Area
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import names_and_more, where
+from gatewayd.report.wording import names_and_more
 
 __all__: list[str] = []
 
-_LONGEST_WRITE = {Area.HOLDING: 123, Area.COIL: 1968}
-"""Registers and coils that one request writes at most (Application Protocol V1.1b3, 6.11 and 6.12)."""
-
 
 @cell_rule(
-    "GW518",
-    "inherited-value",
-    "a held variable that the next owner of its group inherits",
-    """
-A writer that takes a group over inherits what it does not write itself. The other variables take `on_release`
-first, so that no command of the former owner goes on; but one with `on_release: hold` keeps the former owner's
-value, and the new owner's `go` acts on the old `target`. Give the variable another `on_release`, or let the group
-be taken over by writing all of it: `whole: true`. (A takeover by lock request keeps what is held in any case: write
-before you command.)
-""",
-    Severity.WARNING,
+    "GW518", "inherited-value", "a held variable that the next owner of its group inherits", Severity.WARNING
 )
 def inherited_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The first member with `hold` in each group that is taken over in pieces."""
@@ -46,154 +31,34 @@ def inherited_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(first.at("on_release"), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW519",
-    "split-group",
-    "a group that no single request can take over whole",
-    """
-A writer takes a group over with its first request; what that one does not write falls back (`on_release`) until the
-second one comes. One request writes the whole group where its variables lie side by side: up to 123 holding
-registers or 1968 coils without a gap and without anything else between them, or one RPDO. With `whole: true` a
-group that no request can write whole could only be taken over by lock request. Move the variables together; or,
-where the group need not change hands between two writers that are both there, write `takeover: false`.
-""",
-    Severity.WARNING,
-)
+@cell_rule("GW519", "split-group", "a group that no single request can take over whole", Severity.WARNING)
 def split_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Groups with an owner that ranks above another and cannot write them in one request."""
     for lock in _taken_over(cell):
         members = _members(cell, lock)
         for name in lock.owners[:-1]:
-            if _writes_whole(cell, members, cell.document.writers[name].spec):
+            writer = cell.document.writers[name].spec
+            if any(language.writes_whole(writer, members, cell) for language in languages()):
                 continue
             assert lock.group is not None
             message = f"`{name}` cannot take over the group `{lock.name}` with one request"
-            gap = _first_apart(cell, members)
-            related = () if gap is None else (Related(gap.position, f"`{gap.variable.name}` lies apart"),)
+            apart = (language.apart(members, cell) for language in languages())
+            related = tuple(one for one in apart if one is not None)[:1]
             hint = "lay its variables side by side, or write `takeover: false`"
             yield rule.at(lock.group.key, message, hint=hint, related=related)
             break
 
 
-def _taken_over(cell: ExpandedCell) -> Iterator[ConcreteLock]:
+def _taken_over(cell: ExpandedCell) -> Iterator[ExpandedLock]:
     """Groups of several variables that a writer takes from another."""
     for lock in cell.locks:
         if lock.group is not None and lock.takeover and len(lock.owners) > 1 and len(lock.members) > 1:
             yield lock
 
 
-def _members(cell: ExpandedCell, lock: ConcreteLock) -> list[ConcreteVariable]:
+def _members(cell: ExpandedCell, lock: ExpandedLock) -> list[ExpandedVariable]:
     return [cell.variables[index] for index in lock.members]
 
 
-def _names(variables: Iterable[ConcreteVariable]) -> str:
+def _names(variables: Iterable[ExpandedVariable]) -> str:
     return names_and_more(list(dict.fromkeys(variable.part.name for variable in variables)))
-
-
-def _writes_whole(cell: ExpandedCell, members: list[ConcreteVariable], writer: WriterSpec) -> bool:
-    """Whether one request of a writer can write all of them. SDO writes one at a time."""
-    if writer.modbus and any(_is_block(cell, members, area) for area in _LONGEST_WRITE):
-        return True
-    wanted = {member.index for member in members}
-    pdos = cell.canopen.pdos if cell.canopen is not None else ()
-    return writer.by_rpdo and any(wanted <= {entry.variable for entry in pdo.entries} for pdo in pdos)
-
-
-def _is_block(cell: ExpandedCell, members: list[ConcreteVariable], area: Area) -> bool:
-    """Whether all of them lie in an area without a gap, few enough for one request."""
-    places = _places(cell, members, area)
-    if len({place.variable.index for place in places}) < len(members):
-        return False
-    covered = {address for place in places for address in place.addresses}
-    span = max(covered) - min(covered) + 1
-    return span == len(covered) <= _LONGEST_WRITE[area]
-
-
-def _places(cell: ExpandedCell, members: list[ConcreteVariable], area: Area) -> list[ConcretePlacement]:
-    """Where they lie in an area: of each the first place, by address."""
-    wanted = {member.index for member in members}
-    first: dict[int, ConcretePlacement] = {}
-    for place in cell.placements:
-        if place.area is area and place.variable.index in wanted:
-            first.setdefault(place.variable.index, place)
-    return sorted(first.values(), key=lambda place: place.address)
-
-
-def _first_apart(cell: ExpandedCell, members: list[ConcreteVariable]) -> ConcretePlacement | None:
-    """The first holding register of the group that does not follow the one before it."""
-    end: int | None = None
-    for place in _places(cell, members, Area.HOLDING):
-        if end is not None and place.address > end:
-            return place
-        end = max(end or 0, place.addresses.stop)
-    return None
-
-
-@cell_rule(
-    "GW520",
-    "shared-register",
-    "a bit of several possible owners in a register with bits of other locks",
-    """
-Whoever writes a register writes all of its bits, and most of them only because they lie there: a PLC that read the
-word before writing its own bit would bring back a bit that somebody else has just cleared. So a register takes
-those of its bits that the writer owns already or that nobody else may own; another bit is left alone where the word
-does not change it, and else the request is refused. A bit with several possible owners (`owner: any` is the
-default) is therefore not taken by writing the register. Give it a register of its own or a coil, put all bits of
-the register into one `group`, or name one owner. A client can also take it on purpose: with function 22 (mask
-write), or by a lock request in the status block.
-""",
-    Severity.WARNING,
-)
-def shared_register(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """The first such bit of each line."""
-    reported: set[str] = set()
-    with_coil = {place.variable.index for place in cell.placements if place.area is Area.COIL}
-    for bits in _registers(cell):
-        if len({bit.lock for bit in bits}) < 2:
-            continue
-        for bit in bits:
-            line = bit.place.variable.part.name
-            if line in reported or bit.place.variable.index in with_coil or not _is_shared(cell, bit):
-                continue
-            reported.add(line)
-            yield _shared_bit(rule, cell, bit, next(other for other in bits if other.lock != bit.lock))
-
-
-@dataclass(frozen=True, slots=True)
-class _Bit:
-    place: ConcretePlacement
-    lock: int
-
-
-def _registers(cell: ExpandedCell) -> Iterable[list[_Bit]]:
-    """The bits of inputs by holding register."""
-    found: dict[int, list[_Bit]] = {}
-    for place in cell.placements:
-        variable = place.variable
-        if place.area is not Area.HOLDING or place.bit is None or variable.direction is Direction.OUTPUT:
-            continue
-        if variable.lock is not None:
-            found.setdefault(place.address, []).append(_Bit(place, variable.lock))
-    return found.values()
-
-
-def _is_shared(cell: ExpandedCell, bit: _Bit) -> bool:
-    """Whether several writers may own it, one of them by Modbus."""
-    owners = cell.locks[bit.lock].owners
-    return len(owners) > 1 and any(cell.document.writers[name].spec.modbus for name in owners)
-
-
-def _shared_bit(rule: Rule, cell: ExpandedCell, bit: _Bit, other: _Bit) -> Diagnostic:
-    variable, neighbour = bit.place.variable, other.place.variable
-    lock = cell.locks[bit.lock]
-    owners = " or ".join(f"`{name}`" for name in lock.owners[:2]) + (" and others" if lock.owners[2:] else "")
-    message = (
-        f"writing the whole register does not acquire `{variable.name}` at {where(bit.place)}, which {owners} may own: "
-        f"`{neighbour.name}` shares the register"
-    )
-    related = (Related(other.place.position, f"`{neighbour.name}` is here"),)
-    hint = (
-        "give it a register of its own or a coil, put the bits of the register into one `group`, or name one owner; "
-        "as it is, function 22 (mask write) or a lock request acquires it"
-    )
-    return rule.at(bit.place.position, message, hint=hint, related=related)

@@ -1,68 +1,34 @@
-"""Rules GW515, GW521, GW522 and GW613: who notices that a writer hangs, and keys that nothing lets act."""
+"""Rules GW521 and GW522: who notices that a writer hangs, and keys that nothing lets act."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gatewayd.core.definition import Direction
-from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
-from gatewayd.mapping.expand import ExpandedCell, is_program_output
+from gatewayd.links.registry import languages
+from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.failsafe import silent_motion
 from gatewayd.mapping.rules.ownership import endless_locks
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.mapping.rules.wording import names_and_more
+from gatewayd.mapping.rules.writers import is_supervised, known_by
+from gatewayd.report.wording import names_and_more
 
 __all__: list[str] = []
-
-
-@cell_rule(
-    "GW515",
-    "unsupervised-watchdog",
-    "a watchdog that requires a writer without a timeout",
-    """
-The watchdog is fed while the required writers are alive. A writer without `timeout` counts as alive as
-long as its connection is open, even if its program stands still, so the robot program would not stop.
-""",
-    Severity.WARNING,
-)
-def unsupervised_watchdog(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Required writers without `timeout`."""
-    for position, name in _unsupervised_requirements(cell):
-        message = f"the watchdog requires `{name}`, which has no timeout"
-        related = (Related(cell.document.writers[name].key, f"`{name}` is here"),)
-        yield rule.at(position, message, hint=f"add `timeout: 1s` to `{name}`", related=related)
-
-
-def _unsupervised_requirements(cell: ExpandedCell) -> Iterator[tuple[Position, str]]:
-    """Writers that the watchdog requires and nobody supervises, with the place that names them."""
-    robot = cell.document.robot
-    if robot is None or robot.spec.watchdog is None:
-        return
-    for index, name in enumerate(robot.spec.watchdog.requires or ()):
-        writer = cell.document.writers.get(name)
-        if writer is not None and not writer.spec.is_supervised:
-            yield robot.at("watchdog", "requires", index), name
 
 
 @cell_rule(
     "GW521",
     "unsupervised-writer",
     "a writer that keeps what it owns when its program hangs",
-    """
-The writer has no `timeout` (a CANopen writer no `heartbeat`), and what it owns has no lease: it counts as lost only
-when its connection ends. A PLC whose program has stopped, or whose cable was pulled, can leave the connection open
-for a long time, and its last values stay. `idle_timeout` does not help: a connection that holds something is not
-closed for idleness. Give the writer a `timeout` of some times the period in which it writes.
-""",
     Severity.WARNING,
 )
 def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Writers without supervision, unless another rule has reported already what that leads to."""
     reported = {name for _, name in silent_motion(cell)}
     reported |= {name for _, name in endless_locks(cell)}
-    reported |= {name for _, name in _unsupervised_requirements(cell)}
+    reported |= {named.name for language in languages() for named in language.names_writers(cell.document)}
     for writer in cell.document.writers.values():
-        if writer.spec.is_supervised or writer.name in reported:
+        if is_supervised(writer.spec) or writer.name in reported:
             continue
         kept = [
             cell.variables[lock.members[0]].part.name
@@ -71,25 +37,15 @@ def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         ]
         if not kept:
             continue
-        by_can = not writer.spec.modbus
+        example = known_by(writer.spec)[0].supervision_example or "timeout: 2s"
         message = (
             f"nobody notices when `{writer.name}` hangs; it keeps {names_and_more(list(dict.fromkeys(kept)))}"
         )
-        hint = f"add `{'node: 1, heartbeat: 1s' if by_can else 'timeout: 2s'}` to `{writer.name}`"
+        hint = f"add `{example}` to `{writer.name}`"
         yield rule.at(writer.key, message, hint=hint)
 
 
-@cell_rule(
-    "GW522",
-    "key-without-effect",
-    "a key that nothing in the file lets act",
-    """
-`timeout_counts` says what feeds `timeout`, so it needs one. `grace` is how long what a writer owns outlives its
-connection, and a CANopen writer has none. `whole` is about takeovers, so the group needs owners by priority.
-`adopt_for` is about adopted inputs, and with `on_connect: fallback` none are adopted. A key that does nothing was
-meant to do something.
-""",
-)
+@cell_rule("GW522", "key-without-effect", "a key that nothing in the file lets act")
 def key_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """`timeout_counts`, `grace`, `whole` and `adopt_for` where they mean nothing."""
     yield from _writers(rule, cell)
@@ -102,14 +58,9 @@ def key_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 "name the owners by priority (owner: [plc, hmi]) without `takeover: false`, or remove `whole`"
             )
             yield rule.at(group.key_at("whole"), message, hint=hint)
-    robot = cell.document.robot
-    if (
-        robot is not None
-        and robot.spec.on_connect == "fallback"
-        and "adopt_for" in robot.spec.model_fields_set
-    ):
-        message = "`adopt_for` is for adopted inputs, and `on_connect: fallback` adopts none"
-        yield rule.at(robot.key_at("adopt_for"), message, hint="remove one of the two")
+    for language in languages():
+        for position, message, hint in language.without_effect(cell.document):
+            yield rule.at(position, message, hint=hint)
 
 
 def _writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
@@ -119,35 +70,7 @@ def _writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             message = f"the writer `{writer.name}` has `timeout_counts` without `timeout`"
             hint = "add `timeout: 2s`, or remove it"
             yield rule.at(writer.key_at("timeout_counts"), message, hint=hint)
-        if writer.spec.grace is not None and not writer.spec.modbus:
+        ends = [language.lost_by for language in known_by(writer.spec)]
+        if writer.spec.grace is not None and all(ends):
             message = f"the writer `{writer.name}` has `grace`, and no connection that could end"
-            hint = "remove it; a CANopen writer is lost by its heartbeat or its timeout"
-            yield rule.at(writer.key_at("grace"), message, hint=hint)
-
-
-@cell_rule(
-    "GW613",
-    "valid-without-program",
-    "valid: running where no robot program writes",
-    """
-`valid: running` makes a variable good only while the robot program runs. That is for output registers, which hold
-the last word of a program that has stopped. What the controller itself measures and tells (`actual_q`,
-`robot_mode`) is as true without a program, and would only be hidden.
-""",
-    Severity.WARNING,
-)
-def valid_without_program(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`valid` at outputs that are no registers, and at a robot none of whose output registers are mapped."""
-    outputs = [variable for variable in cell.variables if variable.direction is Direction.OUTPUT]
-    for variable in outputs:
-        if variable.spec.valid is not None and not variable.member and not is_program_output(variable.field):
-            message = f"`{variable.part.name}` ({variable.target}) is as true while no program runs"
-            hint = "remove `valid`; it is for output registers"
-            yield rule.at(variable.part.key_at("valid"), message, hint=hint)
-    robot = cell.document.robot
-    complete = len(cell.document.declared("variables")) == len(cell.document.variables)
-    if robot is None or robot.spec.valid is None or not complete or cell.unresolved:
-        return
-    if not any(is_program_output(variable.field) for variable in outputs):
-        message = "`valid: running` is for output registers, and none is mapped"
-        yield rule.at(robot.key_at("valid"), message, hint="remove it, or map an output register")
+            yield rule.at(writer.key_at("grace"), message, hint=f"remove it; {ends[0]}")

@@ -18,7 +18,7 @@ from gatewayd.canopen.sdo.server import (
     SUB_BLOCK_TIMEOUT,
     TIMEOUT,
     SdoServer,
-    State,
+    SdoState,
 )
 
 ABORT = b"\x80\x05\x20\x00" + struct.pack("<I", AbortCode.GENERAL)
@@ -112,7 +112,7 @@ def test_refused_request(server: SdoServer, request_: str, multiplexer: str, cod
     before = {(one.index, e.subindex): e.value for one in server._dictionary for e in one.entries}
     assert ask(server, request_) == abort(multiplexer, code)
     assert {(one.index, e.subindex): e.value for one in server._dictionary for e in one.entries} == before
-    assert server.state is State.IDLE
+    assert server.state is SdoState.IDLE
 
 
 @pytest.mark.parametrize("length", [0, 1, 4, 7])
@@ -133,14 +133,14 @@ def test_sdo_13_segmented_download(server: SdoServer, dictionary: Dictionary) ->
     assert dictionary.read(0x2005, 0) == b""
     assert ask(server, "19" + b"hij".hex()) == "3000000000000000"
     assert dictionary.read(0x2005, 0) == b"abcdefghij"
-    assert server.state is State.IDLE
+    assert server.state is SdoState.IDLE
 
 
 def test_sdo_14_segmented_upload(server: SdoServer) -> None:
     assert ask(server, "40 08 10 00") == "4108100008000000"
     assert ask(server, "60") == "00" + b"gateway".hex()
     assert ask(server, "70") == "1d" + b"d".hex() + "000000000000"
-    assert server.state is State.IDLE
+    assert server.state is SdoState.IDLE
 
 
 @pytest.mark.parametrize("toggles", ["10", "00 00", "00 10 10"])
@@ -189,7 +189,7 @@ def test_upload_takes_the_value_when_it_begins() -> None:
 def test_upload_of_nothing(server: SdoServer) -> None:
     assert ask(server, "40 05 20 00") == "4105200000000000"
     assert ask(server, "60") == "0f00000000000000"
-    assert server.state is State.IDLE
+    assert server.state is SdoState.IDLE
 
 
 # -- block download ---------------------------------------------------------------------------------------------------
@@ -305,7 +305,7 @@ def test_sdo_24_block_upload(server: SdoServer, dictionary: Dictionary) -> None:
     assert server.receive(b"\xa2\x7f\x7f".ljust(8, b"\0"), 0.0) == segments(data, 127)
     assert server.receive(b"\xa2\x10\x7f".ljust(8, b"\0"), 0.0) == [block_end(data)]
     assert ask(server, "a1") == ""
-    assert server.state is State.IDLE
+    assert server.state is SdoState.IDLE
 
 
 def test_sdo_25_block_size_changes_between_sub_blocks(server: SdoServer, dictionary: Dictionary) -> None:
@@ -375,63 +375,63 @@ def test_block_upload_of_little_may_become_an_ordinary_one(
 # -- ends -------------------------------------------------------------------------------------------------------------
 
 TRANSFERS = {
-    State.DOWNLOAD: ["20 05 20 00"],
-    State.UPLOAD: ["40 08 10 00"],
-    State.BLOCK_DOWNLOAD: ["c0 05 20 00"],
-    State.BLOCK_DOWNLOAD_END: ["c0 05 20 00", "81 61"],
-    State.BLOCK_UPLOAD_START: ["a0 08 10 00 7f"],
-    State.BLOCK_UPLOAD: ["a0 08 10 00 7f", "a3"],
-    State.BLOCK_UPLOAD_END: ["a0 08 10 00 7f", "a3", "a2 02 7f"],
+    SdoState.DOWNLOAD: ["20 05 20 00"],
+    SdoState.UPLOAD: ["40 08 10 00"],
+    SdoState.BLOCK_DOWNLOAD: ["c0 05 20 00"],
+    SdoState.BLOCK_DOWNLOAD_END: ["c0 05 20 00", "81 61"],
+    SdoState.BLOCK_UPLOAD_START: ["a0 08 10 00 7f"],
+    SdoState.BLOCK_UPLOAD: ["a0 08 10 00 7f", "a3"],
+    SdoState.BLOCK_UPLOAD_END: ["a0 08 10 00 7f", "a3", "a2 02 7f"],
 }
 """How to reach every state but IDLE."""
 
 every_state = pytest.mark.parametrize("state", TRANSFERS)
 
 
-def reach(server: SdoServer, state: State) -> None:
+def reach(server: SdoServer, state: SdoState) -> None:
     for text in TRANSFERS[state]:
         ask(server, text)
     assert server.state is state
 
 
 @every_state
-def test_silence_aborts(server: SdoServer, state: State) -> None:
+def test_silence_aborts(server: SdoServer, state: SdoState) -> None:
     """After a second, and the time that the frames of a sub-block may need to reach the client."""
     reach(server, state)
     multiplexer = server._multiplexer.hex()
-    uploading = state in (State.BLOCK_UPLOAD, State.BLOCK_UPLOAD_END)
+    uploading = state in (SdoState.BLOCK_UPLOAD, SdoState.BLOCK_UPLOAD_END)
     deadline = TIMEOUT + (2 * SLOWEST_FRAME if uploading else 0.0)
     assert server.next_deadline(0.0) == deadline
     assert server.tick(deadline - 0.001) == []
     assert [frame.hex() for frame in server.tick(deadline)] == [abort(multiplexer, AbortCode.TIMED_OUT)]
-    assert server.state is State.IDLE
+    assert server.state is SdoState.IDLE
     assert server.next_deadline(deadline) == math.inf
     assert server.tick(10.0) == []
 
 
 @every_state
 def test_the_clients_abort_ends_without_an_answer(
-    server: SdoServer, dictionary: Dictionary, state: State
+    server: SdoServer, dictionary: Dictionary, state: SdoState
 ) -> None:
     reach(server, state)
     assert server.receive(ABORT, 0.0) == []
-    assert server.state is State.IDLE
+    assert server.state is SdoState.IDLE
     assert dictionary.read(0x2005, 0) == b""
 
 
-@pytest.mark.parametrize("state", [state for state in TRANSFERS if state is not State.BLOCK_DOWNLOAD])
-def test_a_new_transfer_ends_the_old_one(server: SdoServer, state: State) -> None:
+@pytest.mark.parametrize("state", [state for state in TRANSFERS if state is not SdoState.BLOCK_DOWNLOAD])
+def test_a_new_transfer_ends_the_old_one(server: SdoServer, state: SdoState) -> None:
     """Within a sub-block no frame can be told from a segment."""
     reach(server, state)
     assert ask(server, "40 06 20 00") == "4306200001020304"
-    assert server.state is State.IDLE
+    assert server.state is SdoState.IDLE
 
 
 @every_state
-def test_reset_forgets_without_a_word(server: SdoServer, state: State) -> None:
+def test_reset_forgets_without_a_word(server: SdoServer, state: SdoState) -> None:
     reach(server, state)
     server.reset()
-    assert server.state is State.IDLE
+    assert server.state is SdoState.IDLE
     assert server.tick(100.0) == []
 
 
@@ -571,4 +571,4 @@ def test_no_frame_raises_and_nothing_incomplete_is_written(frames: list[tuple[by
             assert len(answers) == 1
             assert answers[0][0] in (0x60, 0x20, 0x30, 0xA1)
         assert all(len(one) <= 100 for one in written)
-        assert server.state is not State.IDLE or server.next_deadline(now) == math.inf
+        assert server.state is not SdoState.IDLE or server.next_deadline(now) == math.inf

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from random import Random
 
-from gatewayd.auditfile import GREATEST_SIZE, KEPT
+from gatewayd.service.audit_file import KEPT, MAX_SIZE
 from tests.e2e.plc import STRANGER, Plc
 from tests.e2e.processes import HOST, wait_for
 from tests.soak.cell import MOMENT, STALE_AFTER, VARIANTS
@@ -106,7 +106,7 @@ def full_audit(rig: Rig, _chance: Random) -> None:
     """A file of the size at which it is rotated, put in the audit's place; over when a new one is begun."""
     full = rig.audit.with_suffix(".full")
     with full.open("wb") as stream:
-        stream.truncate(GREATEST_SIZE)
+        stream.truncate(MAX_SIZE)
     number = full.stat().st_ino
     full.replace(rig.audit)
     former = rig.audit.with_name(rig.audit.name + ".1")

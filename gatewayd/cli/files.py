@@ -1,0 +1,54 @@
+"""Mapping files as commands take them: by path or from standard input."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from gatewayd.report.printable import printable
+
+if TYPE_CHECKING:
+    from gatewayd.mapping.loader import Loaded
+
+__all__ = ["STDIN", "load_file", "name_of", "read_file", "reason_of"]
+
+STDIN = "-"
+"""The file name that stands for standard input."""
+
+
+def name_of(file: str) -> str:
+    """What a file is called in messages."""
+    return "stdin" if file == STDIN else str(click.format_filename(file))
+
+
+def read_file(file: str) -> bytes:
+    """Its text; what exceeds the size limit is left out, so that `load` refuses it. Raises OSError, ValueError."""
+    import sys
+    from pathlib import Path
+
+    from gatewayd.mapping.loader import read_bytes
+    from gatewayd.mapping.source import MAX_BYTES
+
+    return sys.stdin.buffer.read(MAX_BYTES + 1) if file == STDIN else read_bytes(Path(file))
+
+
+def reason_of(error: OSError | ValueError) -> str:
+    """Why a file cannot be read or written, in the operating system's words."""
+    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+
+
+def load_file(file: str) -> Loaded | None:
+    """The file, with its findings printed where they leave no plan; None after it was said why it cannot be read."""
+    from gatewayd.mapping.loader import load
+    from gatewayd.report.findings import CheckOutcome, as_text
+
+    name = name_of(file)
+    try:
+        loaded = load(read_file(file), name)
+    except (OSError, ValueError) as error:
+        click.echo(printable(f"{name}: cannot be read: {reason_of(error)}"), err=True)
+        return None
+    if loaded.plan is None:
+        click.echo(as_text(CheckOutcome((name,), loaded.diagnostics)), nl=False, err=True)
+    return loaded

@@ -1,0 +1,165 @@
+"""What is wrong with the communication of a node, as errors (EMCY), and how the node reacts (1029h).
+
+What befalls the node, and what follows:
+
+| event | writers of the cell | NMT (1029h = 0 / 1 / 2) | EMCY |
+|---|---|---|---|
+| RPDO in OPERATIONAL, SDO request | the writer is alive | | |
+| heartbeat of a node of 1016h ends | its writer is lost, and refused till it is back \
+| PRE-OPERATIONAL / as it is / STOPPED | 8130h till it is back |
+| heartbeat that the mapping promises ends, or does not come after the first write or lock request \
+| its writer is lost, and refused till it is back | as it is | |
+| node whose heartbeat is promised boots | its writer is lost | as it is | |
+| guarding stays away | | PRE-OPERATIONAL / as it is / STOPPED | 8130h until it is back |
+| RPDO deadline passes | the RPDO writer is lost | as it is | 8250h until it is received |
+| OPERATIONAL left | the RPDO writer is lost | | |
+| SDO no longer allowed (STOPPED, reset) | the SDO writer is lost | | |
+| bus off, down or absent | all are lost | PRE-OPERATIONAL / as it is / STOPPED | none goes out |
+| bus is back | | "reset communication" if its loss had ended OPERATIONAL / as it is / as it is | 8140h, 0000h after \
+bus-off |
+| controller passive | | as it is | 8120h until it is no more |
+| received frames lost | | as it is | 8110h until none was lost for `OVERRUN_TIME` |
+| robot lost / stale / holds something else / registers unavailable | | as it is | FF10h / FF11h / FF12h / FF13h until \
+that has not been so for `QUIET` |
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from gatewayd.canopen.bus import BusState
+from gatewayd.canopen.emergency import Emergency, ErrorCode
+from gatewayd.canopen.identity import ErrorBehaviour
+from gatewayd.canopen.nmt import NmtCommand, NmtSlave, NmtState
+from gatewayd.links.canopen_node.observer import NodeCounters
+from gatewayd.links.canopen_node.pdo.receive import Fault
+from gatewayd.links.canopen_node.pdo.transmit import TransmitEngine
+
+__all__ = ["OVERRUN_TIME", "CommunicationErrors"]
+
+OVERRUN_TIME: Final = 1.0
+"""Seconds without a lost frame after which the overrun is over."""
+
+
+class CommunicationErrors:
+    """Keeps them in `emergency`. `lose_node` and `lose_rpdo` say whose writers are lost by it, and why."""
+
+    def __init__(
+        self,
+        emergency: Emergency,
+        nmt: NmtSlave,
+        transmit: TransmitEngine,
+        counters: NodeCounters,
+        *,
+        lose_node: Callable[[str, int, float], None],
+        lose_rpdo: Callable[[str, float], None],
+    ) -> None:
+        self.behaviour = ErrorBehaviour()
+        self._emergency = emergency
+        self._nmt = nmt
+        self._transmit = transmit
+        self._counters = counters
+        self._lose_node = lose_node
+        self._lose_rpdo = lose_rpdo
+        self._fell = self._was_off = False
+        self._overrun_until = math.inf
+
+    # -- peers ---------------------------------------------------------------------------------------------------
+
+    def heartbeat_lost(self, node: int, now: float) -> None:
+        """A node of 1016h is no longer heard."""
+        self._emergency.raise_error(ErrorCode.HEARTBEAT, now, bytes([node]), instance=node)
+        self._lose_node("no heartbeat of node {}", node, now)
+        self._communication_error(now)
+
+    def heartbeat_back(self, node: int, now: float) -> None:
+        """It is heard again."""
+        self._emergency.clear(ErrorCode.HEARTBEAT, now, instance=node)
+
+    def guarding_lost(self, now: float) -> None:
+        """The guarding master is no longer heard."""
+        self._emergency.raise_error(ErrorCode.HEARTBEAT, now)
+        self._communication_error(now)
+
+    def guarding_back(self, now: float) -> None:
+        """It is heard again."""
+        self._emergency.clear(ErrorCode.HEARTBEAT, now)
+
+    def sync_length(self, length: int, now: float) -> None:
+        """A SYNC came with a wrong number of bytes."""
+        self._emergency.raise_error(ErrorCode.SYNC_LENGTH, now, bytes([length]))
+
+    def sync_right(self, now: float) -> None:
+        """A SYNC came as it should."""
+        self._emergency.clear(ErrorCode.SYNC_LENGTH, now)
+
+    def fault_raised(self, fault: Fault, number: int, now: float) -> None:
+        """Something is wrong with an RPDO."""
+        self._emergency.raise_error(fault.value, now, number.to_bytes(2, "little"), instance=number)
+        if fault is Fault.TIMEOUT:
+            self._lose_rpdo(f"RPDO {number} stays away", now)
+
+    def fault_cleared(self, fault: Fault, number: int, now: float) -> None:
+        """It is right again."""
+        self._emergency.clear(fault.value, now, instance=number)
+
+    # -- bus -----------------------------------------------------------------------------------------------------
+
+    def bus_seen(self, state: BusState, now: float) -> None:
+        """The bus is in this state now, after `bus_lost` or `bus_back`."""
+        self._was_off = self._was_off or state is BusState.BUS_OFF
+        self._emergency.judge(ErrorCode.PASSIVE, state is BusState.PASSIVE, now)
+
+    def bus_lost(self, now: float) -> None:
+        """No frame goes through any more."""
+        was_operational = self._nmt.state is NmtState.OPERATIONAL
+        self._communication_error(now)
+        self._fell = was_operational and self._nmt.state is NmtState.PRE_OPERATIONAL
+
+    def bus_back(self, now: float) -> None:
+        """Frames go through again."""
+        fell, self._fell = self._fell, False
+        was_off, self._was_off = self._was_off, False
+        if self._nmt.state is NmtState.INITIALISING:
+            self._nmt.boot(now)
+        elif fell:
+            self._nmt.command(NmtCommand.RESET_COMMUNICATION, now)
+        elif self._nmt.state is NmtState.OPERATIONAL:
+            # What was sent meanwhile has reached nobody: every TPDO starts anew.
+            self._transmit.nmt(False, now)
+            self._transmit.nmt(True, now)
+        if was_off:
+            self._emergency.raise_error(ErrorCode.BUS_OFF_RECOVERED, now)
+            self._emergency.clear(ErrorCode.BUS_OFF_RECOVERED, now)
+
+    def frames_lost(self, count: int, now: float) -> None:
+        """So many received frames found no room in a buffer."""
+        self._counters.overruns += count
+        self._overrun_until = now + OVERRUN_TIME
+        self._emergency.raise_error(ErrorCode.OVERRUN, now)
+
+    # -- time ----------------------------------------------------------------------------------------------------
+
+    def tick(self, now: float) -> None:
+        """End an overrun after which nothing was lost."""
+        if now >= self._overrun_until:
+            self._overrun_until = math.inf
+            self._emergency.clear(ErrorCode.OVERRUN, now)
+
+    def next_deadline(self, now: float) -> float:
+        """When it ends; infinity without one."""
+        return self._overrun_until
+
+    def resume(self, former: CommunicationErrors) -> None:
+        """Take over what the bus has done to another node."""
+        self._counters = former._counters
+        self._fell, self._was_off = former._fell, former._was_off
+        self._overrun_until = former._overrun_until
+
+    def _communication_error(self, now: float) -> None:
+        self._counters.communication_errors += 1
+        reaction = self.behaviour.reaction(self._nmt.state)
+        if reaction is not None:
+            self._nmt.command(reaction, now)

@@ -1,0 +1,68 @@
+"""From an expanded node without errors to its plan."""
+
+from __future__ import annotations
+
+from gatewayd.canopen.heartbeat import Consumer
+from gatewayd.canopen.sync import SyncPlan
+from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo
+from gatewayd.links.canopen_node.plan import CanopenPlan, PdoEntry, PdoPlan
+from gatewayd.links.canopen_node.sections import CanopenWriter
+from gatewayd.mapping.expanded import ExpandedCell
+
+__all__ = ["compile_canopen"]
+
+
+def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
+    """The plan of a node without errors."""
+    spec = node.part.spec
+    writers = [part.spec.by(CanopenWriter) for part in cell.document.writers.values()]
+    return CanopenPlan(
+        interface=spec.interface,
+        channel=spec.channel,
+        bitrate=spec.bitrate,
+        node=spec.node,
+        autostart=spec.autostart,
+        heartbeat=_ticks(spec.heartbeat, 1000),
+        sync=SyncPlan(
+            spec.sync.cob_id, spec.sync.producer, _ticks(spec.sync.period, 1_000_000), spec.sync.counter
+        ),
+        consumers=tuple(
+            Consumer(writer.node, _ticks(writer.heartbeat, 1000), index)
+            for index, writer in enumerate(writers)
+            if writer.node is not None and writer.heartbeat is not None
+        ),
+        objects=tuple(one.plan for one in node.objects),
+        pdos=tuple(_pdo(pdo) for pdo in node.pdos),
+        rpdo_writer=next((index for index, writer in enumerate(writers) if writer.by_rpdo), None),
+        sdo_writer=next((index for index, writer in enumerate(writers) if writer.by_sdo), None),
+    )
+
+
+def _pdo(pdo: ExpandedPdo) -> PdoPlan:
+    assert pdo.slot.cob_id is not None
+    return PdoPlan(
+        number=pdo.slot.number,
+        direction=pdo.direction,
+        cob_id=pdo.slot.cob_id,
+        predefined=pdo.slot.predefined,
+        transmission=pdo.transmission,
+        inhibit=_ticks(pdo.inhibit, 10_000),
+        event=_ticks(pdo.event, 1000),
+        entries=(
+            *(
+                PdoEntry(None, word.index, word.subindex, word.type.bits, word.quality_of)
+                for word in pdo.status
+            ),
+            *(
+                PdoEntry(one.variable, one.plan.index, one.plan.subindex, one.plan.type.bits)
+                for one in pdo.entries
+            ),
+        ),
+        sync_start=pdo.sync_start,
+        name=pdo.name,
+    )
+
+
+def _ticks(seconds: float | None, per_second: int) -> int:
+    """A time as CANopen counts it; 0 for none."""
+    return 0 if seconds is None else round(seconds * per_second)

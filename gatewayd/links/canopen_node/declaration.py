@@ -1,0 +1,76 @@
+"""What everybody may know of this kind of link."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from gatewayd.core.definition import CellDefinition
+from gatewayd.core.status_layout import StatusField
+from gatewayd.links.canopen_node.description import description
+from gatewayd.links.canopen_node.plan import CanopenPlan, by_name
+from gatewayd.links.contract import Description, LinkKind, LinkMetric
+from gatewayd.mapping.plan import LinkPlan
+
+__all__ = ["BUS_STATES", "KIND", "NMT_STATES"]
+
+BUS_STATES = ("", "absent", "down", "bus-off", "passive", "warning", "active")
+"""What the status word `can_bus` means; 0: there is no CANopen."""
+NMT_STATES = {0: "initialising", 4: "stopped", 5: "operational", 127: "pre-operational"}
+"""What the status word `nmt_state` means."""
+
+
+def _numbered(names: Iterable[tuple[int, str]]) -> str:
+    return ", ".join(f"{number} {name}" for number, name in names)
+
+
+class CanopenNode(LinkKind):
+    """The kind with the section `canopen`."""
+
+    key = "canopen"
+    title = "CANopen node"
+    fields = {  # noqa: RUF012 - never changed
+        "channel": "interface:channel of the bus",
+        "node": "node-ID of the mapping",
+        "bus": "`absent`, `down`, `bus-off`, `passive`, `warning` or `active`",
+        "nmt_state": "`initialising`, `stopped`, `pre-operational` or `operational`",
+    }
+    status_fields = (
+        StatusField(27, 1, "can_bus", f"0 no CANopen, {_numbered(enumerate(BUS_STATES[1:], 1))}"),
+        StatusField(28, 1, "nmt_state", _numbered(NMT_STATES.items())),
+    )
+    metrics = (
+        LinkMetric(
+            "gatewayd_can_bus_state",
+            "bus_state",
+            f"{_numbered(enumerate(BUS_STATES[1:], 1))}; only with a CAN bus",
+        ),
+        LinkMetric(
+            "gatewayd_can_total",
+            "counters",
+            "the CANopen node's counters by name; only with a CAN bus",
+            label="counter",
+        ),
+    )
+    place = (
+        "null, or `object` (2010h:01), `type`, and `cob_id` of the PDO that carries it, null for SDO alone"
+    )
+    has_one_place = True
+
+    def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
+        """The node and its object dictionary."""
+        assert isinstance(plan, CanopenPlan)
+        return description(plan, cell)
+
+    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
+        """Another bus, or another node on it, is not the one that a master has started."""
+        return ("interface", "channel", "node")
+
+    def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
+        """The same node goes on where nothing that the bus can see is different."""
+        assert isinstance(old, CanopenPlan)
+        assert isinstance(new, CanopenPlan)
+        return by_name(old, before) == by_name(new, after)
+
+
+KIND = CanopenNode()
+"""What everybody may know of this kind of link."""

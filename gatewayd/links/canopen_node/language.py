@@ -1,0 +1,160 @@
+"""The CANopen node's part of the mapping language."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
+from typing import ClassVar, Final
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.links.canopen_node.compile import compile_canopen
+from gatewayd.links.canopen_node.declaration import KIND
+from gatewayd.links.canopen_node.expand import CanopenCell, expand_canopen, node_of, place_of
+from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.canopen_node.sections import (
+    AUTO,
+    NO_PDO,
+    Canopen,
+    CanopenPlace,
+    CanopenPlaces,
+    CanopenWriter,
+    CobIdPool,
+    PdoDefaults,
+    PdoSpec,
+    Sync,
+)
+from gatewayd.links.language import LinkLanguage
+from gatewayd.mapping import syntax
+from gatewayd.mapping.diagnostics import Diagnostic
+from gatewayd.mapping.document import Document, Part
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
+from gatewayd.mapping.model import VariableSpec, WriterSpec
+from gatewayd.mapping.reach import Reach, scaled
+from gatewayd.mapping.section import Section
+
+__all__ = ["LANGUAGE"]
+
+_RPDO: Final = "RPDO"
+_SDO: Final = "SDO"
+_MAX_REAL32: Final = float.fromhex("0x1.fffffep+127")
+
+
+class CanopenLanguage(LinkLanguage):
+    """Section `canopen`, the key `canopen` of variables, and `canopen`, `node` and `heartbeat` of writers."""
+
+    key = KIND.key
+    section = Canopen
+    meaning = "the CANopen node"
+    variable_keys = CanopenPlaces
+    writer_keys = CanopenWriter
+    rules = tuple(
+        f"gatewayd.links.canopen_node.rules.{name}"
+        for name in ("node", "pdos", "pdo_members", "pdo_company", "bus")
+    )
+    tables = "gatewayd.links.canopen_node.tables"
+    exports = "gatewayd.links.canopen_node.exports"
+    nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
+        (VariableSpec, "canopen"): CanopenPlace,
+        (Canopen, "sync"): Sync,
+        (Canopen, "pdo"): PdoDefaults,
+        (Canopen, "cob_ids"): CobIdPool,
+        (Canopen, "pdos"): PdoSpec,
+    }
+    articles: ClassVar[Mapping[type[Section], str]] = {
+        Canopen: "the section `canopen`",
+        CanopenPlace: "`canopen` of a variable",
+        Sync: "the table `sync`",
+        PdoDefaults: "the table `pdo`",
+        CobIdPool: "the table `cob_ids`",
+        PdoSpec: "a PDO",
+    }
+    telling_keys = ("channel", "bitrate", "node", "pdos")
+    writer_example = "canopen: rpdo"
+    supervision_example = "node: 1, heartbeat: 1s"
+    lost_by = "a CANopen writer is lost by its heartbeat or its timeout"
+    place_example = "canopen: auto"
+
+    def broken(self, part: Part[Section]) -> Iterable[Diagnostic]:
+        """PDOs with a name that means something else."""
+        node = part.of(Canopen)
+        for name in (AUTO, NO_PDO):
+            if node is not None and name in node.spec.pdos:
+                message = f"a PDO cannot be called `{name}`: the word has a meaning of its own"
+                yield syntax.BAD_NAME.at(part.key_at("pdos", name), message, hint="choose another name")
+
+    def knows(self, writer: WriterSpec) -> bool:
+        """Whether it writes by a service of the node."""
+        return writer.by(CanopenWriter).canopen is not None
+
+    def names(self, writer: WriterSpec) -> Sequence[str]:
+        """The services by which it writes, and whose heartbeat is watched."""
+        spec = writer.by(CanopenWriter)
+        if spec.canopen is None:
+            return ()
+        services = "RPDO and SDO" if spec.canopen == "any" else spec.canopen.upper()
+        return (services if spec.node is None else f"{services}, heartbeat of node {spec.node}",)
+
+    def silence(self, writer: WriterSpec) -> float | None:
+        """Its heartbeat time."""
+        return writer.by(CanopenWriter).heartbeat
+
+    def ways_of_writer(self, writer: WriterSpec) -> frozenset[str]:
+        """RPDO, SDO, or both."""
+        spec = writer.by(CanopenWriter)
+        return frozenset(way for way, has in ((_RPDO, spec.by_rpdo), (_SDO, spec.by_sdo)) if has)
+
+    def ways_of_variable(self, variable: ExpandedVariable, cell: ExpandedCell) -> frozenset[str]:
+        """RPDO where a PDO carries it, SDO wherever it is an object."""
+        node = node_of(cell)
+        in_pdo = node is not None and variable.index in node.carried
+        ways = ((_RPDO, in_pdo), (_SDO, in_pdo or place_of(variable) is not None))
+        return frozenset(way for way, has in ways if has)
+
+    def writes_whole(
+        self, writer: WriterSpec, variables: Sequence[ExpandedVariable], cell: ExpandedCell
+    ) -> bool:
+        """Whether all of them are in one PDO of the writer. SDO writes one at a time."""
+        node = node_of(cell)
+        wanted = {variable.index for variable in variables}
+        return (
+            node is not None
+            and writer.by(CanopenWriter).by_rpdo
+            and any(wanted <= {entry.variable for entry in pdo.entries} for pdo in node.pdos)
+        )
+
+    def places_of(self, line: Part[VariableSpec], document: Document) -> bool:
+        """Whether the line says so, or a PDO names it."""
+        node = document.part(Canopen)
+        pdos = node.spec.pdos.values() if node is not None else ()
+        listed = (member.name for pdo in pdos for member in pdo.variables)
+        return line.spec.by(CanopenPlaces).canopen is not None or line.name in listed
+
+    def reaches(self, cell: ExpandedCell) -> Iterable[tuple[int, Reach]]:
+        """What the objects show. A BOOLEAN is of bits only."""
+        node = node_of(cell)
+        for placed in node.objects if node is not None else ():
+            if placed.plan.type is not CanType.BOOLEAN:
+                yield placed.variable, _reach(placed.plan.type)
+
+    def expand(self, document: Document, variables: Sequence[ExpandedVariable]) -> CanopenCell | None:
+        """The node, laid out."""
+        part = document.part(Canopen)
+        return expand_canopen(part, variables) if part is not None else None
+
+    def compile(self, cell: ExpandedCell) -> CanopenPlan:
+        """One node on one bus."""
+        node = node_of(cell)
+        assert node is not None
+        return compile_canopen(cell, node)
+
+
+@lru_cache
+def _reach(can_type: CanType) -> Reach:
+    if can_type is CanType.REAL64:
+        return Reach(None, None, is_real=True)
+    if can_type is CanType.REAL32:
+        return scaled(-_MAX_REAL32, _MAX_REAL32, is_real=True)
+    return scaled(*can_type.bounds, is_real=False)
+
+
+LANGUAGE: Final = CanopenLanguage()

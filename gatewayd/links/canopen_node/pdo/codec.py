@@ -1,0 +1,285 @@
+"""The content of one PDO: image values to bytes and bytes to changes, compiled once per mapping.
+
+Entries follow each other bit by bit, least significant bit of the first byte first, numbers little-endian (CiA 301,
+7.3.2 and 7.1.1). Only BOOLEANs may lie off a byte boundary, so a mapping is a row of numbers and of runs of bits:
+numbers go through one `struct`, each run of bits through one integer.
+
+A value that the type cannot hold becomes the nearest one that it can (`fit`): integers saturate, halves round to even,
+NaN becomes 0 in an integer, and a real beyond REAL32 becomes infinite.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain, groupby
+from operator import itemgetter
+from typing import Final, Protocol
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.core.cell import Change
+from gatewayd.core.definition import Value, ValueKind, Variable
+from gatewayd.core.refusal import Reason, Refusal
+
+__all__ = ["MAX_BITS", "Layout", "Mapped", "fit", "is_aligned", "native"]
+
+MAX_BITS: Final = 64
+"""What one CAN frame carries."""
+
+_DIGITS: Final = b"0" + b"1" * 255
+"""Truth of a byte as a binary digit, for `bytes.translate`."""
+_BITS_OF: Final = tuple(tuple(byte >> bit & 1 for bit in range(8)) for byte in range(256))
+"""The bits of every byte, least significant first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """One entry of a mapping."""
+
+    variable: int | None
+    """Index of the variable; None for a word of the status block, and for a dummy entry (no BOOLEAN), which is skipped
+    on reception, 0 on transmission."""
+    type: CanType
+    offset: int | None = None
+    """Where the status block has it."""
+
+    @property
+    def is_dummy(self) -> bool:
+        """Whether it holds nothing."""
+        return self.variable is None and self.offset is None
+
+
+def fit(value: Value, can_type: CanType) -> Value:
+    """The nearest value that `can_type` (a number or BOOLEAN) can hold; see the module's docstring."""
+    if can_type is CanType.BOOLEAN:
+        return bool(value)
+    if can_type.is_real:
+        return _fit_real(value, can_type)
+    if math.isnan(value):
+        return 0
+    signed = can_type.char.islower()
+    low = -(1 << can_type.bits - 1) if signed else 0
+    high = (1 << can_type.bits - signed) - 1
+    return low if value <= low else high if value >= high else round(value)
+
+
+def _fit_real(value: Value, can_type: CanType) -> float:
+    try:
+        can_type.pack(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+    return float(value)
+
+
+def native(raw: Value, kind: ValueKind) -> Value | None:
+    """A received number as a value of a variable of `kind`; None if there is none (NaN or infinity as an integer)."""
+    if kind is ValueKind.BOOL:
+        return bool(raw)
+    if kind is ValueKind.FLOAT:
+        return float(raw)
+    return round(raw) if math.isfinite(raw) else None
+
+
+def is_aligned(types: Iterable[CanType]) -> bool:
+    """Whether entries of these types, one after the other, leave only BOOLEANs off a byte boundary."""
+    position = 0
+    for one in types:
+        if one is not CanType.BOOLEAN and position % 8:
+            return False
+        position += one.bits
+    return True
+
+
+Gather = Callable[[Sequence[Value]], Sequence[Value]]
+ReadWord = Callable[[int, int], int]
+"""Reads so many words of the status block from that offset on, as one number."""
+
+
+class Layout:
+    """A compiled mapping of at most 64 bits, aligned as `is_aligned` says."""
+
+    __slots__ = ("_pack", "_parts", "_runs", "_unpack", "content", "gather", "mapping", "size", "variables")
+
+    def __init__(self, mapping: Sequence[Mapped], variables: Sequence[Variable]) -> None:
+        types = [one.type for one in mapping]
+        bits = sum(one.bits for one in types)
+        assert bits <= MAX_BITS
+        assert is_aligned(types)
+        assert all(one.variable is not None for one in mapping if one.type is CanType.BOOLEAN)
+        self.mapping = tuple(mapping)
+        self.size = (bits + 7) // 8
+        """Bytes."""
+        self.variables = tuple(one.variable for one in mapping if one.variable is not None)
+        """Variables in the order of the mapping, without dummies and status words."""
+        self.content = tuple(one for one in mapping if not one.is_dummy)
+        """What a PDO holds, in the order of the mapping."""
+        self.gather: Gather = _gatherer(self.variables)
+        """Copies the content out of an image's values: what `pack` takes, and comparable with `==`. For a mapping with
+        status words `gatherer` makes it."""
+        runs = list(_runs(self.mapping))
+        compiled = struct.Struct("<" + "".join(run.format for run in runs))
+        self._pack = compiled.pack
+        self._unpack = compiled.unpack
+        self._runs = tuple(_slices(runs)) if any(run.bits for run in runs) else None
+        self._parts = tuple(part for run in runs for part in run.parts(variables))
+
+    @property
+    def has_status(self) -> bool:
+        """Whether it carries words of the status block."""
+        return len(self.content) > len(self.variables)
+
+    def gatherer(self, read: ReadWord) -> Gather:
+        """What copies the content together where some of it is in the status block."""
+        if not self.has_status:
+            return self.gather
+        places = [(one.variable, one.offset or 0, one.type.bits // 16) for one in self.content]
+
+        def gather(values: Sequence[Value]) -> tuple[Value, ...]:
+            return tuple(
+                values[variable] if variable is not None else read(offset, words)
+                for variable, offset, words in places
+            )
+
+        return gather
+
+    def pack(self, content: Sequence[Value]) -> bytes:
+        """The PDO's bytes for what `gather` returned."""
+        try:
+            return self._packed(content)
+        except (struct.error, OverflowError, ValueError, TypeError):
+            return self._packed(
+                [fit(value, one.type) for value, one in zip(content, self.content, strict=True)]
+            )
+
+    def changes(self, data: bytes) -> list[Change] | Refusal:
+        """What `size` bytes mean for the cell. Every bit is meant: who maps it into an RPDO sends it on purpose.
+
+        A refusal says which variable has no value for what was received.
+        """
+        changes: list[Change] = []
+        for part, raw in zip(self._parts, self._unpack(data), strict=True):
+            refusal = part.add(raw, changes)
+            if refusal is not None:
+                return refusal
+        return changes
+
+    def _packed(self, content: Sequence[Value]) -> bytes:
+        if self._runs is None:
+            return self._pack(*content)
+        arguments: list[Value | bytes] = []
+        for span, size in self._runs:
+            if size:
+                digits = bytes(content[span])[::-1].translate(_DIGITS)  # type: ignore[arg-type]  # bits, or a TypeError
+                arguments.append(int(digits, 2).to_bytes(size, "little"))
+            else:
+                arguments += content[span]
+        return self._pack(*arguments)
+
+
+def _gatherer(variables: Sequence[int]) -> Gather:
+    if not variables:
+        return lambda _values: ()
+    first, last = variables[0], variables[-1]
+    if tuple(variables) == tuple(range(first, last + 1)):
+        return itemgetter(slice(first, last + 1))
+    return itemgetter(*variables)
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """Neighbours of a mapping that are handled together: one number, one dummy, or BOOLEANs."""
+
+    mapped: tuple[Mapped, ...]
+    bits: bool
+
+    @property
+    def format(self) -> str:
+        """Its part of the `struct` format."""
+        if self.bits:
+            return f"{self.size}s"
+        one = self.mapped[0]
+        return one.type.char if not one.is_dummy else f"{one.type.bits // 8}x"
+
+    @property
+    def size(self) -> int:
+        """Bytes of a run of bits."""
+        return (len(self.mapped) + 7) // 8
+
+    @property
+    def values(self) -> int:
+        """How many values of the content it takes."""
+        return sum(not one.is_dummy for one in self.mapped)
+
+    def parts(self, variables: Sequence[Variable]) -> Iterator[_Part]:
+        """What takes its value when a PDO is received."""
+        members = [one.variable for one in self.mapped if one.variable is not None]
+        if self.bits:
+            yield _Bits(members, variables)
+        elif members:
+            yield _Number(members[0], self.mapped[0].type, variables[members[0]].kind)
+
+
+def _runs(mapping: Sequence[Mapped]) -> Iterator[_Run]:
+    for bits, group in groupby(mapping, key=lambda one: one.type is CanType.BOOLEAN):
+        if bits:
+            yield _Run(tuple(group), bits=True)
+        else:
+            for one in group:
+                yield _Run((one,), bits=False)
+
+
+def _slices(runs: Iterable[_Run]) -> Iterator[tuple[slice, int]]:
+    """Where each run lies in the content; with its bytes for bits, 0 for numbers."""
+    position = 0
+    for run in runs:
+        yield slice(position, position + run.values), run.size if run.bits else 0
+        position += run.values
+
+
+class _Part(Protocol):
+    """Makes changes of one item of the unpacked PDO."""
+
+    def add(self, raw: Value | bytes, changes: list[Change]) -> Refusal | None:
+        """Append to `changes`, or return why not."""
+
+
+class _Number:
+    __slots__ = ("_direct", "_kind", "_variable")
+
+    def __init__(self, variable: int, can_type: CanType, kind: ValueKind) -> None:
+        self._variable = variable
+        self._kind = kind
+        self._direct = kind is (ValueKind.FLOAT if can_type.is_real else ValueKind.INT)
+
+    def add(self, raw: Value | bytes, changes: list[Change]) -> Refusal | None:
+        assert not isinstance(raw, bytes)
+        value = raw if self._direct else native(raw, self._kind)
+        if value is None:
+            return Refusal(Reason.OUT_OF_LIMITS, self._variable)
+        changes.append(Change(self._variable, value))
+        return None
+
+
+class _Bits:
+    """Both changes of every bit are made in advance."""
+
+    __slots__ = ("_pairs",)
+
+    def __init__(self, members: Sequence[int], variables: Sequence[Variable]) -> None:
+        self._pairs = tuple(
+            tuple(Change(index, _truth(variables[index].kind, bit)) for bit in (False, True))
+            for index in members
+        )
+
+    def add(self, raw: Value | bytes, changes: list[Change]) -> None:
+        assert isinstance(raw, bytes)
+        bits = chain.from_iterable(map(_BITS_OF.__getitem__, raw))
+        changes += [pair[bit] for pair, bit in zip(self._pairs, bits)]  # noqa: B905 - the last byte may have bits to spare
+
+
+def _truth(kind: ValueKind, bit: bool) -> Value:
+    value = native(bit, kind)
+    assert value is not None
+    return value

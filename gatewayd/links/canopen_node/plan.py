@@ -1,0 +1,129 @@
+"""The compiled CANopen side of a mapping: one node on one bus, immutable."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, replace
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.heartbeat import Consumer
+from gatewayd.canopen.sync import SyncPlan
+from gatewayd.core.definition import CellDefinition, Direction
+from gatewayd.mapping.plan import LinkPlan, Plan
+
+__all__ = ["FIRST_STATUS_OBJECT", "CanopenPlan", "ObjectPlan", "PdoEntry", "PdoPlan", "by_name", "canopen_of"]
+
+FIRST_STATUS_OBJECT = 0x5F00
+"""Where the status block begins in the object dictionary."""
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectPlan:
+    """Where one variable lies in the object dictionary."""
+
+    variable: int
+    """Index into `CellDefinition.variables`."""
+    index: int
+    subindex: int
+    type: CanType
+
+
+@dataclass(frozen=True, slots=True)
+class PdoEntry:
+    """One mapped object of a PDO: a variable, a word of the status block, or a dummy that fills a gap."""
+
+    variable: int | None
+    """Index of the variable; None for a word of the status block and for a dummy."""
+    index: int
+    subindex: int
+    bits: int
+    quality_of: int | None = None
+    """Index of the variable whose quality this word of the status block is."""
+
+    @property
+    def is_status(self) -> bool:
+        """Whether it is a word of the status block, which only a TPDO carries."""
+        return self.variable is None and self.index >= FIRST_STATUS_OBJECT
+
+
+@dataclass(frozen=True, slots=True)
+class PdoPlan:
+    """One PDO as it is after power-on."""
+
+    number: int
+    """From 1 within its direction: parameters at 1400h/1800h + number - 1."""
+    direction: Direction
+    """INPUT: an RPDO; OUTPUT: a TPDO."""
+    cob_id: int
+    predefined: bool
+    """The COB-ID is the predefined one: it follows the node-ID."""
+    transmission: int
+    """0, 1-240, 254 or 255 (CiA 301, 7.5.2.36)."""
+    inhibit: int
+    """Least distance of two transmissions in 100 us; 0: none. RPDO: what its producer keeps, for the bus load."""
+    event: int
+    """TPDO: longest distance of two transmissions; RPDO: deadline; in ms; 0: none."""
+    entries: tuple[PdoEntry, ...]
+    sync_start: int = 0
+    name: str = ""
+    """As the mapping calls it; empty for a PDO of the automatic layout."""
+
+
+@dataclass(frozen=True, slots=True)
+class CanopenPlan(LinkPlan):
+    """One node on one bus."""
+
+    interface: str
+    """Interface of python-can; `socketcan` has a path of its own."""
+    channel: str
+    bitrate: int
+    node: int
+    autostart: bool
+    """Enter OPERATIONAL without waiting for an NMT master."""
+    heartbeat: int
+    """Producer heartbeat time in ms after power-on."""
+    sync: SyncPlan
+    consumers: tuple[Consumer, ...]
+    objects: tuple[ObjectPlan, ...]
+    pdos: tuple[PdoPlan, ...]
+    rpdo_writer: int | None
+    """The writer that RPDOs are; None: nobody writes by PDO."""
+    sdo_writer: int | None
+    """The writer that SDO clients are; None: variables are read-only by SDO."""
+
+
+def by_name(plan: CanopenPlan, definition: CellDefinition) -> tuple[object, ...]:
+    """The plan with names in place of the numbers that a mapping gives its variables and writers.
+
+    Two nodes whose results are equal are the same one for the bus, whatever else their mappings say.
+    """
+    variables = [variable.name for variable in definition.variables]
+    writers = [writer.name for writer in definition.writers]
+
+    def variable(index: int | None) -> str | None:
+        return None if index is None else variables[index]
+
+    def writer(index: int | None) -> str | None:
+        return None if index is None else writers[index]
+
+    return (
+        astuple(replace(plan, objects=(), pdos=(), consumers=(), rpdo_writer=None, sdo_writer=None)),
+        writer(plan.rpdo_writer),
+        writer(plan.sdo_writer),
+        [(one.node, one.timeout, writer(one.writer)) for one in plan.consumers],
+        [(variable(one.variable), one.index, one.subindex, one.type) for one in plan.objects],
+        [
+            (
+                astuple(replace(pdo, entries=())),
+                [
+                    (variable(one.variable), one.index, one.subindex, one.bits, variable(one.quality_of))
+                    for one in pdo.entries
+                ],
+            )
+            for pdo in plan.pdos
+        ],
+    )
+
+
+def canopen_of(plan: Plan) -> CanopenPlan | None:
+    """The CANopen node of a cell; None: it has none."""
+    return plan.of(CanopenPlan).get("canopen")

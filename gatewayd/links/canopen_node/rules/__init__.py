@@ -1,0 +1,1 @@
+"""Rules about the node, its bus and its PDOs."""

@@ -1,0 +1,158 @@
+"""Rules GW407, GW408 and GW426 to GW429: what the cells on one CAN bus share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from math import ceil
+
+from gatewayd.canopen.cob_ids import Function, is_restricted
+from gatewayd.core.definition import Direction
+from gatewayd.links.canopen_node.bus_load import (
+    ERROR_ABOVE,
+    FIRST_EVENT_TYPE,
+    WARNING_ABOVE,
+    Share,
+    Station,
+    bus_shares,
+    load,
+    pdo_bits,
+    station_of,
+)
+from gatewayd.links.canopen_node.expand import CanopenCell, node_of
+from gatewayd.links.canopen_node.rules.pdos import cob_id_place
+from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
+from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.mapping.rules.registry import plant_rule
+from gatewayd.report.wording import cob
+
+__all__: list[str] = []
+
+
+@plant_rule("GW407", "bus-cob-id-clash", "two cells on one bus that send with the same COB-ID")
+def bus_cob_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """TPDOs of one cell that another cell sends too, or that are a service of it."""
+    for nodes in _buses(cells):
+        used: dict[int, tuple[CanopenCell, str, Position]] = {}
+        for node in nodes:
+            number = node.part.spec.node
+            used.setdefault(Function.EMCY + number, (node, f"EMCY of node {number}", node.part.at("node")))
+        for node in nodes:
+            reported: set[Position] = set()
+            for pdo in node.pdos:
+                own = pdo.slot.cob_id
+                if pdo.direction is Direction.INPUT or own is None or is_restricted(own):
+                    continue
+                place = cob_id_place(node, pdo)
+                what = f"{pdo.label} of node {node.part.spec.node}"
+                other, known, where = used.setdefault(own, (node, what, place))
+                # Equal node-IDs have a rule of their own, and within a cell GW405 looks.
+                if other is node or other.part.spec.node == node.part.spec.node or place in reported:
+                    continue
+                reported.add(place)
+                related = (Related(where, f"{known} is {cob(own)}"),)
+                message = f"{pdo.label} has the COB-ID {cob(own)}, which is {known} on the same bus"
+                yield rule.at(place, message, hint="choose another COB-ID", related=related)
+
+
+@plant_rule("GW408", "node-id-clash", "two cells with the same node-ID on one bus")
+def node_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """Equal node-IDs on one channel."""
+    for nodes in _buses(cells):
+        first: dict[int, CanopenCell] = {}
+        for node in nodes:
+            other = first.setdefault(node.part.spec.node, node)
+            if other is not node:
+                spec = node.part.spec
+                message = f"node {spec.node} on {spec.channel} is already another cell"
+                related = (Related(other.part.at("node"), f"node {spec.node} first used here"),)
+                hint = "give each cell its own node-ID, 1 to 127"
+                yield rule.at(node.part.at("node"), message, hint=hint, related=related)
+
+
+@plant_rule("GW428", "bit-rate-clash", "two cells on one bus with different bit-rates")
+def bit_rate_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """Different bit-rates on one channel."""
+    for first, *others in _buses(cells):
+        for node in others:
+            spec, other = node.part.spec, first.part.spec
+            if spec.bitrate != other.bitrate:
+                message = (
+                    f"{spec.channel} has {spec.bitrate} bit/s here and {other.bitrate} bit/s in another cell"
+                )
+                related = (Related(first.part.at("bitrate"), f"{other.bitrate} bit/s is here"),)
+                hint = "write the bit-rate of the bus in both files"
+                yield rule.at(node.part.at("bitrate"), message, hint=hint, related=related)
+
+
+@plant_rule("GW429", "two-sync-producers", "two cells that send the same SYNC")
+def two_sync_producers(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """Second producers of a COB-ID."""
+    for nodes in _buses(cells):
+        first: dict[int, CanopenCell] = {}
+        for node in nodes:
+            sync = node.part.spec.sync
+            other = first.setdefault(sync.cob_id, node) if sync.producer else node
+            if other is not node:
+                message = f"another cell on {node.part.spec.channel} sends SYNC ({cob(sync.cob_id)}) already"
+                related = (Related(other.part.at("sync", "producer"), "the other producer is here"),)
+                hint = "remove `producer` in one of the two files"
+                yield rule.at(node.part.at("sync", "producer"), message, hint=hint, related=related)
+
+
+@plant_rule("GW426", "bus-load-high", "a bus that can be loaded with more than 40 %", Severity.WARNING)
+def bus_load_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """Buses between the two thresholds."""
+    yield from _loaded(rule, cells, lambda share: WARNING_ABOVE < share <= ERROR_ABOVE)
+
+
+@plant_rule("GW427", "bus-load-too-high", "a bus that can be loaded with more than 70 %")
+def bus_load_too_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """Buses above the second threshold."""
+    yield from _loaded(rule, cells, lambda share: share > ERROR_ABOVE)
+
+
+def _loaded(
+    rule: Rule, cells: Sequence[ExpandedCell], is_meant: Callable[[float], bool]
+) -> Iterator[Diagnostic]:
+    by_node = {id(node_of(cell)): cell for cell in cells}
+    for nodes in _buses(cells):
+        bus = [station_of(by_node[id(node)], node) for node in nodes]
+        shares = bus_shares(bus)
+        spec = bus[0].node.part.spec
+        share = load(shares, spec.bitrate)
+        if not is_meant(share):
+            continue
+        most = max(shares, key=lambda one: one.bits_per_second)
+        others = "" if len(bus) == 1 else f" by {len(bus)} cells"
+        message = (
+            f"{spec.channel} can be loaded with {share:.0%} of {spec.bitrate} bit/s{others}, "
+            f"most of it by {most.what} ({most.rate:.4g} frames/s, {load([most], spec.bitrate):.1%})"
+        )
+        yield rule.at(bus[0].node.part.at("bitrate"), message, hint=_remedy(bus, shares, spec.bitrate))
+
+
+def _remedy(bus: Sequence[Station], shares: Sequence[Share], bit_rate: int) -> str:
+    """The inhibit time that brings all event-driven PDOs below the warning, if one does."""
+    events = {
+        f"node {station.node.part.spec.node}: {pdo.label}": pdo_bits(pdo)
+        for station in bus
+        for pdo in station.node.pdos
+        if pdo.transmission >= FIRST_EVENT_TYPE
+    }
+    rest = load([share for share in shares if share.what not in events], bit_rate)
+    room = (WARNING_ABOVE - rest) * bit_rate
+    if events and room > 0:
+        milliseconds = ceil(1000 * sum(events.values()) / room)
+        if milliseconds <= 1000:
+            return f"`pdo: {{inhibit: {milliseconds}ms}}` for all event-driven PDOs brings it to 40 %"
+    return "use a slower SYNC, REAL32, fewer variables in PDOs, or a higher bit-rate"
+
+
+def _buses(cells: Sequence[ExpandedCell]) -> Iterator[list[CanopenCell]]:
+    """The nodes on each bus, in the order of the files."""
+    buses: dict[tuple[str, str], list[CanopenCell]] = {}
+    for node in map(node_of, cells):
+        if node is not None:
+            spec = node.part.spec
+            buses.setdefault((spec.interface, spec.channel), []).append(node)
+    yield from buses.values()

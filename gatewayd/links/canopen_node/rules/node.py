@@ -1,0 +1,293 @@
+"""Rules GW401, GW413 to GW415, GW420 to GW425, GW432, GW435: the node, number types, who writes by CANopen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.core.definition import Direction, ValueKind
+from gatewayd.links.canopen_node.bus_load import BIT_RATES, FIRST_EVENT_TYPE
+from gatewayd.links.canopen_node.expand import MappedObject, node_of, place_of
+from gatewayd.links.canopen_node.sections import Canopen, CanopenPlaces, CanopenWriter
+from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
+from gatewayd.mapping.model import WriterSpec
+from gatewayd.mapping.rules.registry import cell_rule
+from gatewayd.mapping.rules.writers import known_by, ways_of, ways_of_variable
+from gatewayd.report.wording import number, one_and_more, seconds
+
+__all__: list[str] = []
+
+_REAL32_DIGITS = 2**24
+_RPDO = "RPDO"
+
+
+@cell_rule(
+    "GW401", "no-canopen-section", "variables or writers on CANopen in a file without a canopen section"
+)
+def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """The first variable, else the first writer, that names CANopen."""
+    if cell.document.has("canopen"):
+        return
+    hint = "add `canopen: {channel: can0, bitrate: 500000, node: 16}`"
+    for part in cell.document.variables.values():
+        if part.spec.by(CanopenPlaces).canopen is not None:
+            message = f"`{part.name}` is on CANopen, but the file has no section `canopen`"
+            yield rule.at(part.key_at("canopen"), message, hint=hint)
+            return
+    for writer in cell.document.writers.values():
+        if writer.spec.by(CanopenWriter).canopen is not None:
+            message = f"the writer `{writer.name}` is on CANopen, but the file has no section `canopen`"
+            yield rule.at(writer.key_at("canopen"), message, hint=hint)
+            return
+
+
+@cell_rule("GW413", "canopen-type", "a CANopen type that does not suit the robot's type")
+def canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Types of another kind."""
+    for variable, one in _lines(cell):
+        place = place_of(variable)
+        if not one.fits and place is not None:
+            message = f"`{variable.part.name}` ({variable.target}, {variable.type}) cannot be {place.type}"
+            hint = f"write {_suited(variable)}, or leave `type` out"
+            yield rule.at(variable.at("canopen", "type"), message, hint=hint)
+
+
+def _suited(variable: ExpandedVariable) -> str:
+    if variable.kind is ValueKind.BOOL:
+        return "BOOLEAN"
+    return "REAL64 or REAL32" if variable.kind is ValueKind.FLOAT else "an INTEGER or UNSIGNED type"
+
+
+@cell_rule("GW414", "real32-loss", "a double of the robot in a REAL32 that loses digits", Severity.WARNING)
+def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Reals that are REAL32 without their line saying so, and those for which it is never enough."""
+    for variable, one in _lines(cell):
+        place = place_of(variable)
+        if one.plan.type is not CanType.REAL32 or variable.kind is not ValueKind.FLOAT:
+            continue
+        limits = variable.spec.limits
+        coarse = limits is not None and max(-limits[0], limits[1]) > _REAL32_DIGITS
+        if variable.grows or coarse:
+            message = f"`{variable.part.name}` needs more digits than a REAL32 has"
+            yield rule.at(_type_place(variable), message, hint="write `canopen: {type: REAL64}`")
+        elif place is None or place.type is None:
+            message = f"`{variable.part.name}` is a double of the robot and becomes a REAL32 with 7 digits"
+            hint = "write `canopen: {type: REAL32}` if that is enough, or `{type: REAL64}`"
+            yield rule.at(_type_place(variable), message, hint=hint)
+
+
+@cell_rule(
+    "GW415",
+    "narrow-canopen-type",
+    "an integer from the robot in a CANopen type too small for it",
+    Severity.WARNING,
+)
+def narrow_canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Integer outputs in types that do not hold their range."""
+    for variable, one in _lines(cell):
+        bounds = variable.range
+        if variable.direction is Direction.INPUT or bounds is None or not one.fits:
+            continue
+        low, high = one.plan.type.bounds
+        if bounds[0] < low or bounds[1] > high:
+            message = (
+                f"`{variable.part.name}` can be {number(bounds[0])} to {number(bounds[1])}, "
+                f"{one.plan.type.name} shows {low} to {high}"
+            )
+            hint = "use a wider type, or state the range with `limits: [least, greatest]`"
+            yield rule.at(_type_place(variable), message, hint=hint)
+
+
+@cell_rule("GW420", "watched-itself", "a writer whose heartbeat is that of this node")
+def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Writers with the node-ID of the cell."""
+    canopen = cell.document.part(Canopen)
+    if canopen is None:
+        return
+    for writer in cell.document.writers.values():
+        node = writer.spec.by(CanopenWriter).node
+        if node == canopen.spec.node:
+            message = f"the writer `{writer.name}` has the node-ID {node}, which is this cell's own"
+            related = (Related(canopen.at("node"), f"this cell is node {canopen.spec.node}"),)
+            hint = "write the node-ID of the master, often 1 or 127"
+            yield rule.at(writer.at("node"), message, hint=hint, related=related)
+
+
+@cell_rule("GW421", "unknown-bit-rate", "a bit-rate that CANopen does not have")
+def unknown_bit_rate(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Bit-rates outside the list."""
+    canopen = cell.document.part(Canopen)
+    if canopen is None or canopen.spec.bitrate in BIT_RATES:
+        return
+    rate = canopen.spec.bitrate
+    near = rate * 1000 if rate * 1000 in BIT_RATES else min(BIT_RATES, key=lambda known: abs(known - rate))
+    message = f"{rate} bit/s is no bit-rate of CANopen"
+    yield rule.at(canopen.at("bitrate"), message, hint=f"write {near}, if that is the bit-rate of the bus")
+
+
+@cell_rule(
+    "GW422",
+    "idle-canopen-writer",
+    "a writer by PDO or SDO where there is nothing for it to write",
+    Severity.WARNING,
+)
+def idle_canopen_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Writers whose service carries no input."""
+    node = node_of(cell)
+    if node is None or len(cell.document.declared("variables")) > len(cell.document.variables):
+        return
+    by_sdo = any(one.direction is Direction.INPUT for one in node.objects)
+    by_rpdo = any(entry.direction is Direction.INPUT for pdo in node.pdos for entry in pdo.entries)
+    for writer in cell.document.writers.values():
+        spec = writer.spec.by(CanopenWriter)
+        if (spec.canopen == "rpdo" and not by_rpdo) or (spec.by_sdo and not by_sdo):
+            what = "in a PDO" if by_sdo else "on CANopen"
+            message = f"`{writer.name}` writes by {spec.canopen}, and no variable towards the robot is {what}"
+            hint = "write `canopen: auto` at its variables, or remove `canopen` here"
+            yield rule.at(writer.at("canopen"), message, hint=hint)
+
+
+@cell_rule("GW423", "out-of-reach", "an input that none of its owners can write where it lies")
+def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Inputs in RPDOs that no RPDO writer owns, and inputs without any common way."""
+    if not cell.document.writers:
+        return
+    for variable in _inputs(cell):
+        owners = _owners(cell, variable)
+        ways = ways_of_variable(variable, cell)
+        if not owners or not ways:
+            continue
+        reach = frozenset().union(*(ways_of(writer) for _, writer in owners))
+        names = one_and_more([name for name, _ in owners])
+        if _RPDO in ways and _RPDO not in reach:
+            message = f"`{variable.part.name}` is in an RPDO, and its owner {names} does not write by RPDO"
+            hint = "name a writer with `canopen: rpdo` as owner, or write `canopen: object`"
+            yield rule.at(_canopen_place(variable), message, hint=hint)
+        elif not ways & reach:
+            message = (
+                f"`{variable.part.name}` can be written by {' and '.join(sorted(ways))} only, "
+                f"its owner {names} writes by {' and '.join(sorted(reach))}"
+            )
+            hint = "name another owner, or put the variable where its owner writes"
+            yield rule.at(variable.position, message, hint=hint)
+
+
+@cell_rule("GW432", "owner-elsewhere", "an owner that cannot write where the variable lies", Severity.WARNING)
+def owner_elsewhere(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Named owners without a common way, where another one has one."""
+    reported: set[Position] = set()
+    for variable in _inputs(cell):
+        assert variable.lock is not None
+        lock = cell.locks[variable.lock]
+        ways = ways_of_variable(variable, cell)
+        owners = _owners(cell, variable)
+        if lock.is_any or not ways or not any(ways & ways_of(writer) for _, writer in owners):
+            continue
+        for name, writer in owners:
+            if not ways & ways_of(writer) and lock.position not in reported:
+                reported.add(lock.position)
+                message = (
+                    f"the owner `{name}` writes by {' and '.join(sorted(ways_of(writer)))}, "
+                    f"`{variable.part.name}` can be written by {' and '.join(sorted(ways))} only"
+                )
+                hint = f"put `{variable.part.name}` where `{name}` writes, or remove that owner"
+                yield rule.at(lock.position, message, hint=hint)
+
+
+def _owners(cell: ExpandedCell, variable: ExpandedVariable) -> list[tuple[str, WriterSpec]]:
+    if variable.lock is None:
+        return []
+    return [(name, cell.document.writers[name].spec) for name in cell.locks[variable.lock].owners]
+
+
+def _inputs(cell: ExpandedCell) -> Iterator[ExpandedVariable]:
+    """The first input of each line that has an owner, on a cell with a node."""
+    node = node_of(cell)
+    if node is None:
+        return
+    for variable in cell.variables:
+        if variable.direction is Direction.INPUT and variable.lock is not None and not variable.member:
+            yield variable
+
+
+@cell_rule("GW424", "two-canopen-writers", "two writers for one service of the node")
+def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Second writers by RPDO, and by SDO."""
+    writers = [(writer, writer.spec.by(CanopenWriter)) for writer in cell.document.writers.values()]
+    for service in ("by_rpdo", "by_sdo"):
+        found = [(writer, spec) for writer, spec in writers if getattr(spec, service)]
+        for other, spec in found[1:]:
+            first, former = found[0]
+            if service == "by_sdo" and spec.by_rpdo and former.by_rpdo:
+                continue
+            message = f"`{other.name}` writes by {service[3:].upper()} too, like `{first.name}`"
+            related = (Related(first.at("canopen"), f"`{first.name}` is here"),)
+            hint = "make one writer of the two, or let one write by rpdo and the other by sdo"
+            yield rule.at(other.at("canopen"), message, hint=hint, related=related)
+
+
+@cell_rule("GW425", "half-supervision", "a watched heartbeat without a node, a time, or CANopen")
+def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`node` without `heartbeat` and the other way round, and either without `canopen`."""
+    for writer in cell.document.writers.values():
+        spec = writer.spec.by(CanopenWriter)
+        given = [key for key in ("node", "heartbeat") if getattr(spec, key) is not None]
+        if not given:
+            continue
+        if spec.canopen is None:
+            message = f"the writer `{writer.name}` has `{given[0]}`, but does not write by CANopen"
+            hint = f"add `canopen: rpdo`, or remove `{given[0]}`"
+            yield rule.at(writer.key_at(given[0]), message, hint=hint)
+        elif len(given) == 1:
+            other = "heartbeat" if given[0] == "node" else "node"
+            message = f"the writer `{writer.name}` has `{given[0]}` without `{other}`"
+            hint = (
+                "add `heartbeat: 500ms`"
+                if other == "heartbeat"
+                else "add `node: 1`, the node-ID of the writer"
+            )
+            yield rule.at(writer.key_at(given[0]), message, hint=hint)
+
+
+@cell_rule(
+    "GW435",
+    "timeout-of-silence",
+    "a timeout for a CANopen writer that may be silent for good reason",
+    Severity.WARNING,
+)
+def timeout_of_silence(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`timeout` of RPDO writers without a heartbeat where no RPDO has to come."""
+    node = node_of(cell)
+    if node is None:
+        return
+    received = [pdo for pdo in node.pdos if pdo.direction is Direction.INPUT]
+    if not received or any(pdo.event is not None or pdo.transmission < FIRST_EVENT_TYPE for pdo in received):
+        return
+    for writer in cell.document.writers.values():
+        timeout, spec = writer.spec.timeout, writer.spec.by(CanopenWriter)
+        only_here = len(known_by(writer.spec)) == 1
+        if spec.by_rpdo and only_here and timeout is not None and spec.heartbeat is None:
+            message = f"`{writer.name}` is lost after {seconds(timeout)} without a PDO, and none has to come"
+            hint = "write `node: 1, heartbeat: 1s` in place of `timeout`, or give the PDOs a `deadline`"
+            yield rule.at(writer.at("timeout"), message, hint=hint)
+
+
+def _lines(cell: ExpandedCell) -> Iterator[tuple[ExpandedVariable, MappedObject]]:
+    """The first variable of each line that is an object, with the object."""
+    node = node_of(cell)
+    seen: set[str] = set()
+    for one in node.objects if node is not None else ():
+        variable = cell.variables[one.variable]
+        if variable.part.name not in seen:
+            seen.add(variable.part.name)
+            yield variable, one
+
+
+def _canopen_place(variable: ExpandedVariable) -> Position:
+    return variable.part.at("canopen") if place_of(variable) is not None else variable.position
+
+
+def _type_place(variable: ExpandedVariable) -> Position:
+    """Place of the type where it is written, else of what stands for it."""
+    return variable.part.at("canopen", "type") if place_of(variable) is not None else variable.position

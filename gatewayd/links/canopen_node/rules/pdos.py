@@ -1,0 +1,311 @@
+"""Rules GW402 to GW406, GW409, GW416 to GW419 and GW431: PDOs and their COB-IDs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from gatewayd.canopen.cob_ids import Function, is_restricted
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.core.definition import Direction
+from gatewayd.links.canopen_node.bus_load import FIRST_EVENT_TYPE, pdo_bits
+from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo, node_of
+from gatewayd.links.canopen_node.pdo_layout import PDO_BITS, PDO_NUMBERS
+from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
+from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.mapping.rules.registry import cell_rule
+from gatewayd.report.wording import cob, number, seconds
+
+__all__ = ["cob_id_place"]
+
+_UNUSED = range(0x680, 0x6E0)
+"""Identifiers that no predefined service of any node has."""
+_HIGH_NODES = (range(0x1C0, 0x200), range(0x2C0, 0x300), range(0x3C0, 0x400), range(0x4C0, 0x500))
+"""PDOs of node-IDs from 64 on, which small networks do not have."""
+_KEYS = {Direction.INPUT: "rpdo", Direction.OUTPUT: "tpdo"}
+_WORDS = {Direction.INPUT: "towards the robot", Direction.OUTPUT: "from the robot"}
+
+
+@cell_rule("GW402", "pdo-too-long", "a PDO with more than 64 bits")
+def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """PDOs of the file beyond eight bytes."""
+    for pdo in _pdos(cell):
+        if pdo.bits > PDO_BITS:
+            name = next(name for name, end in _contents(cell, pdo) if end > PDO_BITS)
+            message = (
+                f"the PDO `{pdo.name}` has {pdo.bits} bits, a PDO carries {PDO_BITS}; `{name}` does not fit"
+            )
+            hint = f"move `{name}` and what follows it to another PDO"
+            yield rule.at(pdo.position, message, hint=hint)
+
+
+@cell_rule("GW403", "pdo-misaligned", "a number in a PDO that does not begin at a byte")
+def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """The first number of each PDO off a byte boundary."""
+    for pdo in _pdos(cell):
+        for offset, entry in pdo.offsets:
+            if entry.plan.type is not CanType.BOOLEAN and offset % 8:
+                name = cell.variables[entry.variable].name
+                message = f"`{name}` ({entry.plan.type.name}) begins at bit {offset} of the PDO `{pdo.name}`"
+                hint = "put the numbers before the bits"
+                yield rule.at(pdo.position, message, hint=hint)
+                break
+
+
+@cell_rule("GW404", "mixed-pdo", "a PDO with variables of both directions")
+def mixed_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """The first variable of each PDO that flows the other way."""
+    for pdo in _pdos(cell):
+        other = next((entry for entry in pdo.entries if entry.direction is not pdo.direction), None)
+        if other is not None:
+            name = cell.variables[other.variable].name
+            first = pdo.status[0].name if pdo.status else cell.variables[pdo.entries[0].variable].name
+            message = (
+                f"the PDO `{pdo.name}` carries `{first}` {_WORDS[pdo.direction]} "
+                f"and `{name}` {_WORDS[other.direction]}"
+            )
+            yield rule.at(pdo.position, message, hint=f"make a PDO of its own for `{name}`")
+
+
+@dataclass(frozen=True, slots=True)
+class _Use:
+    cob_id: int
+    what: str
+    place: Position
+
+
+@cell_rule("GW405", "cob-id-clash", "one COB-ID for two services of the node")
+def cob_id_clash(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """COB-IDs of PDOs and of SYNC that are used already."""
+    node = node_of(cell)
+    if node is None:
+        return
+    used = {use.cob_id: use for use in _services(node)}
+    sync = node.part.spec.sync
+    if not is_restricted(sync.cob_id):
+        place = node.part.at("sync", "cob_id")
+        yield from _clash(rule, used, _Use(sync.cob_id, "SYNC", place))
+    reported: set[Position] = set()
+    for pdo in node.pdos:
+        if pdo.slot.cob_id is None or is_restricted(pdo.slot.cob_id):
+            continue
+        place = cob_id_place(node, pdo)
+        for finding in _clash(rule, used, _Use(pdo.slot.cob_id, pdo.label, place)):
+            if place not in reported:
+                reported.add(place)
+                yield finding
+
+
+def _clash(rule: Rule, used: dict[int, _Use], use: _Use) -> Iterator[Diagnostic]:
+    other = used.setdefault(use.cob_id, use)
+    if other is not use:
+        message = f"{use.what} has the COB-ID {cob(use.cob_id)}, which is {other.what}"
+        related = (Related(other.place, f"{other.what} is {cob(use.cob_id)}"),)
+        yield rule.at(use.place, message, hint="choose another COB-ID, such as 0x680", related=related)
+
+
+def _services(node: CanopenCell) -> Iterator[_Use]:
+    """What a node has without being asked, as far as it is not restricted."""
+    place, number = node.part.at("node"), node.part.spec.node
+    yield _Use(Function.EMCY + number, f"EMCY of node {number}", place)
+    yield _Use(Function.TIME, "TIME", place)
+
+
+@cell_rule("GW406", "restricted-cob-id", "a COB-ID that no PDO and no SYNC may have")
+def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Restricted COB-IDs of SYNC and PDOs, and in the declared ranges."""
+    node = node_of(cell)
+    if node is None:
+        return
+    spec, part = node.part.spec, node.part
+    hint = "use one of a node-ID that does not exist, such as 0x1C0, or one from 0x680 to 0x6DF"
+    written = [(spec.sync.cob_id, "SYNC", part.at("sync", "cob_id"))]
+    written += [
+        (pdo.cob_id, f"the PDO `{name}`", part.at("pdos", name, "cob_id"))
+        for name, pdo in spec.pdos.items()
+        if pdo.cob_id is not None
+    ]
+    for key, ranges in (("tpdo", spec.cob_ids.tpdo), ("rpdo", spec.cob_ids.rpdo)):
+        for position, cob_ids in enumerate(ranges):
+            first = next((cob_id for cob_id in cob_ids if is_restricted(cob_id)), None)
+            if first is not None:
+                written.append((first, f"`{key}`", part.at("cob_ids", key, position)))
+    for cob_id, what, place in written:
+        if is_restricted(cob_id):
+            yield rule.at(place, f"{what} has the COB-ID {cob(cob_id)}, which is reserved", hint=hint)
+
+
+@cell_rule("GW409", "too-few-cob-ids", "more PDOs than COB-IDs")
+def too_few_cob_ids(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """How many are missing in each direction, and which would do."""
+    node = node_of(cell)
+    if node is None:
+        return
+    used = {pdo.slot.cob_id for pdo in node.pdos if pdo.slot.cob_id is not None}
+    used |= {use.cob_id for use in _services(node)} | {node.part.spec.sync.cob_id}
+    for direction, key in reversed(_KEYS.items()):
+        pdos = [pdo for pdo in node.pdos if pdo.direction is direction]
+        missing = sum(pdo.slot.cob_id is None or pdo.slot.number > PDO_NUMBERS for pdo in pdos)
+        if not missing:
+            continue
+        proposal = _proposal(missing, used)
+        used |= set(proposal)
+        declared = getattr(node.part.spec.cob_ids, key)
+        total = sum(map(len, declared)) or "none"
+        message = (
+            f"{missing} of {len(pdos)} PDOs {_WORDS[direction]} have no COB-ID: "
+            f"four are predefined, and {total} declared"
+        )
+        hint = "use REAL32, or keep variables out of PDOs with `canopen: object`"
+        if len(proposal) == missing:
+            hint = f"add `cob_ids: {{{key}: {_spans([*_written(declared), *proposal])}}}` if nobody else uses them"
+        place = node.part.at("cob_ids", key) if declared else node.part.key
+        yield rule.at(place, message, hint=hint)
+
+
+def _written(ranges: Iterable[range]) -> Iterator[int]:
+    return (cob_id for one in ranges for cob_id in one)
+
+
+def _proposal(count: int, used: set[int]) -> list[int]:
+    """So many identifiers that nothing predefined is likely to have."""
+    free = [cob_id for span in (_UNUSED, *_HIGH_NODES) for cob_id in span if cob_id not in used]
+    return free[:count]
+
+
+def _spans(cob_ids: list[int]) -> str:
+    """Identifiers as the file writes them: `0x680..0x68F`, a list of such where there are gaps."""
+    spans: list[list[int]] = []
+    for cob_id in cob_ids:
+        if spans and cob_id == spans[-1][1] + 1:
+            spans[-1][1] = cob_id
+        else:
+            spans.append([cob_id, cob_id])
+    texts = [cob(first) if first == last else f"{cob(first)}..{cob(last)}" for first, last in spans]
+    return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
+
+
+@cell_rule("GW431", "pdo-key-of-other-side", "a key of a PDO that means nothing in its direction")
+def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`event` at RPDOs, `deadline` at TPDOs, `sync_start` where no SYNC counts."""
+    node = node_of(cell)
+    for pdo in _pdos(cell):
+        assert node is not None
+        receives = pdo.direction is Direction.INPUT
+        written = node.part.spec.pdos[pdo.name].model_fields_set
+        wrong, right = ("event", "deadline") if receives else ("deadline", "event")
+        if wrong in written:
+            message = f"the PDO `{pdo.name}` goes {_WORDS[pdo.direction]} and has `{wrong}`"
+            if not receives:
+                message = f"the PDO `{pdo.name}` comes {_WORDS[pdo.direction]} and has `{wrong}`"
+            place = node.part.key_at("pdos", pdo.name, wrong)
+            yield rule.at(place, message, hint=f"write `{right}`, or remove it")
+        if "sync_start" in written and (receives or not 0 < pdo.transmission < FIRST_EVENT_TYPE):
+            message = f"the PDO `{pdo.name}` has `sync_start` and is not sent with every n-th SYNC"
+            place = node.part.key_at("pdos", pdo.name, "sync_start")
+            yield rule.at(place, message, hint="remove `sync_start`, or write `transmission: sync`")
+
+
+@cell_rule(
+    "GW416", "sync-without-period", "synchronous PDOs, and nobody says how often SYNC comes", Severity.WARNING
+)
+def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """The first synchronous PDO of a node without a period."""
+    node = node_of(cell)
+    if node is None or node.part.spec.sync.period is not None:
+        return
+    pdo = next((pdo for pdo in node.pdos if pdo.transmission < FIRST_EVENT_TYPE), None)
+    if pdo is not None:
+        message = f"{pdo.label} is synchronous (type {pdo.transmission}), and the period of SYNC is not known"
+        hint = "add `sync: {period: 10ms}`, with `producer: true` if no other node sends SYNC"
+        yield rule.at(_key_place(node, pdo, "transmission"), message, hint=hint)
+
+
+@cell_rule("GW417", "producer-without-period", "a SYNC producer without a period")
+def producer_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`producer: true` alone."""
+    node = node_of(cell)
+    if node is not None and node.part.spec.sync.producer and node.part.spec.sync.period is None:
+        message = f"node {node.part.spec.node} is to produce SYNC without a period"
+        yield rule.at(node.part.at("sync", "producer"), message, hint="add `period: 10ms` to `sync`")
+
+
+@cell_rule(
+    "GW418", "inhibit-below-frame-time", "an inhibit time shorter than the frame itself", Severity.WARNING
+)
+def inhibit_below_frame_time(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Inhibit times without effect."""
+    node = node_of(cell)
+    if node is None:
+        return
+    reported: set[Position] = set()
+    for pdo in node.pdos:
+        duration = pdo_bits(pdo) / node.part.spec.bitrate
+        if pdo.transmission < FIRST_EVENT_TYPE or pdo.inhibit is None or pdo.inhibit >= duration:
+            continue
+        place = _key_place(node, pdo, "inhibit")
+        if place not in reported:
+            reported.add(place)
+            message = (
+                f"the inhibit time of {pdo.label}, {seconds(pdo.inhibit)}, is shorter than its frame "
+                f"({number(round(duration * 1000, 2))}ms at {node.part.spec.bitrate} bit/s)"
+            )
+            yield rule.at(place, message, hint="use some times the length of the frame, such as 10ms")
+
+
+@cell_rule("GW419", "event-below-inhibit", "an event time shorter than the inhibit time", Severity.WARNING)
+def event_below_inhibit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Event timers that the inhibit time always delays."""
+    node = node_of(cell)
+    if node is None:
+        return
+    reported: set[Position] = set()
+    for pdo in node.pdos:
+        if pdo.direction is Direction.INPUT or pdo.transmission < FIRST_EVENT_TYPE:
+            continue
+        if pdo.event is None or pdo.inhibit is None or pdo.event >= pdo.inhibit:
+            continue
+        place = _key_place(node, pdo, "event")
+        if place not in reported:
+            reported.add(place)
+            message = (
+                f"the event time of {pdo.label}, {seconds(pdo.event)}, is shorter than its inhibit time, "
+                f"{seconds(pdo.inhibit)}"
+            )
+            hint = "make the event time some times as long as the inhibit time"
+            yield rule.at(place, message, hint=hint)
+
+
+def cob_id_place(node: CanopenCell, pdo: ExpandedPdo) -> Position:
+    """Where the file gives a PDO its COB-ID: at the PDO, among the declared ones, or by the node-ID."""
+    if pdo.name and node.part.spec.pdos[pdo.name].cob_id is not None:
+        return node.part.at("pdos", pdo.name, "cob_id")
+    if pdo.slot.predefined:
+        return node.part.at("node")
+    key = _KEYS[pdo.direction]
+    for position, cob_ids in enumerate(getattr(node.part.spec.cob_ids, key)):
+        if pdo.slot.cob_id in cob_ids:
+            return node.part.at("cob_ids", key, position)
+    return node.part.key
+
+
+def _key_place(node: CanopenCell, pdo: ExpandedPdo, key: str) -> Position:
+    """Where a key of a PDO is written: at the PDO, or among the defaults."""
+    if pdo.name and key in node.part.spec.pdos[pdo.name].model_fields_set:
+        return node.part.at("pdos", pdo.name, key)
+    return node.part.at("pdo", key)
+
+
+def _pdos(cell: ExpandedCell) -> Iterator[ExpandedPdo]:
+    """The PDOs of the file; those of the automatic layout have none of these mistakes."""
+    node = node_of(cell)
+    if node is not None:
+        yield from (pdo for pdo in node.pdos if pdo.name)
+
+
+def _contents(cell: ExpandedCell, pdo: ExpandedPdo) -> Iterator[tuple[str, int]]:
+    """The name of everything in a PDO, and the bit after it."""
+    for offset, word in pdo.status_offsets:
+        yield word.name, offset + word.type.bits
+    for offset, entry in pdo.offsets:
+        yield cell.variables[entry.variable].name, offset + entry.plan.type.bits

@@ -1,0 +1,404 @@
+"""The CANopen link: one node, its bus, and the loop's clock.
+
+Frames go from the driver into the node and out again within one turn of the loop; one timer follows the node's next
+deadline. The heartbeat needs the core: a daemon that is frozen, or whose core stands still, falls silent.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from contextlib import suppress
+from dataclasses import asdict
+from datetime import datetime
+
+from gatewayd.canopen.bus import Bus, BusError, BusState
+from gatewayd.canopen.drivers import make_bus
+from gatewayd.canopen.errors import ErrorFrame
+from gatewayd.canopen.frame import Frame
+from gatewayd.canopen.lss import BIT_RATES
+from gatewayd.canopen.nmt import NmtState
+from gatewayd.canopen.queue import Transmitter
+from gatewayd.core.cell import Cell
+from gatewayd.core.definition import Direction
+from gatewayd.links.canopen_node.declaration import BUS_STATES, NMT_STATES
+from gatewayd.links.canopen_node.node import Node
+from gatewayd.links.canopen_node.observer import Observer
+from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.canopen_node.storage import JsonStore, Store
+from gatewayd.links.contract import Context, Level, Link, LinkHealth, LinkRuntime
+from gatewayd.logs.records import fields
+from gatewayd.loop import clock
+from gatewayd.loop.progress import wait_with_progress
+from gatewayd.loop.retry import until_done
+from gatewayd.mapping.plan import LinkPlan
+
+__all__ = ["CORE_TIME", "LOSS_INTERVAL", "RETRY", "RUNTIME", "CanLink"]
+
+CORE_TIME = 0.5
+"""Seconds without a count of the core's heartbeat after which the core counts as stuck."""
+RETRY = 2.0
+"""Seconds between two attempts at a bus that cannot be used as it is set up."""
+LOSS_INTERVAL = 10.0
+"""Seconds between two lines of the log about lost frames."""
+CLOCK_STEP = 1.0
+"""Seconds by which the network's time may differ from what was last reported before it is reported again."""
+
+log = logging.getLogger("gatewayd.canopen")
+
+
+class CanLink(Link, Observer):
+    """Keeps `cell` on its CAN bus while `run` runs."""
+
+    title = "CAN link"
+
+    def __init__(self, plan: CanopenPlan, cell: Cell, store: Store) -> None:
+        self._plan = plan
+        self._cell = cell
+        self._bus: Bus | None = None
+        self._transmitter = Transmitter(
+            self._offer,
+            self._renew,
+            now=clock.now,
+            punctual=self._offer_at_once,
+            overdue=clock.overdue,
+        )
+        self._timer: asyncio.TimerHandle | None = None
+        self._catching: asyncio.Handle | None = None
+        self._due = math.inf
+        self._runs = False
+        self._started = False
+        self._beat = (-1, -math.inf)
+        self._offset = math.inf
+        self._lost = 0
+        self._lost_told = -math.inf
+        self._other_bit_rate: int | None = None
+        self._switch = (0, 0.0)
+        self._switching = asyncio.Event()
+        self._progress = 0
+        # The kernel's interfaces are set by whoever administers them; python-can opens its own with a bit rate.
+        self._bit_rates = (
+            () if plan.interface == "socketcan" else tuple(rate for rate in BIT_RATES if rate is not None)
+        )
+        self._store = store
+        self.node = self._new_node()
+        cell.listeners.append(self._on_image)
+        self._show_words()
+
+    @property
+    def progress(self) -> int:
+        """Counts while the link's task goes on, whatever the bus does."""
+        return self._progress
+
+    @property
+    def reachable(self) -> bool:
+        """While the bus carries frames."""
+        return self.node.bus.carries
+
+    def health(self) -> LinkHealth:
+        """How the bus is, and what the node on it is up to.
+
+        An active bus alone is not well: before NMT start no PDO goes either way. A node-ID above 127 is none (LSS).
+        """
+        bus, nmt = self.node.bus, NMT_STATES[self.node.nmt.state]
+        level, words = _BUS_WORDS[bus]
+        if level is Level.GOOD and nmt != "operational":
+            level, words = Level.WARN, f"{words}, but {nmt}: no PDOs until a master starts the node"
+        number = self.node.node_id
+        return LinkHealth(
+            f"CAN {self._plan.channel}",
+            level,
+            words,
+            f"node {number if number <= 127 else 'without id'}, {nmt}",
+            () if bus is BusState.ACTIVE else (f"CAN bus {BUS_STATES[bus + 1]}",),
+            {
+                "channel": f"{self._plan.interface}:{self._plan.channel}",
+                "node": self._plan.node,
+                "bus": BUS_STATES[bus + 1],
+                "bus_state": bus + 1,
+                "nmt_state": nmt,
+                "counters": asdict(self.node.counters),
+            },
+        )
+
+    async def run(self) -> None:
+        """Stay on the bus until cancelled. May be run again: for the node the bus was away meanwhile."""
+        self._runs = True
+        try:
+            await self._open(self.node.bit_rate)
+            now = clock.now()
+            if not self._started:
+                self._started = True
+                self.node.start(now)
+            self._schedule(now)
+            while True:
+                await self._wait_until(math.inf)
+                self._switching.clear()
+                bit_rate, silence = self._switch
+                await self._wait_until(clock.now() + silence)
+                await self._open(bit_rate)
+        finally:
+            self._leave()
+
+    def release(self, now: float) -> None:
+        """Another node takes the place of this one: who wrote by it is lost."""
+        self.node.lose_writers("the new mapping needs another node", now)
+
+    def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
+        """Go on, unnoticed by the bus, with the cell that succeeded the present one."""
+        assert isinstance(plan, CanopenPlan)
+        former = self.node
+        self._plan, self._cell = plan, cell
+        self.node = self._new_node()
+        if self._started:
+            self.node.resume(former, now)
+        cell.listeners.append(self._on_image)
+        self._show_words()
+        self.cob_ids_changed()
+        if self._runs:
+            self._schedule(now)
+
+    async def close(self) -> None:
+        """Send what still waits, as far as the bus takes it."""
+        self._transmitter.flush()
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`: frames that are read now may have waited that long.
+
+        They are read before the loop serves anything else; what waits to be sent is made anew.
+        """
+        self.node.gap(since, now)
+        self._beat = (self._beat[0], now)
+        self._transmitter.renew()
+        if not self._runs:
+            self.node.caught_up()
+        elif self._catching is None:
+            self._catching = asyncio.get_running_loop().call_soon(self._catch_up)
+
+    # -- called by the driver ------------------------------------------------------------------------------------
+
+    def on_frames(self, frames: list[Frame], now: float) -> None:
+        """Received frames."""
+        receive = self.node.receive
+        for frame in frames:
+            receive(frame, now)
+        self._schedule(now)
+
+    def on_error(self, error: ErrorFrame, now: float) -> None:
+        """An error frame; what follows from it comes as a state."""
+
+    def on_lost(self, count: int, now: float) -> None:
+        """Frames were lost for want of room."""
+        self._lost += count
+        if now - self._lost_told >= LOSS_INTERVAL:
+            log.warning("CAN frames lost", extra=fields(**self._names(), frames=self._lost))
+            self._lost, self._lost_told = 0, now
+        self.node.frames_lost(count, now)
+        self._schedule(now)
+
+    def on_state(self, state: BusState, reason: str, now: float) -> None:
+        """The bus is in another state."""
+        level = logging.INFO if state is BusState.ACTIVE or not self._runs else logging.WARNING
+        log.log(
+            level,
+            "CAN bus %s",
+            state.name.lower().replace("_", "-"),
+            extra=fields(**self._names(), reason=reason),
+        )
+        self._cell.health.words["can_bus"] = state + 1
+        if state.carries:
+            self._compare_bit_rates()
+            self._transmitter.open()
+        else:
+            self._transmitter.close()
+        self.node.bus_changed(state, now)
+        self._schedule(now)
+
+    def on_writable(self, now: float) -> None:
+        """There is room in the driver again."""
+        self._transmitter.flush()
+
+    # -- called by the node --------------------------------------------------------------------------------------
+
+    def cob_ids_changed(self) -> None:
+        """The node listens to other COB-IDs now."""
+        if self._bus is not None:
+            self._bus.set_filters(self.node.cob_ids(), self.node.remote_ids())
+
+    def nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
+        """The node is in another NMT state."""
+        self._cell.health.words["nmt_state"] = new
+        log.info("CANopen node %s", new.name.lower().replace("_", "-"), extra=fields(**self._names()))
+
+    def report(self, text: str) -> None:
+        """Something for the log."""
+        log.warning("CANopen: %s", text, extra=fields(**self._names()))
+
+    def time_told(self, moment: datetime, now: float) -> None:
+        """The network's clock: reported once, and when it was set."""
+        offset = moment.timestamp() - now
+        if abs(offset - self._offset) > CLOCK_STEP:
+            self._offset = offset
+            log.info(
+                "network time", extra=fields(**self._names(), time=moment.isoformat(timespec="milliseconds"))
+            )
+
+    def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
+        """An LSS master activates a bit rate: be silent, switch, be silent for as long again (CiA 305)."""
+        if self._plan.interface == "socketcan":
+            return
+        self._close_bus("LSS switches the bit rate")
+        self._switch = (bit_rate, 2 * delay)
+        self._switching.set()
+
+    # -- inside --------------------------------------------------------------------------------------------------
+
+    def _show_words(self) -> None:
+        self._cell.health.words.update(can_bus=self.node.bus + 1, nmt_state=self.node.nmt.state)
+
+    def _new_node(self) -> Node:
+        return Node(
+            self._plan,
+            self._cell,
+            self._transmitter.send,
+            self._store,
+            self._core_lives,
+            observer=self,
+            bit_rates=self._bit_rates,
+        )
+
+    def _count(self) -> None:
+        self._progress += 1
+
+    async def _wait_until(self, moment: float) -> None:
+        """Wait for that moment, or for a switch of the bit rate, and count meanwhile."""
+        rest = moment - clock.now()
+        # Not wait_for: Python 3.11's can swallow a cancellation that comes with the time-out.
+        with suppress(TimeoutError):
+            async with asyncio.timeout(None if rest == math.inf else rest):
+                await wait_with_progress(self._switching.wait(), self._count, math.inf)
+
+    async def _open(self, bit_rate: int) -> None:
+        """Open the bus; a set-up that cannot work is tried again, in case it is repaired."""
+
+        async def attempt() -> None:
+            bus = self._bus = make_bus(self._plan.interface, self._plan.channel, bit_rate, self)
+            bus.set_filters(self.node.cob_ids(), self.node.remote_ids())
+            try:
+                await wait_with_progress(bus.open(), self._count, math.inf)
+            except BusError:
+                self._bus = None
+                raise
+
+        def report(error: Exception) -> None:
+            log.error("%s", error, extra=fields(**self._names(), retry_s=RETRY))
+
+        await until_done(attempt, BusError, report, RETRY, self._count)
+
+    def _compare_bit_rates(self) -> None:
+        """The kernel's interface is what it is; `check` has computed the load with what the mapping says."""
+        actual = self._bus.bitrate if self._bus is not None else None
+        if actual not in (None, self._plan.bitrate, self._other_bit_rate):
+            log.warning(
+                "CAN bit rate is not that of the mapping",
+                extra=fields(**self._names(), bitrate=actual, mapping=self._plan.bitrate),
+            )
+        self._other_bit_rate = actual
+
+    def _offer(self, frame: Frame) -> bool:
+        return self._bus is not None and self._bus.send(frame)
+
+    def _catch_up(self) -> None:
+        """Read what waited; as long as there is more, what comes has waited too."""
+        self._catching = None
+        if self._bus is None or self._bus.catch_up():
+            self.node.caught_up()
+        elif self._runs:
+            self._catching = asyncio.get_running_loop().call_soon(self._catch_up)
+        self._transmitter.flush()
+        if self._runs:
+            self._schedule(clock.now())
+
+    def _offer_at_once(self, frame: Frame) -> bool:
+        """A frame that may not be late: not where older ones still wait in the kernel."""
+        bus = self._bus
+        return bus is not None and not bus.lags(self.node.bit_rate) and bus.send(frame)
+
+    def _renew(self, can_id: int) -> Frame | None:
+        return self.node.renew(can_id, clock.now())
+
+    def _close_bus(self, reason: str) -> None:
+        bus, self._bus = self._bus, None
+        if bus is not None:
+            bus.close()
+            self.on_state(BusState.DOWN, reason, clock.now())
+
+    def _leave(self) -> None:
+        self._runs = False
+        self._close_bus("the link ends")
+        if self._timer is not None:
+            self._timer.cancel()
+        if self._catching is not None:
+            self._catching.cancel()
+            self.node.caught_up()
+        self._timer, self._catching, self._due = None, None, math.inf
+        self._switching.clear()
+
+    def _on_image(self, direction: Direction) -> None:
+        now = clock.now()
+        self.node.image_changed(direction, now)
+        self._schedule(now)
+
+    def _schedule(self, now: float) -> None:
+        """Move the timer if the node's next deadline has come nearer."""
+        due = self.node.next_deadline(now)
+        if due >= self._due or not self._runs:
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._due = due
+        self._timer = asyncio.get_running_loop().call_at(due, self._tick)
+
+    def _tick(self) -> None:
+        now = clock.judged_now()
+        self._timer, self._due = None, math.inf
+        self.node.tick(now)
+        self._schedule(now)
+
+    def _core_lives(self, now: float) -> bool:
+        count, since = self._beat
+        if self._cell.health.heartbeat != count:
+            self._beat = (self._cell.health.heartbeat, now)
+            return True
+        return now - since <= CORE_TIME
+
+    def _names(self) -> dict[str, object]:
+        return {
+            "cell": self._cell.definition.name,
+            "bus": f"{self._plan.interface}:{self._plan.channel}",
+            "node": self._plan.node,
+        }
+
+
+_BUS_WORDS = {
+    BusState.ABSENT: (Level.BAD, "absent: no such interface"),
+    BusState.DOWN: (Level.BAD, "down: the interface is not configured"),
+    BusState.BUS_OFF: (Level.BAD, "bus-off: cut off after too many errors"),
+    BusState.PASSIVE: (Level.WARN, "error-passive: look at cable, termination and bit rate"),
+    BusState.WARNING: (Level.WARN, "many errors: look at cable, termination and bit rate"),
+    BusState.ACTIVE: (Level.GOOD, "active"),
+}
+
+
+class CanopenRuntime(LinkRuntime):
+    """Nodes, each with a file of what its master had it store."""
+
+    def make(self, plan: LinkPlan, cell: Cell, context: Context) -> CanLink:
+        """A node, which boots when its link runs."""
+        assert isinstance(plan, CanopenPlan)
+        return CanLink(plan, cell, JsonStore(context.state / f"{cell.definition.name}.canopen.json"))
+
+
+RUNTIME = CanopenRuntime()
+"""What the daemon needs of this kind of link."""

@@ -1,0 +1,230 @@
+"""The CANopen part of the mapping language as typed models: the node, its PDOs, and a variable's place in them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from gatewayd.links.canopen_node.scalars import (
+    EVENT,
+    CobId,
+    CobIdRanges,
+    InhibitTime,
+    Members,
+    MillisecondTime,
+    StatusMembers,
+    Transmission,
+)
+from gatewayd.mapping import syntax
+from gatewayd.mapping.scalars import Duration, Name, Whole, refuse
+from gatewayd.mapping.section import Section
+
+__all__ = [
+    "AUTO",
+    "NO_PDO",
+    "Canopen",
+    "CanopenPlace",
+    "CanopenPlaces",
+    "CanopenWriter",
+    "CobIdPool",
+    "NumberType",
+    "PdoDefaults",
+    "PdoSpec",
+    "RealType",
+    "Sync",
+]
+
+AUTO = "auto"
+"""Stands for the automatic layout; no PDO can have this name."""
+NO_PDO = "none"
+"""Stands for the object dictionary alone; no PDO can have this name."""
+
+RealType = Literal["REAL64", "REAL32"]
+NumberType = Literal[
+    "BOOLEAN",
+    "INTEGER8",
+    "INTEGER16",
+    "INTEGER32",
+    "INTEGER64",
+    "UNSIGNED8",
+    "UNSIGNED16",
+    "UNSIGNED32",
+    "UNSIGNED64",
+    "REAL32",
+    "REAL64",
+]
+
+
+def _counter(value: int) -> int:
+    if value == 1:
+        refuse(syntax.OUT_OF_RANGE, "a SYNC counter that overflows at 1 is reserved", "write 0, or 2 to 240")
+    return value
+
+
+class Sync(Section):
+    """What the node has to do with SYNC."""
+
+    cob_id: CobId = Field(default=0x80, description="COB-ID of SYNC", json_schema_extra={"default": "0x80"})
+    producer: bool = Field(default=False, description="whether this node sends SYNC")
+    period: Duration | None = Field(
+        default=None, description="time between two SYNCs; a consumer states it for the bus load"
+    )
+    counter: Annotated[Whole, AfterValidator(_counter)] = Field(
+        default=0,
+        ge=0,
+        le=240,
+        description="greatest value of the counter in SYNC, 2 to 240; 0: SYNC carries none",
+    )
+
+
+class PdoDefaults(Section):
+    """What holds for every PDO that does not say otherwise."""
+
+    transmission: Transmission = Field(
+        default=EVENT,
+        description="event (when a value changed), sync (every SYNC), or a type: 0, 1 to 240, 254, 255",
+        json_schema_extra={"default": "event"},
+    )
+    inhibit: InhibitTime = Field(default=None, description="least time between two transmissions")
+    event: MillisecondTime = Field(
+        default=None, description="greatest time between two transmissions of a PDO from the robot"
+    )
+    deadline: MillisecondTime = Field(
+        default=None, description="time without a PDO towards the robot after which it counts as missing"
+    )
+    real: RealType = Field(default="REAL64", description="type of reals that do not name their own")
+
+
+class CobIdPool(Section):
+    """COB-IDs that this node may use for PDOs beyond the four predefined of each direction."""
+
+    tpdo: CobIdRanges = Field(
+        default=(), description="for PDOs from the robot: 0x1A0, 0x1A0..0x1AF, or a list"
+    )
+    rpdo: CobIdRanges = Field(default=(), description="for PDOs towards the robot: 0x220, or a list")
+
+
+class PdoSpec(Section):
+    """One PDO laid out by hand."""
+
+    cob_id: CobId | None = Field(
+        default=None, description="COB-ID; default: the next predefined one, then one of `cob_ids`"
+    )
+    transmission: Transmission | None = Field(
+        default=None,
+        description="event (when a value changed), sync (every SYNC), or a type: 0, 1 to 240, 254, 255",
+    )
+    inhibit: InhibitTime = Field(default=None, description="least time between two transmissions")
+    event: MillisecondTime = Field(
+        default=None, description="greatest time between two transmissions of a PDO from the robot"
+    )
+    deadline: MillisecondTime = Field(
+        default=None, description="time without a PDO towards the robot after which it counts as missing"
+    )
+    sync_start: Whole = Field(
+        default=0, ge=0, le=240, description="counter value of the first SYNC that counts; 0: any"
+    )
+    status: StatusMembers = Field(
+        default=(),
+        description="words of the status block, before the variables, in a PDO from the robot: names of its fields "
+        "(flags, robot_state), 'quality of force'",
+    )
+    variables: Members = Field(
+        default=(),
+        description="variables in their order: start, 'recipe[0..7]'; `canopen: {pdo: NAME}` adds more",
+    )
+    comment: str = Field(default="", max_length=500, description="for people")
+
+
+class Canopen(Section):
+    """One node on one CAN bus."""
+
+    interface: Annotated[str, Field(min_length=1, max_length=64)] = Field(
+        default="socketcan", description="interface of python-can; socketcan is the kernel's"
+    )
+    channel: Annotated[str, Field(min_length=1, max_length=200)] = Field(
+        description="the bus: can0, or what the interface calls it"
+    )
+    bitrate: Whole = Field(
+        gt=0,
+        le=1_000_000,
+        description="bit/s of the bus; the daemon does not set it, `check` computes with it",
+    )
+    node: Whole = Field(ge=1, le=127, description="node-ID")
+    autostart: bool = Field(default=False, description="become OPERATIONAL without waiting for an NMT master")
+    heartbeat: MillisecondTime = Field(
+        default=0.5,
+        description="time between two heartbeats; none: no heartbeat",
+    )
+    sync: Sync = Field(default=Sync(), description="SYNC", json_schema_extra={"default": {}})
+    pdo: PdoDefaults = Field(
+        default=PdoDefaults(), description="defaults of all PDOs", json_schema_extra={"default": {}}
+    )
+    cob_ids: CobIdPool = Field(
+        default=CobIdPool(),
+        description="COB-IDs for PDOs beyond the predefined ones",
+        json_schema_extra={"default": {}},
+    )
+    pdos: dict[Name, PdoSpec] = Field(default_factory=dict, description="PDOs laid out by hand, by name")
+
+
+class CanopenPlace(Section):
+    """Where a variable is in CANopen."""
+
+    pdo: Name = Field(
+        default=AUTO, description="auto (default), none (object dictionary only), or the name of a PDO"
+    )
+    type: NumberType | None = Field(default=None, description="CiA 301 type; default: from the robot's type")
+
+
+def _place(value: Any) -> Any:
+    """Bring the short forms into one: `auto`, `object`, or a table."""
+    if isinstance(value, (dict, CanopenPlace)):
+        return value
+    if value == AUTO:
+        return {}
+    if value == "object":
+        return {"pdo": NO_PDO}
+    hint = "write auto, object, or a table such as {pdo: NAME, type: REAL32}"
+    return refuse(syntax.BAD_CHOICE, "`canopen` of a variable is neither auto nor object nor a table", hint)
+
+
+class CanopenPlaces(Section):
+    """What a variable has by CANopen."""
+
+    canopen: (
+        Annotated[
+            CanopenPlace,
+            BeforeValidator(_place, json_schema_input_type=Literal["auto", "object"] | CanopenPlace),
+        ]
+        | None
+    ) = Field(
+        default=None, description="auto, object (no PDO), or {pdo: NAME, type: ...}; default: not on CANopen"
+    )
+
+
+class CanopenWriter(Section):
+    """What a writer has by CANopen."""
+
+    canopen: Literal["rpdo", "sdo", "any"] | None = Field(
+        default=None, description="services of the CANopen node by which it writes: rpdo, sdo, or any (both)"
+    )
+    node: Whole | None = Field(
+        default=None, ge=1, le=127, description="node-ID whose heartbeat tells whether it lives (CANopen)"
+    )
+    heartbeat: MillisecondTime = Field(
+        default=None,
+        description="time without a heartbeat of `node`, from the writer's first sign on, after which it is lost "
+        "and writes nothing by CANopen until it is heard",
+    )
+
+    @property
+    def by_rpdo(self) -> bool:
+        """Whether RPDOs are this writer's."""
+        return self.canopen in ("rpdo", "any")
+
+    @property
+    def by_sdo(self) -> bool:
+        """Whether SDO requests are this writer's."""
+        return self.canopen in ("sdo", "any")

@@ -1,0 +1,138 @@
+"""The status block as objects: the same numbers that Modbus shows from 60000 on, and the same requests for locks.
+
+Indices are fixed, like the block's addresses: a record of the header's fields, then one array for each table, with 254
+entries to an index. Entry n of a table of variables is variable n; variable 255 is entry 1 of the next index.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Final
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.dictionary import Abort, Access, Entry, Object, Pdo, array, record
+from gatewayd.core.cell import Cell
+from gatewayd.core.requester import Requester
+from gatewayd.core.status import StatusBlock
+from gatewayd.core.status_layout import RELEASE, REQUEST, TABLES, StatusField, StatusTable
+from gatewayd.links.canopen_node.pdo.codec import Mapped
+from gatewayd.links.canopen_node.plan import FIRST_STATUS_OBJECT
+from gatewayd.links.canopen_node.variables import ABORT_OF
+from gatewayd.links.registry import status_fields
+
+__all__ = ["HEADER", "TABLE_INDICES", "StatusObjects", "status_word"]
+
+HEADER: Final = FIRST_STATUS_OBJECT
+"""The record of the header's fields, in the order of `registry.status_fields`."""
+TABLE_INDICES: Final = {
+    "good": 0x5F01,
+    "writers_alive": 0x5F02,
+    "owner": 0x5F10,
+    "lease": 0x5F20,
+    "age": 0x5F30,
+    "quality": 0x5F40,
+}
+"""The first index of each table of `core.status_layout.TABLES`."""
+
+_LARGEST_ARRAY = 254
+_TYPES = {1: CanType.UNSIGNED16, 2: CanType.UNSIGNED32}
+"""By words of the block."""
+
+
+def status_word(index: int, subindex: int) -> Mapped | None:
+    """What a TPDO carries of the status block there; None if it may carry nothing.
+
+    Whether a table has so many entries, the dictionary knows.
+    """
+    if index == HEADER:
+        fields = status_fields()
+        field = fields[subindex - 1] if 0 < subindex <= len(fields) else None
+        if field is None or field.offset in (REQUEST, RELEASE):
+            return None
+        return Mapped(None, _TYPES[field.words], field.offset)
+    for table in TABLES:
+        chunk = index - TABLE_INDICES[table.name]
+        if subindex and 0 <= chunk < -(-table.words // _LARGEST_ARRAY):
+            return Mapped(None, CanType.UNSIGNED16, table.offset + chunk * _LARGEST_ARRAY + subindex - 1)
+    return None
+
+
+class StatusObjects:
+    """The objects of one cell's status block."""
+
+    def __init__(
+        self,
+        cell: Cell,
+        clock: Callable[[], float],
+        requester: Callable[[], Requester],
+        asking: Callable[[], Requester],
+    ) -> None:
+        """`clock`: the moment of the request that is being served; `requester`: who SDO clients are now.
+
+        `asking`: the same, when one asks for a lock.
+        """
+        self._block = StatusBlock(cell, status_fields())
+        self._definition = cell.definition
+        self._clock = clock
+        self._requester = requester
+        self._asking = asking
+
+    def objects(self) -> Iterator[Object]:
+        """5F00h and the tables that have entries."""
+        yield record(HEADER, "Status", (self._field(*item) for item in enumerate(status_fields(), 1)))
+        for table in TABLES:
+            names = self._names(table)
+            first = TABLE_INDICES[table.name]
+            for chunk in range(-(-len(names) // _LARGEST_ARRAY)):
+                start = chunk * _LARGEST_ARRAY
+                title = f"Status {table.name}" + (f" {chunk + 1}" if chunk else "")
+                entries = self._cells(table, start, names[start : start + _LARGEST_ARRAY])
+                yield array(first + chunk, title, entries)
+
+    def _field(self, subindex: int, field: StatusField) -> Entry:
+        writable = field.offset in (REQUEST, RELEASE)
+        return Entry(
+            subindex,
+            field.name,
+            _TYPES[field.words],
+            Access.RW if writable else Access.RO,
+            bytes(2 * field.words),
+            pdo=Pdo.NONE if writable else Pdo.TRANSMIT,
+            source=partial(self._read, field.offset, field.words),
+            sink=partial(self._write, field.offset) if writable else None,
+        )
+
+    def _names(self, table: StatusTable) -> Sequence[str]:
+        """What each entry of the table tells of."""
+        variables = [variable.name for variable in self._definition.variables]
+        if table.name == "writers_alive":
+            return [writer.name for writer in self._definition.writers]
+        if table.name == "good":
+            words = (variables[first : first + 16] for first in range(0, len(variables), 16))
+            return [f"{word[0]}..{word[-1]}" for word in words]
+        return variables
+
+    def _cells(self, table: StatusTable, start: int, names: Sequence[str]) -> Iterator[Entry]:
+        for number, name in enumerate(names):
+            offset = table.offset + start + number
+            yield Entry(
+                number + 1,
+                f"{table.name} {name}",
+                CanType.UNSIGNED16,
+                Access.RO,
+                bytes(2),
+                pdo=Pdo.TRANSMIT,
+                source=partial(self._read, offset, 1),
+            )
+
+    def _read(self, offset: int, words: int) -> bytes:
+        # The block has its high word first and its high byte first, so that all bytes are turned round.
+        return self._block.read(offset, words, self._clock())[::-1]
+
+    def _write(self, offset: int, data: bytes) -> None:
+        word = int.from_bytes(data, "little")
+        requester = self._asking() if offset == REQUEST and word else self._requester()
+        refusal = self._block.write(requester, offset, (word,), self._clock())
+        if refusal is not None:
+            raise Abort(ABORT_OF[refusal.reason])

@@ -1,0 +1,53 @@
+"""The words of the status block that a TPDO can carry, as the object dictionary has them (5F00h and 5F40h on).
+
+Only numbers that can be read: the words that take requests for locks say nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.core.status_layout import RELEASE, REQUEST
+from gatewayd.links.registry import status_fields
+
+__all__ = ["FIELD_NAMES", "StatusWord", "field_word", "quality_word"]
+
+_HEADER: Final = 0x5F00
+_QUALITY: Final = 0x5F40
+_LARGEST_ARRAY: Final = 254
+_TYPES: Final = {1: CanType.UNSIGNED16, 2: CanType.UNSIGNED32}
+_SUBINDICES: Final = {
+    field.name: (number, _TYPES[field.words])
+    for number, field in enumerate(status_fields(), 1)
+    if field.offset not in (REQUEST, RELEASE)
+}
+
+FIELD_NAMES: Final = tuple(_SUBINDICES)
+"""Fields of the header that a TPDO can carry."""
+
+
+@dataclass(frozen=True, slots=True)
+class StatusWord:
+    """One word of the status block in a TPDO."""
+
+    name: str
+    """As the mapping names it: `flags`, `quality of recipe[3]`."""
+    index: int
+    subindex: int
+    type: CanType
+    quality_of: int | None = None
+    """Index of the variable whose quality it is."""
+
+
+def field_word(name: str) -> StatusWord:
+    """A field of the header, one of `FIELD_NAMES`."""
+    subindex, can_type = _SUBINDICES[name]
+    return StatusWord(name, _HEADER, subindex, can_type)
+
+
+def quality_word(variable: int, name: str) -> StatusWord:
+    """The quality of the variable with that index and name."""
+    further, member = divmod(variable, _LARGEST_ARRAY)
+    return StatusWord(f"quality of {name}", _QUALITY + further, member + 1, CanType.UNSIGNED16, variable)

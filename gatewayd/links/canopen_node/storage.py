@@ -1,0 +1,384 @@
+"""Parameters that survive a restart: 1010h and 1011h, and the file behind them (CiA 301, 7.5.2.13 and .14).
+
+What is saved is what differs from the mapping, so that a changed mapping is not hidden by what was once equal to it.
+Saved values come back after every reset, each one only if its entry still exists with that length. The parameters of
+PDOs and of manufacturer objects mean something only together with the layout they were saved under: they come back
+only under the same one (`layout_of`). What is not taken over is reported and stays in the file until the next save.
+
+LSS keeps its node-ID in the same file. It holds while the mapping names the node-ID that it replaced.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, Object, Pdo, array
+from gatewayd.canopen.nmt import NmtCommand
+from gatewayd.links.canopen_node.plan import FIRST_STATUS_OBJECT
+
+__all__ = [
+    "ALL",
+    "FORMAT",
+    "GROUPS",
+    "JsonStore",
+    "LssSettings",
+    "MemoryStore",
+    "Parameters",
+    "Saved",
+    "Store",
+    "StoreError",
+    "layout_of",
+]
+
+FORMAT = 1
+"""Version of the file."""
+ALL = range(0x1000, 0x1_0000)
+_COMMUNICATION = range(0x1000, 0x2000)
+GROUPS: Mapping[int, tuple[str, range]] = {
+    1: ("all parameters", ALL),
+    2: ("communication parameters", _COMMUNICATION),
+    3: ("application parameters", range(0x6000, 0xA000)),
+    4: ("manufacturer parameters", range(0x2000, 0x6000)),
+}
+"""Sub-indices of 1010h and 1011h."""
+_PDOS = range(0x1400, 0x1C00)
+_MAPPINGS = range(0x1A00, 0x1C00)
+_BOUND_TO_LAYOUT = (_PDOS, range(0x2000, 0x1_0000))
+_SAVE = b"save"
+_LOAD = b"load"
+_ON_COMMAND = 1
+"""Capability: saves and restores when told to, never by itself."""
+
+Key = tuple[int, int]
+"""Index and sub-index."""
+
+
+class StoreError(Exception):
+    """The file cannot be read or written; the text names it and says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class LssSettings:
+    """What an LSS master has stored."""
+
+    node: int
+    replaces: int
+    """Node-ID that the mapping had then."""
+    bitrate: int | None = None
+    """Bits per second; None: that of the mapping."""
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """The content of a store."""
+
+    layout: int = 0
+    values: Mapping[Key, bytes] = field(default_factory=dict)
+    lss: LssSettings | None = None
+
+
+class Store(Protocol):
+    """Keeps one node's `Saved`."""
+
+    def load(self) -> Saved:
+        """What was saved last; empty if nothing was. Raises StoreError."""
+
+    def save(self, saved: Saved) -> None:
+        """Keep it, whole or not at all. Raises StoreError."""
+
+
+class MemoryStore:
+    """Keeps nothing beyond the process: for a node without a state directory."""
+
+    def __init__(self) -> None:
+        self._saved = Saved()
+
+    def load(self) -> Saved:
+        """What was saved last."""
+        return self._saved
+
+    def save(self, saved: Saved) -> None:
+        """Keep it in memory."""
+        self._saved = saved
+
+
+class JsonStore:
+    """A JSON file, replaced as a whole. Saving waits for the disk, which is why no node saves while OPERATIONAL."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def load(self) -> Saved:
+        """The file's content; empty if there is no file."""
+        try:
+            text = self.path.read_text(encoding="ascii")
+        except FileNotFoundError:
+            return Saved()
+        except (OSError, UnicodeError) as error:
+            raise StoreError(f"{self.path}: cannot be read: {error}") from None
+        try:
+            return _decode(json.loads(text))
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            raise StoreError(
+                f"{self.path}: is damaged ({error!r}): delete it, or save the parameters again"
+            ) from None
+
+    def save(self, saved: Saved) -> None:
+        """Write beside the file, wait for the disk, then take its place."""
+        beside = self.path.with_name(self.path.name + ".new")
+        try:
+            with beside.open("w", encoding="ascii") as file:
+                file.write(json.dumps(_encode(saved), indent=1) + "\n")
+                file.flush()
+                os.fsync(file.fileno())
+            beside.replace(self.path)
+            directory = os.open(self.path.parent, os.O_RDONLY)
+            try:
+                os.fsync(directory)
+            finally:
+                os.close(directory)
+        except OSError as error:
+            raise StoreError(f"{self.path}: cannot be written: {error}") from None
+
+
+def layout_of(dictionary: Iterable[Object], node: int, values: Mapping[Key, bytes] | None = None) -> int:
+    """32 bits that change when the defaults of a PDO change, or an object that it may carry, or one that is stored.
+
+    Defaults that contain the node-ID count without it: another node-ID is not another layout. The status block lies
+    where it lies; which variable an entry of its tables tells of counts only where `values` put one into a PDO.
+    """
+    digest = 0
+    tables = any(map(_maps_status_table, (values or {}).items()))
+    for one in dictionary:
+        if not _is_bound(one.index) or (one.index >= FIRST_STATUS_OBJECT and not tables):
+            continue
+        for entry in one.entries:
+            if not entry.stored and entry.pdo is Pdo.NONE:
+                continue
+            default = _rebased(entry, node, 0) if entry.plus_node else entry.default
+            text = f"{one.index:x}:{entry.subindex:x} {entry.type.name} {entry.name} {entry.pdo.name} "
+            kept = default.hex() if entry.stored else ""
+            digest = zlib.crc32((text + kept).encode(), digest)
+    return digest
+
+
+class Parameters:
+    """1010h, 1011h and the power-on values of all entries. Reads the store when it is made.
+
+    `node` is the node-ID of the mapping. `ready()` tells whether the node may wait for a disk now; `report(text)` is
+    called for what could not be taken over, `failed(whether)` when reading the store failed or a save put that right.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        node: int,
+        *,
+        ready: Callable[[], bool],
+        report: Callable[[str], None],
+        failed: Callable[[bool], None],
+    ) -> None:
+        self._store = store
+        self._ready = ready
+        self._report = report
+        self._failed = failed
+        self._planned = node
+        self._dictionary: Dictionary | None = None
+        self._layout = 0
+        self._saved = self._load()
+        self._node = self.lss.node if self.lss is not None else node
+
+    @property
+    def node(self) -> int:
+        """The node-ID that the defaults contain now; at first the one to start with."""
+        return self._node
+
+    @property
+    def lss(self) -> LssSettings | None:
+        """What an LSS master has stored."""
+        return self._saved.lss
+
+    def objects(self) -> Iterable[Object]:
+        """1010h and 1011h."""
+        yield array(0x1010, "Store parameters", self._entries("Save", self._save))
+        yield array(0x1011, "Restore default parameters", self._entries("Restore", self._restore))
+
+    def bind(self, dictionary: Dictionary) -> None:
+        """Take the dictionary whose entries are kept, and drop what no longer fits it."""
+        self._dictionary = dictionary
+        self._layout = layout_of(dictionary, self._node, self._saved.values)
+        kept = {key: value for key, value in self._saved.values.items() if self._fits(key, value)}
+        dropped = [f"{index:04X}h:{sub:02X}" for index, sub in self._saved.values if (index, sub) not in kept]
+        if dropped:
+            self._report(
+                "stored parameters do not fit this mapping, defaults are used: " + ", ".join(sorted(dropped))
+            )
+        self._saved = replace(self._saved, values=kept, layout=self._layout)
+
+    def report_differences(self) -> None:
+        """Report what was stored and is not what the mapping says."""
+        self._report_stored(self._saved.values, "stored parameters are used in place of the mapping's")
+
+    def apply(self, command: NmtCommand, node: int) -> None:
+        """Give the entries their power-on values: after "reset communication" those of communication alone.
+
+        Defaults follow `node` before. Those of PDOs are their table's own affair, which has to have followed already.
+        """
+        assert self._dictionary is not None
+        indices = _COMMUNICATION if command is NmtCommand.RESET_COMMUNICATION else ALL
+        for one in self._dictionary:
+            for entry in one.entries:
+                if entry.plus_node and one.index not in _PDOS:
+                    entry.default = _rebased(entry, self._node, node)
+                if one.index in indices:
+                    entry.value = self._saved.values.get((one.index, entry.subindex), entry.default)
+        self._node = node
+
+    def save_lss(self, node: int, bitrate: int | None) -> bool:
+        """Keep what an LSS master stores; whether that succeeded."""
+        try:
+            self._replace(replace(self._saved, lss=LssSettings(node, self._planned, bitrate)))
+        except StoreError:
+            return False
+        return True
+
+    def _load(self) -> Saved:
+        try:
+            saved = self._store.load()
+        except StoreError as error:
+            self._report(str(error))
+            self._failed(True)
+            return Saved()
+        lss = saved.lss
+        if lss is None or lss.replaces == self._planned:
+            return saved
+        self._report(
+            f"node-ID {lss.node} was stored by LSS in place of {lss.replaces}; "
+            f"the mapping names {self._planned} now, which is used"
+        )
+        return replace(saved, lss=None)
+
+    def _entries(self, verb: str, act: Callable[[range, bytes], None]) -> Iterable[Entry]:
+        for number, (name, indices) in GROUPS.items():
+            yield Entry(
+                number,
+                f"{verb} {name}",
+                CanType.UNSIGNED32,
+                Access.RW,
+                CanType.UNSIGNED32.pack(_ON_COMMAND),
+                sink=_bound(act, indices),
+            )
+
+    def _save(self, indices: range, signature: bytes) -> None:
+        """Keep what differs from the defaults now."""
+        assert self._dictionary is not None
+        self._permit(signature, _SAVE)
+        values = {key: value for key, value in self._saved.values.items() if key[0] not in indices}
+        for one in self._dictionary:
+            if one.index in indices:
+                values.update(
+                    ((one.index, entry.subindex), entry.value)
+                    for entry in one.entries
+                    if entry.stored and entry.value != entry.default
+                )
+        self._commit(values)
+        self._report_stored(values, "parameters were stored that are not the mapping's")
+
+    def _report_stored(self, values: Mapping[Key, bytes], what: str) -> None:
+        assert self._dictionary is not None
+        found = [
+            f"{index:04X}h:{sub:02X}"
+            for (index, sub), value in sorted(values.items())
+            if value != self._dictionary.entry(index, sub).default
+        ]
+        if found:
+            self._report(f"{what}: {', '.join(found)}")
+
+    def _restore(self, indices: range, signature: bytes) -> None:
+        """Forget what was saved; the present values stay until the next reset."""
+        self._permit(signature, _LOAD)
+        self._commit({key: value for key, value in self._saved.values.items() if key[0] not in indices})
+
+    def _permit(self, signature: bytes, expected: bytes) -> None:
+        if signature != expected:
+            raise Abort(AbortCode.CANNOT_STORE)
+        if not self._ready():
+            raise Abort(AbortCode.DEVICE_STATE)
+
+    def _commit(self, values: Mapping[Key, bytes]) -> None:
+        try:
+            self._layout = layout_of(self._dictionary or (), self._node, values)
+            self._replace(replace(self._saved, values=values, layout=self._layout))
+        except StoreError:
+            raise Abort(AbortCode.HARDWARE) from None
+
+    def _replace(self, saved: Saved) -> None:
+        try:
+            self._store.save(saved)
+        except StoreError as error:
+            self._report(str(error))
+            raise
+        self._saved = saved
+        self._failed(False)
+
+    def _fits(self, key: Key, value: bytes) -> bool:
+        assert self._dictionary is not None
+        try:
+            entry = self._dictionary.entry(*key)
+        except Abort:
+            return False
+        same_layout = self._saved.layout == self._layout or not _is_bound(key[0])
+        return entry.stored and same_layout and entry.type.size in (None, len(value))
+
+
+def _is_bound(index: int) -> bool:
+    return any(index in indices for indices in _BOUND_TO_LAYOUT)
+
+
+def _maps_status_table(item: tuple[Key, bytes]) -> bool:
+    (index, subindex), value = item
+    return index in _MAPPINGS and subindex > 0 and int.from_bytes(value, "little") >> 16 > FIRST_STATUS_OBJECT
+
+
+def _rebased(entry: Entry, old: int, new: int) -> bytes:
+    size = len(entry.default)
+    return (int.from_bytes(entry.default, "little") - old + new).to_bytes(size, "little")
+
+
+def _bound(act: Callable[[range, bytes], None], indices: range) -> Callable[[bytes], None]:
+    return lambda data: act(indices, data)
+
+
+def _encode(saved: Saved) -> dict[str, Any]:
+    lss = saved.lss
+    content: dict[str, Any] = {
+        "layout": saved.layout,
+        "values": {
+            f"{index:04x}:{sub:02x}": value.hex() for (index, sub), value in sorted(saved.values.items())
+        },
+        "lss": None if lss is None else {"node": lss.node, "replaces": lss.replaces, "bitrate": lss.bitrate},
+    }
+    return {"format": FORMAT, "checksum": _checksum(content), **content}
+
+
+def _decode(document: dict[str, Any]) -> Saved:
+    content = {key: document[key] for key in ("layout", "values", "lss")}
+    if document["format"] != FORMAT or document["checksum"] != _checksum(content):
+        raise ValueError("wrong format or checksum")
+    values = {}
+    for key, value in content["values"].items():
+        index, _, sub = key.partition(":")
+        values[int(index, 16), int(sub, 16)] = bytes.fromhex(value)
+    lss = content["lss"]
+    return Saved(content["layout"], values, None if lss is None else LssSettings(**lss))
+
+
+def _checksum(content: Mapping[str, Any]) -> int:
+    return zlib.crc32(json.dumps(content, sort_keys=True).encode())

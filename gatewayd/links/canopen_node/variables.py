@@ -1,0 +1,204 @@
+"""The variables of a cell as objects of the manufacturer area, for SDO; PDOs map the same objects.
+
+Reading gives the value of the image at that moment. Writing is a write request of the writer that SDO clients are: the
+cell applies or refuses it, and counts and records the refusal, whatever was wrong with the value.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from itertools import groupby
+from typing import Final
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.dictionary import (
+    Abort,
+    AbortCode,
+    Access,
+    Entry,
+    Object,
+    Pdo,
+    array,
+    record,
+    variable,
+)
+from gatewayd.core.cell import Cell, Change
+from gatewayd.core.definition import Direction, Value, ValueKind, Variable
+from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
+from gatewayd.links.canopen_node.pdo.codec import fit, native
+from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan
+
+__all__ = ["ABORT_OF", "VariableObjects"]
+
+ABORT_OF: Final = {
+    Reason.NO_SUCH_ADDRESS: AbortCode.NO_OBJECT,
+    Reason.NOT_WRITABLE: AbortCode.READ_ONLY,
+    Reason.HELD: AbortCode.LOCAL_CONTROL,
+    Reason.OUT_OF_LIMITS: AbortCode.INVALID_VALUE,
+    Reason.PARTIAL_VALUE: AbortCode.LENGTH,
+    Reason.ROBOT_LOST: AbortCode.DEVICE_STATE,
+    Reason.CLAIMED_ELSEWHERE: AbortCode.DEVICE_STATE,
+    Reason.HEARTBEAT_LOST: AbortCode.DEVICE_STATE,
+    Reason.PARTIAL_TAKEOVER: AbortCode.LENGTH,
+    Reason.WAITED: AbortCode.DEVICE_STATE,
+    Reason.NOT_MEANT: AbortCode.LOCAL_CONTROL,
+}
+"""What an SDO client is told when the cell refuses."""
+
+
+class VariableObjects:
+    """The objects of one cell's variables."""
+
+    def __init__(
+        self, plan: CanopenPlan, cell: Cell, clock: Callable[[], float], requester: Callable[[], Requester]
+    ) -> None:
+        """`clock`: the moment of the request that is being served; `requester`: who SDO clients are when they write."""
+        self._plan = plan
+        self._cell = cell
+        self._clock = clock
+        self._requester = requester
+        self._received = {
+            entry.variable
+            for pdo in plan.pdos
+            if pdo.direction is Direction.INPUT
+            for entry in pdo.entries
+            if entry.variable is not None
+        }
+
+    def objects(self) -> Iterator[Object]:
+        """By index: arrays where all sub-indices are of one type, with the mapping's names as names of the entries."""
+        placed = sorted(self._plan.objects, key=lambda item: (item.index, item.subindex))
+        used: Counter[str] = Counter()
+        for index, group in groupby(placed, key=lambda item: item.index):
+            items = tuple(group)
+            name = self._name(items)
+            used[name] += 1
+            yield self._object(index, name if used[name] == 1 else f"{name} {used[name]}", items)
+
+    def _name(self, items: Iterable[ObjectPlan]) -> str:
+        variables = self._cell.definition.variables
+        directions = {variables[item.variable].direction.value.capitalize() for item in items}
+        types = sorted({item.type.name for item in items})
+        return " ".join((*sorted(directions), *types))
+
+    def _object(self, index: int, name: str, items: tuple[ObjectPlan, ...]) -> Object:
+        entries = [self._entry(item) for item in items]
+        if entries[0].subindex == 0:
+            return variable(index, entries[0])
+        make = array if len({entry.type for entry in entries}) == 1 else record
+        return make(index, name, entries)
+
+    def _entry(self, item: ObjectPlan) -> Entry:
+        one = self._cell.definition.variables[item.variable]
+        source = partial(self._read, item)
+        default = item.type.pack(fit(one.kind.zero, item.type))
+        if one.direction is Direction.OUTPUT:
+            return Entry(
+                item.subindex, one.name, item.type, Access.RO, default, pdo=Pdo.TRANSMIT, source=source
+            )
+        low, high = _declared_bounds(one, item.type)
+        writable = self._is_writable(item.variable)
+        return _Input(
+            item.subindex,
+            one.name,
+            item.type,
+            Access.RWW if writable else Access.RO,
+            default,
+            low=low,
+            high=high,
+            pdo=Pdo.RECEIVE if writable else Pdo.NONE,
+            source=source,
+            sink=partial(self._write, item),
+        )
+
+    def _is_writable(self, index: int) -> bool:
+        plan = self._plan
+        return plan.sdo_writer is not None or plan.rpdo_writer is not None or index in self._received
+
+    def _read(self, item: ObjectPlan) -> bytes:
+        if item.variable in self._cell.unreadable:
+            raise Abort(AbortCode.DEVICE_STATE)
+        value = self._cell.image.values[item.variable]
+        try:
+            return item.type.pack(value)
+        except (struct.error, OverflowError):
+            return item.type.pack(fit(value, item.type))
+
+    def _write(self, item: ObjectPlan, data: bytes) -> None:
+        one, requester, now = (
+            self._cell.definition.variables[item.variable],
+            self._requester(),
+            self._clock(),
+        )
+        refusal, value = self._meaning(item, data, one)
+        if refusal is not None:
+            self._cell.refuse(requester, refusal, now, value)
+        elif value is not None:
+            refusal = self._cell.write(requester, [Change(item.variable, value)], now)
+        if refusal is not None:
+            raise Abort(_abort_code(refusal, one, value))
+
+    def _meaning(self, item: ObjectPlan, data: bytes, one: Variable) -> tuple[Refusal | None, Value | None]:
+        """What the cell is asked for, or why it need not be."""
+        if self._plan.sdo_writer is None:
+            return Refusal(Reason.NOT_WRITABLE, item.variable), None
+        if len(data) != item.type.size:
+            return Refusal(Reason.PARTIAL_VALUE, item.variable), None
+        if item.type is CanType.BOOLEAN and data[0] > 1:
+            return Refusal(Reason.OUT_OF_LIMITS, item.variable), data[0]
+        value = native(item.type.unpack(data), one.kind)
+        return (Refusal(Reason.OUT_OF_LIMITS, item.variable) if value is None else None), value
+
+
+class _Input(Entry):
+    """Leaves length and range to the cell, which records refusals; `low` and `high` are what the EDS tells of them."""
+
+    __slots__ = ()
+
+    def write(self, data: bytes) -> None:
+        """Hand any bytes to the sink. Raises Abort."""
+        assert self.sink is not None
+        self.sink(data)
+
+
+def _abort_code(refusal: Refusal, one: Variable, value: Value | None) -> AbortCode:
+    if refusal.reason is Reason.OUT_OF_LIMITS and value is not None:
+        low, high = _accepted(one)
+        if value > high:
+            return AbortCode.VALUE_TOO_HIGH
+        if value < low:
+            return AbortCode.VALUE_TOO_LOW
+    return ABORT_OF[refusal.reason]
+
+
+def _accepted(one: Variable) -> tuple[float, float]:
+    """Between which values the cell may take one as it is, or clamp it."""
+    if one.kind is ValueKind.BOOL:
+        return 0, 1
+    low = -math.inf if one.low is None else one.low
+    high = math.inf if one.high is None else one.high
+    limits = one.limits
+    if limits is None or limits.clamp:
+        return low, high
+    return max(low, limits.low), min(high, limits.high)
+
+
+def _declared_bounds(one: Variable, can_type: CanType) -> tuple[float | None, float | None]:
+    """The limits that the EDS tells: those that the type does not tell already."""
+    low, high = _accepted(one)
+    if can_type is CanType.BOOLEAN or can_type.is_real:
+        least, greatest = (-math.inf, math.inf) if can_type.is_real else (0.0, 1.0)
+    else:
+        signed = can_type.char.islower()
+        least = -(1 << can_type.bits - 1) if signed else 0
+        greatest = (1 << can_type.bits - signed) - 1
+        low, high = (
+            bound if math.isinf(bound) else rounded(bound)
+            for bound, rounded in ((low, math.ceil), (high, math.floor))
+        )
+    return (low if low > least else None), (high if high < greatest else None)

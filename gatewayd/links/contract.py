@@ -1,0 +1,300 @@
+"""What a kind of link has to say and do: the only thing that the rest of the gateway knows of Modbus or CANopen.
+
+A kind is a package with three modules that load apart, because not everybody needs all of it:
+
+- `declaration` (`KIND`): its key, how it describes a plan, what its status words and metrics are. Light; for everybody.
+- `language` (`LANGUAGE`): its part of the mapping language, with rules. For `check`, `show` and the compiling process.
+- `runtime` (`RUNTIME`): the link itself. For the daemon.
+
+Everything has a default but for what makes the kind one. `gatewayd.links.registry` names the packages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Protocol
+
+if TYPE_CHECKING:
+    # A check, which has no use for a running cell, imports this module.
+    from gatewayd.core.cell import Cell
+    from gatewayd.core.definition import CellDefinition
+    from gatewayd.core.status_layout import StatusField
+    from gatewayd.mapping.plan import LinkPlan, Plan
+
+__all__ = [
+    "Context",
+    "Description",
+    "Level",
+    "Link",
+    "LinkHealth",
+    "LinkKind",
+    "LinkMetric",
+    "LinkRuntime",
+    "Names",
+    "Place",
+    "PrepareError",
+    "Prepared",
+    "SharedPart",
+    "SourceLink",
+]
+
+# -- declaration -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class LinkMetric:
+    """A gauge or counter (`..._total`) with one sample for each link, whose cell is its label."""
+
+    name: str
+    figure: str
+    """The figure of the link's health that has the value."""
+    meaning: str
+    label: str = ""
+    """A further label; the figure is then a mapping from its values to numbers."""
+    shared: tuple[str, str] | None = None
+    """Of something that several cells share: a label in place of the cell, and the figure that says which it is."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What tells its samples apart."""
+        first = self.shared[0] if self.shared is not None else "cell"
+        return (first, self.label) if self.label else (first,)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a link shows one variable."""
+
+    text: str
+    """For people, in one piece: `holding 100 (400101) int32`."""
+    fields: Mapping[str, object]
+    """For programs: the object that the control interface has of it (`LinkKind.place`)."""
+    area: str
+    """For the page: `holding`, `object`."""
+    address: str
+    """Within the area: `100`, `0.3`, `2010h:01`."""
+    notation: str
+    """The address as others spell it, or what else leads there: `400101`, `COB-ID 0x190`."""
+    type: str
+
+
+class Names(str):
+    """A setting that is a list of names with blanks between them: what differs is shown name by name."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A plan of a link in words. What is not set is missing; parts of a cell go by their names, never by index."""
+
+    settings: Mapping[str, str] = field(default_factory=dict)
+    """Fact -> text: two plans differ where these do, so every number that matters stands in one."""
+    places: Mapping[int, Sequence[Place]] = field(default_factory=dict)
+    """By index of the variable."""
+    writers: Mapping[int, str] = field(default_factory=dict)
+    """How the writer with this index is known."""
+    address: str = ""
+    """Where it is, in one piece: `127.0.0.1:502 unit 1`."""
+    fields: Mapping[str, object] = field(default_factory=dict)
+    """What the control interface says of the link besides its health: `{"listen": ..., "unit": ...}`."""
+
+
+class LinkKind:
+    """One kind of link: what everybody may know of it."""
+
+    key: ClassVar[str]
+    """Of its section, and of its places at variables and writers: `modbus`."""
+    title: ClassVar[str]
+    """For headlines: `Modbus TCP server`."""
+    fields: ClassVar[Mapping[str, str]] = {}
+    """Fields of its object in the status of the control interface, and what they mean."""
+    place: ClassVar[str] = ""
+    """What the control interface has of a variable at the key, in words; empty: its links have no places."""
+    has_one_place: ClassVar[bool] = False
+    """A variable has one place at most: the interface has that or null, not a list."""
+    status_fields: ClassVar[tuple[StatusField, ...]] = ()
+    """Words of the status block that its links tell (`Cell.health.words`), at addresses that nobody else has."""
+    metrics: ClassVar[tuple[LinkMetric, ...]] = ()
+    usual: ClassVar[bool] = False
+    """Nearly every cell has one: its runtime is imported while the mapping files are read."""
+
+    def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
+        """The plan in words."""
+        raise NotImplementedError
+
+    def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
+        """Whether a running link can go on with another plan (`Link.rebind`). Asked before anything moves."""
+        return False
+
+    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
+        """Facts among its settings by whose change owners would lose their connection, or find another robot.
+
+        A link that is to be removed is asked with its present plan as both.
+        """
+        return ()
+
+    def disturbs(
+        self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
+    ) -> Iterable[str]:
+        """What else must not happen unasked, in words."""
+        return ()
+
+
+# -- runtime -----------------------------------------------------------------------------------------------------
+
+
+class Level(IntEnum):
+    """How a part of the picture is: idle things are grey, the others green, yellow and red."""
+
+    IDLE = 0
+    GOOD = 1
+    WARN = 2
+    BAD = 3
+
+
+@dataclass(frozen=True, slots=True)
+class LinkHealth:
+    """How a link is at this moment."""
+
+    name: str = ""
+    """For headlines: `Modbus 127.0.0.1:502`, `CAN can0`."""
+    level: Level = Level.GOOD
+    words: str = ""
+    """Its state in a few words: `listening`, `bus-off`."""
+    detail: str = ""
+    """More of it: `2 connections`."""
+    problems: tuple[str, ...] = ()
+    """What keeps the cell from being well, each in words with cause and remedy."""
+    figures: Mapping[str, object] = field(default_factory=dict)
+    """By name, for the control interface (`LinkKind.fields`) and metrics."""
+
+
+class Link:
+    """One connection to the outside of one cell."""
+
+    title: ClassVar[str]
+    """In the log, before the name of the cell: `robot link`."""
+
+    @property
+    def progress(self) -> int | None:
+        """Moves while `run` works, whatever the other side does; 0: it has not begun. For the watchdog.
+
+        None: the link has no work of its own, what it shares with others does it.
+        """
+        return None
+
+    @property
+    def reachable(self) -> bool | None:
+        """Whether a writer can reach the cell by it now; None: no writer ever comes this way."""
+        return None
+
+    @property
+    def settled(self) -> bool:
+        """False while it is about to know more: a reload waits a little."""
+        return True
+
+    async def run(self) -> None:
+        """Work until cancelled."""
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`; called before anything that waited is served."""
+
+    def release(self, now: float) -> None:
+        """It will not go on: writers that it alone knows are lost, in the old cell, before there is a new one."""
+
+    def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
+        """Go on with another plan and the successor of the cell; only where `LinkKind.fits` said so."""
+        raise NotImplementedError
+
+    def flush(self, now: float) -> None:
+        """Send at once what is due."""
+
+    async def close(self) -> None:
+        """Send what is still due; `run` is cancelled afterwards."""
+
+    def health(self) -> LinkHealth:
+        """How it is now."""
+        return LinkHealth()
+
+
+class SourceLink(Link):
+    """The link that tells the values of a cell and takes what is written: every cell has exactly one.
+
+    Its losses are the cell's (`Cell.robot_lost`), and freshness is about it.
+    """
+
+    sent_listeners: list[Callable[[], None]]
+    """Called after something that was written has been sent. They must not raise."""
+
+
+class PrepareError(OSError):
+    """Something that several cells use cannot be had; the text says what and why."""
+
+
+class Prepared(Protocol):
+    """What a shared part needs for other plans, ready and not in use yet."""
+
+    def commit(self) -> None:
+        """Have it in use by the next `SharedPart.serve`. Cannot fail."""
+
+    async def abort(self) -> None:
+        """Give it back; nothing has changed."""
+
+
+class SharedPart:
+    """What the links of one kind use together in all cells: listeners."""
+
+    async def run(self) -> None:
+        """Work until cancelled; what cannot be had yet is tried again."""
+        raise NotImplementedError
+
+    def progress(self) -> Mapping[str, int]:
+        """A counter for each thing that has to go on, by its name for the log; 0: it has not begun."""
+        return {}
+
+    def troubles(self) -> Sequence[str]:
+        """What concerns the gateway as a whole, in a few words each."""
+        return ()
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`; called before anything that waited is served."""
+
+    async def prepare(self, plans: Sequence[Plan]) -> Prepared:
+        """Have ready what these plans need besides what there is. Raises PrepareError."""
+        raise NotImplementedError
+
+    def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
+        """Serve these links from now on, and no others. `successors` are cells that took the place of another one."""
+        raise NotImplementedError
+
+    async def close(self) -> None:
+        """Take nothing more: nobody writes afterwards."""
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What a link is made with, besides plan and cell."""
+
+    now: float
+    state: Path
+    """Directory of what is kept across restarts."""
+    shared: SharedPart | None = None
+    """What the kind shares, as `LinkRuntime.share` made it."""
+    former: Link | None = None
+    """The link that this one replaces, whose `run` has ended or will have before this one's begins."""
+
+
+class LinkRuntime:
+    """Makes links of one kind."""
+
+    def share(self) -> SharedPart | None:
+        """What all links of the kind use together; made once for a daemon."""
+        return None
+
+    def make(self, plan: LinkPlan, cell: Cell, context: Context) -> Link:
+        """A link that does nothing before its `run`."""
+        raise NotImplementedError

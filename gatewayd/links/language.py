@@ -1,0 +1,182 @@
+"""What a kind of link adds to the mapping language: the part of the contract for `check`, `show` and the compiler.
+
+Everything has a default but for what makes the kind one. What the language, its rules and its tables want to know of a
+link they ask here; they name none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from gatewayd.mapping.diagnostics import Diagnostic, Position, Related
+from gatewayd.mapping.document import Document, Part
+from gatewayd.mapping.expanded import CellSettings, Defined, ExpandedCell, ExpandedLink, ExpandedVariable
+from gatewayd.mapping.model import VariableSpec, WriterSpec
+from gatewayd.mapping.plan import LinkPlan
+from gatewayd.mapping.reach import Reach
+from gatewayd.mapping.section import Section
+
+__all__ = ["DefiningLanguage", "LinkLanguage", "WriterName"]
+
+
+@dataclass(frozen=True, slots=True)
+class WriterName:
+    """A place in a link's section that names a writer."""
+
+    name: str
+    position: Position
+    role: str
+    """What the writer is there: `the writer that the watchdog requires,`."""
+    no_any: str = ""
+    """What is wrong with `any` there; empty: nothing."""
+    whole: Position | None = None
+    """Where to say so: the place of all names."""
+
+
+class LinkLanguage:
+    """One kind's sections, places, writers' keys, expansion, compilation and rules."""
+
+    # -- what it is called -------------------------------------------------------------------------------------------
+
+    key: ClassVar[str]
+    """Of the kind: the key of its section, and of its places at variables and writers."""
+    section: ClassVar[type[Section]]
+    """The table at the top of the file."""
+    meaning: ClassVar[str]
+    """What the section is, for editors: `the Modbus TCP server`."""
+    required: ClassVar[bool] = False
+    defines: ClassVar[bool] = False
+    """Whether it is a `DefiningLanguage`."""
+    counts_absent: ClassVar[bool] = False
+    """Whether a cell without the section has the fingerprint of one whose link is null: so it was from the first."""
+    variable_keys: ClassVar[type[Section] | None] = None
+    """Keys that a variable has by this kind, before those of the language: where it is."""
+    variable_policies: ClassVar[type[Section] | None] = None
+    """Keys of a variable by this kind that come after those."""
+    writer_keys: ClassVar[type[Section] | None] = None
+    """Keys that a writer has by this kind; the one called `key` says how it is known."""
+    rules: ClassVar[tuple[str, ...]] = ()
+    """Modules whose import enters the kind's rules."""
+    tables: ClassVar[str] = ""
+    """Module with `TABLES`, the kind's `LinkTables`, for `show`."""
+    exports: ClassVar[str] = ""
+    """Module with `EXPORTS`, a tuple of `Export`."""
+
+    # -- findings about its sections ---------------------------------------------------------------------------------
+
+    nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {}
+    """Sections inside sections, by the first step of the path that leads there."""
+    articles: ClassVar[Mapping[type[Section], str]] = {}
+    """What its sections are called in a finding: `the section \\`modbus\\``."""
+    places: ClassVar[tuple[type[Section], ...]] = ()
+    """Sections inside a variable, beside whose keys those of the variable are expected."""
+    telling_keys: ClassVar[tuple[str, ...]] = ()
+    """Keys of its section that are seen at the top of the file."""
+    elsewhere: ClassVar[Mapping[tuple[type[Section], str], str]] = {}
+    """Hints for keys that people write into the wrong section."""
+    synonyms: ClassVar[Mapping[tuple[str, str], str]] = {}
+    """(key, word in capitals) -> what the word is called here."""
+    output_policies: ClassVar[Mapping[str, str]] = {}
+    """Keys of a variable that never act on an input -> what they say."""
+
+    def broken(self, part: Part[Section]) -> Iterable[Diagnostic]:
+        """What is wrong with its section although all of its values are valid; the section is left out then."""
+        return ()
+
+    def without_effect(self, document: Document) -> Iterable[tuple[Position, str, str]]:
+        """Keys of its section that nothing in the file lets act: place, what is wrong, and the remedy."""
+        return ()
+
+    def names_writers(self, document: Document) -> Iterable[WriterName]:
+        """Places of its section that name writers."""
+        return ()
+
+    # -- writers -----------------------------------------------------------------------------------------------------
+
+    writer_example: ClassVar[str] = ""
+    """How a writer is made known: `modbus: 192.168.1.20`."""
+    way: ClassVar[str] = ""
+    """What people call writing by this kind, where it is only one service; empty: as its key."""
+    supervision_example: ClassVar[str] = ""
+    """How it is supervised by this kind: `node: 1, heartbeat: 1s`; empty: by `timeout` only."""
+    lost_by: ClassVar[str] = ""
+    """How its writers are lost, where they have no connection that could end."""
+
+    def knows(self, writer: WriterSpec) -> bool:
+        """Whether the writer can write by this kind of link."""
+        return False
+
+    def names(self, writer: WriterSpec) -> Sequence[str]:
+        """How the writer is known, in words: `192.168.1.20`, `RPDO, heartbeat of node 1`."""
+        return ()
+
+    def silence(self, writer: WriterSpec) -> float | None:
+        """Seconds without a sign of life of its own (not a request) after which the writer is lost by this kind."""
+        return None
+
+    def ways_of_writer(self, writer: WriterSpec) -> frozenset[str]:
+        """Services by which the writer writes, as people call them."""
+        return frozenset({self.way or self.key} if self.knows(writer) else ())
+
+    def ways_of_variable(self, variable: ExpandedVariable, cell: ExpandedCell) -> frozenset[str]:
+        """Services by which the variable can be written."""
+        return frozenset({self.way or self.key} if self.places_of(variable.part, cell.document) else ())
+
+    def writes_whole(
+        self, writer: WriterSpec, variables: Sequence[ExpandedVariable], cell: ExpandedCell
+    ) -> bool:
+        """Whether one request of the writer can write all of these."""
+        return False
+
+    def apart(self, variables: Sequence[ExpandedVariable], cell: ExpandedCell) -> Related | None:
+        """Which of these lies too far from the others for one request."""
+        return None
+
+    # -- variables ---------------------------------------------------------------------------------------------------
+
+    place_example: ClassVar[str] = ""
+    """How a variable gets a place: `modbus: N`."""
+
+    def places_of(self, line: Part[VariableSpec], document: Document) -> bool:
+        """Whether a line of the file has a place by this kind."""
+        return False
+
+    def more_places(self, variable: ExpandedVariable) -> str:
+        """How one variable gets several places by this kind; empty: it does not."""
+        return ""
+
+    def reaches(self, cell: ExpandedCell) -> Iterable[tuple[int, Reach]]:
+        """Which values its places show, by index of the variable; places that show all need not be named."""
+        return ()
+
+    # -- from the file to the plan -----------------------------------------------------------------------------------
+
+    def expand(self, document: Document, variables: Sequence[ExpandedVariable]) -> ExpandedLink | None:
+        """The kind's side of a cell, laid out; None: it has none. Never raises, whatever valid parts there are."""
+        return None
+
+    def compile(self, cell: ExpandedCell) -> LinkPlan:
+        """The plan of a cell without errors that has the section."""
+        raise NotImplementedError
+
+
+class DefiningLanguage(LinkLanguage):
+    """The language of the one kind that defines variables: their range, type and direction."""
+
+    defines = True
+    unwritten: ClassVar[Mapping[str, object]] = {}
+    """Fields of `CellDefinition` -> what they are where the file says nothing, if not the core's default."""
+
+    def define(self, line: Part[VariableSpec], document: Document) -> tuple[Sequence[Defined], bool]:
+        """The values that a line names, in order, and whether they are a family. Raises UndefinedError."""
+        raise NotImplementedError
+
+    def named(self, line: Part[VariableSpec]) -> str:
+        """What a line names, as written."""
+        raise NotImplementedError
+
+    def settings(self, document: Document) -> CellSettings:
+        """What its section says of the cell."""
+        raise NotImplementedError

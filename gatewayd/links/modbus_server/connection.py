@@ -1,0 +1,187 @@
+"""One connection of a peer: from its acceptance by asyncio to its end.
+
+asyncio owns the socket's life: it accepts, keeps answers that the peer does not take yet, and closes. It does not read.
+Telling a protocol of a few bytes costs it more than answering them costs us, so the listener's `ReadPoller` watches
+all sockets, and each one is read straight into the buffer of its `ModbusSession`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+from typing import Protocol, cast
+
+from gatewayd.core.requester import new_connection
+from gatewayd.links.modbus_server.peers import Address, address_of
+from gatewayd.links.modbus_server.polling import ReadPoller
+from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
+from gatewayd.links.modbus_server.sockets import has_unread, seconds_since_established, set_options
+from gatewayd.links.modbus_server.waiting import WaitedInput
+from gatewayd.logs.records import fields
+from gatewayd.loop import clock
+from gatewayd.report.format import address as address_text
+
+__all__ = ["PeerAdmission", "PeerConnection"]
+
+_log = logging.getLogger("gatewayd.modbus")
+
+
+class PeerAdmission(Protocol):
+    """Decides who is served, and hears of the end of everybody who is."""
+
+    def connected(self, connection: PeerConnection) -> None:
+        """A peer has connected. It is served unless this call aborts the connection."""
+
+    def disconnected(self, connection: PeerConnection) -> None:
+        """A connection has ended, admitted or not."""
+
+
+class PeerConnection(asyncio.BufferedProtocol):
+    """The requests of one peer in, the answers out.
+
+    `get_buffer` stays undefined on purpose: if asyncio ever read, in spite of being paused, it would fail the
+    connection instead of losing requests.
+    """
+
+    wire: asyncio.Transport
+
+    def __init__(self, admission: PeerAdmission, poller: ReadPoller) -> None:
+        self.admission = admission
+        self.poller = poller
+        self.session = ModbusSession()
+        self.receive = self.session.received
+        """What takes the bytes that came in; another function while they may have waited."""
+        self.waiting: WaitedInput | None = None
+        self.number = new_connection()
+        self.peer = ""
+        self.address: Address | None = None
+        self.accesses: dict[int, UnitAccess] = {}
+        self.last_request = 0.0
+        """When the last whole request came in; bytes that make none keep no connection open."""
+        self.stalled_since: float | None = None
+        self.established = 0.0
+        """When the kernel had the connection; it may have waited for its acceptance."""
+        self.reason = "closed by the peer"
+        self.descriptor = -1
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """See asyncio; called once, after the connection was accepted."""
+        self.wire = cast("asyncio.Transport", transport)
+        # Answers that the peer does not take stop its requests at once, so at most one turn's answers ever wait.
+        self.wire.set_write_buffer_limits(high=0)
+        peer = self.wire.get_extra_info("peername")
+        if not peer:
+            self.wire.abort()
+            return
+        self.peer = address_text(peer[0], peer[1])
+        self.address = address_of(peer[0])
+        sock = self.wire.get_extra_info("socket")
+        self.descriptor = sock.fileno()
+        set_options(sock)
+        now = clock.now()
+        self.last_request, self.established = now, now - seconds_since_established(sock)
+        self.admission.connected(self)
+        # asyncio begins to read after this call, in the same turn of the loop. Later versions skip that if reading is
+        # paused by now; that of Python 3.11.2 (Debian 12) begins regardless. All of them obey a pause in the next turn,
+        # and calls made here come before the sockets of that turn.
+        asyncio.get_running_loop().call_soon(self._begin)
+
+    def _begin(self) -> None:
+        """Have the poller read in asyncio's place."""
+        if not self.wire.is_closing():
+            self.wire.pause_reading()
+            self.poller.add(self.descriptor, self.readable)
+
+    def readable(self) -> None:
+        """The socket has something to read: the hot path."""
+        session = self.session
+        try:
+            count = os.readv(self.descriptor, session.buffer.space)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            self.abort(str(error))
+            return
+        if not count:
+            self.drop("closed by the peer")
+            return
+        # Only now: until the bytes were read they may have waited, and others of this turn were served before.
+        now = clock.judged_now()
+        try:
+            answers = self.receive(count, now)
+        except Exception:  # noqa: BLE001 - a defect of ours costs this connection, not the others
+            received = bytes(session.buffer.data[: session.buffer.end + count]).hex(" ")
+            _log.exception("a request could not be answered", extra=fields(peer=self.peer, received=received))
+            self.abort("internal error")
+            return
+        if answers:
+            self.last_request = now
+            try:
+                sent = os.write(self.descriptor, answers)
+            except (BlockingIOError, InterruptedError):
+                sent = 0
+            except OSError as error:
+                self.abort(str(error))
+                return
+            if sent < len(answers):
+                self.wire.write(answers[sent:])
+        if session.broken:
+            self.drop(f"no Modbus TCP: {session.broken}")
+
+    def stood_still(self, since: float, until: float) -> None:
+        """Nothing was read for this time: it is no silence of the peer, and what is in the socket may be that old."""
+        length = until - since
+        self.last_request += length
+        if self.stalled_since is not None:
+            self.stalled_since += length
+        self.wait(since, until)
+
+    def wait(self, since: float, until: float) -> None:
+        """What is in the socket may have waited from `since` to `until`."""
+        unread = bool(self.session.buffer.end) or has_unread(self.descriptor)
+        self.waiting = WaitedInput(since, until, unread=unread, former=self.waiting)
+        self.receive = self._receive_late
+
+    def _receive_late(self, count: int, now: float) -> bytes:
+        """In place of `session.received`, until all that waited was read."""
+        session, waiting = self.session, self.waiting
+        waited = waiting.seconds(now) if waiting is not None else 0.0
+        if waiting is None or not waited:
+            self.waiting, self.receive = None, session.received
+            return session.received(count, now)
+        asked = len(session.buffer.space[0])
+        answers = session.received_late(count, now, waited)
+        if count < asked and not session.buffer.end:
+            waiting.drained()
+        return answers
+
+    def pause_writing(self) -> None:
+        """See asyncio; the peer does not read its answers: take no more requests."""
+        self.stalled_since = clock.now()
+        self.poller.remove(self.descriptor)
+
+    def resume_writing(self) -> None:
+        """See asyncio; the peer has caught up."""
+        self.stalled_since = None
+        if not self.wire.is_closing():
+            self.poller.add(self.descriptor, self.readable)
+
+    def drop(self, reason: str) -> None:
+        """Close the connection after what was answered already."""
+        self.reason = reason
+        self.poller.remove(self.descriptor)
+        self.wire.close()
+
+    def abort(self, reason: str) -> None:
+        """Close the connection at once."""
+        self.reason = reason
+        self.poller.remove(self.descriptor)
+        self.wire.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """See asyncio; called after the connection has ended, whoever ended it."""
+        if exc is not None:
+            self.reason = str(exc)
+        self.poller.remove(self.descriptor)
+        self.admission.disconnected(self)

@@ -1,0 +1,62 @@
+"""What everybody may know of this kind of link."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from gatewayd.core.definition import CellDefinition
+from gatewayd.core.status_layout import StatusField
+from gatewayd.links.contract import Description, LinkKind, LinkMetric
+from gatewayd.links.modbus_server.description import description
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.mapping.plan import LinkPlan
+
+__all__ = ["KIND"]
+
+
+class ModbusServer(LinkKind):
+    """The kind with the section `modbus`."""
+
+    key = "modbus"
+    title = "Modbus TCP server"
+    usual = True
+    fields = {  # noqa: RUF012 - never changed
+        "listen": "host:port of the listener",
+        "unit": "unit id",
+        "connections": "open connections of the listener",
+    }
+    status_fields = (
+        StatusField(26, 1, "modbus_connections", "open Modbus connections to this unit's listener"),
+    )
+    metrics = (
+        LinkMetric(
+            "gatewayd_modbus_up",
+            "listening",
+            "1 while the listener accepts connections",
+            shared=("listener", "listen"),
+        ),
+        LinkMetric(
+            "gatewayd_modbus_connections",
+            "connections",
+            "open Modbus connections",
+            shared=("listener", "listen"),
+        ),
+    )
+    place = "list of its places: `area`, `address` from 0, `bit` or null, `notation` (4xxxxx form)"
+
+    def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
+        """The unit and its map."""
+        assert isinstance(plan, ModbusPlan)
+        return description(plan)
+
+    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
+        """Clients of another listener or unit connect anew."""
+        return ("listen", "unit")
+
+    def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
+        """A unit always goes on; if it moves to another listener, its clients have to follow."""
+        return True
+
+
+KIND = ModbusServer()
+"""What everybody may know of this kind of link."""

@@ -1,0 +1,293 @@
+"""The Modbus functions a unit serves: from one request PDU to one answer PDU, at one moment, without side effects
+before everything that can be refused has been checked.
+
+The order of checks is the specification's (V1.1b3, 6): function 01, quantity, byte count and length 03, address range
+02, then execution. A refusal of the cell becomes the exception code of `EXCEPTION_OF`.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from enum import IntEnum
+
+from gatewayd.core import status_layout
+from gatewayd.core.cell import Cell, Change
+from gatewayd.core.definition import Value
+from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import Requester
+from gatewayd.core.status import StatusBlock
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.registers import (
+    MAX_BITS,
+    MAX_REGISTERS,
+    BitTable,
+    RegisterImage,
+    RegisterTable,
+)
+from gatewayd.links.registry import status_fields
+from gatewayd.modbus import identification
+from gatewayd.modbus.identification import Identification
+
+__all__ = ["EXCEPTION_OF", "ExceptionCode", "Unit", "exception", "execute"]
+
+
+class ExceptionCode(IntEnum):
+    """Why a request is not answered with data (V1.1b3, 7)."""
+
+    ILLEGAL_FUNCTION = 0x01
+    ILLEGAL_ADDRESS = 0x02
+    ILLEGAL_VALUE = 0x03
+    BUSY = 0x06
+    PATH_UNAVAILABLE = 0x0A
+    TARGET_FAILED = 0x0B
+
+
+EXCEPTION_OF = {
+    Reason.NO_SUCH_ADDRESS: ExceptionCode.ILLEGAL_ADDRESS,
+    Reason.NOT_WRITABLE: ExceptionCode.ILLEGAL_ADDRESS,
+    Reason.HELD: ExceptionCode.BUSY,
+    Reason.OUT_OF_LIMITS: ExceptionCode.ILLEGAL_VALUE,
+    Reason.PARTIAL_VALUE: ExceptionCode.ILLEGAL_VALUE,
+    Reason.ROBOT_LOST: ExceptionCode.TARGET_FAILED,
+    Reason.CLAIMED_ELSEWHERE: ExceptionCode.PATH_UNAVAILABLE,
+    Reason.HEARTBEAT_LOST: ExceptionCode.TARGET_FAILED,
+    Reason.PARTIAL_TAKEOVER: ExceptionCode.ILLEGAL_VALUE,
+    Reason.WAITED: ExceptionCode.BUSY,
+    Reason.NOT_MEANT: ExceptionCode.BUSY,
+}
+
+
+class Unit:
+    """One robot cell as a Modbus unit."""
+
+    def __init__(self, plan: ModbusPlan, cell: Cell) -> None:
+        self.plan = plan
+        self.cell = cell
+        self.image = RegisterImage(plan, cell)
+        self.status = StatusBlock(cell, status_fields())
+        self.identification = Identification(cell.definition.name, cell.definition.fingerprint)
+
+    def close(self) -> None:
+        """Follow the cell no longer."""
+        self.image.close()
+
+
+Answer = bytes | ExceptionCode
+_Function = Callable[[Unit, Requester, bytes, float], Answer]
+
+_MAX_WRITTEN_BITS = 1968
+_MAX_WRITTEN_REGISTERS = 123
+_MAX_WRITTEN_WITH_READ = 121
+_COIL_ON = 0xFF00
+_STATUS_END = status_layout.BASE + status_layout.LENGTH
+
+_TWO_WORDS = struct.Struct(">HH")
+_MASK = struct.Struct(">HHH")
+_WRITE_MULTIPLE = struct.Struct(">HHB")
+_READ_WRITE = struct.Struct(">HHHHB")
+
+
+def execute(unit: Unit, requester: Requester, pdu: bytes, now: float) -> bytes:
+    """The answer to a request of `requester`."""
+    function = _FUNCTIONS.get(pdu[0])
+    answer = ExceptionCode.ILLEGAL_FUNCTION if function is None else function(unit, requester, pdu, now)
+    return exception(pdu[0], answer) if isinstance(answer, ExceptionCode) else answer
+
+
+def exception(function: int, code: ExceptionCode) -> bytes:
+    """The answer that refuses a request of `function`."""
+    return bytes((function | 0x80, code))
+
+
+# -- reading ----------------------------------------------------------------------------------------------------------
+
+
+def _read_coils(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
+    return _read_bits(unit.image.coils, pdu)
+
+
+def _read_discrete(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
+    return _read_bits(unit.image.discrete, pdu)
+
+
+def _read_holding(unit: Unit, _requester: Requester, pdu: bytes, now: float) -> Answer:
+    return _read_registers(unit, unit.image.holding, pdu, now)
+
+
+def _read_input(unit: Unit, _requester: Requester, pdu: bytes, now: float) -> Answer:
+    return _read_registers(unit, unit.image.input, pdu, now)
+
+
+def _read_bits(table: BitTable, pdu: bytes) -> Answer:
+    if len(pdu) != 5:
+        return ExceptionCode.ILLEGAL_VALUE
+    address, count = _TWO_WORDS.unpack_from(pdu, 1)
+    if not 1 <= count <= MAX_BITS:
+        return ExceptionCode.ILLEGAL_VALUE
+    if table.readable.reach[address] < count:
+        return _unreadable(table.readable.mapped[address], count)
+    bits = table.read(address, count)
+    return bytes((pdu[0], len(bits))) + bits
+
+
+def _read_registers(unit: Unit, table: RegisterTable, pdu: bytes, now: float) -> Answer:
+    if len(pdu) != 5:
+        return ExceptionCode.ILLEGAL_VALUE
+    address, count = _TWO_WORDS.unpack_from(pdu, 1)
+    if not 1 <= count <= MAX_REGISTERS:
+        return ExceptionCode.ILLEGAL_VALUE
+    refused = _refuse_registers(table, address, count)
+    if refused is not None:
+        return refused
+    return bytes((pdu[0], 2 * count)) + _registers(unit, table, address, count, now)
+
+
+def _refuse_registers(table: RegisterTable, address: int, count: int) -> ExceptionCode | None:
+    """Why these registers cannot be read, if they cannot."""
+    if table.readable.reach[address] >= count or _of_status(address, count):
+        return None
+    return _unreadable(table.readable.mapped[address], count)
+
+
+def _unreadable(mapped: int, count: int) -> ExceptionCode:
+    """Mapped, but held back because the robot no longer sends; or not mapped at all."""
+    return ExceptionCode.TARGET_FAILED if mapped >= count else ExceptionCode.ILLEGAL_ADDRESS
+
+
+def _registers(unit: Unit, table: RegisterTable, address: int, count: int, now: float) -> bytes:
+    if address >= status_layout.BASE:
+        return unit.status.read(address - status_layout.BASE, count, now)
+    return bytes(table.image[2 * address : 2 * (address + count)])
+
+
+def _of_status(address: int, count: int) -> bool:
+    return address >= status_layout.BASE and address + count <= _STATUS_END
+
+
+# -- writing ----------------------------------------------------------------------------------------------------------
+
+
+def _write_coil(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
+    if len(pdu) != 5:
+        return ExceptionCode.ILLEGAL_VALUE
+    address, value = _TWO_WORDS.unpack_from(pdu, 1)
+    if value not in {0, _COIL_ON}:
+        return ExceptionCode.ILLEGAL_VALUE
+    return _apply(unit, requester, unit.image.coils.changes(address, [value == _COIL_ON]), now) or pdu
+
+
+def _write_register(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
+    if len(pdu) != 5:
+        return ExceptionCode.ILLEGAL_VALUE
+    (address, _value) = _TWO_WORDS.unpack_from(pdu, 1)
+    return _write_registers(unit, requester, address, pdu[3:], now) or pdu
+
+
+def _write_coils(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
+    if len(pdu) < 6:
+        return ExceptionCode.ILLEGAL_VALUE
+    address, count, size = _WRITE_MULTIPLE.unpack_from(pdu, 1)
+    if not 1 <= count <= _MAX_WRITTEN_BITS or size != (count + 7) >> 3 or len(pdu) != 6 + size:
+        return ExceptionCode.ILLEGAL_VALUE
+    packed = int.from_bytes(pdu[6:], "little")
+    bits = [bool(packed >> position & 1) for position in range(count)]
+    return _apply(unit, requester, unit.image.coils.changes(address, bits), now) or pdu[:5]
+
+
+def _write_multiple(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
+    if len(pdu) < 6:
+        return ExceptionCode.ILLEGAL_VALUE
+    address, count, size = _WRITE_MULTIPLE.unpack_from(pdu, 1)
+    if not 1 <= count <= _MAX_WRITTEN_REGISTERS or size != 2 * count or len(pdu) != 6 + size:
+        return ExceptionCode.ILLEGAL_VALUE
+    return _write_registers(unit, requester, address, pdu[6:], now) or pdu[:5]
+
+
+def _mask_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
+    if len(pdu) != 7:
+        return ExceptionCode.ILLEGAL_VALUE
+    address, and_mask, or_mask = _MASK.unpack_from(pdu, 1)
+    if _of_status(address, 1):
+        present = int.from_bytes(unit.status.read(address - status_layout.BASE, 1, now), "big")
+        word = (present & and_mask) | (or_mask & ~and_mask & 0xFFFF)
+        return _write_status(unit, requester, address, [word], now) or pdu
+    return _apply(unit, requester, unit.image.holding.masked(address, and_mask, or_mask), now) or pdu
+
+
+def _read_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
+    if len(pdu) < 10:
+        return ExceptionCode.ILLEGAL_VALUE
+    first, count, address, written, size = _READ_WRITE.unpack_from(pdu, 1)
+    if not (1 <= count <= MAX_REGISTERS and 1 <= written <= _MAX_WRITTEN_WITH_READ):
+        return ExceptionCode.ILLEGAL_VALUE
+    if size != 2 * written or len(pdu) != 10 + size:
+        return ExceptionCode.ILLEGAL_VALUE
+    table = unit.image.holding
+    refused = _refuse_registers(table, first, count)
+    if refused is None:
+        refused = _write_registers(unit, requester, address, pdu[10:], now)
+    if refused is not None:
+        return refused
+    return bytes((pdu[0], 2 * count)) + _registers(unit, table, first, count, now)
+
+
+def _write_registers(
+    unit: Unit, requester: Requester, address: int, data: bytes, now: float
+) -> ExceptionCode | None:
+    if _of_status(address, len(data) // 2):
+        words = struct.unpack(f">{len(data) // 2}H", data)
+        return _write_status(unit, requester, address, words, now)
+    return _apply(unit, requester, unit.image.holding.changes(address, data), now)
+
+
+def _write_status(
+    unit: Unit, requester: Requester, address: int, words: Sequence[int], now: float
+) -> ExceptionCode | None:
+    refusal = unit.status.write(requester, address - status_layout.BASE, words, now)
+    return EXCEPTION_OF[refusal.reason] if refusal is not None else None
+
+
+def _apply(
+    unit: Unit, requester: Requester, changes: list[Change] | Refusal, now: float
+) -> ExceptionCode | None:
+    """Hand all changes of one request to the cell at once, and every refusal of ours to its records."""
+    if isinstance(changes, Refusal):
+        unit.cell.refuse(requester, changes, now)
+        return EXCEPTION_OF[changes.reason]
+    if requester.writer is None:
+        refusal: Refusal | None = _refuse_undeclared(unit, requester, changes, now)
+    else:
+        refusal = unit.cell.write(requester, changes, now)
+    return EXCEPTION_OF[refusal.reason] if refusal is not None else None
+
+
+def _refuse_undeclared(unit: Unit, requester: Requester, changes: list[Change], now: float) -> Refusal:
+    """A peer that may write nothing is refused even if it wrote what is there already."""
+    variable: int | None = changes[0].variable if changes else None
+    value: Value | None = changes[0].value if changes else None
+    refusal = Refusal(Reason.NOT_WRITABLE, variable)
+    unit.cell.refuse(requester, refusal, now, value)
+    return refusal
+
+
+def _identify(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
+    if len(pdu) > 1 and pdu[1] != identification.MEI_TYPE:
+        return ExceptionCode.ILLEGAL_FUNCTION
+    answer = unit.identification.answer(pdu)
+    return ExceptionCode(answer) if isinstance(answer, int) else answer
+
+
+_FUNCTIONS: dict[int, _Function] = {
+    1: _read_coils,
+    2: _read_discrete,
+    3: _read_holding,
+    4: _read_input,
+    5: _write_coil,
+    6: _write_register,
+    15: _write_coils,
+    16: _write_multiple,
+    22: _mask_write,
+    23: _read_write,
+    identification.FUNCTION: _identify,
+}

@@ -1,0 +1,283 @@
+"""The listener: one address, the units served there, and who may reach which of them.
+
+asyncio accepts connections; `PeerConnection` serves one of them, `limits` says which have to end.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from types import MappingProxyType
+
+from gatewayd.core.cell import Cell
+from gatewayd.core.requester import Requester
+from gatewayd.links.modbus_server.connection import PeerConnection
+from gatewayd.links.modbus_server.functions import Unit
+from gatewayd.links.modbus_server.limits import idle_timeout, longest_unused, max_connections, overdue
+from gatewayd.links.modbus_server.peers import DenialLog, PeerEvent, PeerEventKind, may_connect, writer_of
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.polling import ReadPoller
+from gatewayd.links.modbus_server.session import UnitAccess
+from gatewayd.links.modbus_server.waiting import SETTLING
+from gatewayd.links.modbus_server.writers import names_of, succeeded, writers_of
+from gatewayd.loop import clock
+from gatewayd.report.format import address as address_text
+
+__all__ = ["ListenError", "ModbusListener"]
+
+_SWEEP = 0.25
+"""Seconds between two looks for connections that are idle or stalled."""
+
+_REMEDIES = {
+    errno.EADDRINUSE: "another program listens there; stop it or choose another port under modbus: listen:",
+    errno.EACCES: "ports below 1024 need the capability CAP_NET_BIND_SERVICE; grant it or choose a port from 1024 on",
+    errno.EADDRNOTAVAIL: "this machine has no such address; use one of its own or 0.0.0.0 under modbus: listen:",
+}
+
+
+class ListenError(OSError):
+    """The address cannot be listened on; `errno` tells why, the text also what to do."""
+
+
+class ModbusListener:
+    """One listening address and the units behind it.
+
+    `observe` is called with the events of connections; it must not raise.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        *,
+        observe: Callable[[PeerEvent], None] = lambda _event: None,
+    ) -> None:
+        self._host = host
+        self._port = port
+        self._observe = observe
+        self._units: dict[int, Unit] = {}
+        self._connections: dict[PeerConnection, None] = {}
+        self._denials = DenialLog()
+        self._server: asyncio.Server | None = None
+        self._poller: ReadPoller | None = None
+        self._sweeper: asyncio.TimerHandle | None = None
+        self._gap = (-math.inf, -math.inf)
+        """When the process stood still last, if ever."""
+        self.progress = 0
+        """Moves with each attempt to listen, and several times a second from then on."""
+
+    @property
+    def port(self) -> int:
+        """The port that is listened on, also if 0 was asked for."""
+        return int(self._server.sockets[0].getsockname()[1]) if self._server is not None else self._port
+
+    @property
+    def connections(self) -> int:
+        """Connections that are open now."""
+        return len(self._connections)
+
+    @property
+    def listening(self) -> bool:
+        """Whether connections are accepted now."""
+        return self._server is not None
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Host and port as asked for."""
+        return self._host, self._port
+
+    @property
+    def name(self) -> str:
+        """Host and port, for messages."""
+        return address_text(self._host, self._port)
+
+    async def start(self) -> None:
+        """Listen. Raises ListenError."""
+        poller = ReadPoller()
+        accepted = partial(PeerConnection, self, poller)
+        try:
+            server = await asyncio.get_running_loop().create_server(
+                accepted, self._host, self._port, reuse_address=True
+            )
+        except OSError as error:
+            poller.close()
+            self.progress += 1
+            raise self._explained(error) from error
+        self._server, self._poller = server, poller
+        self._sweep()
+
+    def _explained(self, error: OSError) -> ListenError:
+        remedy = _REMEDIES.get(error.errno or 0, "check modbus: listen:")
+        cause = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+        return ListenError(error.errno, f"cannot listen on {self.name}: {cause}; {remedy}")
+
+    async def close(self, reason: str = "gateway stopped") -> None:
+        """Stop listening and end all connections at once; the units follow their cells no longer."""
+        if self._sweeper is not None:
+            self._sweeper.cancel()
+            self._sweeper = None
+        for connection in list(self._connections):
+            connection.abort(reason)
+            self.disconnected(connection)
+        for unit in self._units.values():
+            unit.close()
+        self._units = {}
+        server, self._server = self._server, None
+        poller, self._poller = self._poller, None
+        if server is None or poller is None:
+            return
+        poller.close()
+        for listening in server.sockets:
+            asyncio.get_running_loop().remove_reader(listening)
+        try:
+            # Transports close their sockets in the next turn of the loop. Until then what was accepted already becomes
+            # a connection, which is refused. With its server closed, asyncio would drop it without closing its socket.
+            await asyncio.sleep(0)
+        finally:
+            server.close()
+
+    def serve(
+        self, units: Iterable[tuple[ModbusPlan, Cell]], successors: Mapping[Cell, Cell] = MappingProxyType({})
+    ) -> None:
+        """Answer for these units, and for no others, from the next request on; connections stay.
+
+        A unit whose plan and cell are the very objects served already goes on untouched. `successors` are cells that
+        took over the connections of another one, so that a writer that is there before and after never leaves. Raises
+        ValueError for two units of one number.
+        """
+        wanted: dict[int, tuple[ModbusPlan, Cell]] = {}
+        for plan, cell in units:
+            if plan.unit in wanted:
+                raise ValueError(
+                    f"unit {plan.unit} is served twice on {self.name}: give every cell a unit of its own"
+                )
+            wanted[plan.unit] = (plan, cell)
+        former = self._units
+        units_now: dict[int, Unit] = {}
+        for number, (plan, cell) in wanted.items():
+            kept = former.get(number)
+            if kept is None or kept.plan is not plan or kept.cell is not cell:
+                kept = Unit(plan, cell)
+            units_now[number] = kept
+        self._units = units_now
+        now = clock.now()
+        for connection in list(self._connections):
+            if not self._admit(connection, now, "unit no longer served", successors):
+                connection.abort("not on the access list any more")
+        for number, unit in former.items():
+            if units_now.get(number) is not unit:
+                unit.cell.health.words["modbus_connections"] = 0
+                unit.close()
+        self._count()
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`: what is in the sockets may have waited that long."""
+        self._gap = since, now
+        for connection in self._connections:
+            connection.stood_still(since, now)
+
+    # -- called by connections ------------------------------------------------------------------------------------
+
+    def connected(self, connection: PeerConnection) -> None:
+        """A peer has connected: let it in or refuse it."""
+        if self._server is None:
+            connection.abort("not listening")
+            return
+        now = clock.now()
+        address = connection.address
+        if address is None or not any(may_connect(address, unit.plan) for unit in self._units.values()):
+            self._refuse(connection, PeerEventKind.DENIED, now)
+            return
+        if len(self._connections) >= max_connections(self._plans()) and not self._make_room(now):
+            self._refuse(connection, PeerEventKind.FULL, now)
+            return
+        self._connections[connection] = None
+        since, until = self._gap
+        if connection.established <= until + SETTLING:
+            connection.wait(min(since, connection.established), until)
+        self._admit(connection, now, "")
+        self._count()
+        self._observe(PeerEvent(PeerEventKind.CONNECTED, connection.peer, names_of(connection.accesses)))
+
+    def disconnected(self, connection: PeerConnection) -> None:
+        """A connection has ended; called once or more for each."""
+        if connection not in self._connections:
+            return
+        del self._connections[connection]
+        names = names_of(connection.accesses)
+        now = clock.now()
+        accesses, connection.accesses = connection.accesses, {}
+        connection.session.serve({})
+        for cell, requester in writers_of(accesses):
+            cell.writer_disconnected(requester, now, connection.reason)
+        self._count()
+        self._observe(PeerEvent(PeerEventKind.DISCONNECTED, connection.peer, names, connection.reason))
+
+    # -- inside ---------------------------------------------------------------------------------------------------
+
+    def _admit(
+        self,
+        connection: PeerConnection,
+        now: float,
+        reason: str,
+        successors: Mapping[Cell, Cell] = MappingProxyType({}),
+    ) -> bool:
+        """Give the connection the units its address may reach; returns whether there is any.
+
+        Writers that it is both before and after stay connected throughout.
+        """
+        address = connection.address
+        accesses = {
+            number: UnitAccess(
+                unit, Requester(writer_of(address, unit.plan.writers), str(address), connection.number)
+            )
+            for number, unit in self._units.items()
+            if address is not None and may_connect(address, unit.plan)
+        }
+        before, after = succeeded(writers_of(connection.accesses), successors), writers_of(accesses)
+        connection.accesses = accesses
+        connection.session.serve(accesses)
+        for cell, requester in after:
+            if (cell, requester) not in before:
+                cell.writer_connected(requester, now, connection.peer)
+        for cell, requester in before:
+            if (cell, requester) not in after:
+                cell.writer_disconnected(requester, now, reason)
+        return bool(accesses)
+
+    def _refuse(self, connection: PeerConnection, kind: PeerEventKind, now: float) -> None:
+        connection.abort(kind.value)
+        repeats = self._denials.repeats(f"{kind.name} {connection.address}", now)
+        if repeats is not None:
+            self._observe(PeerEvent(kind, connection.peer, reason=kind.value, repeats=repeats))
+
+    def _make_room(self, now: float) -> bool:
+        """Close the connection that was unused longest, if any may be; returns whether one was."""
+        unused = longest_unused(self._connections, now)
+        if unused is None:
+            return False
+        unused.abort("made room for a new connection")
+        self.disconnected(unused)
+        return True
+
+    def _plans(self) -> list[ModbusPlan]:
+        return [unit.plan for unit in self._units.values()]
+
+    def _sweep(self) -> None:
+        self.progress += 1
+        now = clock.now()
+        idle = idle_timeout(self._plans())
+        for connection in list(self._connections):
+            reason = overdue(connection, idle, now)
+            if reason:
+                connection.abort(reason)
+        delay = _SWEEP if idle is None else min(_SWEEP, idle / 4)
+        self._sweeper = asyncio.get_running_loop().call_later(delay, self._sweep)
+
+    def _count(self) -> None:
+        for unit in self._units.values():
+            unit.cell.health.words["modbus_connections"] = len(self._connections)

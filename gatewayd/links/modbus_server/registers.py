@@ -1,0 +1,322 @@
+"""The four Modbus data tables of one unit: what its addresses hold, and what a write to them means.
+
+Registers lie in one `bytearray` of big-endian words per table, so that a read is a slice; coils and discrete inputs
+are packed eight to a byte in the order of the protocol. Whether a range may be read is one look at the number of
+readable addresses that follow its first one.
+"""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from gatewayd.core.cell import Cell, Change
+from gatewayd.core.definition import Direction
+from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
+from gatewayd.links.modbus_server.runs import Run, bit_runs, number_runs, words_of_bits
+from gatewayd.modbus.areas import Area
+from gatewayd.modbus.codec import Codec
+
+__all__ = ["MAX_BITS", "MAX_REGISTERS", "BitTable", "Readable", "RegisterImage", "RegisterTable"]
+
+MAX_REGISTERS = 125
+"""Registers of one read (V1.1b3, 6.3)."""
+MAX_BITS = 2000
+"""Coils or discrete inputs of one read (V1.1b3, 6.1)."""
+
+_ADDRESSES = 65536
+_WORD = struct.Struct(">H")
+
+
+class Readable:
+    """For every address, how many may be read from it on in one request.
+
+    `reach` is what counts now; `mapped` is what would count if no variable were held back.
+    """
+
+    __slots__ = ("_addresses", "_held_back", "_longest", "mapped", "reach")
+
+    def __init__(self, addresses: Iterable[int], longest: int) -> None:
+        self._addresses = sorted(set(addresses), reverse=True)
+        self._longest = longest
+        self._held_back: frozenset[int] = frozenset()
+        self.mapped = self._empty()
+        self._fill(self.mapped, frozenset())
+        self.reach = self.mapped[:]
+
+    def hold_back(self, addresses: frozenset[int]) -> None:
+        """Make every read that touches one of `addresses` fail, until the next call."""
+        if addresses == self._held_back:
+            return
+        self._held_back = addresses
+        # In place: connections keep a reference to it.
+        for address in self._addresses:
+            self.reach[address] = 0
+        self._fill(self.reach, addresses)
+
+    def _empty(self) -> bytearray | array[int]:
+        return bytearray(_ADDRESSES) if self._longest <= 0xFF else array("H", bytes(2 * _ADDRESSES))
+
+    def _fill(self, reach: bytearray | array[int], without: frozenset[int]) -> None:
+        follower, length = -1, 0
+        for address in self._addresses:
+            if address in without:
+                length = 0
+            else:
+                length = length + 1 if address + 1 == follower else 1
+                reach[address] = min(length, self._longest)
+            follower = address
+
+
+@dataclass(frozen=True, slots=True)
+class _Number:
+    """A variable that fills whole registers."""
+
+    address: int
+    words: int
+    variable: int
+    writable: bool
+    codec: Codec
+
+    def changes(self, data: bytes) -> list[Change] | None:
+        """None if the words mean nothing that the variable could hold."""
+        value = self.codec.decode(data)
+        return None if value is None else [Change(self.variable, value)]
+
+    def masked(self, present: int, and_mask: int, or_mask: int) -> list[Change] | None:
+        word = (present & and_mask) | (or_mask & ~and_mask & 0xFFFF)
+        return self.changes(_WORD.pack(word))
+
+
+@dataclass(frozen=True, slots=True)
+class _Bits:
+    """A register into which bits are packed."""
+
+    address: int
+    writable: bool
+    bits: tuple[tuple[int, int, bool], ...]
+    """Mask, variable, and whether it is implied where the whole register is written."""
+
+    @property
+    def words(self) -> int:
+        return 1
+
+    @property
+    def variable(self) -> int:
+        return self.bits[0][1]
+
+    def changes(self, data: bytes) -> list[Change] | None:
+        (word,) = _WORD.unpack(data)
+        return [Change(variable, bool(word & mask), implied) for mask, variable, implied in self.bits]
+
+    def masked(self, _present: int, and_mask: int, or_mask: int) -> list[Change] | None:
+        return [
+            Change(variable, bool(or_mask & mask))
+            for mask, variable, _implied in self.bits
+            if not and_mask & mask
+        ]
+
+
+class RegisterTable:
+    """Holding registers or input registers."""
+
+    def __init__(self, placements: Sequence[Placement], cell: Cell, *, fill_gaps: bool) -> None:
+        self.image = bytearray(2 * _ADDRESSES)
+        """Big-endian words by address."""
+        covered = {
+            placement.address + word: placement.variable
+            for placement in placements
+            for word in range(placement.words)
+        }
+        self.readable = Readable(_filled(covered) if fill_gaps else covered, MAX_REGISTERS)
+        self._addresses_of = _addresses_by_variable(placements)
+        self._items: dict[int, _Number | _Bits] = {
+            item.address + word: item for item in _items(placements, cell) for word in range(item.words)
+        }
+
+    def hold_back(self, variables: frozenset[int]) -> None:
+        """Let reads that touch one of `variables` fail."""
+        self.readable.hold_back(_addresses(self._addresses_of, variables))
+
+    def changes(self, address: int, data: bytes) -> list[Change] | Refusal:
+        """What writing the big-endian words `data` from `address` on means for the cell.
+
+        Every register must be mapped and writable, and every variable covered whole.
+        """
+        end = address + len(data) // 2
+        refusal = self._unwritable(range(address, end))
+        if refusal is not None:
+            return refusal
+        changes: list[Change] = []
+        position = address
+        while position < end:
+            item = self._items[position]
+            behind = item.address + item.words
+            if position != item.address or behind > end:
+                return Refusal(Reason.PARTIAL_VALUE, item.variable)
+            start = 2 * (position - address)
+            meant = item.changes(data[start : start + 2 * item.words])
+            if meant is None:
+                return Refusal(Reason.OUT_OF_LIMITS, item.variable)
+            changes += meant
+            position = behind
+        return changes
+
+    def masked(self, address: int, and_mask: int, or_mask: int) -> list[Change] | Refusal:
+        """What Mask Write Register means: (present AND and_mask) OR (or_mask AND NOT and_mask).
+
+        Of packed bits only those are written that `and_mask` selects with a 0.
+        """
+        refusal = self._unwritable(range(address, address + 1))
+        if refusal is not None:
+            return refusal
+        item = self._items[address]
+        if item.words > 1:
+            return Refusal(Reason.PARTIAL_VALUE, item.variable)
+        (present,) = _WORD.unpack_from(self.image, 2 * address)
+        meant = item.masked(present, and_mask, or_mask)
+        return Refusal(Reason.OUT_OF_LIMITS, item.variable) if meant is None else meant
+
+    def _unwritable(self, addresses: range) -> Refusal | None:
+        read_only: Refusal | None = None
+        for address in addresses:
+            item = self._items.get(address)
+            if item is None:
+                return Refusal(Reason.NO_SUCH_ADDRESS)
+            if not item.writable and read_only is None:
+                read_only = Refusal(Reason.NOT_WRITABLE, item.variable)
+        return read_only
+
+
+class BitTable:
+    """Coils or discrete inputs."""
+
+    def __init__(self, placements: Sequence[Placement], cell: Cell, *, fill_gaps: bool) -> None:
+        self.image = bytearray(_ADDRESSES // 8)
+        """Bits by address, the first one in the least significant bit of the first byte."""
+        self._cell = cell
+        self._variables = {placement.address: placement.variable for placement in placements}
+        self.readable = Readable(_filled(self._variables) if fill_gaps else self._variables, MAX_BITS)
+        self._addresses_of = _addresses_by_variable(placements)
+
+    def hold_back(self, variables: frozenset[int]) -> None:
+        """Let reads that touch one of `variables` fail."""
+        self.readable.hold_back(_addresses(self._addresses_of, variables))
+
+    def read(self, address: int, count: int) -> bytes:
+        """`count` bits from `address` on, packed as the protocol sends them, padded with zeros."""
+        end = address + count
+        covered = int.from_bytes(self.image[address >> 3 : (end + 7) >> 3], "little")
+        return (covered >> (address & 7) & ((1 << count) - 1)).to_bytes((count + 7) >> 3, "little")
+
+    def changes(self, address: int, bits: Sequence[bool]) -> list[Change] | Refusal:
+        """What writing `bits` from `address` on means for the cell."""
+        changes = []
+        for position, bit in enumerate(bits, address):
+            variable = self._variables.get(position)
+            if variable is None:
+                return Refusal(Reason.NO_SUCH_ADDRESS)
+            changes.append(Change(variable, bit))
+        return changes
+
+
+class RegisterImage:
+    """All four tables of one unit, kept up to date by the cell until `close`."""
+
+    def __init__(self, plan: ModbusPlan, cell: Cell) -> None:
+        def table(area: Area) -> RegisterTable:
+            return RegisterTable(_of(plan.placements, area), cell, fill_gaps=plan.fill_gaps)
+
+        def bits(area: Area) -> BitTable:
+            return BitTable(_of(plan.placements, area), cell, fill_gaps=plan.fill_gaps)
+
+        self.holding = table(Area.HOLDING)
+        self.input = table(Area.INPUT)
+        self.coils = bits(Area.COIL)
+        self.discrete = bits(Area.DISCRETE)
+        self._cell = cell
+        self._held_back: frozenset[int] = frozenset()
+        self._runs = {
+            direction: tuple(self._compile(plan.placements, direction, cell)) for direction in Direction
+        }
+        for direction in Direction:
+            self.refresh(direction)
+        cell.listeners.append(self.refresh)
+
+    def close(self) -> None:
+        """Follow the cell no longer."""
+        if self.refresh in self._cell.listeners:
+            self._cell.listeners.remove(self.refresh)
+
+    def refresh(self, direction: Direction) -> None:
+        """Encode what changed of the variables of one direction; the cell calls it after every change."""
+        values = self._cell.image.values
+        for run in self._runs[direction]:
+            run.refresh(values)
+        if self._cell.unreadable is not self._held_back:
+            self._held_back = self._cell.unreadable
+            for table in (self.holding, self.input, self.coils, self.discrete):
+                table.hold_back(self._held_back)
+
+    def _compile(self, placements: Sequence[Placement], direction: Direction, cell: Cell) -> Iterator[Run]:
+        variables = cell.definition.variables
+        flowing = [
+            placement for placement in placements if variables[placement.variable].direction is direction
+        ]
+        for area, words in ((Area.HOLDING, self.holding), (Area.INPUT, self.input)):
+            numbers = [placement for placement in _of(flowing, area) if placement.bit is None]
+            yield from number_runs(numbers, words.image)
+            # A register may mix bits of both directions: each direction then needs all of them to write it whole.
+            mixed = {placement.address for placement in _of(flowing, area) if placement.bit is not None}
+            packed = [placement for placement in _of(placements, area) if placement.bit is not None]
+            yield from words_of_bits([bit for bit in packed if bit.address in mixed], words.image)
+        for area, bits in ((Area.COIL, self.coils), (Area.DISCRETE, self.discrete)):
+            yield from bit_runs(_of(flowing, area), bits.image)
+
+
+def _of(placements: Iterable[Placement], area: Area) -> list[Placement]:
+    return [placement for placement in placements if placement.area is area]
+
+
+def _filled(addresses: Iterable[int]) -> range:
+    """All addresses from the first to the last one."""
+    mapped = sorted(addresses)
+    return range(mapped[0], mapped[-1] + 1) if mapped else range(0)
+
+
+def _addresses_by_variable(placements: Iterable[Placement]) -> dict[int, frozenset[int]]:
+    addresses: dict[int, frozenset[int]] = {}
+    for placement in placements:
+        covered = range(placement.address, placement.address + placement.words)
+        addresses[placement.variable] = addresses.get(placement.variable, frozenset()).union(covered)
+    return addresses
+
+
+def _addresses(of: dict[int, frozenset[int]], variables: frozenset[int]) -> frozenset[int]:
+    return frozenset[int]().union(*(of[variable] for variable in variables if variable in of))
+
+
+def _items(placements: Sequence[Placement], cell: Cell) -> Iterator[_Number | _Bits]:
+    variables = cell.definition.variables
+    packed: dict[int, list[tuple[int, int]]] = {}
+    for placement in placements:
+        if placement.bit is not None:
+            packed.setdefault(placement.address, []).append((1 << placement.bit, placement.variable))
+        elif placement.codec is not None:
+            writable = variables[placement.variable].direction is Direction.INPUT
+            yield _Number(placement.address, placement.words, placement.variable, writable, placement.codec)
+    for address, bits in packed.items():
+        locks = {variables[variable].lock for _mask, variable in bits} - {None}
+        # Who writes a register whose inputs are one lock, or that is one bit, means it. An output in it nobody means.
+        shared = len(locks) > 1
+        yield _Bits(
+            address,
+            writable=bool(locks),
+            bits=tuple(
+                (mask, variable, shared or variables[variable].lock is None)
+                for mask, variable in sorted(bits)
+            ),
+        )

@@ -1,0 +1,254 @@
+"""Rules GW7xx: conversions between the robot's types and those of the registers that lose something."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isclose, isfinite
+
+from gatewayd.core.definition import Direction, ValueKind
+from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProblem, placements_of
+from gatewayd.links.modbus_server.rules.wording import first_of_each_line, where
+from gatewayd.links.modbus_server.sections import ModbusPlaces
+from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule, Severity
+from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.mapping.rules.registry import cell_rule
+from gatewayd.modbus.codec import TYPES, Codec
+from gatewayd.report.wording import number
+
+__all__: list[str] = []
+
+_FLOAT_DIGITS = {"float32": 1 << 24, "float64": 1 << 53}
+"""Integers up to here survive in a real of the type."""
+_MIN_STEPS = 10
+
+
+@cell_rule("GW701", "time-in-float32", "the controller's time in a float32", Severity.WARNING)
+def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Growing reals in a float32."""
+    for placement in _numbers(cell):
+        if placement.type == "float32" and placement.variable.grows:
+            message = (
+                f"`{placement.variable.name}` grows for ever, and float32 at {where(placement)} loses its end"
+            )
+            yield rule.at(_key(placement, "type"), message, hint="use `type: float64`")
+
+
+@cell_rule("GW702", "fraction-lost", "a real in an integer type without a scale", Severity.WARNING)
+def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Doubles in integer types without a written scale."""
+    for placement in _numbers(cell):
+        if (
+            placement.variable.kind is ValueKind.FLOAT
+            and not TYPES[placement.type].is_real
+            and placement.type != "bool"
+            and placement.spec.scale is None
+        ):
+            message = (
+                f"`{placement.variable.name}` is a real, {placement.type} at {where(placement)} "
+                "shows whole numbers only"
+            )
+            hint = "add a scale such as `scale: 0.001`, or `scale: 1` if whole numbers are meant"
+            yield rule.at(_key(placement, "type"), message, hint=hint)
+
+
+@cell_rule(
+    "GW703", "narrow-integer", "an integer from the robot in a register too small for it", Severity.WARNING
+)
+def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Integer outputs in types that do not hold their range."""
+    for placement in _numbers(cell):
+        variable = placement.variable
+        bounds = variable.range
+        if variable.direction is Direction.INPUT or variable.kind is not ValueKind.INT or bounds is None:
+            continue
+        low, high = _reach(placement)
+        if TYPES[placement.type].is_real or placement.type == "bool":
+            continue
+        if bounds[0] < low or bounds[1] > high:
+            message = (
+                f"`{variable.name}` can be {number(bounds[0])} to {number(bounds[1])}, "
+                f"{placement.type} at {where(placement)} shows {number(low)} to {number(high)}"
+            )
+            hint = "use a wider type, or state the range with `limits: [least, greatest]`"
+            yield rule.at(_key(placement, "type"), message, hint=hint)
+
+
+@cell_rule("GW704", "coarse-scale", "a scale too coarse for the limits", Severity.WARNING)
+def coarse_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Scales of doubles with fewer than ten steps between the limits."""
+    for placement in _numbers(cell):
+        limits = placement.variable.spec.limits
+        if (
+            limits is None
+            or limits[0] >= limits[1]
+            or placement.variable.kind is not ValueKind.FLOAT
+            or TYPES[placement.type].is_real
+            or placement.type == "bool"
+            or placement.spec.scale is None
+        ):
+            continue
+        steps = (limits[1] - limits[0]) / abs(placement.scale)
+        if steps < _MIN_STEPS:
+            message = (
+                f"the scale {number(placement.scale)} leaves {number(int(steps) + 1)} values of "
+                f"`{placement.variable.name}` between {number(limits[0])} and {number(limits[1])}"
+            )
+            hint = (
+                f"robot value = raw * scale: use a finer scale such as {number(_fine(limits[1] - limits[0]))}"
+            )
+            yield rule.at(_key(placement, "scale"), message, hint=hint)
+
+
+def _fine(span: float) -> float:
+    """A power of ten that makes at least a thousand steps of `span`."""
+    scale = 1.0
+    while span / scale < 1000 and scale > 1e-9:
+        scale /= 10
+    return scale
+
+
+@cell_rule("GW705", "limit-not-reachable", "a limit that the register type cannot express", Severity.WARNING)
+def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Limits of inputs beyond what type, scale and offset reach."""
+    for placement in _numbers(cell):
+        variable, limits = placement.variable, placement.variable.spec.limits
+        if variable.direction is Direction.OUTPUT or limits is None or placement.type == "bool":
+            continue
+        low, high = _reach(placement)
+        slack = abs(placement.scale) / 2
+        # What the robot's own type excludes is GW609.
+        least = limits[0] if variable.low is None else max(limits[0], variable.low)
+        most = limits[1] if variable.high is None else min(limits[1], variable.high)
+        if least < low - slack or most > high + slack:
+            message = (
+                f"`{variable.name}` may be {number(limits[0])} to {number(limits[1])}, "
+                f"{placement.type} with scale {number(placement.scale)} reaches {number(low)} to {number(high)}"
+            )
+            hint = "use a wider type or a coarser scale, or narrow the limits"
+            yield rule.at(_key(placement, "type"), message, hint=hint)
+
+
+@cell_rule("GW706", "scale-of-zero", "a scale of zero")
+def scale_of_zero(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Scales of zero."""
+    zero = [item for item in placements_of(cell) if item.problem is PlacementProblem.SCALE_OF_ZERO]
+    for placement in first_of_each_line(zero):
+        message = f"`{placement.variable.name}` has the scale 0"
+        yield rule.at(_key(placement, "scale"), message, hint="leave `scale` out, or write for example 0.1")
+
+
+@cell_rule("GW707", "scaled-bit", "scale, offset or order at a bit")
+def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Number conversions of bits."""
+    for placement in first_of_each_line(placements_of(cell)):
+        spec = placement.spec
+        keys = [key for key in ("scale", "offset") if getattr(spec, key) is not None]
+        whole = placement.codec is not None and placement.variable.kind is ValueKind.BOOL and keys
+        if placement.problem is PlacementProblem.SCALED_BIT or whole:
+            key = keys[0] if keys else "order"
+            message = f"`{placement.variable.name}` is a bit and has `{key}`"
+            yield rule.at(_key(placement, key), message, hint=f"remove `{key}`")
+
+
+@cell_rule("GW708", "uneven-scale", "an integer with a scale that does not come out even", Severity.WARNING)
+def uneven_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Scales of integers that need rounding."""
+    for placement in _numbers(cell):
+        variable = placement.variable
+        if variable.kind is not ValueKind.INT or placement.type == "bool":
+            continue
+        if variable.direction is Direction.INPUT:
+            even = _whole(placement.scale) and _whole(placement.offset)
+        else:
+            even = TYPES[placement.type].is_real or (
+                _whole(1 / placement.scale) and _whole(placement.offset / placement.scale)
+            )
+        if not even:
+            message = (
+                f"`{variable.name}` is a whole number, scale {number(placement.scale)} "
+                f"and offset {number(placement.offset)} round it"
+            )
+            key = "scale" if placement.spec.scale is not None else "offset"
+            hint = "leave scale and offset out, or choose them so that every value comes out even"
+            yield rule.at(_key(placement, key), message, hint=hint)
+
+
+def _whole(value: float) -> bool:
+    return isfinite(value) and isclose(value, round(value), rel_tol=1e-9)
+
+
+@cell_rule(
+    "GW709", "integer-in-real", "an integer in a real that has too few digits for it", Severity.WARNING
+)
+def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Integers in reals with fewer digits."""
+    for placement in _numbers(cell):
+        variable, digits = placement.variable, _FLOAT_DIGITS.get(placement.type)
+        bounds = variable.range
+        if variable.kind is not ValueKind.INT or digits is None or bounds is None:
+            continue
+        if max(-bounds[0], bounds[1]) > digits:
+            message = (
+                f"`{variable.name}` can be {number(bounds[0])} to {number(bounds[1])}, "
+                f"{placement.type} is exact up to {digits}"
+            )
+            hint = "use an integer type, or state the range with `limits: [least, greatest]`"
+            yield rule.at(_key(placement, "type"), message, hint=hint)
+
+
+@cell_rule("GW710", "number-as-bool", "a number shown as 0 or 1", Severity.WARNING)
+def number_as_bool(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Numbers with the type bool."""
+    for placement in _numbers(cell):
+        variable = placement.variable
+        if placement.type == "bool" and variable.kind is not ValueKind.BOOL:
+            message = (
+                f"`{variable.name}` is a number ({variable.type}), bool at {where(placement)} shows 0 or 1"
+            )
+            hint = f"use a number type, or map one bit, `{variable.target}.N`"
+            yield rule.at(_key(placement, "type"), message, hint=hint)
+
+
+@cell_rule("GW711", "fallback-not-shown", "a stale value that the register cannot show", Severity.WARNING)
+def fallback_not_shown(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """`on_stale` values that come back from the register as something else."""
+    for placement in _numbers(cell):
+        variable = placement.variable
+        value, codec = variable.spec.on_stale.value, placement.codec
+        if variable.direction is Direction.INPUT or value is None or isinstance(value, bool) or codec is None:
+            continue
+        shown = _round_trip(codec, value)
+        if shown is None or abs(shown - value) > abs(placement.scale) / 2 + 1e-6 * abs(value):
+            message = (
+                f"`{variable.name}` is to be {number(value)} when stale, "
+                f"{placement.type} at {where(placement)} shows {'nothing' if shown is None else number(shown)}"
+            )
+            hint = "use a value that the register can show, or another type"
+            yield rule.at(variable.at("on_stale"), message, hint=hint)
+
+
+def _round_trip(codec: Codec, value: float) -> float | None:
+    shown = codec.decode(codec.encode(value))
+    return None if shown is None or not isfinite(shown) else float(shown)
+
+
+def _numbers(cell: ExpandedCell) -> Iterator[ExpandedPlacement]:
+    """The first of each line that lies in whole registers and has a codec."""
+    return (item for item in first_of_each_line(placements_of(cell)) if item.codec is not None)
+
+
+def _reach(placement: ExpandedPlacement) -> tuple[float, float]:
+    """Least and greatest robot value that the register can express."""
+    form = TYPES[placement.type]
+    ends = (form.low * placement.scale + placement.offset, form.high * placement.scale + placement.offset)
+    return min(ends), max(ends)
+
+
+def _key(placement: ExpandedPlacement, key: str) -> Position:
+    """Place of a key of the placement where it was written, else of its address."""
+    if getattr(placement.spec, key) is None:
+        return placement.position
+    index = next(
+        i for i, spec in enumerate(placement.variable.spec.by(ModbusPlaces).modbus) if spec is placement.spec
+    )
+    return placement.variable.at("modbus", index, key)

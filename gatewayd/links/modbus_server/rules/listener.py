@@ -1,0 +1,156 @@
+"""Rules GW205 to GW208 and GW216 to GW219: the Modbus listener, its units and its peers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from ipaddress import ip_address, ip_network
+
+from gatewayd.links.modbus_server.plan import Network
+from gatewayd.links.modbus_server.rules.wording import peer
+from gatewayd.links.modbus_server.sections import Modbus, ModbusWriter
+from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
+from gatewayd.mapping.document import Part
+from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.mapping.rules.registry import cell_rule, plant_rule
+
+__all__: list[str] = []
+
+_MODBUS_PORTS = (502, 802)
+_FIRST_FREE_PORT = 1024
+_LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
+_SHARED = ("connections", "idle_timeout")
+
+
+@plant_rule("GW206", "unit-clash", "two cells with the same unit on one listener")
+def unit_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """Equal units on equal listen addresses."""
+    first: dict[tuple[str, int], tuple[ExpandedCell, Part[Modbus]]] = {}
+    for cell, modbus in _listeners(cells):
+        listen, unit = str(modbus.spec.listen), modbus.spec.unit
+        if (listen, unit) not in first:
+            first[listen, unit] = cell, modbus
+            continue
+        other, earlier = first[listen, unit]
+        message = f"unit {unit} at {listen} already belongs to the cell `{other.document.cell}`"
+        related = (Related(earlier.at("unit"), f"unit {unit} first used here"),)
+        hint = "give this cell another `unit`, or another `listen` address"
+        yield rule.at(modbus.at("unit"), message, hint=hint, related=related)
+
+
+@plant_rule("GW207", "listen-clash", "two listeners that ask for the same port")
+def listen_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """Wildcard and single addresses on one port."""
+    by_port: dict[int, list[Part[Modbus]]] = {}
+    for _, modbus in _listeners(cells):
+        listen = modbus.spec.listen
+        known = by_port.setdefault(listen.port, [])
+        other = next((item for item in known if _clash(item.spec.listen.host, listen.host)), None)
+        if other is not None:
+            message = f"{listen} cannot be opened beside {other.spec.listen}: both want port {listen.port}"
+            related = (Related(other.at("listen"), f"{other.spec.listen} is here"),)
+            hint = f"write {other.spec.listen} here too (the units differ), or use another port"
+            yield rule.at(modbus.at("listen"), message, hint=hint, related=related)
+        known.append(modbus)
+
+
+@plant_rule(
+    "GW208", "listener-settings", "cells on one listener disagree about its connections", Severity.WARNING
+)
+def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """Different settings for equal listen addresses."""
+    first: dict[str, tuple[ExpandedCell, Part[Modbus]]] = {}
+    for cell, modbus in _listeners(cells):
+        other, earlier = first.setdefault(str(modbus.spec.listen), (cell, modbus))
+        for key in _SHARED:
+            if getattr(modbus.spec, key) != getattr(earlier.spec, key):
+                message = (
+                    f"`{key}` of {modbus.spec.listen} differs from the cell `{other.document.cell}`; "
+                    "the most generous counts"
+                )
+                related = (Related(earlier.at(key), f"`{key}` of `{other.document.cell}`"),)
+                hint = f"write the same `{key}` in both files"
+                yield rule.at(modbus.at(key), message, hint=hint, related=related)
+
+
+@cell_rule("GW216", "writer-shut-out", "a writer that the access list does not let in")
+def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Writers without a network that `allow` reaches."""
+    modbus = cell.document.part(Modbus)
+    if modbus is None or not modbus.spec.allow:
+        return
+    for writer in cell.document.writers.values():
+        if writer.spec.by(ModbusWriter).modbus and not any(
+            _meet(network, modbus.spec.allow) for network in writer.spec.by(ModbusWriter).modbus
+        ):
+            shown = ", ".join(map(peer, writer.spec.by(ModbusWriter).modbus[:3]))
+            message = f"the access list of the listener shuts the writer `{writer.name}` ({shown}) out"
+            related = (Related(modbus.at("allow"), "the access list is here"),)
+            hint = f"add {peer(writer.spec.by(ModbusWriter).modbus[0])} to `allow`"
+            yield rule.at(writer.at("modbus"), message, hint=hint, related=related)
+
+
+@cell_rule("GW217", "open-listener", "a listener on every address without an access list", Severity.WARNING)
+def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Wildcard listeners without `allow`."""
+    modbus = cell.document.part(Modbus)
+    if modbus is not None and not modbus.spec.allow and ip_address(modbus.spec.listen.host).is_unspecified:
+        message = f"{modbus.spec.listen} serves every network of this machine, and there is no access list"
+        hint = "add `allow: [192.168.1.0/24]` with the networks that may connect"
+        yield rule.at(modbus.at("listen"), message, hint=hint)
+
+
+@cell_rule("GW218", "foreign-port", "a privileged port that belongs to another service", Severity.WARNING)
+def foreign_port(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Low ports other than Modbus's own."""
+    modbus = cell.document.part(Modbus)
+    if modbus is None:
+        return
+    port = modbus.spec.listen.port
+    if port < _FIRST_FREE_PORT and port not in _MODBUS_PORTS:
+        message = f"port {port} is reserved for another service"
+        yield rule.at(modbus.at("listen"), message, hint="use 502, or a port from 1024 on such as 1502")
+
+
+@cell_rule(
+    "GW219",
+    "unreachable-listener",
+    "a writer elsewhere, and a listener that only this machine reaches",
+    Severity.WARNING,
+)
+def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Loopback listeners with writers from outside."""
+    modbus = cell.document.part(Modbus)
+    if modbus is None or not ip_address(modbus.spec.listen.host).is_loopback:
+        return
+    for writer in cell.document.writers.values():
+        if writer.spec.by(ModbusWriter).modbus and not any(
+            _meet(network, _LOOPBACK) for network in writer.spec.by(ModbusWriter).modbus
+        ):
+            shown = peer(writer.spec.by(ModbusWriter).modbus[0])
+            message = (
+                f"the writer `{writer.name}` ({shown}) cannot reach {modbus.spec.listen}, "
+                "which only this machine can"
+            )
+            related = (Related(modbus.at("listen"), f"the listener is {modbus.spec.listen}"),)
+            hint = "listen on the address of the machine network, for example 192.168.1.2:502"
+            yield rule.at(writer.at("modbus"), message, hint=hint, related=related)
+
+
+def _listeners(cells: Sequence[ExpandedCell]) -> Iterator[tuple[ExpandedCell, Part[Modbus]]]:
+    for cell in cells:
+        modbus = cell.document.part(Modbus)
+        if modbus is not None:
+            yield cell, modbus
+
+
+def _clash(one: str, other: str) -> bool:
+    if one == other:
+        return False
+    first, second = ip_address(one), ip_address(other)
+    # An IPv6 wildcard takes the port of IPv4 too.
+    wide = [address for address in (first, second) if address.is_unspecified]
+    return any(address.version == 6 for address in wide) or (bool(wide) and first.version == second.version)
+
+
+def _meet(network: Network, allowed: Sequence[Network]) -> bool:
+    return any(item.version == network.version and item.overlaps(network) for item in allowed)

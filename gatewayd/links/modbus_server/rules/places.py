@@ -1,0 +1,302 @@
+"""Rules GW20x to GW215: where variables lie in the Modbus areas."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+
+from gatewayd.core.definition import Direction
+from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProblem, placements_of
+from gatewayd.links.modbus_server.rules.wording import AREA_WORDS, first_of_each_line, where
+from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
+from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.mapping.rules.registry import cell_rule
+from gatewayd.modbus.areas import Area
+
+__all__ = ["FIRST_STATUS_REGISTER"]
+
+FIRST_STATUS_REGISTER = 60000
+"""First register of the status block, in holding and input registers alike."""
+
+_LAST_ADDRESS = 0xFFFF
+_READ_LIMIT = 125
+_WRITE_LIMIT = 123
+_TRADITIONAL = {
+    Area.HOLDING: range(40001, 50000),
+    Area.INPUT: range(30001, 40000),
+    Area.DISCRETE: range(10001, 20000),
+}
+_READ_ONLY = (Area.INPUT, Area.DISCRETE)
+_KEYS = {Area.HOLDING: "holding", Area.INPUT: "input", Area.COIL: "coil", Area.DISCRETE: "discrete"}
+
+
+@cell_rule("GW202", "beyond-last-address", "a value that runs past address 65535")
+def beyond_last_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Placements that do not fit below the end of their area."""
+    beyond = [item for item in placements_of(cell) if item.problem is PlacementProblem.BEYOND_END]
+    for placement in first_of_each_line(beyond):
+        last = placement.address + placement.words - 1
+        message = (
+            f"`{placement.variable.name}` would lie at {AREA_WORDS[placement.area]} {placement.address} "
+            f"to {last}, the last address is {_LAST_ADDRESS} ({placement.area.notation(_LAST_ADDRESS)})"
+        )
+        hint = "begin the line at a lower address; the status block begins at 60000"
+        yield rule.at(placement.position, message, hint=hint)
+
+
+@cell_rule("GW203", "status-block", "a variable in the registers of the status block")
+def status_block(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Register placements at 60000 and above."""
+    inside = [
+        item
+        for item in placements_of(cell)
+        if not item.area.of_bits and item.problem is None and item.addresses[-1] >= FIRST_STATUS_REGISTER
+    ]
+    for placement in first_of_each_line(inside):
+        message = (
+            f"`{placement.variable.name}` lies at {where(placement)}, "
+            f"but registers from {FIRST_STATUS_REGISTER} on are the status block"
+        )
+        yield rule.at(placement.position, message, hint="place it below 60000")
+
+
+@cell_rule("GW204", "traditional-address", "an address that looks like 40001 counting")
+def traditional_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Written addresses in the range of the traditional notation of their area."""
+    for placement in first_of_each_line(placements_of(cell)):
+        address = placement.spec.address
+        if address in _TRADITIONAL.get(placement.area, ()):
+            meant = address - _TRADITIONAL[placement.area].start
+            message = (
+                f"address {address} of `{placement.variable.part.name}` looks like the {address} of a manual"
+            )
+            hint = (
+                f"addresses count from 0: for the manual's {address} write {meant} "
+                f"({placement.area.notation(meant)})"
+            )
+            yield rule.at(placement.position, message, hint=hint)
+
+
+@cell_rule("GW209", "number-in-bit", "a number in a place that holds a single bit")
+def number_in_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Numbers in coils, discrete inputs and single bits."""
+    wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.NUMBER_IN_BIT]
+    for placement in first_of_each_line(wrong):
+        variable = placement.variable
+        message = (
+            f"`{variable.name}` is a number ({variable.field}, {variable.type}) "
+            f"and cannot lie in {where(placement)}"
+        )
+        area = "holding" if placement.area in (Area.COIL, Area.HOLDING) else "input"
+        hint = f"give it whole registers, {{{area}: N}}, or map one bit of it, `{variable.target}.N`"
+        yield rule.at(placement.position, message, hint=hint)
+
+
+@cell_rule("GW210", "input-in-read-only-area", "an input variable that lies only where nobody can write")
+def input_in_read_only_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Inputs all of whose placements are read-only."""
+    for _, group in groupby(placements_of(cell), key=lambda item: item.variable.part.name):
+        placements = list(group)
+        first = placements[0]
+        if first.variable.direction is Direction.INPUT and all(
+            item.area in _READ_ONLY for item in placements
+        ):
+            message = (
+                f"`{first.variable.name}` is an input of the robot ({first.variable.target}), "
+                f"but nobody can write {where(first)}"
+            )
+            area = "coil" if first.area is Area.DISCRETE else "holding"
+            yield rule.at(first.position, message, hint=f"place it in a writable area: {{{area}: N}}")
+
+
+@cell_rule("GW211", "bit-without-place", "type bit at a whole register")
+def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Type `bit` without a bit number."""
+    wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.BIT_WITHOUT_PLACE]
+    for placement in first_of_each_line(wrong):
+        message = f"`{placement.variable.name}` has the type bit, but {where(placement)} is a whole register"
+        hint = f"write the bit, {_KEYS[placement.area]}: {placement.address}.0, or type: bool"
+        yield rule.at(placement.position, message, hint=hint)
+
+
+@cell_rule("GW222", "type-of-bit", "a number type for a place that holds a single bit")
+def type_of_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Number types at single bits."""
+    wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.TYPE_IN_BIT]
+    for placement in first_of_each_line(wrong):
+        message = f"`{placement.variable.name}` has the type {placement.spec.type} at {where(placement)}"
+        yield rule.at(placement.position, message, hint="leave `type` out")
+
+
+@cell_rule(
+    "GW212",
+    "split-value",
+    "a value that a client reading or writing in full blocks cuts in two",
+    Severity.WARNING,
+)
+def split_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Values across multiples of 125 registers from the start of their block, 123 for writing."""
+    reported: set[tuple[str, int]] = set()
+    for area in (Area.HOLDING, Area.INPUT):
+        placed = [item for item in placements_of(cell) if item.area is area and item.problem is None]
+        writable = [
+            item
+            for item in placed
+            if item.area is Area.HOLDING and item.variable.direction is Direction.INPUT
+        ]
+        for limit, verb, items in ((_READ_LIMIT, "reads", placed), (_WRITE_LIMIT, "writes", writable)):
+            for placement, start, boundary in _cut(items, limit):
+                key = placement.variable.part.name, id(placement.spec)
+                if key in reported:
+                    continue
+                reported.add(key)
+                message = (
+                    f"`{placement.variable.name}` at {where(placement)} is cut at {boundary} "
+                    f"by a client that {verb} the block from {start} on with {limit} registers at a time"
+                )
+                hint = f"let it begin at {boundary}, or leave a gap in the block before it"
+                yield rule.at(placement.position, message, hint=hint)
+
+
+def _cut(placements: list[ExpandedPlacement], limit: int) -> Iterator[tuple[ExpandedPlacement, int, int]]:
+    """Placements that a boundary cuts, with the start of their block and the boundary."""
+    start = end = -1
+    for placement in sorted(placements, key=lambda item: item.address):
+        if placement.address > end:
+            start = placement.address
+        end = max(end, placement.address + placement.words)
+        block = (placement.address - start) // limit
+        if (placement.addresses[-1] - start) // limit != block:
+            yield placement, start, start + (block + 1) * limit
+
+
+@cell_rule("GW213", "mixed-directions", "a register that mixes bits of both directions")
+def mixed_directions(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Holding registers with input bits and output bits."""
+    packed = [item for item in placements_of(cell) if item.bit is not None and item.area is Area.HOLDING]
+    first: dict[int, ExpandedPlacement] = {}
+    reported: set[tuple[str, str]] = set()
+    for placement in packed:
+        other = first.setdefault(placement.address, placement)
+        lines = other.variable.part.name, placement.variable.part.name
+        if other.variable.direction is placement.variable.direction or lines in reported:
+            continue
+        reported.add(lines)
+        message = (
+            f"`{placement.variable.name}` ({placement.variable.direction.value}) shares {_register(placement)} "
+            f"with `{other.variable.name}` ({other.variable.direction.value})"
+        )
+        related = (Related(other.position, f"`{other.variable.name}`, {where(other)}"),)
+        hint = "use one register for inputs and another for outputs"
+        yield rule.at(placement.position, message, hint=hint, related=related)
+
+
+def _register(placement: ExpandedPlacement) -> str:
+    return f"{AREA_WORDS[placement.area]} {placement.address} ({placement.area.notation(placement.address)})"
+
+
+@cell_rule("GW214", "register-overlap", "two variables at the same place of an area")
+def register_overlap(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Overlaps of like with like."""
+    for later, earlier, count in _overlaps(cell, mixed=False):
+        more = f", and {count - 1} more of these lines" if count > 1 else ""
+        message = (
+            f"`{later.variable.name}` lies at {where(later)}, where `{earlier.variable.name}` lies{more}"
+        )
+        related = (
+            Related(earlier.position, f"`{earlier.variable.name}`, {where(earlier)}, first used here"),
+        )
+        hint = _room(cell, later)
+        yield rule.at(later.position, message, hint=hint, related=related)
+
+
+@cell_rule("GW215", "bit-in-number", "a register that holds bits and a number")
+def bit_in_number(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Overlaps of a packed bit with a number."""
+    for later, earlier, _ in _overlaps(cell, mixed=True):
+        message = (
+            f"`{later.variable.name}` lies at {where(later)}, inside the same register as "
+            f"`{earlier.variable.name}`: one is a bit, the other a number"
+        )
+        related = (
+            Related(earlier.position, f"`{earlier.variable.name}`, {where(earlier)}, first used here"),
+        )
+        hint = _room(cell, later)
+        yield rule.at(later.position, message, hint=hint, related=related)
+
+
+def _overlaps(
+    cell: ExpandedCell, *, mixed: bool
+) -> Iterator[tuple[ExpandedPlacement, ExpandedPlacement, int]]:
+    """Pairs of lines that overlap: first placement of the later line, what it meets, and how many do.
+
+    A sweep over sorted places, so that a thousand variables cost no more than their sorting.
+    """
+    pairs: dict[tuple[str, int, str, int], list[tuple[ExpandedPlacement, ExpandedPlacement]]] = {}
+    for area in Area:
+        placed = [item for item in placements_of(cell) if item.area is area and item.problem is None]
+        reach: ExpandedPlacement | None = None
+        for placement in sorted(placed, key=_span):
+            if reach is not None and _span(placement)[0] < _span(reach)[1]:
+                earlier, later = sorted((reach, placement), key=_order)
+                if ((earlier.bit is None) != (later.bit is None)) == mixed:
+                    key = (*_line(later), *_line(earlier))
+                    pairs.setdefault(key, []).append((later, earlier))
+            if reach is None or _span(placement)[1] > _span(reach)[1]:
+                reach = placement
+    for found in pairs.values():
+        later, earlier = min(found, key=lambda pair: pair[0].variable.index)
+        yield later, earlier, len(found)
+
+
+def _line(placement: ExpandedPlacement) -> tuple[str, int]:
+    return placement.variable.part.name, id(placement.spec)
+
+
+def _span(placement: ExpandedPlacement) -> tuple[int, int]:
+    """First bit and the bit after the last, counting sixteen to an address."""
+    start = placement.address * 16
+    if placement.bit is not None:
+        return start + placement.bit, start + placement.bit + 1
+    return start, start + placement.words * 16
+
+
+def _order(placement: ExpandedPlacement) -> tuple[int, int]:
+    return placement.position.line, placement.position.column
+
+
+def _room(cell: ExpandedCell, placement: ExpandedPlacement) -> str:
+    """Remedy for an overlap: the next addresses of the area where the whole line fits."""
+    area = placement.area
+    here = [item for item in placements_of(cell) if item.area is area and item.problem is None]
+    line = [item for item in here if _line(item) == _line(placement)]
+    start = min(item.address for item in line)
+    length = max(item.addresses[-1] for item in line) + 1 - start
+    end = _LAST_ADDRESS + 1 if area.of_bits else FIRST_STATUS_REGISTER
+    for taken in sorted((item.addresses for item in here if _line(item) != _line(placement)), key=_first):
+        if taken[0] < start + length:
+            start = max(start, taken[-1] + 1)
+        else:
+            break
+    if start + length > end:
+        return "shorten one of the two lines, or use another area"
+    last = start + length - 1
+    if length == 1:
+        return f"the line fits at {start} ({area.notation(start)})"
+    return f"the line fits at {start} to {last} ({area.notation(start)} to {area.notation(last)})"
+
+
+def _first(addresses: range) -> int:
+    return addresses[0]
+
+
+@cell_rule("GW220", "no-modbus-section", "variables with Modbus addresses in a file without a modbus section")
+def no_modbus_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Placements without a listener."""
+    placements = placements_of(cell)
+    if not placements or cell.document.has("modbus"):
+        return
+    first = placements[0]
+    message = f"`{first.variable.name}` has a Modbus address, but the file has no section `modbus`"
+    hint = "add `modbus: {listen: 127.0.0.1:1502}`"
+    yield rule.at(first.position, message, hint=hint)

@@ -1,0 +1,80 @@
+"""Rule GW520: bits that several writers own by turns, in one register."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from gatewayd.core.definition import Direction
+from gatewayd.links.modbus_server.expand import ExpandedPlacement, placements_of
+from gatewayd.links.modbus_server.rules.wording import where
+from gatewayd.links.modbus_server.sections import ModbusWriter
+from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
+from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.mapping.rules.registry import cell_rule
+from gatewayd.modbus.areas import Area
+
+__all__: list[str] = []
+
+
+@cell_rule(
+    "GW520",
+    "shared-register",
+    "a bit of several possible owners in a register with bits of other locks",
+    Severity.WARNING,
+)
+def shared_register(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """The first such bit of each line."""
+    reported: set[str] = set()
+    with_coil = {place.variable.index for place in placements_of(cell) if place.area is Area.COIL}
+    for bits in _registers(cell):
+        if len({bit.lock for bit in bits}) < 2:
+            continue
+        for bit in bits:
+            line = bit.place.variable.part.name
+            if line in reported or bit.place.variable.index in with_coil or not _is_shared(cell, bit):
+                continue
+            reported.add(line)
+            yield _shared_bit(rule, cell, bit, next(other for other in bits if other.lock != bit.lock))
+
+
+@dataclass(frozen=True, slots=True)
+class _Bit:
+    place: ExpandedPlacement
+    lock: int
+
+
+def _registers(cell: ExpandedCell) -> Iterable[list[_Bit]]:
+    """The bits of inputs by holding register."""
+    found: dict[int, list[_Bit]] = {}
+    for place in placements_of(cell):
+        variable = place.variable
+        if place.area is not Area.HOLDING or place.bit is None or variable.direction is Direction.OUTPUT:
+            continue
+        if variable.lock is not None:
+            found.setdefault(place.address, []).append(_Bit(place, variable.lock))
+    return found.values()
+
+
+def _is_shared(cell: ExpandedCell, bit: _Bit) -> bool:
+    """Whether several writers may own it, one of them by Modbus."""
+    owners = cell.locks[bit.lock].owners
+    return len(owners) > 1 and any(
+        cell.document.writers[name].spec.by(ModbusWriter).modbus for name in owners
+    )
+
+
+def _shared_bit(rule: Rule, cell: ExpandedCell, bit: _Bit, other: _Bit) -> Diagnostic:
+    variable, neighbour = bit.place.variable, other.place.variable
+    lock = cell.locks[bit.lock]
+    owners = " or ".join(f"`{name}`" for name in lock.owners[:2]) + (" and others" if lock.owners[2:] else "")
+    message = (
+        f"writing the whole register does not acquire `{variable.name}` at {where(bit.place)}, which {owners} may own: "
+        f"`{neighbour.name}` shares the register"
+    )
+    related = (Related(other.place.position, f"`{neighbour.name}` is here"),)
+    hint = (
+        "give it a register of its own or a coil, put the bits of the register into one `group`, or name one owner; "
+        "as it is, function 22 (mask write) or a lock request acquires it"
+    )
+    return rule.at(bit.place.position, message, hint=hint, related=related)

@@ -1,0 +1,45 @@
+"""How findings about Modbus name places."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from gatewayd.links.modbus_server.expand import ExpandedPlacement
+from gatewayd.links.modbus_server.plan import Network
+from gatewayd.modbus.areas import Area
+
+__all__ = ["AREA_WORDS", "first_of_each_line", "peer", "where"]
+
+AREA_WORDS = {
+    Area.HOLDING: "holding register",
+    Area.INPUT: "input register",
+    Area.COIL: "coil",
+    Area.DISCRETE: "discrete input",
+}
+"""What one address of an area is called."""
+
+
+def where(placement: ExpandedPlacement) -> str:
+    """Where it lies, both ways of counting: `holding registers 100 to 103 (400101 to 400104)`."""
+    word = AREA_WORDS[placement.area]
+    if placement.bit is not None:
+        return f"bit {placement.bit} of {word} {placement.address} ({placement.notation})"
+    if placement.words == 1:
+        return f"{word} {placement.address} ({placement.notation})"
+    last = placement.address + placement.words - 1
+    return f"{word}s {placement.address} to {last} ({placement.notation} to {placement.area.notation(last)})"
+
+
+def first_of_each_line(placements: Iterable[ExpandedPlacement]) -> Iterator[ExpandedPlacement]:
+    """Of a family on one line only the first: one mistake is one finding."""
+    seen: set[tuple[str, int]] = set()
+    for placement in placements:
+        key = placement.variable.part.name, id(placement.spec)
+        if key not in seen:
+            seen.add(key)
+            yield placement
+
+
+def peer(network: Network) -> str:
+    """An address, or a network with its length."""
+    return str(network.network_address) if network.num_addresses == 1 else str(network)

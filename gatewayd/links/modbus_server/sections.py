@@ -1,0 +1,160 @@
+"""The Modbus part of the mapping language: the section `modbus`, and a variable's places in registers."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+
+from gatewayd.links.modbus_server.scalars import BAD_ADDRESS, Address
+from gatewayd.mapping import syntax
+from gatewayd.mapping.scalars import (
+    Listen,
+    ListenAddress,
+    Networks,
+    OptionalDuration,
+    Real,
+    Whole,
+    refuse,
+)
+from gatewayd.mapping.section import Section
+from gatewayd.modbus.areas import Area
+
+__all__ = ["Modbus", "ModbusPlaces", "ModbusWriter", "NumberType", "PlacementSpec", "WordOrder"]
+
+NumberType = Literal[
+    "bool", "bit", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"
+]
+WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
+
+
+class Modbus(Section):
+    """One unit of a Modbus TCP listener."""
+
+    listen: Listen = Field(
+        default=ListenAddress("127.0.0.1", 502),
+        description="address and port to listen on",
+        json_schema_extra={"default": "127.0.0.1:502"},
+    )
+    unit: Whole = Field(default=1, ge=1, le=247, description="unit identifier of this cell")
+    allow: Networks = Field(
+        default=(),
+        description="addresses and networks that may connect; default: everybody who reaches the port",
+    )
+    connections: Whole = Field(default=32, ge=1, le=1024, description="greatest number of connections")
+    idle_timeout: OptionalDuration = Field(
+        default=60.0, description="a connection without a request for so long is closed; none: never"
+    )
+    gaps: Literal["refuse", "zero"] = Field(
+        default="refuse", description="reading registers that nothing is mapped to: exception 02, or zeros"
+    )
+    order: WordOrder = Field(
+        default="ABCD", description="byte order of all variables that do not name their own"
+    )
+
+
+class PlacementSpec(Section):
+    """Where a variable lies in Modbus and how its number is written there."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [{"required": [area]} for area in ("holding", "input", "coil", "discrete")]
+        }
+    )
+
+    holding: Address | None = Field(default=None, description="holding register (4xxxxx)")
+    input: Address | None = Field(default=None, description="input register (3xxxxx), read only")
+    coil: Address | None = Field(default=None, description="coil (0xxxxx), one bit")
+    discrete: Address | None = Field(default=None, description="discrete input (1xxxxx), one bit, read only")
+    type: NumberType | None = Field(default=None, description="number type; default: from the robot's type")
+    order: WordOrder | None = Field(
+        default=None,
+        description="ABCD: big-endian; CDAB: words swapped; BADC: bytes swapped; DCBA: both",
+    )
+    scale: Real | None = Field(default=None, description="robot value = raw value * scale + offset")
+    offset: Real | None = Field(default=None, description="robot value = raw value * scale + offset")
+
+    @model_validator(mode="after")
+    def _one_area(self) -> Self:
+        given = [area for area in _AREAS if getattr(self, area) is not None]
+        if len(given) != 1:
+            found = "none" if not given else " and ".join(given)
+            message = f"a placement names exactly one of holding, input, coil and discrete; found {found}"
+            refuse(
+                BAD_ADDRESS,
+                message,
+                "write for example {holding: 100}; several placements make a list",
+            )
+        if self.area.of_bits and self.bit is not None:
+            message = f"a {given[0]} address has no bits"
+            refuse(BAD_ADDRESS, message, f"write {{{given[0]}: N}} with a whole number")
+        return self
+
+    @property
+    def area(self) -> Area:
+        """The Modbus table."""
+        return next(area for key, area in _AREAS.items() if getattr(self, key) is not None)
+
+    @property
+    def area_key(self) -> str:
+        """The key that names the table."""
+        return next(key for key in _AREAS if getattr(self, key) is not None)
+
+    @property
+    def address(self) -> int:
+        """Protocol address from 0."""
+        return self._place()[0]
+
+    @property
+    def bit(self) -> int | None:
+        """Bit of the register, or None."""
+        return self._place()[1]
+
+    def _place(self) -> tuple[int, int | None]:
+        place: tuple[int, int | None] = getattr(self, self.area_key)
+        return place
+
+
+_AREAS = {"holding": Area.HOLDING, "input": Area.INPUT, "coil": Area.COIL, "discrete": Area.DISCRETE}
+
+
+def _places(value: Any) -> Any:
+    """Bring the short forms into one: `100`, `0.3`, `{coil: 5}`, or a list of them."""
+    items = value if isinstance(value, (list, tuple)) else [value]
+    return [
+        item if isinstance(item, (dict, PlacementSpec)) else {"holding": _present(item)} for item in items
+    ]
+
+
+def _present(item: Any) -> Any:
+    if item is None or isinstance(item, (bool, list)):
+        refuse(
+            syntax.WRONG_TYPE,
+            "a Modbus address is missing",
+            "write a register (100), a bit (100.3) or {coil: 5}",
+        )
+    return item
+
+
+class ModbusPlaces(Section):
+    """What a variable has by Modbus."""
+
+    modbus: Annotated[
+        tuple[PlacementSpec, ...],
+        BeforeValidator(
+            _places,
+            json_schema_input_type=float | str | PlacementSpec | list[float | str | PlacementSpec],
+        ),
+        Field(strict=False),
+    ] = Field(
+        default=(),
+        description="address from 0 (100), bit of a register (100.3), {area: address, type: ...}, or a list of these",
+    )
+
+
+class ModbusWriter(Section):
+    """What a writer has by Modbus."""
+
+    modbus: Networks = Field(
+        default=(), description="address or network of the Modbus client, or a list of them"
+    )

@@ -1,0 +1,124 @@
+"""One connection's requests: bytes in, answers out, in order, whatever the depth of pipelining. No input or output.
+
+A single read of registers, nearly all of the traffic, is answered here at once; everything else goes to
+`gatewayd.links.modbus_server.functions`.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from gatewayd.core.requester import Requester
+from gatewayd.links.modbus_server.functions import ExceptionCode, Unit, exception, execute
+from gatewayd.links.modbus_server.registers import MAX_REGISTERS
+from gatewayd.loop import clock
+from gatewayd.modbus.frames import FrameBuffer, FramingError, encode, split
+
+__all__ = ["ModbusSession", "UnitAccess"]
+
+_READ_HOLDING = 3
+_READ_INPUT = 4
+_READ_FRAME = 12
+_READ_LENGTH = 6
+_unpack_read = struct.Struct(">2sHHHHH").unpack_from
+"""Transaction id, protocol id, length, unit id and function, address, quantity."""
+_HEAD = struct.Struct(">HHBBB")
+_THIS_DEVICE = (0, 255)
+"""Unit ids by which a client on TCP means the device itself (Messaging on TCP/IP Guide V1.0b, 4.4.2.3)."""
+
+
+class UnitAccess:
+    """What a peer may do with one unit."""
+
+    __slots__ = ("requester", "unit", "writer_seen")
+
+    def __init__(self, unit: Unit, requester: Requester) -> None:
+        self.unit = unit
+        self.requester = requester
+        """The peer as a writer of the unit's cell, or as an undeclared one."""
+        self.writer_seen = unit.cell.writer_seen
+
+
+class ModbusSession:
+    """The requests of one connection."""
+
+    def __init__(self) -> None:
+        self.buffer = FrameBuffer()
+        self.broken = ""
+        """Why the connection must be closed, once something came in that is no Modbus frame."""
+        self._accesses: dict[int, UnitAccess] = {}
+        self._reads: dict[int, tuple[Any, bytearray, tuple[bytes, ...], UnitAccess]] = {}
+
+    def serve(self, accesses: Mapping[int, UnitAccess]) -> None:
+        """Answer for these units from now on. The only one also answers to 0 and 255."""
+        self._accesses = dict(accesses)
+        if len(accesses) == 1:
+            self._accesses.update(dict.fromkeys(_THIS_DEVICE, *accesses.values()))
+        self._reads = {}
+        for unit, access in self._accesses.items():
+            image = access.unit.image
+            for function, table in ((_READ_HOLDING, image.holding), (_READ_INPUT, image.input)):
+                key = unit << 8 | function
+                self._reads[key] = (table.readable.reach, table.image, _heads(key), access)
+
+    def received(self, count: int, now: float) -> bytes:
+        """`count` bytes were written to `buffer.space`; returns the answers to all requests that are complete."""
+        buffer = self.buffer
+        if count == _READ_FRAME and not buffer.end:
+            transaction, protocol, length, key, address, quantity = _unpack_read(buffer.data)
+            read = self._reads.get(key)
+            if read is not None and length == _READ_LENGTH and not protocol:
+                reach, image, heads, access = read
+                if 0 < quantity <= reach[address]:
+                    access.writer_seen(access.requester, now)
+                    first = 2 * address
+                    answer: bytes = transaction + heads[quantity] + image[first : first + 2 * quantity]
+                    return answer
+        return self._answers(buffer.end + count, now)
+
+    def received_late(self, count: int, now: float, waited: float) -> bytes:
+        """The same for bytes that may have waited so many seconds while the gateway stood still.
+
+        The cell hears of it with every request; it refuses commands that are too old and judges what is a sign of life.
+        """
+        return self._answers(self.buffer.end + count, now, waited)
+
+    def _answers(self, end: int, now: float, waited: float = 0.0) -> bytes:
+        """The answers to all requests that are complete before `end` of the buffer."""
+        answers = []
+        start = 0
+        try:
+            while (frame := split(self.buffer.data, start, end)) is not None:
+                start = frame.end
+                if clock.overdue():
+                    # Stopped between two requests: those that follow have waited since they were read.
+                    read_at, now = now, clock.judged_now()
+                    waited = max(waited, now - read_at)
+                answers.append(
+                    encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now, waited))
+                )
+        except FramingError as error:
+            self.broken = str(error)
+        self.buffer.discard(start, end)
+        return b"".join(answers)
+
+    def _answer(self, unit: int, pdu: bytes, now: float, waited: float) -> bytes:
+        access = self._accesses.get(unit)
+        if access is None:
+            return exception(pdu[0], ExceptionCode.TARGET_FAILED)
+        requester = replace(access.requester, waited=waited) if waited else access.requester
+        access.writer_seen(requester, now)
+        return execute(access.unit, requester, pdu, now)
+
+
+@cache
+def _heads(key: int) -> tuple[bytes, ...]:
+    """For every quantity, what stands between transaction id and registers in the answer to a read."""
+    unit, function = key >> 8, key & 0xFF
+    return tuple(
+        _HEAD.pack(0, 3 + 2 * quantity, unit, function, 2 * quantity) for quantity in range(MAX_REGISTERS + 1)
+    )

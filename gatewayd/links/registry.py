@@ -1,0 +1,101 @@
+"""The kinds of links that there are. A new one is a package beside these and a line in `LINK_KINDS`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING, cast
+
+from gatewayd.core.status_layout import FIELDS, StatusField
+from gatewayd.links.contract import LinkKind, LinkRuntime
+
+if TYPE_CHECKING:
+    from gatewayd.links.exports import Export
+    from gatewayd.links.language import DefiningLanguage, LinkLanguage
+    from gatewayd.links.tables import LinkTables
+
+__all__ = [
+    "LINK_KINDS",
+    "definer",
+    "exports",
+    "kind_of",
+    "kinds",
+    "language_of",
+    "languages",
+    "runtime_of",
+    "status_fields",
+    "tables",
+]
+
+LINK_KINDS = (
+    "gatewayd.links.robot",
+    "gatewayd.links.modbus_server",
+    "gatewayd.links.canopen_node",
+)
+"""Packages, imported when they are used. Their order is that of sections in lists and tables."""
+
+
+@cache
+def kinds() -> tuple[LinkKind, ...]:
+    """All kinds, in order."""
+    found = (import_module(f"{package}.declaration").KIND for package in LINK_KINDS)
+    return tuple(kind for kind in found if isinstance(kind, LinkKind))
+
+
+@cache
+def status_fields() -> tuple[StatusField, ...]:
+    """All numbers of the status block's header, the core's and those of all kinds, by address."""
+    fields = (*FIELDS, *(field for kind in kinds() for field in kind.status_fields))
+    return tuple(sorted(fields, key=lambda field: field.offset))
+
+
+def kind_of(key: str) -> LinkKind:
+    """The kind whose links have this key."""
+    return next(kind for kind in kinds() if kind.key == key)
+
+
+@cache
+def language_of(key: str) -> LinkLanguage:
+    """What the kind with this key adds to the mapping language."""
+    # The daemon, which has no use for models, imports this module and not those.
+    language: LinkLanguage = import_module(f"{_package(key)}.language").LANGUAGE
+    return language
+
+
+@cache
+def languages() -> tuple[LinkLanguage, ...]:
+    """What all kinds add to the mapping language, in order."""
+    return tuple(language_of(kind.key) for kind in kinds())
+
+
+@cache
+def definer() -> DefiningLanguage:
+    """What the one kind that defines variables adds to the mapping language."""
+    (found,) = (language for language in languages() if language.defines)
+    return cast("DefiningLanguage", found)
+
+
+@cache
+def tables() -> tuple[LinkTables, ...]:
+    """What all kinds show of a mapping, in order."""
+    return tuple(import_module(language.tables).TABLES for language in languages() if language.tables)
+
+
+@cache
+def exports() -> Mapping[str, Export]:
+    """What all kinds write for other tools, by name."""
+    modules = [import_module(language.exports) for language in languages() if language.exports]
+    return {export.name: export for module in modules for export in module.EXPORTS}
+
+
+@cache
+def runtime_of(key: str) -> LinkRuntime:
+    """What makes links of the kind with this key."""
+    runtime = import_module(f"{_package(key)}.runtime").RUNTIME
+    assert isinstance(runtime, LinkRuntime)
+    return runtime
+
+
+def _package(key: str) -> str:
+    return next(package for package, kind in zip(LINK_KINDS, kinds(), strict=True) if kind.key == key)

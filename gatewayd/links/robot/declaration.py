@@ -1,0 +1,71 @@
+"""What everybody may know of this kind of link."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from gatewayd.core.definition import CellDefinition
+from gatewayd.links.contract import Description, LinkKind
+from gatewayd.links.robot.companions import all_inputs, all_outputs
+from gatewayd.links.robot.description import description
+from gatewayd.links.robot.plan import RobotPlan
+from gatewayd.mapping.plan import LinkPlan
+
+__all__ = ["KIND"]
+
+
+class RobotKind(LinkKind):
+    """The kind with the section `robot`."""
+
+    key = "robot"
+    title = "Universal Robots controller"
+    usual = True
+    fields = {  # noqa: RUF012 - never changed
+        "address": "host:port of the controller",
+        "state": "`lost`, `waiting`, `fresh`, `silent`, `frozen` or `late`",
+        "writable": "connected, and its inputs were adopted",
+        "age": "seconds since the last package that told anything new, or null",
+        "frequency": "packages per second, measured",
+        "packages": "packages received",
+        "skipped": "packages that the controller left out",
+        "late": "packages that came late",
+        "sessions": "sessions with the controller; the first one is no reconnect",
+        "mismatches": "inputs whose read-back differed from what was written",
+        "lag": "seconds by which the newest package is later than the quickest ones were",
+        "unadopted": "inputs whose content in the robot is not known",
+        "differing": "inputs for which the robot holds something else than it was given",
+        "adoption": "seconds until adopted inputs without an owner fall back; 0: none will",
+        "watchdog": "whether the robot's watchdog is fed, or null without one",
+    }
+
+    def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
+        """The session goes on where its settings and claimed inputs are the same, and all outputs are subscribed."""
+        assert isinstance(old, RobotPlan)
+        assert isinstance(new, RobotPlan)
+        return (
+            _session_of(old) == _session_of(new)
+            and set(all_inputs(old.inputs, before.variables)) == set(all_inputs(new.inputs, after.variables))
+            and set(all_outputs(new.outputs, after.variables)).issubset(
+                all_outputs(old.outputs, before.variables)
+            )
+        )
+
+    def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
+        """The session with the controller."""
+        assert isinstance(plan, RobotPlan)
+        return description(plan, cell)
+
+    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
+        """Another address is another robot."""
+        return ("host", "port")
+
+
+def _session_of(plan: RobotPlan) -> tuple[object, ...]:
+    """The settings that a session is made with."""
+    watchdog = plan.watchdog
+    fed = (watchdog.field, watchdog.frequency) if watchdog is not None else None
+    return plan.host, plan.port, plan.frequency, plan.verify, fed
+
+
+KIND = RobotKind()
+"""What everybody may know of this kind of link."""

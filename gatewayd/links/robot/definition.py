@@ -1,0 +1,116 @@
+"""The variables of a cell: what a line of a mapping means in the robot, with its type, range and direction."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from gatewayd.core.definition import Direction, ValueKind
+from gatewayd.links.robot.reference import Target, resolve
+from gatewayd.links.robot.sections import Robot, RobotPlace, RobotValidity
+from gatewayd.mapping.document import Document, Part
+from gatewayd.mapping.expanded import Defined, ExpandedVariable
+from gatewayd.mapping.model import VariableSpec
+from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field
+from gatewayd.rtde.types import DataType
+
+__all__ = ["define", "field_of", "is_program_output"]
+
+_RANGES: Final = {
+    DataType.UINT8: (0, 0xFF),
+    DataType.UINT32: (0, 0xFFFF_FFFF),
+    DataType.UINT64: (0, 0xFFFF_FFFF_FFFF_FFFF),
+    DataType.INT32: (-0x8000_0000, 0x7FFF_FFFF),
+}
+_USUAL: Final = {
+    "robot_mode": (-1, 255),
+    "joint_mode": (0, 255),
+    "safety_mode": (0, 255),
+    "safety_status": (0, 255),
+    "runtime_state": (0, 255),
+    "tool_mode": (0, 255),
+    "time_scale_source": (-1, 255),
+    "robot_status_bits": (0, 0xF),
+    "safety_status_bits": (0, 0xFFF),
+    "analog_io_types": (0, 0xF),
+    "tool_analog_input_types": (0, 0xF),
+    "tool_output_voltage": (0, 24),
+    "actual_digital_input_bits": (0, 0x3FFFF),
+    "actual_digital_output_bits": (0, 0x3FFFF),
+    "actual_configurable_digital_input_bits": (0, 0xFF),
+    "actual_configurable_digital_output_bits": (0, 0xFF),
+}
+"""Values that fields take in truth, where that is much less than their type holds."""
+_GROWING: Final = ("timestamp",)
+_MOVING: Final = ("speed_slider_fraction",)
+_COUNTERPARTS: Final = {
+    "actual_digital_output_bits": "standard_digital_output (with its mask)",
+    "actual_configurable_digital_output_bits": "configurable_digital_output (with its mask)",
+    "standard_analog_output0": "standard_analog_output_0 (with its mask)",
+    "standard_analog_output1": "standard_analog_output_1 (with its mask)",
+    "target_speed_fraction": "speed_slider_fraction (with its mask)",
+}
+"""Outputs that are often taken for the input of nearly the same name."""
+_OUTPUT_REGISTER: Final = "output_"
+
+
+def define(line: Part[VariableSpec], document: Document) -> tuple[list[Defined], bool]:
+    """The values that a line names, in order, and whether they are a family. Raises UnresolvedReference."""
+    reference = line.spec.by(RobotPlace).robot
+    targets = resolve(reference)
+    robot = document.part(Robot)
+    of_all = robot is not None and robot.spec.valid is not None
+    is_asked = line.spec.by(RobotValidity).valid is not None
+    values = [
+        _defined(target, running=is_asked or (of_all and _is_of_program(target.field.name)))
+        for target in targets
+    ]
+    return values, reference.many or len(targets) > 1
+
+
+def field_of(variable: ExpandedVariable) -> Field:
+    """The catalogue's entry of the field that carries it."""
+    return (INPUTS if variable.direction is Direction.INPUT else OUTPUTS)[variable.field]
+
+
+def is_program_output(variable: ExpandedVariable) -> bool:
+    """Whether it is an output register, which only the robot program writes."""
+    return _is_of_program(variable.field)
+
+
+def _is_of_program(field: str) -> bool:
+    return field.startswith(_OUTPUT_REGISTER)
+
+
+def _defined(target: Target, *, running: bool) -> Defined:
+    field = target.field.name
+    direction = Direction.INPUT if field in INPUTS else Direction.OUTPUT
+    low, high = _RANGES.get(target.type, (None, None))
+    is_output = direction is Direction.OUTPUT
+    return Defined(
+        target=target.name,
+        direction=direction,
+        field=field,
+        type=target.type.word,
+        kind=_kind(target.type),
+        low=low,
+        high=high,
+        bit=target.bit,
+        element=target.element,
+        usual=_USUAL.get(field),
+        valid_running=is_output and running,
+        grows=field in _GROWING,
+        moves=field in _MOVING,
+        counterpart=_counterpart(target) if is_output else "",
+    )
+
+
+def _kind(data_type: DataType) -> ValueKind:
+    if data_type is DataType.BOOL:
+        return ValueKind.BOOL
+    return ValueKind.INT if data_type in _RANGES else ValueKind.FLOAT
+
+
+def _counterpart(target: Target) -> str:
+    if _is_of_program(target.name):
+        return f"input_{target.name.removeprefix(_OUTPUT_REGISTER)}"
+    return _COUNTERPARTS.get(target.field.name, "input_int_register_0")

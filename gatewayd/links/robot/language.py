@@ -1,0 +1,132 @@
+"""The robot's part of the mapping language: it defines the variables of a cell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import ClassVar, Final
+
+from gatewayd.core.definition import Direction
+from gatewayd.links.language import DefiningLanguage, WriterName
+from gatewayd.links.robot.declaration import KIND
+from gatewayd.links.robot.definition import define
+from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
+from gatewayd.links.robot.rates import package_period, package_rate
+from gatewayd.links.robot.sections import ADOPT_FOR, Robot, RobotPlace, RobotValidity, Watchdog
+from gatewayd.mapping.diagnostics import Position
+from gatewayd.mapping.document import Document, Part
+from gatewayd.mapping.expanded import CellSettings, Defined, ExpandedCell
+from gatewayd.mapping.model import VariableSpec
+from gatewayd.mapping.section import Section
+
+__all__ = ["LANGUAGE"]
+
+_STALE_PERIODS: Final = 5
+_MIN_STALE_AFTER: Final = 0.1
+_TIMESTAMP: Final = "timestamp"
+_PROGRAM_STATE: Final = "runtime_state"
+"""The field that says whether the robot program runs."""
+_UNKNOWN: Final = Robot(host="unknown")
+
+
+class RobotLanguage(DefiningLanguage):
+    """Section `robot`, and the keys `robot` and `valid` of a variable."""
+
+    key = KIND.key
+    section = Robot
+    meaning = "the controller"
+    required = True
+    variable_keys = RobotPlace
+    variable_policies = RobotValidity
+    rules = ("gatewayd.links.robot.rules.fields", "gatewayd.links.robot.rules.companions",
+             "gatewayd.links.robot.rules.watchdog", "gatewayd.links.robot.rules.rates",
+             "gatewayd.links.robot.rules.validity")  # fmt: skip
+    tables = "gatewayd.links.robot.tables"
+    exports = "gatewayd.links.robot.urscript"
+    nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {(Robot, "watchdog"): Watchdog}
+    articles: ClassVar[Mapping[type[Section], str]] = {Robot: "the section `robot`", Watchdog: "the watchdog"}
+    telling_keys = ("host", "frequency", "port", "series", "version", "adopt_for", "valid")
+    output_policies: ClassVar[Mapping[str, str]] = {"valid": "it says when an output is good"}
+    unwritten: ClassVar[Mapping[str, object]] = {"adopt_for": ADOPT_FOR}
+
+    def without_effect(self, document: Document) -> Iterable[tuple[Position, str, str]]:
+        """`adopt_for` where nothing is adopted."""
+        robot = document.part(Robot)
+        if (
+            robot is not None
+            and robot.spec.on_connect == "fallback"
+            and "adopt_for" in robot.spec.model_fields_set
+        ):
+            message = "`adopt_for` is for adopted inputs, and `on_connect: fallback` adopts none"
+            yield robot.key_at("adopt_for"), message, "remove one of the two"
+
+    def names_writers(self, document: Document) -> Iterable[WriterName]:
+        """The writers that the watchdog requires."""
+        robot = document.part(Robot)
+        if robot is not None and robot.spec.watchdog is not None:
+            for index, name in enumerate(robot.spec.watchdog.requires or ()):
+                position = robot.at("watchdog", "requires", index)
+                yield WriterName(
+                    name,
+                    position,
+                    "the writer that the watchdog requires,",
+                    "a watchdog cannot require `any`",
+                    robot.at("watchdog", "requires"),
+                )
+
+    def define(self, line: Part[VariableSpec], document: Document) -> tuple[Sequence[Defined], bool]:
+        """The values that a line names, in order, and whether they are a family."""
+        return define(line, document)
+
+    def named(self, line: Part[VariableSpec]) -> str:
+        """The reference of a line."""
+        return str(line.spec.by(RobotPlace).robot)
+
+    def settings(self, document: Document) -> CellSettings:
+        """When values are stale, and what becomes of those that the controller holds."""
+        part = document.part(Robot)
+        robot = part.spec if part is not None else _UNKNOWN
+        return CellSettings(
+            robot.stale_after or max(_STALE_PERIODS * package_period(robot), _MIN_STALE_AFTER),
+            robot.on_connect == "fallback",
+            robot.adopt_for,
+            package_rate(robot),
+        )
+
+    def compile(self, cell: ExpandedCell) -> RobotPlan:
+        """How to reach the controller and what to ask of it."""
+        part = cell.document.part(Robot)
+        assert part is not None
+        robot, writers = part.spec, list(cell.document.writers)
+        watchdog = robot.watchdog
+        return RobotPlan(
+            host=robot.host,
+            port=robot.port,
+            frequency=robot.frequency,
+            outputs=tuple(name for name in _subscribed(cell) if name != _TIMESTAMP),
+            inputs=_fields(cell, Direction.INPUT),
+            verify=robot.verify,
+            watchdog=None
+            if watchdog is None
+            else WatchdogPlan(
+                watchdog.field,
+                watchdog.frequency,
+                tuple(writers.index(name) for name in dict.fromkeys(watchdog.requires or ())),
+            ),
+        )
+
+
+def _subscribed(cell: ExpandedCell) -> tuple[str, ...]:
+    """Fields of outputs, and what says whether the program runs where the quality of one hangs on it."""
+    fields = _fields(cell, Direction.OUTPUT)
+    if not any(variable.valid_running for variable in cell.variables):
+        return fields
+    return tuple(dict.fromkeys((*fields, _PROGRAM_STATE)))
+
+
+def _fields(cell: ExpandedCell, direction: Direction) -> tuple[str, ...]:
+    return tuple(
+        dict.fromkeys(variable.field for variable in cell.variables if variable.direction is direction)
+    )
+
+
+LANGUAGE: Final = RobotLanguage()

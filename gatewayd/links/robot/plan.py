@@ -1,0 +1,42 @@
+"""The compiled robot side of a mapping: how to reach the controller and what to ask of it, immutable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gatewayd.mapping.plan import LinkPlan, Plan
+
+__all__ = ["RobotPlan", "WatchdogPlan", "robot_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class WatchdogPlan:
+    """The input register that is fed while gateway and required writers are healthy (URScript `rtde_set_watchdog`)."""
+
+    field: str
+    frequency: float
+    """Feeds per second."""
+    requires: tuple[int, ...]
+    """Writers that must be alive for the feeding to go on."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotPlan(LinkPlan):
+    """How to reach the controller and what to ask of it."""
+
+    host: str
+    port: int
+    frequency: float
+    """Output packages per second asked for; 0: the controller's own rate."""
+    outputs: tuple[str, ...]
+    """Fields to subscribe, in the order of their first variable; without `timestamp` and read-backs."""
+    inputs: tuple[str, ...]
+    """Fields to claim, in the order of their first variable."""
+    verify: bool
+    """Compare what was written with what the controller reads back."""
+    watchdog: WatchdogPlan | None = None
+
+
+def robot_of(plan: Plan) -> RobotPlan:
+    """The controller of a cell."""
+    return plan.of(RobotPlan)["robot"]

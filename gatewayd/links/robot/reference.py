@@ -1,0 +1,131 @@
+"""What a `robot:` reference means: the fields, elements and bits of the catalogue that it names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Final
+
+from gatewayd.links.robot.scalars import Reference
+from gatewayd.mapping.expanded import UndefinedError
+from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, REGISTERS, Field, bit_word
+from gatewayd.rtde.types import DataType
+
+__all__ = ["ReferenceProblem", "Target", "UnresolvedReference", "resolve"]
+
+_BITS: Final = {DataType.UINT8: 8, DataType.UINT32: 32, DataType.UINT64: 64, DataType.INT32: 32}
+_ELEMENTS: Final = {
+    DataType.VECTOR3D: DataType.DOUBLE,
+    DataType.VECTOR6D: DataType.DOUBLE,
+    DataType.VECTOR6INT32: DataType.INT32,
+    DataType.VECTOR6UINT32: DataType.UINT32,
+}
+_FAMILIES: Final = {family.prefix: family for family in REGISTERS}
+_BIT_REGISTERS: Final = {"input_bit_register_": "input", "output_bit_register_": "output"}
+_NUMBERED = re.compile(r"(.*_)(0|[1-9][0-9]{0,3})")
+_WORD_BITS: Final = range(64)
+
+
+class ReferenceProblem(Enum):
+    """Why a `robot:` reference names nothing."""
+
+    UNKNOWN_FIELD = auto()
+    NOT_NUMBERED = auto()
+    """A range of something that has no numbered registers."""
+    NO_SUCH_REGISTER = auto()
+    NOT_A_VECTOR = auto()
+    NO_SUCH_ELEMENT = auto()
+    NOT_AN_INTEGER = auto()
+    """Bits of a field that is no integer."""
+    NO_SUCH_BIT = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One value in the robot."""
+
+    name: str
+    """In full: `input_bit_register_5`, `actual_TCP_pose[0]`, `robot_mode`."""
+    field: Field
+    """The field that carries it."""
+    type: DataType
+    """Of the one value: BOOL for a bit, the element type for a vector."""
+    bit: int | None = None
+    element: int | None = None
+
+
+class UnresolvedReference(UndefinedError):
+    """A reference names nothing known: `name` is the field or the first missing register, `limit` what there is."""
+
+    def __init__(self, problem: ReferenceProblem, name: str, limit: int | None = None) -> None:
+        super().__init__()
+        self.problem, self.name, self.limit = problem, name, limit
+
+
+def resolve(reference: Reference) -> list[Target]:
+    """Find what a reference names, in the order it is written.
+
+    Bits 0 to 63 are bits of the register words that RTDE has; a vector without an element is all its elements.
+    Raises `UnresolvedReference`.
+    """
+    if reference.registers is not None:
+        return [_register(reference.field, number) for number in reference.registers]
+    family = _split_register(reference.field)
+    if family is not None:
+        whole = _register(*family)
+    else:
+        field = INPUTS.get(reference.field) or OUTPUTS.get(reference.field)
+        if field is None:
+            raise UnresolvedReference(ReferenceProblem.UNKNOWN_FIELD, reference.field)
+        whole = Target(field.name, field, field.type)
+    elements = list(_elements(whole, reference.elements))
+    if reference.bits is None:
+        return elements
+    return [bit for element in elements for bit in _bits(element, reference.bits)]
+
+
+def _split_register(field: str) -> tuple[str, int] | None:
+    """Split the name of a numbered register; None for other fields."""
+    match = _NUMBERED.fullmatch(field)
+    if match is None or (match[1] not in _FAMILIES and match[1] not in _BIT_REGISTERS):
+        return None
+    return match[1], int(match[2])
+
+
+def _register(prefix: str, number: int) -> Target:
+    name = f"{prefix}{number}"
+    side = _BIT_REGISTERS.get(prefix)
+    if side is not None and number in _WORD_BITS:
+        word, bit = bit_word(side, number)
+        return Target(name, (INPUTS if side == "input" else OUTPUTS)[word], DataType.BOOL, bit)
+    family = _FAMILIES.get(prefix)
+    if family is None:
+        raise UnresolvedReference(ReferenceProblem.NOT_NUMBERED, prefix)
+    if number not in family.numbers:
+        raise UnresolvedReference(ReferenceProblem.NO_SUCH_REGISTER, name, family.numbers[-1])
+    field = INPUTS.get(name) or OUTPUTS[name]
+    return Target(name, field, field.type)
+
+
+def _elements(whole: Target, wanted: range | None) -> Iterator[Target]:
+    if not whole.type.is_vector:
+        if wanted is not None:
+            raise UnresolvedReference(ReferenceProblem.NOT_A_VECTOR, whole.name)
+        yield whole
+        return
+    for element in wanted if wanted is not None else range(whole.type.count):
+        if element >= whole.type.count:
+            raise UnresolvedReference(ReferenceProblem.NO_SUCH_ELEMENT, whole.name, whole.type.count)
+        yield Target(f"{whole.name}[{element}]", whole.field, _ELEMENTS[whole.type], whole.bit, element)
+
+
+def _bits(whole: Target, wanted: range) -> Iterator[Target]:
+    width = _BITS.get(whole.type)
+    if width is None:
+        raise UnresolvedReference(ReferenceProblem.NOT_AN_INTEGER, whole.name)
+    for bit in wanted:
+        if bit >= width:
+            raise UnresolvedReference(ReferenceProblem.NO_SUCH_BIT, whole.name, width)
+        yield Target(f"{whole.name}.{bit}", whole.field, DataType.BOOL, bit, whole.element)

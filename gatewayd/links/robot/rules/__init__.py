@@ -1,0 +1,1 @@
+"""Rules about the controller and its registers."""

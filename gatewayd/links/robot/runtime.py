@@ -1,0 +1,432 @@
+"""The robot link: one RTDE client and one cell.
+
+Packages go into the image as they come. What the fieldbus writes goes out at once, then at most once per control cycle
+of the controller, always as whole recipes, so that values of one request arrive in one package. Nothing is sent
+before the controller's own inputs were adopted; from then on writes always are, by the recipes that were adopted last.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+
+from gatewayd.core.cell import Cell
+from gatewayd.core.definition import Direction, FallbackKind, Value
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
+from gatewayd.links.contract import Context, Level, LinkHealth, LinkRuntime, SourceLink
+from gatewayd.links.robot.availability import unavailable
+from gatewayd.links.robot.companions import Driven, all_inputs, all_outputs
+from gatewayd.links.robot.inputs import ClaimedInputs
+from gatewayd.links.robot.plan import RobotPlan
+from gatewayd.links.robot.readback import Package
+from gatewayd.links.robot.transfer import OutputTransfer
+from gatewayd.logs.records import fields
+from gatewayd.loop import clock
+from gatewayd.mapping.plan import LinkPlan
+from gatewayd.report.format import address
+from gatewayd.rtde.claims import WATCHDOG_KEY
+from gatewayd.rtde.client import ClientSettings, Loss, LossReason, RtdeClient, Session
+from gatewayd.rtde.messages import TextMessage
+
+__all__ = ["LAST_WORDS", "LOSS_INTERVAL", "RUNTIME", "RobotLink"]
+
+LOSS_INTERVAL = 60.0
+"""Seconds after which a connection that still fails for the same reason is reported again."""
+LAST_WORDS = 0.4
+"""Seconds for which the end of the link waits until what is due has been sent."""
+_LOOK = 0.005
+_PROGRAM = "runtime_state"
+_CYCLE_UNKNOWN = 0.002
+_FEED_LIMIT = 1 << 31
+
+log = logging.getLogger("gatewayd.robot")
+
+
+class RobotLink(SourceLink):
+    """Keeps `cell` and its controller in step while `run` runs."""
+
+    title = "robot link"
+
+    def __init__(self, plan: RobotPlan, cell: Cell, former: RobotLink | None = None) -> None:
+        """With a `former` link the counters go on; its `run` must have ended before this one's begins."""
+        self._plan = plan
+        self._cell = cell
+        watchdog, variables = plan.watchdog, cell.definition.variables
+        self._client = RtdeClient(
+            ClientSettings(
+                plan.host,
+                plan.port,
+                outputs=all_outputs(plan.outputs, variables),
+                inputs=all_inputs(plan.inputs, variables),
+                watchdog=watchdog.field if watchdog is not None else None,
+                frequency=plan.frequency,
+                read_back=plan.verify,
+            ),
+            self,
+        )
+        self._driven = Driven()
+        if former is not None:
+            self._client.statistics = former._client.statistics  # noqa: SLF001 - another one of the same class
+            self._driven = former._driven  # noqa: SLF001
+        self._outputs = OutputTransfer((), {})
+        self._slots: dict[str, slice] = {}
+        self._has_timestamp = False
+        self._program: int | None = None
+        """Where packages tell the state of the robot program."""
+        self._inputs = ClaimedInputs()
+        self._session: Session | None = None
+        """What was agreed and is not adopted yet."""
+        self._agreed: Session | None = None
+        """What the recipes in use are of: a newer session has registers that were not read yet."""
+        self._adopting = False
+        """Whether recipes and image are being taken over, so that they do not fit each other."""
+        self._cycle = _CYCLE_UNKNOWN
+        self._next_send = -math.inf
+        self._pending: asyncio.TimerHandle | None = None
+        self._stage: asyncio.TimerHandle | None = None
+        self._feeds = 0
+        self._loss_reported: tuple[str, float] = ("", -math.inf)
+        self._closing = False
+        self.sent_listeners = []
+        cell.listeners.append(self._on_change)
+
+    def health(self) -> LinkHealth:
+        """The session; how fresh what it brings is, the cell knows."""
+        where = address(self._plan.host, self._plan.port)
+        trouble = self._loss_reported[0].removeprefix(f"{self._plan.host}:{self._plan.port}: ")
+        figures = {"address": where, "trouble": trouble, "watchdog": self._watchdog_fed()}
+        if self._client.session is not None:
+            return LinkHealth("Robot", Level.GOOD, "connected", where, figures=figures)
+        problems = (trouble,) if trouble else ()
+        return LinkHealth("Robot", Level.BAD, "not connected", trouble or where, problems, figures)
+
+    def _watchdog_fed(self) -> bool | None:
+        return None if self._plan.watchdog is None else self._cell.health.watchdog_fed
+
+    @property
+    def progress(self) -> int:
+        """Moves several times a second while `run` works, whatever the controller does."""
+        return self._client.statistics.progress
+
+    async def run(self) -> None:
+        """Stay connected until cancelled. Raises what is a defect, after the cell was told that the robot is lost."""
+        try:
+            await self._run()
+        except Exception:
+            with suppress(Exception):
+                self.session_lost(Loss(LossReason.FAILED, "internal error", started=True))
+            raise
+
+    async def _run(self) -> None:
+        """Work; when cancelled, first let the fallbacks that have begun to act come to their end."""
+        work = asyncio.create_task(self._work())
+        try:
+            await asyncio.shield(work)
+        except asyncio.CancelledError:
+            await self._finish()
+            raise
+        finally:
+            self._cancel_timers()
+            work.cancel()
+            await asyncio.gather(work, return_exceptions=True)
+
+    async def _work(self) -> None:
+        if self._plan.watchdog is None:
+            await self._client.run()
+            return
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self._client.run())
+            group.create_task(self._feed_watchdog(1 / self._plan.watchdog.frequency))
+
+    async def close(self) -> None:
+        """Send what is still due. Cancelling `run` afterwards ends the connection; what was sent is delivered."""
+        self._closing = True
+        end = clock.now() + LAST_WORDS
+        while self._owed() and clock.now() < end:  # noqa: ASYNC110 - a session that is being set up may take it
+            await asyncio.sleep(_LOOK)
+        await self._finish()
+        owed = self._owed()
+        if owed:
+            names = ", ".join(self._cell.definition.variables[index].name for index in owed)
+            log.warning(
+                "the robot keeps what it holds",
+                extra=fields(cell=self._cell.definition.name, variables=names),
+            )
+
+    async def _finish(self) -> None:
+        """Send what is due, and wait for the control cycles that it needs."""
+        end = clock.now() + LAST_WORDS
+        self.flush(clock.now())
+        while self._inputs.is_releasing and clock.now() < end:  # noqa: ASYNC110 - ends by a timer, or with the session
+            await asyncio.sleep(_LOOK)
+
+    def _owed(self) -> list[int]:
+        """Inputs that should fall back and have not."""
+        variables = self._cell.definition.variables
+        return [
+            index
+            for index in sorted(self._cell.delivery.owed)
+            if variables[index].on_release.kind is not FallbackKind.HOLD
+        ]
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`. The packages that waited tell their own time."""
+        self._client.gap()
+
+    def flush(self, now: float) -> None:
+        """Send what is still due at once."""
+        self._inputs.release(self._cell.delivery.take_releases())
+        self._send(now)
+
+    @property
+    def settled(self) -> bool:
+        """False between the claim of registers and the package that tells what they hold."""
+        return self._session is None
+
+    def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
+        """Go on with another plan and the successor of the cell, by the session that is there, at once.
+
+        Inputs that are new take over what the controller was last given.
+        """
+        assert isinstance(plan, RobotPlan)
+        self.flush(now)
+        if self._on_change in self._cell.listeners:
+            self._cell.listeners.remove(self._on_change)
+        self._plan, self._cell = plan, cell
+        cell.listeners.append(self._on_change)
+        session = self._agreed
+        if session is None:
+            return
+        variables = cell.definition.variables
+        reasons = unavailable(session, variables)
+        self._outputs = OutputTransfer(variables, self._slots, reasons)
+        self._adopting = True
+        held = self._inputs.rebind(variables, reasons)
+        self._tell_availability(reasons, now)
+        self._adopting = False
+        if cell.accepts_writes:
+            quality = cell.image.quality
+            cell.adopt(
+                {index: value for index, value in held.items() if quality[index] is Quality.NEVER}, now
+            )
+
+    # -- called by the client ----------------------------------------------------------------------------------------
+
+    def session_started(self, session: Session) -> None:
+        """The set-up is complete; the first package follows."""
+        now = clock.now()
+        variables = self._cell.definition.variables
+        self._slots = session.outputs.slots
+        self._has_timestamp = "timestamp" in self._slots
+        self._program = self._slots[_PROGRAM].start if _PROGRAM in self._slots else None
+        reasons = unavailable(session, variables)
+        self._outputs = OutputTransfer(variables, self._slots, reasons)
+        self._cycle = 1 / session.series.base_rate if session.series is not None else _CYCLE_UNKNOWN
+        self._inputs = ClaimedInputs(variables, session, self._driven, self._cycle)
+        self._session = self._agreed = session
+        self._loss_reported = ("", -math.inf)
+        rate = f"{1 / session.period:g} Hz"
+        self._cell.robot_connected(
+            now, f"controller {session.controller}, RTDE protocol {session.protocol}, {rate}"
+        )
+        self._tell_availability(reasons, now)
+
+    def inputs_changed(self, session: Session) -> None:
+        """Registers that were in use elsewhere are ours now, or others share a recipe.
+
+        New ones can be written once the next package has shown what they hold. The former recipes serve until then.
+        """
+        self._session = session
+
+    def values(self, flat: Sequence[Value], now: float) -> None:
+        """A package."""
+        clock.judged_now()
+        cell = self._cell
+        self._measure()
+        if cell.freshness.state is not Source.FRESH:
+            self._outputs.forget()
+        timestamp = float(flat[self._slots["timestamp"]][0]) if self._has_timestamp else None
+        news = cell.package_arrived(timestamp, now, clock.raw())
+        if news:
+            self._outputs.copy(flat, cell.image.values)
+            cell.program(int(flat[self._program]) if self._program is not None else None)
+            cell.outputs_written(now)
+            self._inputs.look(flat)
+            if self._session is not None:
+                self._adopt(self._session, flat, now)
+            elif self._plan.verify:
+                self._compare(flat, now)
+        if cell.delivery.under_way:
+            for index in self._inputs.delivered(
+                flat if news else None, tuple(cell.delivery.under_way), cell.image.values, now
+            ):
+                cell.delivery.delivered(index)
+        if not news and cell.lag_doubtful(now):
+            self._client.probe()
+
+    def session_lost(self, loss: Loss) -> None:
+        """The session has ended, or an attempt at one has failed."""
+        now = clock.now()
+        self._inputs = ClaimedInputs()
+        self._session = self._agreed = None
+        self._cancel_timers()
+        self._cell.health.watchdog_fed = False
+        if loss.started:
+            self._cell.robot_lost(loss.text, now)
+        reported, at = self._loss_reported
+        if not loss.started and (loss.text != reported or now - at >= LOSS_INTERVAL):
+            self._loss_reported = (loss.text, now)
+            address = f"{self._plan.host}:{self._plan.port}"
+            log.warning(
+                "no robot", extra=fields(cell=self._cell.definition.name, robot=address, reason=loss.text)
+            )
+
+    def probed(self, delay: float) -> None:
+        """The controller answered behind all that it had sent before."""
+        if self._cell.backlog_probed(delay, clock.now()):
+            self._client.reconnect("its clock stood still for a while, or what it sent was held up")
+
+    def text(self, message: TextMessage) -> None:
+        """The controller says something; it goes to the log."""
+        log.warning(
+            "the controller says",
+            extra=fields(
+                cell=self._cell.definition.name,
+                text=message.message,
+                source=message.source or None,
+                level=message.level,
+            ),
+        )
+
+    # -- robot -> cell -----------------------------------------------------------------------------------------------
+
+    def _measure(self) -> None:
+        statistics, health = self._client.statistics, self._cell.health
+        health.skipped = statistics.skipped
+        health.late = statistics.late
+        health.frequency = statistics.frequency
+
+    def _tell_availability(self, reasons: Mapping[int, str], now: float) -> None:
+        for index, reason in reasons.items():
+            self._cell.set_availability([index], False, reason, now)
+        served = (index for index in range(len(self._cell.definition.variables)) if index not in reasons)
+        self._cell.set_availability(served, True, "", now)
+
+    def _adopt(self, session: Session, flat: Sequence[Value], now: float) -> None:
+        """Take over what the controller's inputs hold, as the package reads them back."""
+        self._session, self._agreed = None, session
+        reasons = unavailable(session, self._cell.definition.variables)
+        self._adopting = True
+        adopted = self._inputs.adopt(session, flat, now, reasons)
+        self._tell_availability(reasons, now)
+        self._adopting = False
+        self._cell.adopt(adopted, now)
+
+    def _compare(self, flat: Sequence[Value], now: float) -> None:
+        """See what the controller made of the inputs; what it lost is sent again."""
+        cell, delivery = self._cell, self._cell.delivery
+        found = self._inputs.compare(
+            Package(flat, delivery.given_at, delivery.differing, cell.health.lag, now)
+        )
+        if found.differ or found.agree or found.follow:
+            cell.read_back(found.differ, found.agree, found.follow, now)
+        elif delivery.differing:
+            self._send_soon(now)
+
+    # -- cell -> robot -----------------------------------------------------------------------------------------------
+
+    def _on_change(self, direction: Direction) -> None:
+        if direction is Direction.INPUT:
+            self._inputs.release(self._cell.delivery.take_releases())
+            self._send_soon(clock.now())
+
+    def _send_soon(self, now: float) -> None:
+        """Send what is due, at once or when the controller's next cycle has begun."""
+        if self._pending is not None or self._adopting:
+            return
+        if now >= self._next_send:
+            self._send(now)
+        else:
+            loop = asyncio.get_running_loop()
+            self._pending = loop.call_later(self._next_send - now, self._send_pending)
+
+    def _send_pending(self) -> None:
+        self._pending = None
+        self._send(clock.now())
+
+    def _send(self, now: float) -> None:
+        """Send every recipe of which something was given or has changed."""
+        if self._adopting:
+            return
+        cell, inputs, delivery = self._cell, self._inputs, self._cell.delivery
+        missing = inputs.incomplete(delivery.given_at)
+        if missing:
+            cell.complete(missing, now)
+        for due in inputs.due(cell.image.values, delivery.given_at, delivery.differing, now):
+            self._next_send = now + self._cycle
+            if not self._client.send(due.recipe, due.values):
+                continue
+            alone = inputs.sent(due, now)
+            if alone:
+                self._client.join(*alone)
+            for listener in self.sent_listeners:
+                listener()
+        self._await_stage(now)
+
+    def _await_stage(self, now: float) -> None:
+        end = self._inputs.stage_end
+        if end is not None and self._stage is None:
+            self._stage = asyncio.get_running_loop().call_later(max(0.0, end - now), self._end_stages)
+
+    def _end_stages(self) -> None:
+        """Masks take their own values again."""
+        self._stage = None
+        now = clock.now()
+        self._inputs.end_stages(now)
+        self._send(now)
+
+    def _cancel_timers(self) -> None:
+        for timer in (self._pending, self._stage):
+            if timer is not None:
+                timer.cancel()
+        self._pending = self._stage = None
+
+    async def _feed_watchdog(self, period: float) -> None:
+        while True:
+            await asyncio.sleep(period)
+            health = self._cell.health
+            health.watchdog_fed = self._is_healthy() and self._feed()
+            self._feeds = (self._feeds + 1) % _FEED_LIMIT
+
+    def _feed(self) -> bool:
+        session = self._client.session
+        recipe = session.inputs.get(WATCHDOG_KEY) if session is not None else None
+        return recipe is not None and self._client.send(recipe, (self._feeds,))
+
+    def _is_healthy(self) -> bool:
+        """Whether the robot is heard, and every writer that the watchdog stands for is alive."""
+        watchdog, cell = self._plan.watchdog, self._cell
+        if watchdog is None or self._closing or cell.freshness.state is not Source.FRESH:
+            return False
+        return all(cell.writers.alive[writer] for writer in watchdog.requires)
+
+
+class RobotRuntime(LinkRuntime):
+    """Links to controllers."""
+
+    def make(self, plan: LinkPlan, cell: Cell, context: Context) -> RobotLink:
+        """A link; what a former one counted and drove goes on."""
+        assert isinstance(plan, RobotPlan)
+        former = context.former
+        if not isinstance(former, RobotLink):
+            return RobotLink(plan, cell)
+        cell.robot_lost("the new mapping needs another session", context.now)
+        return RobotLink(plan, cell, former)
+
+
+RUNTIME = RobotRuntime()
+"""What the daemon needs of this kind of link."""

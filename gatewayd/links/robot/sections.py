@@ -1,0 +1,85 @@
+"""The section `robot` of a mapping file: the controller and what is asked of it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from gatewayd.links.robot.scalars import RobotReference, Version
+from gatewayd.mapping.scalars import Duration, Host, Name, Names, OptionalDuration, Real, Whole
+from gatewayd.mapping.section import Section
+from gatewayd.rtde.types import DEFAULT_PORT
+
+__all__ = ["ADOPT_FOR", "Robot", "RobotPlace", "RobotValidity", "Watchdog"]
+
+ADOPT_FOR = 10.0
+"""Seconds that an adopted input waits for an owner where the file says nothing."""
+
+
+class Watchdog(Section):
+    """Feeding of the robot-side watchdog."""
+
+    field: Name = Field(
+        description="RTDE input register that is fed; named in rtde_set_watchdog of the robot program"
+    )
+    frequency: Real = Field(default=10.0, gt=0, le=500, description="feeds per second")
+    requires: Names | None = Field(
+        default=None, description="writers that must be alive for the feeding to go on; default: none"
+    )
+
+
+class Robot(Section):
+    """The controller and what is asked of it."""
+
+    host: Host = Field(description="name or IP address of the controller")
+    port: Whole = Field(default=DEFAULT_PORT, ge=1, le=65535, description="TCP port of RTDE")
+    series: Literal["cb3", "e", "x"] | None = Field(
+        default=None, description="controller series; lets `check` know base rate and fields"
+    )
+    version: Version | None = Field(
+        default=None,
+        description="controller software, for example 5.12; lets `check` know which fields exist",
+    )
+    frequency: Real = Field(
+        default=0.0, ge=0, le=500, description="packages per second, Hz; 0: the controller's own rate"
+    )
+    stale_after: Duration | None = Field(
+        default=None,
+        description="time without a fresh package after which outputs are stale; default: 5 periods, at least 100ms",
+    )
+    on_connect: Literal["adopt", "fallback"] = Field(
+        default="adopt",
+        description="inputs without an owner after connecting: keep what the controller holds, or give on_release",
+    )
+    adopt_for: OptionalDuration = Field(
+        default=ADOPT_FOR,
+        description="how long an adopted input waits for an owner, counted once from the start, before it takes "
+        "on_release; none: for ever",
+    )
+    verify: bool = Field(
+        default=True,
+        description="read inputs back all the time and compare them with what was written; false: only when connecting",
+    )
+    valid: Literal["running"] | None = Field(
+        default=None,
+        description="running: the output registers (`output_*`) are good only while the robot program runs",
+    )
+    watchdog: Watchdog | None = Field(default=None, description="register that is fed while all is well")
+
+
+class RobotPlace(Section):
+    """What a variable is in the robot."""
+
+    robot: RobotReference = Field(
+        description="RTDE field, 'field[element]', field.bit, or a range of registers such as output_int_register_0..23"
+    )
+
+
+class RobotValidity(Section):
+    """When a variable of the robot is good."""
+
+    valid: Literal["running"] | None = Field(
+        default=None,
+        description="outputs: running makes it good only while the robot program runs; default: always",
+    )

@@ -1,0 +1,1 @@
+"""What is logged, how it looks, and where it goes."""

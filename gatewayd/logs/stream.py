@@ -1,0 +1,70 @@
+"""Where the log goes, by a thread of its own: whoever reads it may stop reading, and the robot does not wait for that.
+
+A pipe that is full makes its writer wait. Lines wait in a bounded queue instead; what does not fit is dropped, counted,
+and reported as soon as there is room.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Sequence
+
+from gatewayd.logs.records import fields
+from gatewayd.loop.lines import LineThread
+
+__all__ = ["CAPACITY", "LogStream"]
+
+CAPACITY = 10_000
+"""Lines that may wait for the reader."""
+
+log = logging.getLogger("gatewayd.logs")
+
+
+class LogStream:
+    """A stream for `gatewayd.logs.records.configure` on a file descriptor. Writing never waits and never raises."""
+
+    def __init__(self, descriptor: int, capacity: int = CAPACITY) -> None:
+        self._reported = 0
+        self._descriptor = descriptor
+        self._lines = LineThread("log", capacity, self._write, self._report_lost)
+        self._lines.start()
+
+    @property
+    def lost(self) -> int:
+        """Lines dropped since the start."""
+        return self._lines.dropped
+
+    def write(self, text: str) -> None:
+        """Queue a line with its end."""
+        self._lines.put(text)
+
+    def flush(self) -> None:
+        """Nothing: lines are on their way."""
+
+    def fileno(self) -> int:
+        """The descriptor that is written to."""
+        return self._descriptor
+
+    def close(self, patience: float = 0.5) -> None:
+        """Write what waits, for `patience` seconds at most."""
+        self._lines.close(patience)
+
+    # -- the thread ----------------------------------------------------------------------------------------------
+
+    def _write(self, lines: Sequence[str]) -> bool:
+        rest = memoryview("".join(lines).encode("utf-8", "backslashreplace"))
+        try:
+            # Not through sys.stderr: a thread that waits inside it would hold a lock that the interpreter's end needs.
+            while rest:
+                rest = rest[os.write(self._descriptor, rest) :]
+        except OSError:
+            return True  # to nobody
+        return True
+
+    def _report_lost(self) -> None:
+        """There is room to report it."""
+        pending = self.lost - self._reported
+        if pending:
+            self._reported += pending
+            log.warning("log lines lost", extra=fields(lines=pending))

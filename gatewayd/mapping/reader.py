@@ -1,0 +1,352 @@
+"""From the tree of a mapping file to its typed parts, each validated by itself.
+
+One bad variable hides no finding of another: a part with errors is left out of the document, and everything
+that is wrong with it is reported at its exact place.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Any, Final, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
+
+from gatewayd.links.language import LinkLanguage
+from gatewayd.links.registry import languages
+from gatewayd.mapping import syntax
+from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule, rule_of
+from gatewayd.mapping.document import Document, Part, Step, walk
+from gatewayd.mapping.language import FILE, VARIABLE, WRITER
+from gatewayd.mapping.model import ANY, FORMAT_VERSION, Group, VariableSpec, WriterSpec
+from gatewayd.mapping.scalars import CellName, Name
+from gatewayd.mapping.section import Section
+from gatewayd.mapping.source import Items, MappingText, Node, Scalar, Table, TableEntry
+
+__all__ = ["read_document"]
+
+S = TypeVar("S", bound=Section)
+Found = TypeVar("Found")
+
+
+def read_document(source: MappingText) -> tuple[Document, tuple[Diagnostic, ...]]:
+    """Validate the tree of a file part by part. Never raises."""
+    if source.root is None:
+        return Document(source, ""), source.findings
+    reader = _Reader(source)
+    document = reader.read(source.root)
+    # What stands in the place of an alias is refused already; that it is no number either helps nobody.
+    refused = {finding.position for finding in source.findings}
+    further = (finding for finding in reader.findings if finding.position not in refused)
+    return document, (*source.findings, *further)
+
+
+def _node_at(node: Node, path: tuple[Step, ...]) -> Node:
+    for step in path:
+        if isinstance(node, Table) and isinstance(step, str) and step in node.entries:
+            node = node.entries[step].value
+        elif isinstance(node, Items) and isinstance(step, int) and step < len(node.items):
+            node = node.items[step]
+    return node
+
+
+_NESTED: Final = {where: section for language in languages() for where, section in language.nested.items()}
+"""Sections inside sections, by the first step of the path that leads there."""
+_ARTICLE: Final[dict[type[Section], str]] = {
+    FILE: "the file",
+    WriterSpec: "a writer",
+    Group: "a group",
+    VariableSpec: "a variable",
+    **{section: words for language in languages() for section, words in language.articles.items()},
+}
+_ELSEWHERE: Final[dict[tuple[type[Section], str], str]] = {
+    **{
+        (FILE, key): f"`{key}` belongs into the section `{language.key}`"
+        for language in languages()
+        for key in language.telling_keys
+    },
+    **{
+        (section, key): f"`{key}` belongs to the writer"
+        for section in (VariableSpec, Group)
+        for key in ("grace", "timeout", "timeout_counts")
+    },
+    (VariableSpec, "whole"): "`whole` belongs to the group",
+    **{where: hint for language in languages() for where, hint in language.elsewhere.items()},
+    **{
+        (section, key): f"`{key}` belongs to the variable, beside `{language.key}`"
+        for language in languages()
+        for section in language.places
+        for key in VARIABLE.model_fields
+    },
+}
+"""Keys that people write one table too high or too low."""
+
+
+def _of(table: Mapping[tuple[type[Section], str], Found], model: type[Section], key: str) -> Found | None:
+    """What a table says of a key of a model, be it said of the model itself or of a part that it is made of."""
+    known = (table.get((base, key)) for base in model.__mro__)
+    return next((found for found in known if found is not None), None)
+
+
+def _article(model: type[Section]) -> str:
+    return next(_ARTICLE[base] for base in model.__mro__ if base in _ARTICLE)
+
+
+_EXPECTED = {
+    "int_type": "a whole number",
+    "float_type": "a number",
+    "bool_type": "true or false",
+    "string_type": "a text",
+    "model_type": "a table of `key: value`",
+    "dict_type": "a table of `key: value`",
+    "tuple_type": "a list",
+    "list_type": "a list",
+}
+_TEXT_HINT = "put it into quotes to make it a text"
+_NAME_READER: TypeAdapter[str] = TypeAdapter(Name)
+_CELL_READER: TypeAdapter[str] = TypeAdapter(CellName)
+
+
+class _Reader:
+    def __init__(self, source: MappingText) -> None:
+        self.source = source
+        self.findings: list[Diagnostic] = []
+        self._named: dict[type[Section], dict[str, Part[Any]]] = {}
+
+    def read(self, root: Table) -> Document:
+        self._format_version(root)
+        for key, entry in root.entries.items():
+            if key not in FILE.model_fields:
+                self._unknown_key(FILE, key, entry.key.position)
+        for key, described in FILE.model_fields.items():
+            if described.is_required() and key != "gatewayd" and key not in root.entries:
+                hint = f"add `{key}:`, {described.description}"
+                self._find(syntax.MISSING_KEY, f"the key `{key}` is missing", self.source.position(), hint)
+        sections = {language.key: self._link(language, root) for language in languages()}
+        return Document(
+            self.source,
+            self._cell(root.entries.get("cell")),
+            {key: part for key, part in sections.items() if part is not None},
+            self._sections(WRITER, root.entries.get("writers")),
+            self._sections(Group, root.entries.get("groups")),
+            self._sections(VARIABLE, root.entries.get("variables")),
+        )
+
+    def _format_version(self, root: Table) -> None:
+        hint = f"write `gatewayd: {FORMAT_VERSION}` in the first lines"
+        entry = root.entries.get("gatewayd")
+        if entry is None:
+            message = "the key `gatewayd` with the version of the mapping language is missing"
+            self._find(syntax.FORMAT_VERSION, message, self.source.position(), hint)
+            return
+        value = entry.value
+        if not isinstance(value, Scalar) or value.quoted or value.text != str(FORMAT_VERSION):
+            given = f"`{value.text}`" if isinstance(value, Scalar) else "this"
+            message = f"{given} is no version of the mapping language that this gatewayd knows"
+            self._find(syntax.FORMAT_VERSION, message, value.position, hint)
+
+    def _cell(self, entry: TableEntry | None) -> str:
+        if entry is None or not self._has_value("cell", entry):
+            return ""
+        try:
+            return _CELL_READER.validate_python(_raw(entry.value))
+        except ValidationError as error:
+            for details in error.errors(include_url=False):
+                self._translate(details, FILE, entry, ("cell",))
+        return ""
+
+    def _sections(self, model: type[S], entry: TableEntry | None) -> dict[str, Part[S]]:
+        parts: dict[str, Part[S]] = {}
+        if entry is None or not self._has_value(entry.key.text, entry):
+            return parts
+        if not isinstance(entry.value, Table):
+            message = f"`{entry.key.text}` is not a table of `name: ...` lines"
+            self._find(
+                syntax.WRONG_TYPE, message, entry.value.position, "write one name with its table per line"
+            )
+            return parts
+        for name, inner in entry.value.entries.items():
+            named = self._name(model, inner)
+            part = self._section(model, inner)
+            if named and part is not None:
+                parts[name] = part
+        return parts
+
+    def _link(self, language: LinkLanguage, root: Table) -> Part[Section] | None:
+        part = self._section(language.section, root.entries.get(language.key))
+        broken = list(language.broken(part)) if part is not None else []
+        self.findings += broken
+        return None if broken else part
+
+    def _name(self, model: type[Section], entry: TableEntry) -> bool:
+        if model is WRITER and entry.key.text == ANY:
+            message = f"a writer cannot be called `{ANY}`: that word stands for every writer"
+            self._find(syntax.BAD_NAME, message, entry.key.position, "choose another name")
+            return False
+        try:
+            _NAME_READER.validate_python(entry.key.text)
+        except ValidationError as error:
+            details = error.errors(include_url=False)[0]
+            context = details.get("ctx", {})
+            self._find(syntax.BAD_NAME, context["message"], entry.key.position, context["hint"])
+            return False
+        return True
+
+    def _section(self, model: type[S], entry: TableEntry | None) -> Part[S] | None:
+        if entry is None or not self._has_value(entry.key.text, entry):
+            return None
+        found = len(self.findings)
+        data = self._data(entry.value)
+        try:
+            spec = model.model_validate(data)
+        except ValidationError as error:
+            for details in error.errors(include_url=False):
+                self._translate(details, model, entry, ())
+            return None
+        return (
+            Part(entry.key.text, spec, entry.key.position, entry.value)
+            if len(self.findings) == found
+            else None
+        )
+
+    def _has_value(self, key: str, entry: TableEntry) -> bool:
+        if isinstance(entry.value, Scalar) and entry.value.value is None:
+            message = f"`{key}` has no value"
+            self._find(syntax.WRONG_TYPE, message, entry.key.position, _valueless_hint(key))
+            return False
+        return True
+
+    def _data(self, node: Node) -> Any:
+        """Turn a node into what pydantic reads; keys without a value are findings and left out."""
+        match node:
+            case Scalar():
+                return node.value
+            case Items():
+                return [self._data(item) for item in node.items]
+            case Table():
+                return {
+                    key: self._data(entry.value)
+                    for key, entry in node.entries.items()
+                    if self._has_value(key, entry)
+                }
+
+    def _translate(
+        self, details: ErrorDetails, model: type[Section], entry: TableEntry, prefix: tuple[Step, ...]
+    ) -> None:
+        """Make one finding of a pydantic error."""
+        path = details["loc"]
+        key, value = walk(entry.value, path, entry.key.position)
+        kind, context = details["type"], details.get("ctx", {})
+        rule = rule_of(kind)
+        if rule is not None:
+            place = key if rule is syntax.MISSING_KEY else value
+            self._find(rule, context["message"], place, context["hint"])
+            return
+        inner = _of(_NESTED, model, str(path[0])) or model if len(path) > 1 else model
+        name = str(
+            next((step for step in reversed((*prefix, *path)) if isinstance(step, str)), entry.key.text)
+        )
+        text = _echo(_node_at(entry.value, path))
+        if kind == "missing" and isinstance(path[-1], str):
+            self._missing_key(inner, path, entry)
+        elif kind == "extra_forbidden":
+            self._unknown_key(inner, name, key)
+        elif kind == "literal_error":
+            self._choice(name, text, context["expected"], value)
+        elif kind in _EXPECTED:
+            hint = _TEXT_HINT if kind == "string_type" else f"write {_EXPECTED[kind]}"
+            if name == "limits":
+                hint = "write [least, greatest], for example [0, 150]"
+            self._find(syntax.WRONG_TYPE, f"`{name}` is {text}, expected is {_EXPECTED[kind]}", value, hint)
+        elif kind in _BOUNDS:
+            message = f"`{name}` is {text}, it must be {_BOUNDS[kind][0]} {context[_BOUNDS[kind][1]]}"
+            self._find(syntax.OUT_OF_RANGE, message, value, _field_hint(inner, name))
+        elif kind == "string_pattern_mismatch":
+            self._find(
+                syntax.BAD_NETWORK, f"{text} is not a host name or IP address", value, "write 192.168.1.10"
+            )
+        else:
+            message = f"`{name}` is {text}: {_SIZES.get(kind, 'wrong number of values')}"
+            self._find(syntax.WRONG_TYPE, message, value, _field_hint(inner, name))
+
+    def _missing_key(self, model: type[Section], path: tuple[Step, ...], entry: TableEntry) -> None:
+        key = str(path[-1])
+        parent, _ = walk(entry.value, path[:-1], entry.key.position)
+        message = f"{_article(model)} needs the key `{key}`"
+        self._find(syntax.MISSING_KEY, message, parent, _field_hint(model, key))
+
+    def _unknown_key(self, model: type[Section], key: str, position: Position) -> None:
+        message = f"{_article(model)} has no key `{key}`"
+        hint = _of(_ELSEWHERE, model, key)
+        if hint is None:
+            close = difflib.get_close_matches(key, model.model_fields, n=1, cutoff=0.6)
+            hint = f"did you mean `{close[0]}`?" if close else "known keys: " + ", ".join(model.model_fields)
+        self._find(syntax.UNKNOWN_KEY, message, position, hint)
+
+    def _choice(self, name: str, text: str, expected: str, position: Position) -> None:
+        choices = [word.strip("' ") for word in expected.replace(" or ", ",").split(",")]
+        written = text.strip("`")
+        close = difflib.get_close_matches(written.lower(), [word.lower() for word in choices], n=1)
+        match = next((word for word in choices if close and word.lower() == close[0]), None)
+        hint = f"did you mean `{match}`?" if match else f"write {', '.join(choices)}"
+        synonyms = (language.synonyms.get((name, written.upper())) for language in languages())
+        meant = next((word for word in synonyms if word in choices), None)
+        if meant is not None:
+            hint = f"write {meant}: that is {written.upper()} here"
+        message = f"`{name}` is {text}, it must be one of {', '.join(choices)}"
+        self._find(syntax.BAD_CHOICE, message, position, hint)
+
+    def _find(self, rule: Rule, message: str, position: Position, hint: str) -> None:
+        self.findings.append(rule.at(position, message, hint=hint))
+
+
+_BOUNDS = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+_SIZES = {
+    "too_short": "not enough values",
+    "too_long": "too many values",
+    "missing": "not enough values",
+    "string_too_short": "it must not be empty",
+    "string_too_long": "too long",
+}
+
+
+def _field_hint(model: type[Section], key: str) -> str:
+    known = model.model_fields.get(key)
+    return f"`{key}`: {known.description}" if known is not None else "see the mapping reference"
+
+
+def _valueless_hint(key: str) -> str:
+    """Three slips of the pen look like a key without a value."""
+    if key.isascii() and key.isdigit():
+        return "a comma ends a value: in a number write a point, such as 0.1 or 100.3"
+    if not key.isprintable():
+        return "there is an invisible character in it, most often a no-break space: type the line anew"
+    name, colon, rest = key.partition(":")
+    if colon:
+        return f"write `{name}: {rest}`, with a space after the colon"
+    return "write a value, or remove the key; what belongs to it is indented below it"
+
+
+def _raw(node: Node) -> Any:
+    return node.value if isinstance(node, Scalar) else {} if isinstance(node, Table) else []
+
+
+_SHOWN_LENGTH = 60
+
+
+def _echo(node: Node) -> str:
+    """Return a value as a message echoes it."""
+    match node:
+        case Scalar():
+            text = node.text if len(node.text) <= _SHOWN_LENGTH else node.text[: _SHOWN_LENGTH - 3] + "..."
+            return f"`{text}`"
+        case Items():
+            return f"a list of {len(node.items)}"
+        case Table():
+            return "a table"

@@ -1,0 +1,251 @@
+"""Numbers in 16-bit Modbus registers: one codec for both directions, worked out once per placement.
+
+`raw = (value - offset) / scale`, `value = raw * scale + offset`. Orders by the bytes of a 32-bit number:
+`ABCD` big-endian (Application Protocol V1.1b3, 4.2), `CDAB` words swapped, `BADC` bytes swapped in each word,
+`DCBA` both; 64-bit numbers alike over four words, 16-bit numbers know only the byte swap.
+
+Encoding saturates: a value beyond the register type becomes the nearest number that the type holds, NaN
+becomes 0 in an integer. A float32 beyond its range becomes the greatest finite one; infinities stay what they
+are in reals. Halves round to even. A `bool` register is written 0 or 1, and every number but 0 reads as true.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
+from struct import Struct
+from typing import Final, TypeAlias
+
+from gatewayd.core.definition import Value, ValueKind
+
+__all__ = ["ORDERS", "TYPES", "Codec", "NumberFormat", "make_codec"]
+
+Buffer: TypeAlias = bytes | bytearray | memoryview
+
+ORDERS: Final = ("ABCD", "CDAB", "BADC", "DCBA")
+"""Word and byte orders."""
+
+
+@dataclass(frozen=True, slots=True)
+class NumberFormat:
+    """A number type of Modbus registers."""
+
+    name: str
+    code: str
+    """`struct` format character."""
+    words: int
+    """Registers."""
+    low: float
+    """Least number; for reals the negative of the greatest finite one."""
+    high: float
+
+    @property
+    def is_real(self) -> bool:
+        """Whether it is an IEEE 754 number."""
+        return self.code in "fd"
+
+
+_FLOAT32_MAXIMUM: Final = float.fromhex("0x1.fffffep+127")
+_FLOAT64_MAXIMUM: Final = float.fromhex("0x1.fffffffffffffp+1023")
+
+TYPES: Final = {
+    number.name: number
+    for number in (
+        NumberFormat("bool", "H", 1, 0, 1),
+        NumberFormat("int16", "h", 1, -(1 << 15), (1 << 15) - 1),
+        NumberFormat("uint16", "H", 1, 0, (1 << 16) - 1),
+        NumberFormat("int32", "i", 2, -(1 << 31), (1 << 31) - 1),
+        NumberFormat("uint32", "I", 2, 0, (1 << 32) - 1),
+        NumberFormat("int64", "q", 4, -(1 << 63), (1 << 63) - 1),
+        NumberFormat("uint64", "Q", 4, 0, (1 << 64) - 1),
+        NumberFormat("float32", "f", 2, -_FLOAT32_MAXIMUM, _FLOAT32_MAXIMUM),
+        NumberFormat("float64", "d", 4, -_FLOAT64_MAXIMUM, _FLOAT64_MAXIMUM),
+    )
+}
+"""Number types by name; `bit` has no registers of its own and no codec."""
+
+
+@dataclass(frozen=True, slots=True)
+class Codec:
+    """How one variable's number is written in registers. Made by `make_codec`."""
+
+    type: str
+    order: str
+    scale: float
+    offset: float
+    kind: ValueKind
+    """Kind of the robot's values."""
+    words: int
+    """Registers covered."""
+    struct_code: str | None
+    """`struct` character that does the same as `encode` for every value of the robot's type, else None.
+
+    Runs of neighbours that have one may be packed by one big-endian `struct`, values as they are.
+    """
+    encode: Callable[[Value], bytes] = field(compare=False, repr=False)
+    """Value in the robot's unit -> `2 * words` register bytes as they go over the wire. Never raises for numbers."""
+    decode: Callable[[Buffer], Value | None] = field(compare=False, repr=False)
+    """Register bytes -> value in the robot's unit; None for what the robot's kind has no value for (NaN as INT).
+
+    Whether the robot's type is wide enough is for `Variable.low` and `.high` to say. Raises `struct.error`
+    for another number of bytes than `2 * words`.
+    """
+
+    @property
+    def meaning(self) -> list[object]:
+        """What a mapping says of it; the rest follows from the variable."""
+        return [self.type, self.order, self.scale, self.offset]
+
+    def __reduce__(self) -> tuple[Callable[..., Codec], tuple[object, ...]]:
+        """Between processes it travels as what it was made of: its functions cannot."""
+        return _compiled, (self.type, self.order, self.kind, (self.scale, self.offset), self.struct_code)
+
+
+def make_codec(
+    type_name: str,
+    order: str = "ABCD",
+    *,
+    kind: ValueKind,
+    scale: float = 1.0,
+    offset: float = 0.0,
+    low: float | None = None,
+    high: float | None = None,
+) -> Codec:
+    """Compile a codec for a robot value of `kind` between `low` and `high` (None: unknown).
+
+    Raises KeyError for an unknown type or order and ValueError for a scale that cannot be undone.
+    """
+    number = TYPES[type_name]
+    if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0:
+        raise ValueError(f"scale {scale} and offset {offset} cannot be undone")
+    merged = scale == 1 and offset == 0 and order == "ABCD" and _is_lossless(number, kind, low, high)
+    return _compiled(type_name, order, kind, (scale, offset), number.code if merged else None)
+
+
+@lru_cache(maxsize=4096)
+def _compiled(
+    type_name: str, order: str, kind: ValueKind, linear: tuple[float, float], struct_code: str | None
+) -> Codec:
+    number, (scale, offset) = TYPES[type_name], linear
+    pack, unpack = _ORDERS[order](number)
+    plain = scale == 1 and offset == 0
+    encode = _plain_encoder(number, pack, kind) if plain else _encoder(number, pack, scale, offset)
+    decode = _plain_decoder(number, unpack, kind) if plain else _decoder(unpack, scale, offset, kind)
+    return Codec(type_name, order, scale, offset, kind, number.words, struct_code, encode, decode)
+
+
+def _is_lossless(number: NumberFormat, kind: ValueKind, low: float | None, high: float | None) -> bool:
+    if kind is ValueKind.FLOAT:
+        return number.code == "d"
+    if kind is ValueKind.BOOL or number.is_real or low is None or high is None:
+        return False
+    return number.low <= low and high <= number.high
+
+
+Pack: TypeAlias = "Callable[[Value], bytes]"
+Unpack: TypeAlias = "Callable[[Buffer], tuple[int | float, ...]]"
+
+
+def _big(number: NumberFormat) -> tuple[Pack, Unpack]:
+    layout = Struct(">" + number.code)
+    return layout.pack, layout.unpack
+
+
+def _little(number: NumberFormat) -> tuple[Pack, Unpack]:
+    layout = Struct("<" + number.code)
+    return layout.pack, layout.unpack
+
+
+def _big_swapped(number: NumberFormat) -> tuple[Pack, Unpack]:
+    return _swapped(*_big(number))
+
+
+def _little_swapped(number: NumberFormat) -> tuple[Pack, Unpack]:
+    return _swapped(*_little(number))
+
+
+def _swapped(pack: Pack, unpack: Unpack) -> tuple[Pack, Unpack]:
+    return (lambda value: _swap(pack(value))), (lambda data: unpack(_swap(data)))
+
+
+def _swap(data: Buffer) -> bytes:
+    """Exchange the two bytes of every word."""
+    out = bytearray(data)
+    out[0::2], out[1::2] = data[1::2], data[0::2]
+    return bytes(out)
+
+
+_ORDERS: Final = {"ABCD": _big, "CDAB": _little_swapped, "BADC": _big_swapped, "DCBA": _little}
+
+
+def _plain_encoder(number: NumberFormat, pack: Pack, kind: ValueKind) -> Pack:
+    """Encode without arithmetic, so that 64-bit integers keep every digit."""
+    if number.name == "bool":
+        return lambda value: pack(bool(value))
+    if number.is_real:
+        return _real_packer(number, pack)
+    low, high = int(number.low), int(number.high)
+    if kind is ValueKind.FLOAT:
+        return lambda value: pack(_saturated(value, low, high))
+
+    def encode(value: Value) -> bytes:
+        return pack(low if value < low else high if value > high else int(value))
+
+    return encode
+
+
+def _encoder(number: NumberFormat, pack: Pack, scale: float, offset: float) -> Pack:
+    if number.is_real:
+        pack_real = _real_packer(number, pack)
+        return lambda value: pack_real((value - offset) / scale)
+    low, high = int(number.low), int(number.high)
+    return lambda value: pack(_saturated((value - offset) / scale, low, high))
+
+
+def _saturated(value: float, low: int, high: int) -> int:
+    if value <= low:
+        return low
+    if value >= high:
+        return high
+    return round(value) if value == value else 0  # noqa: PLR0124 - NaN is what differs from itself
+
+
+def _real_packer(number: NumberFormat, pack: Pack) -> Pack:
+    high = number.high
+
+    def encode(value: Value) -> bytes:
+        try:
+            return pack(value)
+        except OverflowError:
+            return pack(high if value > 0 else -high)
+
+    return encode
+
+
+def _plain_decoder(number: NumberFormat, unpack: Unpack, kind: ValueKind) -> Callable[[Buffer], Value | None]:
+    if kind is ValueKind.BOOL:
+        return lambda data: bool(unpack(data)[0])
+    if number.name == "bool":
+        truth: tuple[Value, Value] = (0, 1) if kind is ValueKind.INT else (0.0, 1.0)
+        return lambda data: truth[unpack(data)[0] != 0]
+    if kind is ValueKind.FLOAT:
+        return lambda data: float(unpack(data)[0])
+    if number.is_real:
+        return lambda data: _whole(unpack(data)[0])
+    return lambda data: unpack(data)[0]
+
+
+def _decoder(
+    unpack: Unpack, scale: float, offset: float, kind: ValueKind
+) -> Callable[[Buffer], Value | None]:
+    if kind is ValueKind.FLOAT:
+        return lambda data: unpack(data)[0] * scale + offset
+    if kind is ValueKind.BOOL:
+        return lambda data: unpack(data)[0] * scale + offset != 0
+    return lambda data: _whole(unpack(data)[0] * scale + offset)
+
+
+def _whole(value: float) -> int | None:
+    return round(value) if math.isfinite(value) else None

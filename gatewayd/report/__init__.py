@@ -1,0 +1,1 @@
+"""A cell in words and tables, for people and programs."""

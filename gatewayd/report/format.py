@@ -1,0 +1,73 @@
+"""Values, times and counts in figures for people: the same in commands, texts of events, status page and demonstration.
+
+What programs read has every digit, and comes from elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+__all__ = ["address", "age", "counted", "exact", "listed", "seconds", "span", "value"]
+
+_DIGITS = 3
+
+
+def value(found: object, unit: str = "") -> str:
+    """A value, or a text that stands for one: 0 or 1 for a bit, at most three decimals, and its unit."""
+    if isinstance(found, bool):
+        return "1" if found else "0"
+    text = _real(found) if isinstance(found, float) else str(found)
+    return f"{text} {unit}".rstrip()
+
+
+def _real(real: float) -> str:
+    if real and (abs(real) < 10**-_DIGITS or abs(real) >= 10**12):
+        return f"{real:.{_DIGITS}g}"
+    return f"{real:.{_DIGITS}f}".rstrip("0").rstrip(".")
+
+
+def exact(number: float) -> str:
+    """Every digit that matters, and none that does not."""
+    return repr(number).removesuffix(".0").lower()
+
+
+def seconds(duration: float | None) -> str:
+    """`0.25 s`, with every digit that matters; empty for None."""
+    return "" if duration is None else f"{exact(duration)} s"
+
+
+def age(duration: float | None) -> str:
+    """`12 ms`, `3.4 s`, `5 min`, `2 h`; `-` for never: None or infinity."""
+    if duration is None or duration == math.inf:
+        return "-"
+    if duration < 1:
+        return f"{max(0.0, duration) * 1000:.0f} ms"
+    return f"{duration:.1f} s" if duration < 60 else span(duration)
+
+
+def span(duration: float) -> str:
+    """Two units at most: `42 s`, `2 h 13 min`, `3 d 4 h`."""
+    parts: list[str] = []
+    left = max(0, round(duration))
+    for size, unit in ((86400, "d"), (3600, "h"), (60, "min"), (1, "s")):
+        count, left = divmod(left, size)
+        if count or (unit == "s" and not parts):
+            parts.append(f"{count} {unit}")
+    return " ".join(parts[:2])
+
+
+def counted(count: int, noun: str) -> str:
+    """`1 lock`, `2 locks`, `no locks`."""
+    return f"{count or 'no'} {noun}{'' if count == 1 else 's'}"
+
+
+def address(host: str, port: int) -> str:
+    """`127.0.0.1:502`, `[::1]:502`."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """`a, b, c and 3 more`: the first `most` by name."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,1 @@
+"""The process: cells and links put together, run, watched, reloaded and stopped."""

@@ -1,0 +1,63 @@
+"""`gatewayd run` from its options to its exit code.
+
+The mapping files are read by a process of their own, and meanwhile this one imports what will serve.
+"""
+
+from __future__ import annotations
+
+import logging
+
+from gatewayd.logs.records import fields
+from gatewayd.service.compilation import CompilationError
+from gatewayd.service.options import Options
+from gatewayd.service.signals import SIGNALS, name_of
+from gatewayd.service.startup import Startup, load_plans
+
+__all__ = ["DEFECT", "NOTHING_TO_RUN", "STOPPED", "UNREADABLE", "main"]
+
+STOPPED = 0
+NOTHING_TO_RUN = 1
+UNREADABLE = 2
+DEFECT = 70
+"""Worth another attempt, unlike the others: the service manager starts it again."""
+
+
+def main(options: Options) -> int:
+    """Read the files and serve what they say until the end is asked for; the exit code."""
+    found = _load(options)
+    if SIGNALS.stopping:
+        logging.getLogger("gatewayd.run").info(
+            "stopped before anything was served", extra=fields(signal=name_of(SIGNALS.stopped_by))
+        )
+        return STOPPED
+    if isinstance(found, int):
+        return found
+    from gatewayd.service import assemble  # noqa: PLC0415 - see `_load`
+
+    assemble.run(found, options)
+    return STOPPED
+
+
+def _load(options: Options) -> Startup | int:
+    """What there is to serve, or the exit code."""
+    try:
+        found = load_plans(options.files, _import_what_serves, lambda: SIGNALS.stopping)
+    except CompilationError as error:
+        if not SIGNALS.stopping:
+            logging.getLogger("gatewayd.startup").error("%s", error)  # noqa: TRY400 - the text says it all
+        return DEFECT
+    if not found.plans and not found.broken:
+        return UNREADABLE
+    if not found.plans or (options.strict and (found.broken or found.unreadable)):
+        return NOTHING_TO_RUN
+    return found
+
+
+def _import_what_serves() -> None:
+    """It takes as long as reading the files. Of links, those that nearly every cell has."""
+    import gatewayd.service.assemble  # noqa: F401, PLC0415
+    from gatewayd.links.registry import kinds, runtime_of  # noqa: PLC0415
+
+    for kind in kinds():
+        if kind.usual:
+            runtime_of(kind.key)

@@ -1,0 +1,282 @@
+"""Another mapping for a running gateway: read, check, compare, refuse what is unsafe, swap.
+
+Reading and checking happen in another process, beside the running cells. The swap itself is one step without waiting,
+so that it lies between two packages and two requests. Whatever goes wrong before it, the old mapping runs on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from pathlib import Path
+from typing import Protocol
+
+from gatewayd.core.cell import Cell
+from gatewayd.links.contract import PrepareError
+from gatewayd.logs.records import fields
+from gatewayd.loop import clock
+from gatewayd.loop.retry import reason_of
+from gatewayd.mapping.compiled import Compiled
+from gatewayd.mapping.diagnostics import Diagnostic
+from gatewayd.mapping.plan import Plan
+from gatewayd.report.diff import Changes, as_text, compare, objections
+from gatewayd.service.cell_runtime import CellRuntime
+from gatewayd.service.compilation import Compilation, CompilationError
+from gatewayd.service.shared_parts import AllPrepared
+from gatewayd.service.startup import mapping_files, tell_findings
+
+__all__ = ["ReloadOutcome", "Reloader", "Result", "Swapping"]
+
+SETTLING_TIME = 0.5
+"""Seconds for which a swap waits for a link that is about to know more, a robot's that has just claimed registers."""
+_SHOWN = 3
+"""Reasons that the one-line summary tells."""
+
+log = logging.getLogger("gatewayd.reload")
+
+
+class Result(Enum):
+    """How a reload ended."""
+
+    APPLIED = "applied"
+    UNCHANGED = "unchanged"
+    """The files mean what is running already."""
+    REFUSED = "refused"
+    """Unsafe now, and not forced."""
+    FAILED = "failed"
+    """A file has errors or cannot be read, something shared cannot be had, or a defect."""
+
+    @property
+    def is_good(self) -> bool:
+        """Whether what runs now is what the files say."""
+        return self in (Result.APPLIED, Result.UNCHANGED)
+
+
+@dataclass(frozen=True, slots=True)
+class ReloadOutcome:
+    """What a reload came to."""
+
+    result: Result
+    reasons: tuple[str, ...] = ()
+    """Why it was refused or failed; of an applied one what is to be known."""
+    changes: tuple[str, ...] = ()
+    """What is or would be different, one line for each cell."""
+    swap: float = 0.0
+    """Seconds that the swap itself took."""
+    details: tuple[str, ...] = ()
+    """The changes one by one, as `gatewayd diff` tells them."""
+
+    @property
+    def text(self) -> str:
+        """One sentence, for STATUS, log and terminal."""
+        reasons = "; ".join(self.reasons[:_SHOWN])
+        if len(self.reasons) > _SHOWN:
+            reasons += f"; and {len(self.reasons) - _SHOWN} more"
+        changes = "; ".join(self.changes)
+        match self.result:
+            case Result.UNCHANGED:
+                return "reload: nothing has changed"
+            case Result.APPLIED:
+                return f"reloaded: {changes}" + (f" (but {reasons})" if reasons else "")
+            case Result.REFUSED:
+                return f"reload refused, the old mapping runs on: {reasons} (gatewayd reload --force does it)"
+        return f"reload failed, the old mapping runs on: {reasons}"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the service manager shows until the next reload: why this one was not done, or what it left behind."""
+        return (self.text,) if not self.result.is_good or self.reasons else ()
+
+    @property
+    def exit_code(self) -> int:
+        """0 if what runs now is what the files say, else 1."""
+        return 0 if self.result.is_good else 1
+
+    def as_object(self) -> dict[str, object]:
+        """For JSON: `result`, `text`, `reasons`, `changes`, `details`, `swap_ms`."""
+        return {
+            "result": self.result.value,
+            "text": self.text,
+            "reasons": list(self.reasons),
+            "changes": list(self.changes),
+            "details": list(self.details),
+            "swap_ms": round(self.swap * 1000, 3),
+        }
+
+
+class Swapping(Protocol):
+    """What a reload needs of the daemon."""
+
+    @property
+    def runtimes(self) -> Sequence[CellRuntime]:
+        """The cells that are served now."""
+
+    @property
+    def running(self) -> bool:
+        """Whether there is anything to swap."""
+
+    async def prepare(self, plans: Sequence[Plan]) -> AllPrepared:
+        """Have ready what these plans need besides what there is. Raises PrepareError."""
+
+    def swap(self, plans: Sequence[Plan], now: float, prepared: AllPrepared) -> list[str]:
+        """Serve these plans instead; returns inputs left as they were."""
+
+
+class Reloader:
+    """Reloads the mapping files at `paths` (files or directories) into `daemon`, one reload after another.
+
+    `began` and `ended` are called around each reload.
+    """
+
+    def __init__(
+        self,
+        daemon: Swapping,
+        paths: Sequence[Path],
+        began: Callable[[], None] = lambda: None,
+        ended: Callable[[ReloadOutcome], None] = lambda _outcome: None,
+    ) -> None:
+        self.last: ReloadOutcome | None = None
+        """What the last reload came to."""
+        self._daemon = daemon
+        self._paths = tuple(paths)
+        self._began = began
+        self._ended = ended
+        self._busy = asyncio.Lock()
+        self._asked = asyncio.Event()
+
+    def ask(self) -> None:
+        """Reload soon, by `run`; asking again before it begins changes nothing. For signal handlers."""
+        self._asked.set()
+
+    async def run(self) -> None:
+        """Do what `ask` asks for, until cancelled."""
+        while True:
+            await self._asked.wait()
+            self._asked.clear()
+            await self.reload()
+
+    async def reload(self, *, force: bool = False) -> ReloadOutcome:
+        """Read, check, compare and swap; `force`: also what is unsafe. Never raises but for a cancellation."""
+        async with self._busy:
+            self._began()
+            outcome = ReloadOutcome(Result.FAILED, ("it was interrupted",))
+            try:
+                outcome = await self._reload(force=force)
+            except Exception as error:
+                log.exception("internal error")
+                outcome = ReloadOutcome(Result.FAILED, (f"internal error: {error!r}",))
+            finally:
+                self.last = outcome
+                self._ended(outcome)
+        level = logging.INFO if outcome.result.is_good else logging.ERROR
+        took = {"swap_ms": f"{outcome.swap * 1000:.1f}"} if outcome.result is Result.APPLIED else {}
+        log.log(level, outcome.text, extra=fields(**took))
+        return outcome
+
+    async def _reload(self, *, force: bool) -> ReloadOutcome:
+        files = await asyncio.to_thread(mapping_files, self._paths)
+        if not files:
+            return ReloadOutcome(Result.FAILED, (f"no mapping file in {', '.join(map(str, self._paths))}",))
+        try:
+            with Compilation(files) as compilation:
+                compiled = await asyncio.to_thread(compilation.result)
+        except CompilationError as error:
+            return ReloadOutcome(Result.FAILED, (str(error),))
+        tell_findings(compiled.files)
+        reasons = tuple(_reasons(compiled))
+        if reasons:
+            return ReloadOutcome(Result.FAILED, reasons)
+        plans = compiled.plans
+        differences = self._compare(plans)
+        if not differences:
+            return ReloadOutcome(Result.UNCHANGED)
+        outcome = await self._swap(plans, differences, force=force)
+        summaries = (one if isinstance(one, str) else one.summary for one in differences)
+        return replace(outcome, changes=tuple(summaries), details=tuple(_details(differences)))
+
+    async def _swap(
+        self, plans: Sequence[Plan], differences: Sequence[Changes | str], *, force: bool
+    ) -> ReloadOutcome:
+        objected = () if force else self._objections(plans, differences)
+        if objected:
+            return ReloadOutcome(Result.REFUSED, objected)
+        try:
+            prepared = await self._daemon.prepare(plans)
+        except PrepareError as error:
+            return ReloadOutcome(Result.FAILED, (reason_of(error),))
+        await self._settle()
+        # From here to the swap nothing waits: what is owned now is owned in the swap.
+        objected = () if force else self._objections(plans, differences)
+        if objected or not self._daemon.running:
+            await prepared.abort()
+            if objected:
+                return ReloadOutcome(Result.REFUSED, objected)
+            return ReloadOutcome(Result.FAILED, ("the gateway stops",))
+        now = clock.now()
+        stranded = self._daemon.swap(plans, now, prepared)
+        left = tuple(f"the robot keeps what it holds in {name}" for name in stranded)
+        return ReloadOutcome(Result.APPLIED, left, swap=clock.now() - now)
+
+    def _compare(self, plans: Sequence[Plan]) -> list[Changes | str]:
+        """What differs, by cell; a cell that is new or gone in one sentence."""
+        running = {runtime.plan.cell.name: runtime.plan for runtime in self._daemon.runtimes}
+        found: list[Changes | str] = []
+        for plan in plans:
+            former = running.pop(plan.cell.name, None)
+            if former is None:
+                found.append(f"{plan.cell.name}: new cell, {len(plan.cell.variables)} variables")
+                continue
+            changes = compare(former, plan)
+            if changes:
+                found.append(changes)
+        found.extend(f"{name}: cell removed" for name in running)
+        return found
+
+    def _objections(self, plans: Sequence[Plan], differences: Sequence[Changes | str]) -> tuple[str, ...]:
+        runtimes = {runtime.plan.cell.name: runtime for runtime in self._daemon.runtimes}
+        found: list[str] = []
+        for changes in differences:
+            if isinstance(changes, Changes):
+                name = changes.old.cell.name
+                found += (f"{name}: {one}" for one in objections(changes, _owned(runtimes[name].cell)))
+        gone = runtimes.keys() - {plan.cell.name for plan in plans}
+        found += (f"{name}: the whole cell would be gone" for name in sorted(gone))
+        return tuple(found)
+
+    async def _settle(self) -> None:
+        """Wait for links that are about to know more, so that last fallbacks can still be sent."""
+        end = clock.now() + SETTLING_TIME
+        while clock.now() < end and not all(  # noqa: ASYNC110
+            link.settled for one in self._daemon.runtimes for link in one.links.values()
+        ):
+            await asyncio.sleep(0.002)
+
+
+def _details(differences: Sequence[Changes | str]) -> Iterator[str]:
+    for changes in differences:
+        if isinstance(changes, str):
+            yield changes
+        else:
+            yield from as_text(changes).splitlines()
+
+
+def _owned(cell: Cell) -> set[str]:
+    owners, variables = cell.ownership.owners, cell.definition.variables
+    return {one.name for one in variables if one.lock is not None and owners[one.lock] is not None}
+
+
+def _reasons(compiled: Compiled) -> Iterator[str]:
+    """Why not all of it can be served."""
+    for unread in compiled.unreadable:
+        yield f"{unread.name} cannot be read: {unread.reason}"
+    for one in compiled.files:
+        yield from map(_line, one.errors)
+
+
+def _line(finding: Diagnostic) -> str:
+    """With the remedy: whoever reloads looks at no log."""
+    hint = f"; {finding.hint}" if finding.hint else ""
+    return f"{finding.position}: {finding.rule.id} {finding.rule.slug}: {finding.message}{hint}"

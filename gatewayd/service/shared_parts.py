@@ -1,0 +1,79 @@
+"""What the links of several cells use together, one part for each kind of link that has such a thing."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator, Mapping, Sequence
+
+from gatewayd.core.cell import Cell
+from gatewayd.links.contract import Prepared, PrepareError, SharedPart
+from gatewayd.links.registry import runtime_of
+from gatewayd.mapping.plan import Plan
+from gatewayd.service.cell_runtime import CellRuntime
+
+__all__ = ["AllPrepared", "SharedParts"]
+
+
+class AllPrepared:
+    """What all parts have ready."""
+
+    def __init__(self) -> None:
+        self.each: list[Prepared] = []
+
+    def commit(self) -> None:
+        """Have all of it in use by the next `SharedParts.serve`."""
+        for prepared in self.each:
+            prepared.commit()
+
+    async def abort(self) -> None:
+        """Give all of it back."""
+        await asyncio.gather(*(prepared.abort() for prepared in self.each))
+
+
+class SharedParts:
+    """The parts by name of the links; made when the first link of a kind is."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, SharedPart | None] = {}
+
+    def of(self, name: str) -> SharedPart | None:
+        """What the links of this name share; None: nothing."""
+        if name not in self._parts:
+            self._parts[name] = runtime_of(name).share()
+        return self._parts[name]
+
+    def __iter__(self) -> Iterator[SharedPart]:
+        return (part for part in self._parts.values() if part is not None)
+
+    def progress(self) -> dict[str, int]:
+        """A counter for each thing that has to go on."""
+        return {name: count for part in self for name, count in part.progress().items()}
+
+    def troubles(self) -> list[str]:
+        """What concerns the gateway as a whole."""
+        return [trouble for part in self for trouble in part.troubles()]
+
+    async def prepare(self, plans: Sequence[Plan]) -> AllPrepared:
+        """Have ready what these plans need. Raises PrepareError, and nothing has changed."""
+        for plan in plans:
+            for name in plan.links:
+                self.of(name)
+        found = AllPrepared()
+        try:
+            for part in self:
+                found.each.append(await part.prepare(plans))
+        except PrepareError:
+            await found.abort()
+            raise
+        return found
+
+    def serve(self, runtimes: Sequence[CellRuntime], successors: Mapping[Cell, Cell]) -> None:
+        """Serve the links of these cells, and no others."""
+        for name, part in self._parts.items():
+            if part is not None:
+                links = [runtime.links[name] for runtime in runtimes if name in runtime.links]
+                part.serve(links, successors)
+
+    async def close(self) -> None:
+        """Take nothing more."""
+        await asyncio.gather(*(part.close() for part in self))

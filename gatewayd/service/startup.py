@@ -1,0 +1,101 @@
+"""From the files named on the command line to the plans that can be served; what cannot be is said, one line each."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from os.path import isdir
+from pathlib import Path
+
+from gatewayd.logs.records import fields
+from gatewayd.mapping.compiled import CompiledFile
+from gatewayd.mapping.diagnostics import Severity
+from gatewayd.mapping.plan import Plan
+from gatewayd.service.compilation import Compilation
+
+__all__ = [
+    "PATTERN",
+    "Startup",
+    "load_plans",
+    "mapping_files",
+    "state_directory",
+    "tell_findings",
+]
+
+PATTERN = "*.yaml"
+"""The files of a configuration directory."""
+
+log = logging.getLogger("gatewayd.startup")
+
+
+def state_directory(environment: Mapping[str, str]) -> Path:
+    """Where to keep what survives a restart: what systemd gives (STATE_DIRECTORY), else the user's own (XDG)."""
+    given = environment.get("STATE_DIRECTORY")
+    if given:
+        return Path(given.partition(":")[0])
+    base = environment.get("XDG_STATE_HOME")
+    return (Path(base) if base else Path.home() / ".local" / "state") / "gatewayd"
+
+
+@dataclass(frozen=True, slots=True)
+class Startup:
+    """What there is to serve."""
+
+    plans: tuple[Plan, ...]
+    unreadable: int
+    """Files that could not be read."""
+    broken: int
+    """Files with errors."""
+
+    @property
+    def notes(self) -> list[str]:
+        """What the service manager shows until a reload mends it."""
+        count = self.broken + self.unreadable
+        return [f"{count} mapping file{'s' if count > 1 else ''} not served, see the log"] if count else []
+
+
+def mapping_files(paths: Iterable[Path]) -> list[Path]:
+    """The files meant: a directory stands for its *.yaml files, by name."""
+    found: list[Path] = []
+    for path in paths:
+        # Path.is_dir would raise for a name that no file can have; such a one is reported when it is opened.
+        if isdir(path):  # noqa: PTH112
+            inside = sorted(path.glob(PATTERN))
+            if not inside:
+                log.error(
+                    "no mapping file in the directory", extra=fields(directory=str(path), pattern=PATTERN)
+                )
+            found.extend(inside)
+        else:
+            found.append(path)
+    return found
+
+
+def load_plans(
+    paths: Sequence[Path],
+    meanwhile: Callable[[], object] = lambda: None,
+    given_up: Callable[[], bool] = lambda: False,
+) -> Startup:
+    """Read and check everything; log what cannot be served and why. Raises CompilationError.
+
+    `meanwhile` is called while another process reads; that ends early once it is `given_up`.
+    """
+    with Compilation(mapping_files(paths)) as compilation:
+        meanwhile()
+        compiled = compilation.result(given_up)
+    for unread in compiled.unreadable:
+        log.error("cannot read the mapping file", extra=fields(file=unread.name, reason=unread.reason))
+    tell_findings(compiled.files)
+    broken = [one for one in compiled.files if one.plan is None]
+    for one in broken:
+        log.error("the cell is not served", extra=fields(file=one.name, remedy=f"gatewayd check {one.name}"))
+    return Startup(compiled.plans, len(compiled.unreadable), len(broken))
+
+
+def tell_findings(files: Iterable[CompiledFile]) -> None:
+    """Log every finding with its place, rule and remedy."""
+    for finding in (finding for one in files for finding in one.diagnostics):
+        level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
+        rule = f"{finding.rule.id} {finding.rule.slug}"
+        log.log(level, finding.message, extra=fields(at=str(finding.position), rule=rule, hint=finding.hint))

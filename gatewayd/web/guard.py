@@ -1,0 +1,161 @@
+"""What stands between the status listener and whoever reaches its port: bounds, headers, host check, token.
+
+Reading is free; everything else needs the token. No answer ever carries a traceback.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import logging
+from collections.abc import Awaitable, Callable
+from ipaddress import ip_address
+from typing import cast
+
+from aiohttp import web
+from aiohttp.typedefs import Middleware
+from aiohttp.web_protocol import RequestHandler
+
+from gatewayd.logs.records import fields
+from gatewayd.loop import clock
+
+__all__ = ["HEADERS", "MAX_BODY", "MAX_CONNECTIONS", "PATIENCE", "Doors", "is_local_name", "middleware"]
+
+MAX_CONNECTIONS = 32
+"""Open at a time; further ones are closed at once, so that a flood costs the robot's loop next to nothing."""
+PATIENCE = 20.0
+"""Seconds after which a connection that has not finished a request is closed: idle, slow, or not reading its answer."""
+MAX_BODY = 4096
+"""Bytes of a request's body."""
+HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; object-src 'none'"
+    ),
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Cache-Control": "no-store",
+    "Server": "gatewayd",
+}
+"""Go with every answer."""
+_READING = ("GET", "HEAD")
+_SWEEP = 2.0
+
+log = logging.getLogger("gatewayd.status")
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Doors:
+    """Lets in at most `MAX_CONNECTIONS` connections to `server`, and shows out who wastes one."""
+
+    def __init__(self, server: web.Server) -> None:
+        self._server = server
+        self._seen: dict[RequestHandler, float] = {}
+        """Connections with the time of their last finished request, or of their beginning."""
+
+    def __call__(self) -> asyncio.Protocol:
+        """The protocol of a new connection."""
+        self._forget_closed()
+        if len(self._seen) >= MAX_CONNECTIONS:
+            return _Full()
+        handler = self._server()
+        self._seen[handler] = clock.now()
+        return handler
+
+    def finished(self, handler: RequestHandler) -> None:
+        """A request of the connection was answered."""
+        if handler in self._seen:
+            self._seen[handler] = clock.now()
+
+    async def sweep(self) -> None:
+        """Close what wastes a connection, until cancelled."""
+        while True:
+            await asyncio.sleep(_SWEEP)
+            self._forget_closed()
+            now = clock.now()
+            for handler in [handler for handler, seen in self._seen.items() if now - seen > PATIENCE]:
+                transport = handler.transport
+                if transport is not None:
+                    transport.abort()
+
+    def _forget_closed(self) -> None:
+        now = clock.now()
+        # A connection of this very moment may not have its transport yet.
+        for handler, seen in list(self._seen.items()):
+            if handler.transport is None and now - seen > _SWEEP / 2:
+                del self._seen[handler]
+
+
+class _Full(asyncio.Protocol):
+    """Closes the connection."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        cast("asyncio.Transport", transport).abort()
+
+
+def is_local_name(host: str) -> bool:
+    """Whether a Host header names an address or this machine, so that no other site's name was led here."""
+    name = host.rpartition(":")[0] if not host.endswith("]") and ":" in host else host
+    name = name.strip("[]").lower()
+    if name == "localhost" or name.endswith(".localhost"):
+        return True
+    try:
+        ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def middleware(token: str | None, doors: Callable[[], Doors | None], *, local_only: bool) -> Middleware:
+    """Asks for the token, answers errors in one line, adds `HEADERS`.
+
+    With `local_only` the Host header has to be local: a page from elsewhere in a browser on this machine could
+    otherwise read along under its own name (DNS rebinding).
+    """
+
+    @web.middleware
+    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+        refusal = _refusal(request, token, local_only=local_only)
+        response = _plain(*refusal) if refusal is not None else await _answer(request, handler)
+        for name, value in HEADERS.items():
+            response.headers.setdefault(name, value)
+        entrance = doors()
+        if entrance is not None:
+            entrance.finished(request.protocol)
+        return response
+
+    return guard
+
+
+def _refusal(request: web.Request, token: str | None, *, local_only: bool) -> tuple[int, str] | None:
+    if local_only and not is_local_name(request.host):
+        return 421, "ask for 127.0.0.1 or localhost; a proxy must set the Host header to it"
+    if request.method in _READING:
+        return None
+    if token is None:
+        return 403, "reading only: the gateway was started without --token-file"
+    given = request.headers.get("Authorization", "").removeprefix("Bearer ")
+    if not hmac.compare_digest(given.encode("utf-8", "surrogateescape"), token.encode()):
+        log.warning("a request without the right token", extra=fields(peer=request.remote, path=request.path))
+        return 401, "this needs the token: Authorization: Bearer TOKEN"
+    return None
+
+
+async def _answer(request: web.Request, handler: Handler) -> web.StreamResponse:
+    try:
+        return await handler(request)
+    except web.HTTPException as error:
+        response = _plain(error.status, error.reason)
+        if "Allow" in error.headers:
+            response.headers["Allow"] = error.headers["Allow"]
+        return response
+    except Exception:
+        log.exception("a request could not be answered", extra=fields(path=request.path))
+        return _plain(500, "internal error, see the log of the gateway")
+
+
+def _plain(status: int, text: str) -> web.Response:
+    headers = {"WWW-Authenticate": "Bearer"} if status == 401 else {}
+    return web.Response(status=status, text=text + "\n", headers=headers)

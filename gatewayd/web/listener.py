@@ -1,0 +1,172 @@
+"""The status listener: HTTP on one TCP address, by aiohttp. Everything it can be asked is a line in `_routes`.
+
+It is imported only where it is configured, and only after serving has begun: aiohttp alone takes 0.2 s to import.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from importlib.resources import files
+
+from aiohttp import web
+
+from gatewayd import __version__
+from gatewayd.control.api import Api
+from gatewayd.control.endpoint import Reload
+from gatewayd.control.server import application
+from gatewayd.loop import clock
+from gatewayd.service.cell_runtime import CellRuntime
+from gatewayd.web import view
+from gatewayd.web.guard import MAX_BODY, MAX_CONNECTIONS, Doors, is_local_name, middleware
+from gatewayd.web.health import health, readiness
+from gatewayd.web.metrics import CONTENT_TYPE, Exposition
+from gatewayd.web.probes import Probes
+
+__all__ = ["PAGE", "StatusListener"]
+
+PAGE = {
+    "/": ("index.html", "text/html"),
+    "/style.css": ("style.css", "text/css"),
+    "/icon.svg": ("icon.svg", "image/svg+xml"),
+    "/app.js": ("app.js", "text/javascript"),
+    "/picture.js": ("picture.js", "text/javascript"),
+    "/variables.js": ("variables.js", "text/javascript"),
+    "/history.js": ("history.js", "text/javascript"),
+    "/words.js": ("words.js", "text/javascript"),
+}
+"""Path -> file of gatewayd/web/page and its type. All of it is read once."""
+_WORTH_PACKING = 2048
+_CLOSING_TIME = 0.5
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class StatusListener:
+    """Answers on `host` and `port` (0: any free one) about the daemon that `probes` measures.
+
+    `token` is asked for by everything but reading; None: nothing but reading. With `api` the control interface is under
+    /api as well.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        probes: Probes,
+        token: str | None = None,
+        api: tuple[Api, Reload | None] | None = None,
+    ) -> None:
+        self._host, self._port = host, port
+        self._probes = probes
+        self._exposition = Exposition(probes, __version__)
+        self._doors: Doors | None = None
+        guard = middleware(token, lambda: self._doors, local_only=_is_loopback(host))
+        self._app = web.Application(middlewares=[guard], client_max_size=MAX_BODY)
+        self._app.add_routes(self._routes())
+        if api is not None:
+            self._app.add_subapp("/api", application(*api))
+        self._runner: web.AppRunner | None = None
+        self._server: asyncio.Server | None = None
+        self._sweeper: asyncio.Task[None] | None = None
+
+    @property
+    def port(self) -> int:
+        """The port that is listened on."""
+        return int(self._server.sockets[0].getsockname()[1]) if self._server is not None else self._port
+
+    async def start(self) -> None:
+        """Listen. Raises OSError."""
+        runner = web.AppRunner(
+            self._app, access_log=None, keepalive_timeout=15.0, handle_signals=False, lingering_time=1.0
+        )
+        await runner.setup()
+        assert runner.server is not None
+        doors = Doors(runner.server)
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(doors, self._host, self._port, backlog=MAX_CONNECTIONS)
+        self._doors, self._runner = doors, runner
+        self._sweeper = loop.create_task(doors.sweep())
+
+    async def close(self) -> None:
+        """Stop listening and end all connections."""
+        if self._server is not None:
+            self._server.close()
+        if self._sweeper is not None:
+            self._sweeper.cancel()
+        if self._runner is not None:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(_CLOSING_TIME):
+                    await self._runner.cleanup()
+
+    # -- what can be asked ------------------------------------------------------------------------------------------
+
+    def _routes(self) -> list[web.RouteDef]:
+        return [
+            *(web.get(path, _file(*file)) for path, file in PAGE.items()),
+            web.get("/healthz", self._healthz),
+            web.get("/readyz", self._readyz),
+            web.get("/metrics", self._metrics),
+            web.get("/page/cells", self._overview),
+            web.get("/page/cells/{cell}", self._layout),
+            web.get("/page/cells/{cell}/state", self._state),
+        ]
+
+    async def _healthz(self, _request: web.Request) -> web.Response:
+        healthy, answer = health(self._probes.late)
+        return _json(answer, status=200 if healthy else 503)
+
+    async def _readyz(self, _request: web.Request) -> web.Response:
+        probes = self._probes
+        ready, answer = readiness(probes.verdicts(clock.now()), probes.late, probes.troubles())
+        return _json(answer, status=200 if ready else 503)
+
+    async def _metrics(self, request: web.Request) -> web.Response:
+        return _packed(request, self._exposition.text(), {"Content-Type": CONTENT_TYPE})
+
+    async def _overview(self, _request: web.Request) -> web.Response:
+        return _json(view.overview(self._probes.daemon, __version__))
+
+    async def _layout(self, request: web.Request) -> web.Response:
+        body = view.as_json(view.layout(self._runtime(request)))
+        return _packed(request, body, {"Content-Type": "application/json"})
+
+    async def _state(self, request: web.Request) -> web.Response:
+        runtime = self._runtime(request)
+        text = request.query.get("since", "0")
+        since = int(text) if text.isascii() and text.isdigit() and len(text) < 16 else 0
+        return _json(view.state(runtime, self._probes, since, clock.now()))
+
+    def _runtime(self, request: web.Request) -> CellRuntime:
+        name = request.match_info["cell"]
+        for runtime in self._probes.daemon.runtimes:
+            if runtime.cell.definition.name == name:
+                return runtime
+        raise web.HTTPNotFound(reason="there is no such cell")
+
+
+def _json(document: object, status: int = 200) -> web.Response:
+    return web.Response(body=view.as_json(document), status=status, content_type="application/json")
+
+
+def _packed(request: web.Request, body: bytes, headers: dict[str, str]) -> web.Response:
+    """What is large and seldom asked for is packed for those who can unpack it."""
+    if len(body) >= _WORTH_PACKING and "gzip" in request.headers.get("Accept-Encoding", ""):
+        body, headers = gzip.compress(body, 1), {**headers, "Content-Encoding": "gzip"}
+    return web.Response(body=body, headers=headers)
+
+
+def _file(name: str, content_type: str) -> Handler:
+    body = files("gatewayd.web").joinpath("page", name).read_bytes()
+    headers = {"Content-Type": f"{content_type}; charset=utf-8", "Cache-Control": "no-cache"}
+
+    async def handle(request: web.Request) -> web.Response:
+        return _packed(request, body, headers)
+
+    return handle
+
+
+def _is_loopback(host: str) -> bool:
+    return is_local_name(host) and (host == "localhost" or host.startswith(("127.", "::1", "[::1")))

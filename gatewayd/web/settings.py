@@ -1,0 +1,57 @@
+"""Where the status listener listens, and the token that it asks for. Light: the command line is checked by it."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+__all__ = ["MIN_TOKEN", "Settings", "SettingsError", "parse_address", "read_token"]
+
+MIN_TOKEN = 16
+"""Characters that a token must have."""
+
+
+class SettingsError(ValueError):
+    """An option that cannot be used; the text says what to do."""
+
+
+class Settings:
+    """Where to listen and what to ask for. Raises SettingsError."""
+
+    def __init__(self, text: str, token_file: Path | None = None) -> None:
+        self.host, self.port = parse_address(text)
+        self.token = read_token(token_file) if token_file is not None else None
+
+
+def parse_address(text: str) -> tuple[str, int]:
+    """`127.0.0.1:9502`, `[::1]:9502`, `gateway.plant:9502`; `:9502` alone is loopback."""
+    host, colon, port = text.rpartition(":")
+    bare = host.removeprefix("[").removesuffix("]")
+    bracketed = host.startswith("[") and host.endswith("]")
+    if not (colon and port.isascii() and port.isdigit() and int(port) <= 0xFFFF) or (
+        ":" in bare and not bracketed
+    ):
+        raise SettingsError(f"{text!r} is no address: use HOST:PORT, say 127.0.0.1:9502 or [::1]:9502")
+    return bare or "127.0.0.1", int(port)
+
+
+def read_token(path: Path) -> str:
+    """The token: the file's only line. A file that others may read is refused."""
+    try:
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode):
+            raise SettingsError(f"{path}: no ordinary file")
+        if mode & (stat.S_IROTH | stat.S_IWOTH):
+            raise SettingsError(f"{path}: others may read or change it; run: chmod o-rw {path}")
+        with path.open("rb") as stream:
+            text = stream.read(1024).decode().strip()
+    except OSError as error:
+        raise SettingsError(f"{path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"{path}: no text") from error
+    if len(text) < MIN_TOKEN or not text.isascii() or not text.isprintable() or " " in text:
+        raise SettingsError(
+            f"{path}: a token is one word of at least {MIN_TOKEN} characters; make one: "
+            f"head -c 24 /dev/urandom | base64 > {path}"
+        )
+    return text

@@ -1,0 +1,146 @@
+"""The CANopen part of the language: what it takes, and how a mistake in it is told."""
+
+from __future__ import annotations
+
+import pytest
+
+from gatewayd.links.canopen_node.sections import Canopen, CanopenPlace, CanopenPlaces
+from gatewayd.mapping.diagnostics import Diagnostic
+from gatewayd.mapping.document import Document
+from gatewayd.mapping.reader import read_document
+from gatewayd.mapping.rules.writers import is_supervised
+from gatewayd.mapping.source import parse
+
+HEAD = "gatewayd: 1\ncell: c\nrobot: {host: r}\nvariables: {}\n"
+
+
+def read(text: str) -> tuple[Document, tuple[Diagnostic, ...]]:
+    return read_document(parse((HEAD + text).encode(), "f"))
+
+
+def section(text: str) -> Canopen:
+    document, findings = read(f"canopen: {{channel: can0, bitrate: 500000, node: 16{text}}}")
+    assert findings == ()
+    part = document.part(Canopen)
+    assert part is not None
+    return part.spec
+
+
+def test_defaults() -> None:
+    spec = section("")
+    assert (spec.interface, spec.autostart, spec.heartbeat) == ("socketcan", False, 0.5)
+    assert (spec.sync.cob_id, spec.sync.producer, spec.sync.period, spec.sync.counter) == (
+        0x80,
+        False,
+        None,
+        0,
+    )
+    assert (spec.pdo.transmission, spec.pdo.inhibit, spec.pdo.event, spec.pdo.real) == (
+        254,
+        None,
+        None,
+        "REAL64",
+    )
+
+
+def test_everything_at_once() -> None:
+    spec = section(
+        ", interface: slcan, autostart: true, heartbeat: none,"
+        " sync: {cob_id: 0x90, producer: true, period: 5ms, counter: 10},"
+        " pdo: {transmission: sync, deadline: 1s, real: REAL32}, cob_ids: {tpdo: [0x680, 0x690..0x69F], rpdo: 0x6A0},"
+        " pdos: {forces: {cob_id: 0x1C0, sync_start: 3, variables: [a, 'b[1..2]'], comment: two}}"
+    )
+    assert (spec.interface, spec.autostart, spec.heartbeat) == ("slcan", True, None)
+    assert (spec.sync.cob_id, spec.sync.producer, spec.sync.period, spec.sync.counter) == (
+        0x90,
+        True,
+        0.005,
+        10,
+    )
+    assert spec.cob_ids.tpdo == (range(0x680, 0x681), range(0x690, 0x6A0))
+    assert [str(member) for member in spec.pdos["forces"].variables] == ["a", "b[1..2]"]
+
+
+@pytest.mark.parametrize(
+    "text, place",
+    [
+        ("auto", CanopenPlace()),
+        ("object", CanopenPlace(pdo="none")),
+        ("{pdo: forces, type: REAL32}", CanopenPlace(pdo="forces", type="REAL32")),
+        ("{type: UNSIGNED8}", CanopenPlace(type="UNSIGNED8")),
+    ],
+)
+def test_a_variable_says_where_it_is(text: str, place: CanopenPlace) -> None:
+    text = f"variables: {{a: {{robot: robot_mode, canopen: {text}}}}}"
+    document, findings = read_document(
+        parse(f"{HEAD.removesuffix('variables: {}' + chr(10))}{text}".encode(), "f")
+    )
+    assert findings == ()
+    assert document.variables["a"].spec.by(CanopenPlaces).canopen == place
+
+
+@pytest.mark.parametrize(
+    "text, slug, hint",
+    [
+        ("{bitrate: 500000, node: 16}", "missing-key", "the bus"),
+        ("{channel: can0, bitrate: 500000, node: 128}", "out-of-range", "node-ID"),
+        ("{channel: can0, bitrate: 0, node: 1}", "out-of-range", "bit/s"),
+        ("{channel: 0, bitrate: 500000, node: 1}", "wrong-type", "quotes"),
+        ("{channel: can0, bitrate: 500000, node: 1, heartbeat: 500}", "bad-duration", "500ms"),
+        ("{channel: can0, bitrate: 500000, node: 1, sync: {perod: 1ms}}", "unknown-key", "`period`"),
+        ("{channel: can0, bitrate: 500000, node: 1, sync: {counter: 1}}", "out-of-range", "2 to 240"),
+        ("{channel: can0, bitrate: 500000, node: 1, pdo: {real: float}}", "bad-choice", "REAL64"),
+        ("{channel: can0, bitrate: 500000, node: 1, pdos: {p: {cobid: 0x1C0}}}", "unknown-key", "`cob_id`"),
+        (
+            "{channel: can0, bitrate: 500000, node: 1, pdos: {auto: {variables: a}}}",
+            "bad-name",
+            "another name",
+        ),
+        ("{channel: can0, bitrate: 500000, node: 1, pdos: {9p: {variables: a}}}", "bad-name", "letter"),
+        (
+            "{channel: can0, bitrate: 500000, node: 1, pdos: {p: {sync_start: 241}}}",
+            "out-of-range",
+            "counter",
+        ),
+    ],
+)
+def test_mistakes_are_told_with_a_remedy(text: str, slug: str, hint: str) -> None:
+    _, (finding,) = read(f"canopen: {text}")
+    assert finding.rule.slug == slug
+    assert hint in (finding.hint or "")
+
+
+@pytest.mark.parametrize("text", ["yes", "1", "[auto]", "automatic", "{pdo: 1}", "{object: true}"])
+def test_other_places_are_refused(text: str) -> None:
+    text = f"gatewayd: 1\ncell: c\nrobot: {{host: r}}\nvariables: {{a: {{robot: robot_mode, canopen: {text}}}}}\n"
+    _, (finding,) = read_document(parse(text.encode(), "f"))
+    assert finding.hint
+
+
+@pytest.mark.parametrize(
+    "text, slugs",
+    [
+        ("{canopen: rpdo}", []),
+        ("{canopen: any, modbus: 10.0.0.1, node: 1, heartbeat: 1s}", []),
+        ("{timeout: 1s}", ["missing-key"]),
+        ("{canopen: pdo}", ["bad-choice"]),
+        ("{canopen: rpdo, node: 0}", ["out-of-range"]),
+    ],
+)
+def test_writers(text: str, slugs: list[str]) -> None:
+    _, findings = read(f"writers: {{line: {text}}}")
+    assert [finding.rule.slug for finding in findings] == slugs
+
+
+def test_supervision_of_a_writer() -> None:
+    """A heartbeat tells of the CANopen side alone."""
+    writers = read(
+        "writers: {a: {canopen: rpdo}, b: {canopen: rpdo, node: 1, heartbeat: 1s}, c: {canopen: any, timeout: 1s},"
+        " d: {canopen: sdo, modbus: 10.0.0.1, node: 1, heartbeat: 1s}}"
+    )[0].writers
+    assert {name: is_supervised(part.spec) for name, part in writers.items()} == {
+        "a": False,
+        "b": True,
+        "c": True,
+        "d": False,
+    }

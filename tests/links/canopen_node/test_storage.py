@@ -1,0 +1,255 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gatewayd.canopen.datatypes import CanType
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, Pdo, array, record, variable
+from gatewayd.canopen.nmt import NmtCommand
+from gatewayd.links.canopen_node.storage import (
+    JsonStore,
+    LssSettings,
+    MemoryStore,
+    Parameters,
+    Saved,
+    Store,
+    StoreError,
+    layout_of,
+)
+from tests.links.canopen_node.wire import Client
+
+U32 = CanType.UNSIGNED32
+
+
+def _objects(name: str = "force") -> list[Object]:
+    period = Entry(0, "Producer heartbeat time", CanType.UNSIGNED16, Access.RW, b"\xe8\3", stored=True)
+    emcy = Entry(0, "COB-ID EMCY", U32, Access.RW, U32.pack(0x85), plus_node=True, stored=True)
+    cob_id = Entry(1, "COB-ID", U32, Access.RW, U32.pack(0x185), plus_node=True, stored=True)
+    value = Entry(1, name, U32, Access.RW, bytes(4), stored=True)
+    loose = Entry(0, "Synchronous window length", U32, Access.RW, bytes(4))
+    return [
+        variable(0x1007, loose),
+        variable(0x1014, emcy),
+        variable(0x1017, period),
+        record(0x1800, "TPDO 1", (cob_id,)),
+        record(0x2000, "Values", (value,)),
+        record(0x6000, "Profile", (Entry(1, "x", U32, Access.RW, bytes(4), stored=True),)),
+    ]
+
+
+class Kept:
+    """A node's parameters on a store."""
+
+    def __init__(self, store: Store, objects: list[Object] | None = None, node: int = 5) -> None:
+        self.reports: list[str] = []
+        self.failures: list[bool] = []
+        self.ready = True
+        self.service = Parameters(
+            store,
+            node,
+            ready=lambda: self.ready,
+            report=self.reports.append,
+            failed=self.failures.append,
+        )
+        self.client = Client([*(objects or _objects()), *self.service.objects()])
+        self.service.bind(self.client.dictionary)
+        self.service.apply(NmtCommand.RESET_NODE, self.service.node)
+
+    def signed(self, index: int, subindex: int, signature: bytes) -> None:
+        self.client.dictionary.write(index, subindex, signature)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "press-3.json"
+
+
+def test_cct_testing_other_01_capabilities_are_on_command() -> None:
+    client = Kept(MemoryStore()).client
+    for index in (0x1010, 0x1011):
+        assert [client.read(index, number) for number in range(5)] == [4, 1, 1, 1, 1]
+
+
+@pytest.mark.parametrize("index, signature", [(0x1010, b"load"), (0x1010, b"evas"), (0x1011, b"save")])
+def test_cct_testing_other_02_wrong_signature_is_refused(index: int, signature: bytes) -> None:
+    with pytest.raises(Abort) as caught:
+        Kept(MemoryStore()).signed(index, 1, signature)
+    assert caught.value.code is AbortCode.CANNOT_STORE
+
+
+def test_cct_testing_other_03_saved_parameters_survive_a_restart(path: Path) -> None:
+    first = Kept(JsonStore(path))
+    first.client.write(0x1017, 0, 50)
+    first.client.write(0x2000, 1, 7)
+    first.signed(0x1010, 1, b"save")
+    second = Kept(JsonStore(path))
+    assert (second.client.read(0x1017), second.client.read(0x2000, 1)) == (50, 7)
+    assert second.reports == []
+
+
+def test_cct_testing_other_04_restored_defaults_come_with_the_next_reset(path: Path) -> None:
+    kept = Kept(JsonStore(path))
+    kept.client.write(0x1017, 0, 50)
+    kept.signed(0x1010, 1, b"save")
+    kept.signed(0x1011, 1, b"load")
+    assert kept.client.read(0x1017) == 50
+    kept.service.apply(NmtCommand.RESET_COMMUNICATION, 5)
+    assert kept.client.read(0x1017) == 1000
+
+
+@pytest.mark.parametrize(
+    "subindex, kept_values", [(1, (50, 7, 8)), (2, (50, 0, 0)), (3, (1000, 0, 8)), (4, (1000, 7, 0))]
+)
+def test_groups_are_saved_and_restored_apart(subindex: int, kept_values: tuple[int, ...]) -> None:
+    kept = Kept(MemoryStore())
+    kept.client.write(0x1017, 0, 50)
+    kept.client.write(0x2000, 1, 7)
+    kept.client.write(0x6000, 1, 8)
+    kept.signed(0x1010, subindex, b"save")
+    kept.service.apply(NmtCommand.RESET_NODE, 5)
+    read = kept.client.read
+    assert (read(0x1017), read(0x2000, 1), read(0x6000, 1)) == kept_values
+    kept.signed(0x1011, subindex, b"load")
+    kept.service.apply(NmtCommand.RESET_NODE, 5)
+    assert (read(0x1017), read(0x2000, 1), read(0x6000, 1)) == (1000, 0, 0)
+
+
+def test_reset_communication_leaves_the_application_alone() -> None:
+    kept = Kept(MemoryStore())
+    kept.client.write(0x1017, 0, 50)
+    kept.client.write(0x2000, 1, 7)
+    kept.service.apply(NmtCommand.RESET_COMMUNICATION, 5)
+    assert (kept.client.read(0x1017), kept.client.read(0x2000, 1)) == (1000, 7)
+
+
+def test_what_is_not_marked_is_not_stored() -> None:
+    kept = Kept(MemoryStore())
+    kept.client.write(0x1007, 0, 3)
+    kept.signed(0x1010, 1, b"save")
+    kept.service.apply(NmtCommand.RESET_NODE, 5)
+    assert kept.client.read(0x1007) == 0
+
+
+def test_defaults_follow_the_node_id_and_saved_values_do_not() -> None:
+    kept = Kept(MemoryStore())
+    kept.service.apply(NmtCommand.RESET_COMMUNICATION, 9)
+    assert kept.client.read(0x1014) == 0x89
+    kept.client.write(0x1014, 0, 0x1A0)
+    kept.signed(0x1010, 2, b"save")
+    kept.service.apply(NmtCommand.RESET_COMMUNICATION, 5)
+    assert kept.client.read(0x1014) == 0x1A0
+    assert kept.client.read(0x1800, 1) == 0x185, "the table of PDOs moves these"
+
+
+def test_pdo_and_manufacturer_values_do_not_outlive_their_layout() -> None:
+    store = MemoryStore()
+    old = Kept(store)
+    old.client.write(0x1017, 0, 50)
+    old.client.write(0x1800, 1, 0x190)
+    old.client.write(0x2000, 1, 7)
+    old.signed(0x1010, 1, b"save")
+    new = Kept(store, _objects("speed"))
+    assert new.client.read(0x1017) == 50
+    assert (new.client.read(0x1800, 1), new.client.read(0x2000, 1)) == (0x185, 0)
+    assert len(new.reports) == 1
+    assert "1800h:01, 2000h:01" in new.reports[0]
+
+
+def test_another_node_id_is_not_another_layout() -> None:
+    moved = _objects()
+    moved[3].entries[1].default = U32.pack(0x189)
+    assert layout_of(_objects(), 5) == layout_of(moved, 9) != layout_of(moved, 5)
+
+
+def _with_qualities(*names: str) -> list[Object]:
+    entries = (
+        Entry(number, f"quality {name}", CanType.UNSIGNED16, Access.RO, bytes(2), pdo=Pdo.TRANSMIT)
+        for number, name in enumerate(names, 1)
+    )
+    return [*_objects(), array(0x5F40, "Status quality", entries)]
+
+
+def test_the_order_of_variables_counts_where_a_stored_pdo_tells_their_qualities() -> None:
+    one, other = _with_qualities("start", "speed"), _with_qualities("speed", "start")
+    header, quality = ({(0x1A02, 1): U32.pack(value)} for value in (0x5F00_0710, 0x5F40_0110))
+    assert layout_of(one, 5) == layout_of(other, 5) == layout_of(_objects(), 5)
+    assert layout_of(one, 5, header) == layout_of(other, 5, header)
+    assert layout_of(one, 5, quality) != layout_of(other, 5, quality)
+
+
+def test_an_operational_node_does_not_wait_for_a_disk() -> None:
+    kept = Kept(MemoryStore())
+    kept.ready = False
+    with pytest.raises(Abort) as caught:
+        kept.signed(0x1010, 1, b"save")
+    assert caught.value.code is AbortCode.DEVICE_STATE
+
+
+def test_a_disk_that_fails_is_told_and_nothing_changes(tmp_path: Path) -> None:
+    kept = Kept(JsonStore(tmp_path / "missing" / "file.json"))
+    kept.client.write(0x1017, 0, 50)
+    with pytest.raises(Abort) as caught:
+        kept.signed(0x1010, 1, b"save")
+    assert caught.value.code is AbortCode.HARDWARE
+    assert "cannot be written" in kept.reports[0]
+    kept.service.apply(NmtCommand.RESET_NODE, 5)
+    assert kept.client.read(0x1017) == 1000
+
+
+def test_lss_settings_and_parameters_share_the_file(path: Path) -> None:
+    kept = Kept(JsonStore(path))
+    assert kept.service.save_lss(9, 250_000)
+    kept.client.write(0x1017, 0, 50)
+    kept.signed(0x1010, 1, b"save")
+    kept.signed(0x1011, 1, b"load")
+    assert Kept(JsonStore(path)).service.lss == LssSettings(9, 5, 250_000)
+    assert Kept(JsonStore(path)).service.node == 9
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_mapping_with_another_node_id_wins_over_lss() -> None:
+    store = MemoryStore()
+    store.save(Saved(lss=LssSettings(9, 5)))
+    kept = Kept(store, node=6)
+    assert (kept.service.node, kept.service.lss) == (6, None)
+    assert "node-ID 9 was stored by LSS" in kept.reports[0]
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", "null", "\xff", '{"format": 1}'])
+def test_a_damaged_file_means_defaults_a_report_and_a_new_file_with_the_next_save(
+    path: Path, text: str
+) -> None:
+    path.write_text(text, encoding="latin-1")
+    kept = Kept(JsonStore(path))
+    assert kept.client.read(0x1017) == 1000
+    assert (len(kept.reports), kept.failures) == (1, [True])
+    assert str(path) in kept.reports[0]
+    kept.signed(0x1010, 1, b"save")
+    assert kept.failures == [True, False]
+    assert JsonStore(path).load().values == {}
+
+
+def test_an_edited_file_is_damaged(path: Path) -> None:
+    JsonStore(path).save(Saved(values={(0x1017, 0): b"\x32\0"}))
+    document = json.loads(path.read_text())
+    document["values"]["1017:00"] = "3300"
+    path.write_text(json.dumps(document))
+    with pytest.raises(StoreError):
+        JsonStore(path).load()
+
+
+@given(
+    st.dictionaries(st.tuples(st.integers(0x1000, 0xFFFF), st.integers(0, 255)), st.binary(max_size=64)),
+    st.integers(0, 2**32 - 1),
+)
+def test_any_content_comes_back(
+    tmp_path_factory: pytest.TempPathFactory, values: dict[tuple[int, int], bytes], layout: int
+) -> None:
+    saved = Saved(layout, values, LssSettings(9, 255))
+    store = JsonStore(tmp_path_factory.getbasetemp() / "any.json")
+    store.save(saved)
+    assert store.load() == saved

@@ -1,0 +1,57 @@
+"""The Modbus side of one cell, as the daemon sees it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gatewayd.core.cell import Cell
+from gatewayd.links.contract import Level
+from gatewayd.links.modbus_server.link import ModbusUnit
+from gatewayd.links.modbus_server.listener import ModbusListener
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.mapping.loader import load
+from gatewayd.mapping.plan import Plan
+
+TEXT = b"""\
+gatewayd: 1
+cell: press
+robot: {host: robot}
+modbus: {listen: '127.0.0.1:1502', unit: 3}
+variables: {ready: {robot: output_bit_register_0, modbus: 0.0}}
+"""
+
+
+def compiled() -> Plan:
+    plan = load(TEXT, "cell.yaml").plan
+    assert plan is not None
+    return plan
+
+
+def test_without_a_listener_nobody_reaches_it_and_it_says_so() -> None:
+    plan = compiled()
+    unit = ModbusUnit(plan.the(ModbusPlan), Cell(plan.cell))
+    health = unit.health()
+    assert not unit.reachable
+    assert (health.level, health.words) == (Level.BAD, "not listening, see the log")
+    assert health.figures == {"listen": "127.0.0.1:1502", "unit": 3, "connections": 0, "listening": False}
+
+
+async def test_with_a_listener_that_listens_it_is_reachable() -> None:
+    plan = compiled()
+    unit = ModbusUnit(plan.the(ModbusPlan), Cell(plan.cell))
+    unit.listener = ModbusListener("127.0.0.1", 0)
+    await unit.listener.start()
+    try:
+        assert unit.reachable
+        assert (unit.health().level, unit.health().words) == (Level.GOOD, "listening, no connections")
+    finally:
+        await unit.listener.close()
+
+
+def test_it_is_the_unit_of_another_plan_and_cell_after_a_reload() -> None:
+    plan = compiled()
+    unit = ModbusUnit(plan.the(ModbusPlan), Cell(plan.cell))
+    other, successor = replace(plan.the(ModbusPlan), unit=9), Cell(plan.cell)
+    unit.rebind(other, successor, 1.0)
+    assert (unit.plan, unit.cell) == (other, successor)
+    assert unit.health().figures["unit"] == 9

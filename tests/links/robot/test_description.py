@@ -1,0 +1,28 @@
+"""A session with the controller in words."""
+
+from __future__ import annotations
+
+from gatewayd.links.registry import kind_of
+from gatewayd.links.robot.plan import RobotPlan
+from gatewayd.mapping.loader import load
+
+TEXT = """\
+gatewayd: 1
+cell: press
+robot: {host: 127.0.0.1, watchdog: {field: input_int_register_23, frequency: 10, requires: plc}}
+modbus: {listen: '127.0.0.1:1502'}
+writers: {plc: {modbus: 127.0.0.2}}
+variables:
+  start: {robot: input_bit_register_0, modbus: 0.0, owner: plc}
+"""
+
+
+def test_settings_and_address() -> None:
+    plan = load(TEXT.encode(), "cell.yaml").plan
+    assert plan is not None
+    found = kind_of("robot").describe(plan.the(RobotPlan), plan.cell)
+    assert found.settings["watchdog"] == "input_int_register_23 at 10 Hz, requires plc"
+    assert found.settings["frequency"] == "the controller's own"
+    assert found.settings["adopt_for"] == "10 s"
+    assert found.fields == {"address": "127.0.0.1:30004"}
+    assert not found.places

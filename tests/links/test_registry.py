@@ -1,0 +1,27 @@
+"""The kinds of links do not get in each other's way."""
+
+from __future__ import annotations
+
+from gatewayd.core.status_layout import FIELDS, HEADER_WORDS
+from gatewayd.links.registry import LINK_KINDS, kind_of, kinds, status_fields
+
+
+def test_every_package_has_a_kind_with_a_key_of_its_own() -> None:
+    assert len(kinds()) == len(LINK_KINDS)
+    assert len({kind.key for kind in kinds()}) == len(LINK_KINDS)
+    assert [kind_of(kind.key) for kind in kinds()] == list(kinds())
+
+
+def test_kinds_have_words_of_the_status_block_of_their_own() -> None:
+    fields = status_fields()
+    assert set(FIELDS) < set(fields)
+    words = [word for field in fields for word in range(field.offset, field.offset + field.words)]
+    assert len(words) == len(set(words))
+    assert max(words) < HEADER_WORDS
+    assert len({field.name for field in fields}) == len(fields)
+
+
+def test_kinds_have_metrics_of_their_own() -> None:
+    names = [metric.name for kind in kinds() for metric in kind.metrics]
+    assert len(names) == len(set(names))
+    assert all(name.startswith("gatewayd_") for name in names)

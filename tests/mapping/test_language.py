@@ -1,0 +1,41 @@
+"""The whole language, put together from the kinds of links."""
+
+from __future__ import annotations
+
+import pytest
+from pydantic import ValidationError
+
+from gatewayd.links.canopen_node.sections import CanopenWriter
+from gatewayd.links.modbus_server.sections import ModbusWriter
+from gatewayd.mapping.language import FILE, VARIABLE, WRITER
+
+
+def test_keys_come_in_the_order_of_the_kinds() -> None:
+    """Hints, the schema and the reference list them so."""
+    assert list(FILE.model_fields) == [
+        "gatewayd", "cell", "robot", "modbus", "canopen", "writers", "groups", "variables",
+    ]  # fmt: skip
+    assert list(VARIABLE.model_fields) == [
+        "robot", "modbus", "canopen", "owner", "takeover", "lease", "group", "limits", "clamp", "on_release",
+        "on_stale", "valid", "deadband", "unit", "comment",
+    ]  # fmt: skip
+    assert list(WRITER.model_fields) == [
+        "modbus", "canopen", "node", "heartbeat", "timeout", "timeout_counts", "grace",
+    ]  # fmt: skip
+
+
+def test_a_kind_finds_its_own_keys() -> None:
+    writer = WRITER.model_validate({"modbus": "10.0.0.1", "canopen": "rpdo"})
+    assert [str(network) for network in writer.by(ModbusWriter).modbus] == ["10.0.0.1/32"]
+    assert writer.by(CanopenWriter).by_rpdo
+
+
+def test_a_writer_needs_some_link() -> None:
+    with pytest.raises(ValidationError) as caught:
+        WRITER.model_validate({"timeout": "1s"})
+    (error,) = caught.value.errors()
+    assert error["type"] == "missing-key"
+    assert error["ctx"] == {
+        "message": "a writer needs the key `modbus` or `canopen`, by which it is known",
+        "hint": "add for example `modbus: 192.168.1.20` or `canopen: rpdo`",
+    }

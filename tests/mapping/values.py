@@ -1,0 +1,33 @@
+"""Values of a mapping file as their readers get them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from gatewayd.mapping.source import parse, plain
+
+__all__ = ["read", "refused", "written"]
+
+
+def written(text: str) -> object:
+    """What YAML makes of the text of a value."""
+    source = parse(f"a: {text}".encode(), "f")
+    assert source.root is not None, source.findings
+    value = plain(source.root)
+    assert isinstance(value, dict)
+    return value["a"]
+
+
+def read(kind: Any, text: str) -> Any:
+    return TypeAdapter(kind).validate_python(written(text), strict=True)
+
+
+def refused(kind: Any, text: str) -> tuple[str, str, str]:
+    """Rule, message and hint of the refusal."""
+    with pytest.raises(ValidationError) as caught:
+        read(kind, text)
+    details = caught.value.errors()[0]
+    return details["type"], details["ctx"]["message"], details["ctx"]["hint"]

@@ -1,0 +1,54 @@
+"""Figures for people."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from gatewayd.report.format import age, counted, exact, listed, seconds, span, value
+
+
+@pytest.mark.parametrize(
+    "found, unit, text",
+    [
+        (True, "", "1"), (False, "", "0"), (7, "", "7"), (0.1 + 0.2, "N", "0.3 N"), (-2.0, "", "-2"), (0.0, "", "0"),
+        (0.12345, "", "0.123"), (47.5, "N", "47.5 N"), (0.00012, "", "0.00012"), (1e300, "", "1e+300"),
+        (math.nan, "N", "nan N"), (-math.inf, "", "-inf"), ("nan", "", "nan"),
+    ],
+)  # fmt: skip
+def test_values_are_short_and_have_their_unit(found: object, unit: str, text: str) -> None:
+    assert value(found, unit) == text
+
+
+@pytest.mark.parametrize(
+    "seconds, text",
+    [(None, "-"), (math.inf, "-"), (-0.001, "0 ms"), (0.012, "12 ms"), (3.44, "3.4 s"), (75, "1 min 15 s")],
+)
+def test_ages(seconds: float | None, text: str) -> None:
+    assert age(seconds) == text
+
+
+@pytest.mark.parametrize(
+    "seconds, text",
+    [
+        (-1, "0 s"), (0, "0 s"), (4.9999, "5 s"), (59, "59 s"), (3600, "1 h"), (7980, "2 h 13 min"),
+        (266400, "3 d 2 h"),
+    ],
+)  # fmt: skip
+def test_spans_have_two_units_at_most(seconds: float, text: str) -> None:
+    assert span(seconds) == text
+
+
+def test_nouns_agree_with_their_count() -> None:
+    assert [counted(count, "lock") for count in (0, 1, 2)] == ["no locks", "1 lock", "2 locks"]
+
+
+def test_many_names_are_a_few_and_a_number() -> None:
+    assert listed(["a", "b"], 3) == "a, b"
+    assert listed(list("abcde"), 3) == "a, b, c and 2 more"
+
+
+def test_numbers_of_mappings_keep_every_digit() -> None:
+    assert (exact(0.1), exact(5.0), exact(1e-7)) == ("0.1", "5", "1e-07")
+    assert (seconds(2.0), seconds(None)) == ("2 s", "")

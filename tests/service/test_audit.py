@@ -1,0 +1,205 @@
+"""Who wrote what and when: what becomes a record, what is merged, and what it costs."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+from itertools import pairwise
+
+import pytest
+
+from gatewayd.core.cell import Cell, Change
+from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
+from gatewayd.core.requester import Requester
+from gatewayd.report.event_text import ACCEPTED, EventRecord
+from gatewayd.service.audit import MERGED, Audit, Record, plain_value, utc
+
+NUMBER, REAL = 0, 1
+PLC, HMI = 0, 1
+WALL = 1_800_000_000.0
+
+
+def definition() -> CellDefinition:
+    fields = ("input_int_register_0", "input_double_register_0")
+    kinds = (ValueKind.INT, ValueKind.FLOAT)
+    return CellDefinition(
+        name="press",
+        fingerprint=1,
+        variables=tuple(
+            Variable(n + 1, ("number", "real")[n], Direction.INPUT, kinds[n], fields[n], lock=n)
+            for n in (0, 1)
+        ),
+        locks=tuple(Lock(("number", "real")[n], (n,), (PLC, HMI), takeover=True) for n in (0, 1)),
+        writers=(Writer("plc"), Writer("hmi")),
+        stale_after=1.0,
+    )
+
+
+@pytest.fixture
+def cell() -> Cell:
+    cell = Cell(definition())
+    cell.robot_connected(0.0)
+    cell.adopt({NUMBER: 0, REAL: 0.0}, 0.0)
+    return cell
+
+
+@pytest.fixture
+def lines() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def audit(cell: Cell, lines: list[str]) -> Audit:
+    audit = Audit(lines.append, wall_clock=lambda: WALL)
+    audit.watch(cell)
+    return audit
+
+
+def happened(audit: Audit) -> list[EventRecord]:
+    return [record.event for record in audit]
+
+
+def written(audit: Audit) -> list[tuple[str | None, object, object, int]]:
+    return [(one.writer, one.old, one.new, one.times) for one in happened(audit) if one.what == ACCEPTED]
+
+
+def test_a_change_is_recorded_at_once(cell: Cell, audit: Audit, lines: list[str]) -> None:
+    assert cell.write(Requester(PLC), [Change(NUMBER, 7)], 1.5) is None
+    assert json.loads(lines[-1]) == {
+        "time": "2027-01-15T08:00:00.000Z",
+        "monotonic": 1.5,
+        "cell": "press",
+        "what": "write accepted",
+        "writer": "plc",
+        "variable": "number",
+        "old": 0,
+        "new": 7,
+    }
+    assert audit.count == len(audit) == len(lines) == 2
+    assert [one.what for one in happened(audit)] == ["lock acquired", "write accepted"]
+
+
+def test_a_rewrite_of_the_same_value_is_no_record(cell: Cell, audit: Audit) -> None:
+    for turn in range(50):
+        assert cell.write(Requester(PLC), [Change(NUMBER, 7)], 1 + turn / 10) is None
+        audit.tick(1 + turn / 10)
+    assert written(audit) == [("plc", 0, 7, 1)]
+
+
+def test_a_value_that_keeps_changing_is_told_once_a_second(cell: Cell, audit: Audit) -> None:
+    for turn in range(1, 301):
+        now = 1 + turn / 100
+        audit.tick(now)
+        assert cell.write(Requester(PLC), [Change(NUMBER, turn)], now) is None
+    audit.tick(100.0)
+    told = written(audit)
+    assert told[0] == ("plc", 0, 1, 1)
+    assert sum(times for *_, times in told) == 300
+    assert len(told) <= 5
+    assert all(before[2] == after[1] for before, after in pairwise(told))
+    assert told[-1][2] == 300
+
+
+def test_another_writer_ends_what_was_merged(cell: Cell, audit: Audit) -> None:
+    for writer, value in ((HMI, 1), (HMI, 2), (PLC, 3)):
+        assert cell.write(Requester(writer), [Change(NUMBER, value)], 1.0) is None
+    assert written(audit) == [("hmi", 0, 1, 1), ("hmi", 1, 2, 1), ("plc", 2, 3, 1)]
+
+
+def test_the_time_of_merged_changes_is_that_of_the_last(cell: Cell, audit: Audit) -> None:
+    for now, value in ((1.0, 1), (1.2, 2), (1.4, 3)):
+        assert cell.write(Requester(PLC), [Change(NUMBER, value)], now) is None
+    audit.tick(1.0 + MERGED)
+    last = list(audit)[-1]
+    assert (last.monotonic, last.event.times) == (1.4, 2)
+    assert last.wall == pytest.approx(WALL - (MERGED - 0.4))
+
+
+def test_a_refusal_names_reason_and_holder(cell: Cell, audit: Audit) -> None:
+    assert cell.write(Requester(PLC), [Change(NUMBER, 1)], 1.0) is None
+    assert cell.write(Requester(HMI), [Change(NUMBER, 2)], 1.1) is not None
+    refused = happened(audit)[-1]
+    assert (refused.what, refused.writer, refused.holder, refused.old, refused.new, refused.reason) == (
+        "write refused", "hmi", "plc", 1, 2, "held by another owner",
+    )  # fmt: skip
+
+
+def test_an_undeclared_peer_has_a_name_too(cell: Cell, audit: Audit) -> None:
+    assert cell.write(Requester(None), [Change(NUMBER, 2)], 1.1) is not None
+    assert happened(audit)[-1].writer == "undeclared"
+
+
+def test_what_was_written_stands_before_the_fallback(cell: Cell, audit: Audit) -> None:
+    for value in (1, 2, 3):
+        assert cell.write(Requester(PLC), [Change(NUMBER, value)], 1.0) is None
+    cell.writer_connected(Requester(PLC), 1.0)
+    cell.writer_disconnected(Requester(PLC), 1.1, "closed")
+    told = [(one.what, one.writer, one.old, one.new) for one in happened(audit)]
+    assert told[-3:] == [
+        ("lock released", "plc", None, None),
+        ("write accepted", "plc", 1, 3),
+        ("fallback applied", "gateway", 3, 0),
+    ]
+
+
+def test_the_local_operator_is_in_it(cell: Cell, audit: Audit) -> None:
+    assert cell.operator.force(REAL, 2.5, 1.0, 3.0, "by anna") is None
+    cell.tick(3.0)
+    told = [(one.what, one.writer, one.new, one.detail) for one in happened(audit)]
+    assert ("value forced", "operator", 2.5, "by anna") in told
+    assert ("force ended", "operator", None, "time limit") in told
+
+
+def test_unwatching_tells_the_rest_and_ends_it(cell: Cell, audit: Audit) -> None:
+    audit.watch(cell)
+    for value in (1, 2):
+        assert cell.write(Requester(PLC), [Change(NUMBER, value)], 1.0) is None
+    audit.unwatch(cell)
+    audit.unwatch(cell)
+    assert written(audit) == [("plc", 0, 1, 1), ("plc", 1, 2, 1)]
+    assert cell.write(Requester(PLC), [Change(NUMBER, 9)], 9.0) is None
+    audit.tick(99.0)
+    assert audit.count == 3
+    assert not cell.write_listeners
+
+
+def test_the_ring_is_bounded(cell: Cell) -> None:
+    audit = Audit(capacity=3)
+    audit.watch(cell)
+    for value in range(10):
+        assert cell.write(Requester(PLC), [Change(NUMBER, value + 1)], value * 10.0) is None
+    assert (len(audit), audit.count) == (3, 11)
+
+
+@pytest.mark.parametrize("value, plain", [(math.nan, "nan"), (-math.inf, "-inf"), (1.5, 1.5), (True, True)])
+def test_values_are_plain_json(value: float, plain: object) -> None:
+    assert plain_value(value) == plain
+    record = Record(WALL, 1.0, "press", EventRecord(ACCEPTED, new=value))
+    assert json.loads(json.dumps(record.as_json(), allow_nan=False))["new"] == plain
+
+
+def test_times_are_utc() -> None:
+    assert utc(0.0) == "1970-01-01T00:00:00.000Z"
+
+
+def test_following_drops_cells_that_are_gone(cell: Cell, audit: Audit) -> None:
+    other = Cell(definition())
+    audit.follow([other])
+    assert not cell.write_listeners
+    assert len(other.write_listeners) == 1
+    audit.follow([other])
+    assert len(other.write_listeners) == 1
+
+
+async def test_it_keeps_up_with_the_gateway_and_tells_the_rest_at_the_end(cell: Cell) -> None:
+    audit = Audit()
+    audit.watch(cell)
+    running = asyncio.create_task(audit.run(lambda: [cell]))
+    await asyncio.sleep(0)
+    for value in (1, 2):
+        assert cell.write(Requester(PLC), [Change(NUMBER, value)], 1.0) is None
+    assert written(audit) == [("plc", 0, 1, 1)]
+    running.cancel()
+    await asyncio.wait((running,))
+    assert written(audit) == [("plc", 0, 1, 1), ("plc", 1, 2, 1)]

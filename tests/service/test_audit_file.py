@@ -1,0 +1,134 @@
+"""The audit's file under everything a disk can do; the gateway's own thread never notices."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from gatewayd.service import audit_file as auditfile
+from gatewayd.service.audit_file import AuditFile
+
+Opened = Callable[..., AuditFile]
+
+
+@pytest.fixture
+def opened(tmp_path: Path) -> Iterator[Opened]:
+    files: list[AuditFile] = []
+
+    def make(path: Path | None = None, limit: int = 1000, kept: int = 2) -> AuditFile:
+        files.append(AuditFile(path or tmp_path / "audit.jsonl", limit, kept, retry=0.02))
+        return files[-1]
+
+    yield make
+    for one in files:
+        one.close()
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + 10
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def text(path: Path) -> str:
+    return path.read_text() if path.exists() else ""
+
+
+def test_lines_are_appended_to_what_is_there(opened: Opened, tmp_path: Path) -> None:
+    path = tmp_path / "audit.jsonl"
+    path.write_text("before\n")
+    one = opened(path)
+    one.write("now")
+    one.close()
+    assert path.read_text() == "before\nnow\n"
+    assert path.stat().st_mode & 0o777 == 0o644
+
+
+def test_a_new_file_is_not_for_everybody(opened: Opened) -> None:
+    one = opened()
+    one.write("x")
+    one.close()
+    assert one.path.stat().st_mode & 0o007 == 0
+
+
+def test_it_is_rotated_by_size_and_the_oldest_goes(opened: Opened, tmp_path: Path) -> None:
+    one = opened()
+    for number in range(5):
+        one.write(f"{number} " + "x" * 1200)
+        until(lambda number=number: f"{number} x" in text(one.path))  # type: ignore[misc]
+    one.close()
+    found = {path.name: path.read_text()[0] for path in tmp_path.iterdir()}
+    assert found == {"audit.jsonl": "4", "audit.jsonl.1": "3", "audit.jsonl.2": "2"}
+
+
+def test_trouble_is_told_before_anybody_writes(opened: Opened, tmp_path: Path) -> None:
+    one = opened(tmp_path / "missing" / "audit.jsonl")
+    until(lambda: "No such file" in one.trouble)
+    (tmp_path / "missing").mkdir()
+    until(lambda: not one.trouble)
+    assert one.path.read_bytes() == b""
+
+
+@pytest.mark.parametrize("by", ["delete", "move"])
+def test_a_file_that_vanished_is_begun_anew(opened: Opened, tmp_path: Path, by: str) -> None:
+    one = opened()
+    one.write("first")
+    until(lambda: "first" in text(one.path))
+    if by == "delete":
+        one.path.unlink()
+    else:
+        one.path.rename(tmp_path / "moved")
+    one.write("second")
+    until(lambda: "second" in text(one.path))
+    assert one.path.read_text() == "second\n"
+
+
+def test_a_full_disk_is_told_once_and_costs_nothing(opened: Opened, caplog: pytest.LogCaptureFixture) -> None:
+    if not os.path.exists("/dev/full"):  # noqa: PTH110
+        pytest.skip("no /dev/full")
+    one = opened(Path("/dev/full"))
+    one.write("x")
+    until(lambda: bool(one.trouble))
+    begun = time.perf_counter()
+    for _ in range(1000):
+        one.write("y")
+    assert time.perf_counter() - begun < 1.0
+    time.sleep(0.1)
+    told = [record for record in caplog.records if record.levelno == logging.ERROR]
+    assert [record.__dict__["fields"]["reason"] for record in told] == ["No space left on device"]
+
+
+def test_it_goes_on_when_the_directory_comes_and_counts_what_was_lost(
+    opened: Opened, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(auditfile, "QUEUE", 3)
+    one = opened(tmp_path / "missing" / "audit.jsonl", limit=10**6)
+    for number in range(10):
+        one.write(str(number))
+    until(lambda: bool(one.trouble))
+    assert one.dropped == 7
+    one.path.parent.mkdir()
+    until(lambda: "dropped" in text(one.path))
+    *kept, lost = one.path.read_text().splitlines()
+    assert kept == ["0", "1", "2"]
+    assert json.loads(lost) == {"what": "records dropped", "times": 7}
+    until(lambda: not one.trouble)
+
+
+def test_closing_takes_no_longer_than_its_patience(opened: Opened, tmp_path: Path) -> None:
+    """A disk that hangs, here a pipe that nobody reads, does not hang the gateway's end."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    one = opened(pipe)
+    one.write("x")
+    begun = time.monotonic()
+    one.close(0.1)
+    assert time.monotonic() - begun < 5.0
+    os.close(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK))

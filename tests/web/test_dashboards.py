@@ -1,0 +1,117 @@
+"""docs/grafana.json and docs/alerts.yaml ask only for what /metrics tells, by labels that it has."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
+from gatewayd.core.refusal import Reason
+from gatewayd.web.metrics import METRICS, PROCESS_METRICS, MetricKind
+
+DOCS = Path(__file__).parents[2] / "docs"
+OF_PROMETHEUS = {"instance", "job", "le"}
+"""Labels that Prometheus adds, or that a histogram has."""
+
+
+def _known() -> dict[str, set[str]]:
+    found = {"up": set[str](), **{name: set[str]() for name in PROCESS_METRICS}}
+    for info in METRICS:
+        suffixes = ("_bucket", "_sum", "_count") if info.kind is MetricKind.HISTOGRAM else ("",)
+        found |= {info.name + suffix: set(info.labels) for suffix in suffixes}
+    return found
+
+
+KNOWN = _known()
+ASKED = re.compile(r"\b(gatewayd_\w+|process_\w+|up)\b(?:\{([^}]*)\})?")
+VALUES: dict[str, set[str]] = {
+    "quality": {one.name.lower() for one in Quality},
+    "state": {one.name.lower() for one in Source},
+    "reason": {one.name.lower() for one in Reason},
+}
+
+
+def _texts(value: Any, key: str) -> Iterator[str]:
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            if name == key and isinstance(inner, str):
+                yield inner
+            yield from _texts(inner, key)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _texts(inner, key)
+
+
+DASHBOARD = json.loads((DOCS / "grafana.json").read_text())
+ALERTS = YAML(typ="safe", pure=True).load((DOCS / "alerts.yaml").read_text())
+RULES = [rule for group in ALERTS["groups"] for rule in group["rules"]]
+EXPRESSIONS = sorted({*_texts(DASHBOARD, "expr"), *(rule["expr"] for rule in RULES)})
+
+
+@pytest.mark.parametrize("expression", EXPRESSIONS)
+def test_an_expression_asks_for_what_there_is(expression: str) -> None:
+    asked = list(ASKED.finditer(expression))
+    assert asked
+    labels: set[str] = set(OF_PROMETHEUS)
+    for found in asked:
+        assert found[1] in KNOWN, f"{found[1]} is no metric"
+        labels |= KNOWN[found[1]]
+        for name, value in re.findall(r'(\w+)(?:=~|!~|!=|=)"([^"]*)"', found[2] or ""):
+            assert name in KNOWN[found[1]] | OF_PROMETHEUS, f"{found[1]} has no label {name}"
+            assert value.startswith("$") or name not in VALUES or value in VALUES[name]
+    for names in re.findall(r"\b(?:by|on) \(([^)]*)\)", expression):
+        assert {name.strip() for name in names.split(",")} <= labels
+    assert expression.count("(") == expression.count(")")
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule["alert"])
+def test_an_alert_says_where_it_is_and_how_bad(rule: dict[str, Any]) -> None:
+    assert rule["labels"]["severity"] in {"page", "ticket"}
+    asked = {found[1] for found in ASKED.finditer(rule["expr"])}
+    there = OF_PROMETHEUS.union(*(KNOWN[name] for name in asked))
+    shown = set(re.findall(r"\$labels\.(\w+)", rule["annotations"]["summary"]))
+    assert shown <= there
+    assert shown or "$value" in rule["annotations"]["summary"]
+
+
+def test_legends_use_labels_that_exist() -> None:
+    labels = OF_PROMETHEUS.union(*KNOWN.values())
+    for legend in _texts(DASHBOARD, "legendFormat"):
+        assert set(re.findall(r"\{\{(\w+)\}\}", legend)) <= labels
+
+
+def test_panels_lie_side_by_side() -> None:
+    places: set[tuple[int, int]] = set()
+    for panel in DASHBOARD["panels"]:
+        at = panel["gridPos"]
+        cells = {(x, y) for x in range(at["x"], at["x"] + at["w"]) for y in range(at["y"], at["y"] + at["h"])}
+        assert at["x"] + at["w"] <= 24
+        assert not cells & places, panel["title"]
+        places |= cells
+
+
+def test_every_metric_of_the_cells_is_looked_at_or_named_here() -> None:
+    """A metric that neither dashboard nor alerts use has a reason."""
+    used = {found[1] for text in EXPRESSIONS for found in ASKED.finditer(text)}
+    looked_at = {
+        info.name for info in METRICS if used & {info.name, f"{info.name}_bucket", f"{info.name}_count"}
+    }
+    assert {info.name for info in METRICS} - looked_at == {
+        "gatewayd_info",  # for joins
+        "gatewayd_cell_info",  # for joins
+        "gatewayd_uptime_seconds",
+        "gatewayd_robot_state",  # robot_up and the status page say it in words
+        "gatewayd_robot_packages_total",  # package_rate says it
+        "gatewayd_robot_watchdog_fed",  # only with a watchdog in the mapping
+        "gatewayd_input_age_seconds",
+        "gatewayd_adoption_seconds",  # for seconds after a start; the status page says it
+        "gatewayd_locks",
+        "gatewayd_writes_refused_total",  # refusals_total has the reasons
+    }

@@ -1,0 +1,279 @@
+"""The page in a real browser (headless Chromium), against the real daemon and the simulator as processes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+import pytest
+
+from tests.e2e.plant import Plant
+from tests.e2e.plc import HMI, PLC, Plc
+from tests.e2e.processes import HOST, Daemon, Simulator, free_port
+from tests.web.browser import CHROMIUM, Page, browsing
+
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed (Debian package chromium)"),
+    pytest.mark.xdist_group("browser"),
+]
+
+MAPPING = """\
+writers:
+  plc: {modbus: 127.0.0.2}
+  hmi: {modbus: 127.0.0.3}
+variables:
+  start:  {robot: input_bit_register_0, modbus: [0.0, {coil: 5}], owner: plc, comment: begin one cycle}
+  part:   {robot: input_int_register_0, modbus: {holding: 10, type: uint16}, owner: plc, limits: [0, 999]}
+  cycles: {robot: output_int_register_0, modbus: 110, on_stale: hold}
+  tcp:    {robot: actual_TCP_pose, modbus: {holding: 130, type: float32}, unit: m}
+"""
+BOTH_BUSES = """\
+canopen: {interface: virtual, channel: page, bitrate: 500000, node: 16}
+writers:
+  plc:  {modbus: 127.0.0.2}
+  line: {canopen: rpdo}
+variables:
+  start:  {robot: input_bit_register_0, canopen: auto, owner: line, lease: 2s}
+  part:   {robot: input_int_register_0, modbus: 10, canopen: object, owner: plc}
+  force:  {robot: output_double_register_0, modbus: {holding: 104, type: float32}, canopen: auto, unit: N}
+"""
+LIVE = "document.body.dataset.contact === 'live'"
+LOST = "document.body.dataset.contact === 'lost'"
+NARROW, WIDE = (360, 740), (1280, 800)
+WIDTHS = (360, 390, 820, 840, 1000, 1100, 1290, 1400)
+
+
+@dataclass
+class Shown:
+    """A plant and the page that shows it."""
+
+    page: Page
+    simulator: Simulator
+    daemon: Daemon
+    plc: Plc
+    url: str
+
+
+@asynccontextmanager
+async def showing(
+    plant: Plant, size: tuple[int, int], *, dark: bool = False, mapping: str = MAPPING
+) -> AsyncIterator[Shown]:
+    simulator = plant.simulator()
+    port = free_port()
+    daemon = plant.daemon(plant.mapping(mapping, simulator.port), "--status", f"{HOST}:{port}")
+    plc = plant.ready_plc(PLC)
+    daemon.wait_for_line("status page")
+    async with browsing(plant.directory) as page:
+        url = f"http://{HOST}:{port}/"
+        await page.open(url, *size, dark=dark)
+        await page.wait(LIVE)
+        yield Shown(page, simulator, daemon, plc, url)
+
+
+def text(selector: str) -> str:
+    return f"document.querySelector({selector!r}).textContent"
+
+
+def row(name: str, cell: str) -> str:
+    rows = "[...document.querySelectorAll('#rows tr')]"
+    return f"{rows}.find((row) => row.row?.variable.name === '{name}').querySelector('{cell}').textContent"
+
+
+async def test_values_owners_and_events_are_live(plant: Plant) -> None:
+    async with showing(plant, WIDE) as shown:
+        page, plc = shown.page, shown.plc
+        await page.wait(f"{text('.node.robot .state')}.includes('fresh and writable')")
+        for number in (17, 18):
+            assert plc.write(10, [number]) == 0
+            await page.wait(f"{row('part', 'span.value')} === '{number}'")
+            await page.wait(f"{row('cycles', 'span.value')} === '{number}'")
+        await page.wait(f"{row('part', 'span.owner')} === 'plc'")
+        await page.wait(f"{text('#owned')}.includes('part')")
+        await page.wait(f"{text('#happened')}.includes('plc took part')")
+        assert await page.run(row("part", "td.address")) == "10"
+        assert await page.run(row("part", "td.notation")) == "400011"
+        assert await page.run(row("start", "td.notation")) == "400001.0000006"
+        assert await page.run(row("start", "td.address")) == "0.0coil 5"
+        hmi = plant.plc(HMI)
+        assert hmi.write(10, [5]) == 2
+        await page.wait("document.querySelectorAll('.writers .node')[1].dataset.level === 'warn'")
+        await page.wait(f"{text('#happened')}.includes('hmi wrote part = 5: refused')")
+        assert page.problems == []
+
+
+async def test_a_lost_robot_does_not_look_fresh(plant: Plant) -> None:
+    async with showing(plant, WIDE) as shown:
+        page = shown.page
+        fresh = await page.run("getComputedStyle(document.querySelector('#rows span.value')).color")
+        shown.simulator.kill()
+        await page.wait("document.querySelector('.node.robot').dataset.level === 'bad'")
+        await page.wait(f"{text('.node.robot .state')}.includes('connection refused')")
+        await page.wait(f"{row('cycles', 'span.quality')}.startsWith('stale')")
+        stale = await page.run("getComputedStyle(document.querySelector('#rows span.value')).color")
+        assert fresh != stale
+        assert await page.run("document.title.startsWith('■')")
+        assert await page.run(text("#worst")) == "■ Robot"
+        assert "Not good 9" in await page.run(text("#kinds"))
+        assert await page.run(CONTRASTS) == []
+        await page.resize(*NARROW)
+        await page.run("scrollTo(0, 1e6)")
+        await page.run("document.getElementById('worst').click()")
+        assert await page.run("scrollY") == 0
+
+
+async def test_each_bus_has_its_columns(plant: Plant) -> None:
+    """Modbus by both addresses, CANopen by object and COB-ID, under headings that say which is which."""
+    async with showing(plant, WIDE, mapping=BOTH_BUSES) as shown:
+        page = shown.page
+        await page.wait(f"{text('.node.bus:nth-child(2) strong')} === 'CAN page'")
+        assert await page.run(row("part", "td.object")) == "2010h:01"
+        assert await page.run(row("part", "td.cob-id")) == "by SDO"
+        assert await page.run(row("start", "td.cob-id")) == "0x210"
+        assert await page.run(row("start", "td.modbus")) == ""
+        assert await page.run(row("force", "td.notation")) == "400105"
+        await page.wait(f"{text('.node.bus:nth-child(2) .state')}.includes('until a master starts the node')")
+        assert await page.run(text("#worst")) == "▲ CAN page"
+        for width in WIDTHS:
+            await page.resize(width, 800)
+            assert await page.run("document.documentElement.scrollWidth") <= width
+            assert await page.run("document.querySelector('table').scrollWidth") <= await page.run(
+                "document.getElementById('variables').clientWidth"
+            ), width
+        assert await page.run(HEADINGS) == 9
+        await page.open(shown.url, *NARROW)
+        await page.wait(f"{LIVE} && {row('part', 'td.object')} === '2010h:01'")
+        labels = "getComputedStyle(document.querySelector('td.object'), '::before').content"
+        assert await page.run(labels) == '"CANopen"'
+        assert page.problems == []
+
+
+async def test_a_thumb_finds_what_it_wants(plant: Plant) -> None:
+    """The whole row opens on a phone; what can be tapped is high enough, and the filter does not enlarge the page."""
+    async with showing(plant, NARROW) as shown:
+        page = shown.page
+        await page.wait("document.querySelector('#rows tr')")
+        await page.run("document.querySelector('#rows td.value').scrollIntoView({block: 'center'})")
+        hit = "(({x, y}) => document.elementFromPoint(x + 3, y + 3).className)"
+        assert await page.run(f"{hit}(document.querySelector('td.value').getBoundingClientRect())") == "name"
+        small = "[...document.querySelectorAll('.kind, .tabs button, #filter')].filter((one) => one.clientHeight < 36)"
+        assert await page.run(f"{small}.length") == 0
+        size = "parseFloat(getComputedStyle(document.getElementById('filter')).fontSize)"
+        assert await page.run(size) >= 16
+        assert await page.run("getComputedStyle(document.querySelector('td.object')).display") == "none"
+
+
+@pytest.mark.parametrize("stopped", [False, True], ids=["killed", "frozen"])
+async def test_without_the_gateway_the_page_greys_and_says_since_when(plant: Plant, stopped: bool) -> None:
+    """Also when connections are still accepted, by the kernel, and nothing answers."""
+    async with showing(plant, NARROW, dark=True) as shown:
+        page, daemon = shown.page, shown.daemon
+        assert await page.run("getComputedStyle(document.querySelector('main')).opacity") == "1"
+        daemon.popen.send_signal(19 if stopped else 9)
+        await page.wait(LOST)
+        await asyncio.sleep(0.5)
+        assert float(await page.run("getComputedStyle(document.querySelector('main')).opacity")) < 0.5
+        assert "grayscale" in await page.run("getComputedStyle(document.querySelector('main')).filter")
+        alarm = await page.run("document.getElementById('alarm').innerText")
+        assert alarm.startswith("No answer from the gateway since ")
+        if stopped:
+            daemon.popen.send_signal(18)
+            await page.wait(LIVE)
+            await page.wait("document.getElementById('alarm').hidden")
+
+
+async def test_a_reloaded_mapping_is_shown_without_reloading_the_page(plant: Plant) -> None:
+    async with showing(plant, WIDE) as shown:
+        plant.mapping(MAPPING.replace("cycles:", "made:"), shown.simulator.port)
+        shown.daemon.popen.send_signal(1)
+        await shown.page.wait(f"{row('made', 'span.quality')}.startsWith('good')")
+
+
+async def test_one_page_shows_several_cells(plant: Plant) -> None:
+    simulator, port = plant.simulator(), free_port()
+    outputs = "variables:\n  {name}: {{robot: output_int_register_0, modbus: 110}}\n"
+    files = [
+        plant.mapping(outputs.format(name=f"cycles_{unit}"), simulator.port, name=f"cell-{unit}", unit=unit)
+        for unit in (1, 2)
+    ]
+    plant.daemon(*files, "--status", f"{HOST}:{port}").wait_for_line("status page")
+    async with browsing(plant.directory) as page:
+        await page.open(f"http://{HOST}:{port}/", *NARROW)
+        await page.wait(f"{LIVE} && {text('button.name')} === 'cycles_1'")
+        assert await page.run("[...document.getElementById('cells').options].map((one) => one.value)") == [
+            "cell-1",
+            "cell-2",
+        ]
+        await page.run("location.hash = 'cell-2'")
+        await page.wait(f"{LIVE} && {text('button.name')} === 'cycles_2'")
+        assert await page.run("document.getElementById('cells').value") == "cell-2"
+        assert await page.run("document.documentElement.scrollWidth") <= NARROW[0]
+
+
+async def test_filter_and_details_by_keyboard_alone(plant: Plant) -> None:
+    async with showing(plant, WIDE) as shown:
+        page = shown.page
+        await page.press("/", 191)
+        assert await page.run("document.activeElement.id") == "filter"
+        for key in "4001":
+            await page.press(key)
+        visible = "[...document.querySelectorAll('#rows tr')].filter((row) => !row.hidden).length"
+        await page.wait(f"{visible} === 7")
+        assert await page.run(text("#shown")) == "7 of 9"
+        await page.press("Escape", 27)
+        await page.wait(f"{visible} === 9")
+        await page.run("document.querySelector('button.name').focus()")
+        await page.press("Enter", 13)
+        await page.wait("document.querySelector('.detail canvas.plot').clientHeight > 100")
+        assert "begin one cycle" in await page.run(text(".detail dl"))
+        assert await page.run("document.querySelector('button.name').getAttribute('aria-expanded')") == "true"
+        drawn = "canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some(Boolean)"
+        await page.wait(f"((canvas) => {drawn})(document.querySelector('.detail canvas'))")
+
+
+async def test_nothing_sticks_out_and_everything_can_be_read(plant: Plant) -> None:
+    """No sideways scrolling; text has the contrast that WCAG 2 AA asks for; what can be used has a name."""
+    async with showing(plant, NARROW) as shown:
+        page = shown.page
+        for size in (NARROW, WIDE):
+            for dark in (False, True):
+                await page.open(shown.url, *size, dark=dark)
+                await page.wait(f"{LIVE} && document.querySelector('#rows tr')")
+                assert await page.run("document.documentElement.scrollWidth") <= size[0]
+                assert await page.run(CONTRASTS) == [], (size, dark)
+                assert await page.run(NAMELESS) == []
+
+
+HEADINGS = "[...document.querySelectorAll('thead th')].filter((one) => one.checkVisibility()).length"
+CONTRASTS = """
+(() => {
+  const parts = (color) => color.match(/[\\d.]+/g).map(Number);
+  const light = ([r, g, b]) => [r, g, b].map((c) => (c /= 255) <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, c, at) => sum + c * [0.2126, 0.7152, 0.0722][at], 0);
+  const ground = (element) => {
+    for (; element; element = element.parentElement) {
+      const hatch = getComputedStyle(element).backgroundImage.match(/rgb\\([^)]*\\)/);
+      if (hatch) return parts(hatch[0]);
+      const color = parts(getComputedStyle(element).backgroundColor);
+      if (color.length === 3 || color[3] === 1) return color;
+    }
+    return [255, 255, 255];
+  };
+  const bad = new Set();
+  for (const element of document.querySelectorAll("main *, header *")) {
+    const own = [...element.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
+    if (!own || !element.checkVisibility() || element.closest("svg")) continue;
+    const [a, b] = [light(parts(getComputedStyle(element).color)), light(ground(element))].sort((x, y) => y - x);
+    const contrast = (a + 0.05) / (b + 0.05);
+    if (contrast < 4.5) bad.add(`${element.className || element.tagName} ${contrast.toFixed(1)}`);
+  }
+  return [...bad];
+})()
+"""
+NAMELESS = """
+[...document.querySelectorAll("button, input, select, a, [tabindex]")]
+  .filter((element) => element.checkVisibility())
+  .filter((element) => !(element.textContent.trim() || element.getAttribute("aria-label")))
+  .map((element) => element.outerHTML)
+"""

@@ -1,0 +1,85 @@
+"""Prometheus' own tool judges the alert rules, when they fire, the guide's configuration and what a gateway serves."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import urllib.request
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from gatewayd.web.metrics import METRICS
+from tests.e2e.plant import Plant
+from tests.e2e.processes import HOST, free_port
+
+PROMTOOL = shutil.which("promtool")
+DOCS = Path(__file__).parents[2] / "docs"
+ALERTS = DOCS / "alerts.yaml"
+UNIT_TESTS = Path(__file__).parent / "alerts_test.yaml"
+MAPPING = """\
+canopen: {interface: virtual, channel: promtool, bitrate: 500000, node: 16}
+writers:
+  plc: {modbus: 127.0.0.2}
+variables:
+  start:  {robot: input_bit_register_0, modbus: 0.0, canopen: object, owner: plc}
+  cycles: {robot: output_int_register_0, modbus: 110, canopen: auto}
+"""
+
+with_promtool = pytest.mark.skipif(
+    PROMTOOL is None, reason="promtool is not installed (Debian package prometheus)"
+)
+
+
+def promtool(*arguments: str | Path, text: str = "") -> str:
+    """What it says; it has to be content."""
+    assert PROMTOOL is not None
+    done = subprocess.run(
+        [PROMTOOL, *arguments], input=text, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+@with_promtool
+def test_the_rules_are_valid() -> None:
+    assert "SUCCESS" in promtool("check", "rules", ALERTS)
+
+
+@with_promtool
+def test_each_rule_fires_when_it_should_and_only_then() -> None:
+    assert "SUCCESS" in promtool("test", "rules", UNIT_TESTS)
+
+
+def test_the_unit_tests_have_each_rule_firing_and_silent() -> None:
+    yaml = YAML(typ="safe", pure=True)
+    rules = yaml.load(ALERTS.read_text())["groups"][0]["rules"]
+    firing, silent = set[str](), set[str]()
+    for test in yaml.load(UNIT_TESTS.read_text())["tests"]:
+        for case in test["alert_rule_test"]:
+            (firing if case["exp_alerts"] else silent).add(case["alertname"])
+    assert firing == silent == {rule["alert"] for rule in rules}
+
+
+@with_promtool
+def test_the_configuration_of_the_guide_loads_the_rules(tmp_path: Path) -> None:
+    guide = (DOCS / "howto" / "status-page.md").read_text()
+    found = re.search(r"^```yaml\n(scrape_configs:.*?)^```", guide, re.MULTILINE | re.DOTALL)
+    assert found
+    shutil.copy(ALERTS, tmp_path)
+    (tmp_path / "prometheus.yml").write_text(found[1])
+    assert "1 rule files found" in promtool("check", "config", tmp_path / "prometheus.yml")
+
+
+@with_promtool
+def test_what_a_gateway_serves_follows_the_conventions(plant: Plant) -> None:
+    """With both buses, so that every metric is there; the linter says nothing at all."""
+    simulator, port = plant.simulator(), free_port()
+    daemon = plant.daemon(plant.mapping(MAPPING, simulator.port), "--status", f"{HOST}:{port}")
+    daemon.wait_for_line("status page")
+    with urllib.request.urlopen(f"http://{HOST}:{port}/metrics", timeout=10) as response:
+        text = response.read().decode()
+    assert promtool("check", "metrics", text=text) == ""
+    assert [info.name for info in METRICS if f"\n# TYPE {info.name} " not in f"\n{text}"] == []
