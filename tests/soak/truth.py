@@ -141,16 +141,15 @@ def unheard(
         elif entry.outcome == 0 and watching(entry.time - _AROUND, entry.time + _REACHED):
             first = bisect.bisect_left(times, begun)
             held = changes[first - 1].value if first else None
-            last = bisect.bisect_right(times, entry.time + _REACHED)
+            stopped = _begun(stops, begun - _CYCLES, entry.time + _CYCLES)
+            late = sum(stop.end - stop.begin for stop in stopped)
+            last = bisect.bisect_right(times, entry.time + _REACHED + late)
             seen = changes[first:last]
             overtaken = any(change.time - change.blind < entry.time + _CYCLES for change in seen)
             overtaken |= bisect.bisect_right(accepted, entry.time) < bisect.bisect_left(
                 accepted, entry.time + _CYCLES
             )
-            overtaken |= any(
-                _replaced(changes, times, stop)
-                for stop in _begun(stops, begun - _CYCLES, entry.time + _CYCLES)
-            )
+            overtaken |= any(_replaced(changes, times, stop) for stop in stopped)
             if held != entry.value and not overtaken and all(one.value != entry.value for one in seen):
                 yield f"{name} never held {entry.value}, acknowledged at {entry.time:.3f}"
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from random import Random
+from typing import Any
 
+from gatewayd.control.client import ControlError
 from tests.e2e.processes import wait_for
 from tests.soak.cell import FIELDS_OF, FIRST, MASTER_FIELDS
 from tests.soak.faults.common import unjudged
@@ -22,6 +25,16 @@ _LONGEST = 3600
 """Seconds of what the operator ends himself."""
 
 
+def _post(rig: Rig, path: str, body: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """As the gateway asks for: a command that waited while it stood still is repeated."""
+    try:
+        return rig.control.post(path, body)
+    except ControlError as refused:
+        if refused.code != "stood_still":
+            raise
+    return rig.control.post(path, body)
+
+
 def force(rig: Rig, chance: Random) -> None:
     """It ends by its time or by the operator, whether or not the robot was there all the while."""
     name = chance.choice(_FORCED)
@@ -29,13 +42,13 @@ def force(rig: Rig, chance: Random) -> None:
     seconds = chance.uniform(0.2, 1.5)
     by_time, robot_cut = chance.random() < 0.5, chance.random() < 0.3
     with unjudged(rig, _FIELDS.get(name, ()), _VALUE):
-        rig.control.post(f"{path}/force", {"value": _VALUE, "for": seconds if by_time else _LONGEST})
+        _post(rig, f"{path}/force", {"value": _VALUE, "for": seconds if by_time else _LONGEST})
         assert name in rig.look.forced(), f"{name} is not forced"
         if robot_cut:
             rig.simulator.do("drop-clients")
         time.sleep(seconds)
         if not by_time:
-            rig.control.post(f"{path}/unforce")
+            _post(rig, f"{path}/unforce")
         wait_for(lambda: not rig.look.forced(), f"the end of the force of {name}", PATIENCE)
 
 
@@ -44,10 +57,10 @@ def take_lock(rig: Rig, chance: Random) -> None:
     name = chance.choice(_TAKEN)
     seconds = chance.uniform(0.2, 1.5)
     by_time = chance.random() < 0.5
-    taken = rig.control.post(f"/v1/locks/{name}/take", {"for": seconds} if by_time else {})
+    taken = _post(rig, f"/v1/locks/{name}/take", {"for": seconds} if by_time else {})
     assert taken["owner"] == "operator", taken
     time.sleep(seconds)
     if not by_time:
         assert name in rig.look.locks_of("operator"), f"the operator has lost {name}"
-        rig.control.post(f"/v1/locks/{name}/release")
+        _post(rig, f"/v1/locks/{name}/release")
     wait_for(lambda: not rig.look.locks_of("operator"), f"{name} to be free of the operator", PATIENCE)
