@@ -63,7 +63,13 @@ class SupervisedBus:
         self._handler.on_state(state, reason, now)
 
     def _hand_over(self, frames: list[Frame], errors: list[ErrorFrame], now: float) -> None:
-        """Give the handler what was read, data frames first."""
+        """Give the handler what was read, data frames first.
+
+        If the process was stopped while it read, the frames have waited since the time was judged last: whoever has to
+        know of the gap is called before.
+        """
+        if frames and clock.overdue():
+            now = clock.judged_now()
         if frames:
             self.counters.received += len(frames)
             self._handler.on_frames(frames, now)

@@ -5,14 +5,17 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import time
 from collections.abc import Iterator
 
 import pytest
 
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.errors import decode
+from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.supervised import ROOM_RETRY, SupervisedBus
 from gatewayd.canopen.supervision import BusSignal
+from gatewayd.loop import clock
 from tests.links.canopen_node.recorder import Recorder, until
 
 BUS_OFF = 0x2000_0040
@@ -95,3 +98,28 @@ async def test_an_error_frame_is_counted_and_told_with_the_state_that_follows(
 async def test_a_state_is_told_when_it_changes(bus: SupervisedBus, recorder: Recorder) -> None:
     bus._feed(BusSignal.UP, 1.0, "still up")
     assert (recorder.states, recorder.reasons) == ([BusState.ACTIVE], ["up"])
+
+
+def test_what_was_read_while_the_process_was_stopped_is_no_news() -> None:
+    """SIGSTOP can come between two frames of one reading: whoever judges the time is called before they are served."""
+    order: list[str] = []
+
+    class Handler(Recorder):
+        def on_frames(self, frames: list[Frame], now: float) -> None:
+            order.append("frames")
+            self.at = now
+
+    handler = Handler()
+
+    async def read() -> tuple[float, float]:
+        clock.on_gap(lambda _gap: order.append("gap"))
+        bus = SupervisedBus(handler)
+        before = clock.judged_now()
+        time.sleep(2 * clock.GAP)  # noqa: ASYNC251 - as SIGSTOP would: the loop does not turn
+        bus._hand_over([Frame(0x201, bytes(8))], [], before)
+        return before, handler.at
+
+    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+        before, at = runner.run(read())
+    assert order == ["gap", "frames"]
+    assert at - before >= 2 * clock.GAP

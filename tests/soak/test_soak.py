@@ -169,6 +169,14 @@ def test_a_write_that_was_being_served_when_the_gateway_was_stopped_comes_late()
     assert list(misheld(A, [late], written, Record(stops=[Stop(10.001, 12.0)])))
 
 
+def test_a_value_that_is_sent_again_and_again_may_be_the_one_that_was_being_served() -> None:
+    """The later ones waited and were refused; the first was taken before the stop."""
+    late, written = Change(13.51, 7, 0.0), [sent(10.0 + 0.05 * number, 7) for number in range(17)]
+    assert not list(misheld(A, [late], written, Record(stops=[Stop(10.01, 13.5)])))
+    assert list(misheld(A, [late], written, Record(stops=[Stop(9.5, 13.5)])))
+    assert list(misheld(A, [late], written, Record()))
+
+
 def test_a_process_that_does_not_get_the_processor_stands_still() -> None:
     core = str(min(os.sched_getaffinity(0)))
     burning = ["taskset", "-c", core, sys.executable, "-c", "while True: pass"]

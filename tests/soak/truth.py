@@ -87,6 +87,8 @@ def misheld(name: str, changes: Sequence[Change], entries: Sequence[Entry], reco
             max(0.0, min(one.end, change.time) - max(one.begin, moments[place - 1])) for one in pauses
         )
         excused += _stopped_in_the_act(moments[place - 1], stops)
+        if any(_served_across(stop, change, moments) for stop in stops):
+            continue
         if took - change.blind - excused > LATELY:
             yield f"{name} got {change.value} {took:.1f} s after it was written"
 
@@ -94,6 +96,15 @@ def misheld(name: str, changes: Sequence[Change], entries: Sequence[Entry], reco
 def _stopped_in_the_act(sent: float, stops: Sequence[Stop]) -> float:
     """Seconds for which the gateway was stopped while it served what had just been sent."""
     return sum(stop.end - stop.begin for stop in _begun(stops, sent - _CYCLES, sent + _TAKEN))
+
+
+def _served_across(stop: Stop, change: Change, moments: Sequence[float]) -> bool:
+    """Whether the value came when the gateway went on, and was being served when it was stopped."""
+    came = change.time - change.blind
+    if not stop.begin < change.time or came > stop.end + _RESUMED:
+        return False
+    first = bisect.bisect_left(moments, stop.begin - _TAKEN)
+    return first < len(moments) and moments[first] <= stop.begin + _CYCLES
 
 
 def _begun(stops: Sequence[Stop], since: float, until: float) -> Sequence[Stop]:

@@ -309,10 +309,17 @@ class CanLink(Link, Observer):
     def _offer(self, frame: Frame) -> bool:
         return self._bus is not None and self._bus.send(frame)
 
+    @property
+    def _is_catching_up(self) -> bool:
+        return self._catching is not None
+
     def _catch_up(self) -> None:
         """Read what waited; as long as there is more, what comes has waited too."""
         self._catching = None
-        if self._bus is None or self._bus.catch_up():
+        exhausted = self._bus is None or self._bus.catch_up()
+        if self._is_catching_up:
+            return  # The process was stopped again meanwhile: what is read by the next call has waited too.
+        if exhausted:
             self.node.caught_up()
         elif self._runs:
             self._catching = asyncio.get_running_loop().call_soon(self._catch_up)
