@@ -68,9 +68,9 @@ class SupervisedBus:
         If the process was stopped while it read, the frames have waited since the time was judged last: whoever has to
         know of the gap is called before.
         """
-        if frames and clock.overdue():
-            now = clock.judged_now()
         if frames:
+            if clock.overdue():
+                now = clock.judged_now()
             self.counters.received += len(frames)
             self._handler.on_frames(frames, now)
         for report in errors:

@@ -136,12 +136,12 @@ class Admission:
         index = change.variable
         variable = self._variables[index]
         lock = variable.lock
-        standing = Standing.STRANGER if lock is None else self._ownership.standing(lock, writer)
+        standing = Standing.EXCLUDED if lock is None else self._ownership.standing(lock, writer)
         meant = not change.implied or self._means_implied(lock, standing)
         unchanged = change.implied and change.value == self._image.values[index]
         if unchanged and not meant:
             return None
-        if lock is None or standing is Standing.STRANGER:
+        if lock is None or standing is Standing.EXCLUDED:
             return Refusal(Reason.NOT_WRITABLE, index)
         value = within(variable, change.value)
         if value is None:

@@ -19,7 +19,7 @@ __all__ = ["MOVES", "Act", "LockTable", "Move", "Standing"]
 class Standing(Enum):
     """How a writer stands to a lock at this moment."""
 
-    STRANGER = "not among its owners"
+    EXCLUDED = "not among its owners"
     FREE = "free, and may be taken"
     OWNER = "owns it"
     HIGHER = "ranks above the present owner"
@@ -47,9 +47,9 @@ class Move(IntEnum):
 
 
 MOVES: dict[tuple[Standing, Act], Move] = {
-    (Standing.STRANGER, Act.WRITE): Move.REFUSE_NEVER,
-    (Standing.STRANGER, Act.REQUEST): Move.REFUSE_NEVER,
-    (Standing.STRANGER, Act.RELEASE): Move.REFUSE_NEVER,
+    (Standing.EXCLUDED, Act.WRITE): Move.REFUSE_NEVER,
+    (Standing.EXCLUDED, Act.REQUEST): Move.REFUSE_NEVER,
+    (Standing.EXCLUDED, Act.RELEASE): Move.REFUSE_NEVER,
     (Standing.FREE, Act.WRITE): Move.ACQUIRE,
     (Standing.FREE, Act.REQUEST): Move.ACQUIRE,
     (Standing.FREE, Act.RELEASE): Move.NOTHING,
@@ -93,7 +93,7 @@ class LockTable:
         ranks = self._ranks[lock]
         rank = ranks.get(writer)
         if rank is None:
-            return Standing.STRANGER
+            return Standing.EXCLUDED
         owner = self.owners[lock]
         if owner is None:
             return Standing.FREE

@@ -134,7 +134,7 @@ class VariableStatus(TypedDict):
         "`good`, `stale`, `unavailable`, `never`, `forced`, `differs` (the robot holds something else), "
         "`out_of_range` (one of its places cannot show the value) or `not_running` (valid only while the program runs)",
     ]
-    age: Annotated[float | None, "seconds since its source told it, or null if it never did"]
+    age: Annotated[float | None, "seconds since its source reported it, or null if it never did"]
     owner: Annotated[str | None, "name of the writer that owns it now, `operator`, or null"]
     lease: Annotated[float | None, "seconds of the owner's lease left, or null without an owner or end"]
     forced: Annotated[Json | None, "null, or `value` and `remaining` seconds of a force"]

@@ -28,7 +28,7 @@ def test_every_standing_and_act_has_a_move() -> None:
 
 def test_a_move_keeps_the_promises_of_ownership() -> None:
     for (standing, act), move in MOVES.items():
-        assert (move is Move.REFUSE_NEVER) == (standing is Standing.STRANGER)
+        assert (move is Move.REFUSE_NEVER) == (standing is Standing.EXCLUDED)
         assert (move is Move.TAKE_OVER) == (standing is Standing.HIGHER and act is not Act.RELEASE)
         assert (move is Move.RELEASE) == (standing is Standing.OWNER and act is Act.RELEASE)
         if standing is Standing.LOWER:
@@ -43,7 +43,7 @@ def test_writing_and_requesting_are_one_to_the_lock() -> None:
 def test_rank_is_the_place_in_the_list_not_the_number_of_the_writer(table: LockTable) -> None:
     table.apply(RANKED, 0, Move.ACQUIRE, 0.0)
     standings = [table.standing(RANKED, writer) for writer in range(4)]
-    assert standings == [Standing.OWNER, Standing.LOWER, Standing.HIGHER, Standing.STRANGER]
+    assert standings == [Standing.OWNER, Standing.LOWER, Standing.HIGHER, Standing.EXCLUDED]
 
 
 def test_without_takeover_nobody_ranks_above_the_owner(table: LockTable) -> None:

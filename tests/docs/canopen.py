@@ -23,7 +23,7 @@ from gatewayd.links.canopen_node.eds import objects_of
 from gatewayd.links.canopen_node.pdo_table import load_by_bit_rate, pdo_rows
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.robot_errors import QUIET
-from gatewayd.links.canopen_node.status_objects import HEADER, TABLE_INDICES
+from gatewayd.links.canopen_node.status_words import HEADER, TABLE_INDICES
 from gatewayd.links.canopen_node.variables import ABORT_OF
 from gatewayd.links.registry import status_fields
 from gatewayd.mapping.loader import load

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, Access, Entry, Object, Pdo, array, record
@@ -17,27 +16,11 @@ from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 from gatewayd.core.status_layout import RELEASE, REQUEST, TABLES, StatusField, StatusTable
 from gatewayd.links.canopen_node.pdo.codec import Mapped
-from gatewayd.links.canopen_node.plan import FIRST_STATUS_OBJECT
+from gatewayd.links.canopen_node.status_words import HEADER, MAX_ARRAY, TABLE_INDICES, WORD_TYPES
 from gatewayd.links.canopen_node.variables import ABORT_OF
 from gatewayd.links.registry import status_fields
 
-__all__ = ["HEADER", "TABLE_INDICES", "StatusObjects", "status_word"]
-
-HEADER: Final = FIRST_STATUS_OBJECT
-"""The record of the header's fields, in the order of `registry.status_fields`."""
-TABLE_INDICES: Final = {
-    "good": 0x5F01,
-    "writers_alive": 0x5F02,
-    "owner": 0x5F10,
-    "lease": 0x5F20,
-    "age": 0x5F30,
-    "quality": 0x5F40,
-}
-"""The first index of each table of `core.status_layout.TABLES`."""
-
-_LARGEST_ARRAY = 254
-_TYPES = {1: CanType.UNSIGNED16, 2: CanType.UNSIGNED32}
-"""By words of the block."""
+__all__ = ["StatusObjects", "status_word"]
 
 
 def status_word(index: int, subindex: int) -> Mapped | None:
@@ -50,11 +33,11 @@ def status_word(index: int, subindex: int) -> Mapped | None:
         field = fields[subindex - 1] if 0 < subindex <= len(fields) else None
         if field is None or field.offset in (REQUEST, RELEASE):
             return None
-        return Mapped(None, _TYPES[field.words], field.offset)
+        return Mapped(None, WORD_TYPES[field.words], field.offset)
     for table in TABLES:
         chunk = index - TABLE_INDICES[table.name]
-        if subindex and 0 <= chunk < -(-table.words // _LARGEST_ARRAY):
-            return Mapped(None, CanType.UNSIGNED16, table.offset + chunk * _LARGEST_ARRAY + subindex - 1)
+        if subindex and 0 <= chunk < -(-table.words // MAX_ARRAY):
+            return Mapped(None, CanType.UNSIGNED16, table.offset + chunk * MAX_ARRAY + subindex - 1)
     return None
 
 
@@ -84,10 +67,10 @@ class StatusObjects:
         for table in TABLES:
             names = self._names(table)
             first = TABLE_INDICES[table.name]
-            for chunk in range(-(-len(names) // _LARGEST_ARRAY)):
-                start = chunk * _LARGEST_ARRAY
+            for chunk in range(-(-len(names) // MAX_ARRAY)):
+                start = chunk * MAX_ARRAY
                 title = f"Status {table.name}" + (f" {chunk + 1}" if chunk else "")
-                entries = self._cells(table, start, names[start : start + _LARGEST_ARRAY])
+                entries = self._cells(table, start, names[start : start + MAX_ARRAY])
                 yield array(first + chunk, title, entries)
 
     def _field(self, subindex: int, field: StatusField) -> Entry:
@@ -95,7 +78,7 @@ class StatusObjects:
         return Entry(
             subindex,
             field.name,
-            _TYPES[field.words],
+            WORD_TYPES[field.words],
             Access.RW if writable else Access.RO,
             bytes(2 * field.words),
             pdo=Pdo.NONE if writable else Pdo.TRANSMIT,

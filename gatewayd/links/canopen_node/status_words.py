@@ -10,16 +10,37 @@ from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.status_layout import RELEASE, REQUEST
+from gatewayd.links.canopen_node.plan import FIRST_STATUS_OBJECT
 from gatewayd.links.registry import status_fields
 
-__all__ = ["FIELD_NAMES", "StatusWord", "field_word", "quality_word"]
+__all__ = [
+    "FIELD_NAMES",
+    "HEADER",
+    "MAX_ARRAY",
+    "TABLE_INDICES",
+    "WORD_TYPES",
+    "StatusWord",
+    "field_word",
+    "quality_word",
+]
 
-_HEADER: Final = 0x5F00
-_QUALITY: Final = 0x5F40
-_LARGEST_ARRAY: Final = 254
-_TYPES: Final = {1: CanType.UNSIGNED16, 2: CanType.UNSIGNED32}
+HEADER: Final = FIRST_STATUS_OBJECT
+"""The record of the header's fields, in the order of `registry.status_fields`."""
+TABLE_INDICES: Final = {
+    "good": 0x5F01,
+    "writers_alive": 0x5F02,
+    "owner": 0x5F10,
+    "lease": 0x5F20,
+    "age": 0x5F30,
+    "quality": 0x5F40,
+}
+"""The first index of each table of `core.status_layout.TABLES`."""
+MAX_ARRAY: Final = 254
+"""Entries of one index."""
+WORD_TYPES: Final = {1: CanType.UNSIGNED16, 2: CanType.UNSIGNED32}
+"""By words of the block."""
 _SUBINDICES: Final = {
-    field.name: (number, _TYPES[field.words])
+    field.name: (number, WORD_TYPES[field.words])
     for number, field in enumerate(status_fields(), 1)
     if field.offset not in (REQUEST, RELEASE)
 }
@@ -44,10 +65,11 @@ class StatusWord:
 def field_word(name: str) -> StatusWord:
     """A field of the header, one of `FIELD_NAMES`."""
     subindex, can_type = _SUBINDICES[name]
-    return StatusWord(name, _HEADER, subindex, can_type)
+    return StatusWord(name, HEADER, subindex, can_type)
 
 
 def quality_word(variable: int, name: str) -> StatusWord:
     """The quality of the variable with that index and name."""
-    further, member = divmod(variable, _LARGEST_ARRAY)
-    return StatusWord(f"quality of {name}", _QUALITY + further, member + 1, CanType.UNSIGNED16, variable)
+    further, member = divmod(variable, MAX_ARRAY)
+    index = TABLE_INDICES["quality"] + further
+    return StatusWord(f"quality of {name}", index, member + 1, CanType.UNSIGNED16, variable)

@@ -24,7 +24,7 @@ class RobotKind(LinkKind):
         "address": "host:port of the controller",
         "state": "`lost`, `waiting`, `fresh`, `silent`, `frozen` or `late`",
         "writable": "connected, and its inputs were adopted",
-        "age": "seconds since the last package that told anything new, or null",
+        "age": "seconds since the last package that reported anything new, or null",
         "frequency": "packages per second, measured",
         "packages": "packages received",
         "skipped": "packages that the controller left out",

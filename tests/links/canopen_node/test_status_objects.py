@@ -14,7 +14,8 @@ from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 from gatewayd.core.status_layout import LENGTH, RELEASE_ALL, TABLES
-from gatewayd.links.canopen_node.status_objects import HEADER, TABLE_INDICES, StatusObjects, status_word
+from gatewayd.links.canopen_node.status_objects import StatusObjects, status_word
+from gatewayd.links.canopen_node.status_words import HEADER, TABLE_INDICES
 from gatewayd.links.registry import status_fields
 
 LINE, HMI = range(2)
