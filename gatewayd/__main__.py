@@ -57,9 +57,17 @@ def _run() -> int:
         _forget_stdout()
         return READER_GONE
     except Exception as defect:  # noqa: BLE001 - the last line of defence: no traceback reaches a user
+        if _was_interrupted(defect):
+            return INTERRUPTED
         _report(defect)
         return INTERNAL_ERROR
     return result if isinstance(result, int) else 0
+
+
+def _was_interrupted(defect: BaseException) -> bool:
+    """Whether Ctrl-C is behind it: Python 3.11 makes a RuntimeError of one that falls into a `__set_name__`."""
+    cause = defect.__cause__
+    return cause is not None and (isinstance(cause, KeyboardInterrupt) or _was_interrupted(cause))
 
 
 def _leave(code: int) -> NoReturn:

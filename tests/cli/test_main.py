@@ -147,6 +147,7 @@ DEFECT = "gatewayd: internal error: {} (<string>:9); please report with the log\
         ("1 / 0", 70, DEFECT.format("ZeroDivisionError: division by zero")),
         ("raise ValueError('two\\nlines')", 70, DEFECT.format("ValueError: two lines")),
         ("raise KeyboardInterrupt", 130, "\n"),
+        ("raise RuntimeError('Error calling __set_name__') from KeyboardInterrupt()", 130, ""),
         ("raise click.ClickException('no')", 1, "Error: no\n"),
         (
             "raise click.UsageError('no')",
