@@ -167,7 +167,7 @@ def _wants_colour() -> bool:
 
 
 def _explain(name: str) -> str:
-    from gatewayd.mapping.diagnostics import rule_of
+    from gatewayd.mapping.diagnostics import retired_rule_of, rule_of
     from gatewayd.mapping.rules.catalogue import complete, explanation
 
     rules = complete()
@@ -175,7 +175,7 @@ def _explain(name: str) -> str:
         return "".join(
             f"{rule.id}  {rule.slug:<24} {rule.severity.value:<8} {rule.summary}\n" for rule in rules
         )
-    rule = rule_of(name)
+    rule = rule_of(name) or retired_rule_of(name)
     if rule is None:
         from gatewayd.report.wording import did_you_mean
 

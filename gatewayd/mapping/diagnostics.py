@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from importlib.resources import files
+from typing import TypeVar
 
 __all__ = [
     "FAMILIES",
+    "RETIRED",
     "Diagnostic",
     "Position",
     "Related",
+    "RetiredRule",
     "Rule",
     "Severity",
     "all_rules",
     "declare",
+    "retired_rule_of",
     "rule_of",
 ]
 
@@ -119,6 +124,38 @@ class Diagnostic:
         return self.rule.severity
 
 
+@dataclass(frozen=True, slots=True)
+class RetiredRule:
+    """A rule that is no longer checked. Its id and slug stay taken: old reports and comments name them."""
+
+    id: str
+    slug: str
+    reason: str
+    """Why nobody is worse off without it: sentences."""
+
+
+RETIRED = (
+    RetiredRule(
+        "GW218",
+        "foreign-port",
+        "It warned of Modbus ports below 1024 other than 502 and 802. Whether such a port can be opened shows at the "
+        "start, with the remedy, and many plants use 503 and the following ones on purpose.",
+    ),
+    RetiredRule(
+        "GW307",
+        "rate-not-a-divisor",
+        "It warned of a `frequency` between two steps of the controller. The controller then sends somewhat more often "
+        "than asked, never less often; where `series` is given, `check` computes with the rate that it really has.",
+    ),
+    RetiredRule(
+        "GW418",
+        "inhibit-below-frame-time",
+        "It warned of an inhibit time shorter than the frame, which holds nothing back. What such a PDO can do to the "
+        "bus is counted by GW426 and GW427.",
+    ),
+)
+
+_Named = TypeVar("_Named", Rule, RetiredRule)
 _rules: dict[str, Rule] = {}
 
 
@@ -130,10 +167,11 @@ def declare(
     *,
     home: str = "gatewayd.mapping.syntax",
 ) -> Rule:
-    """Enter a rule into the catalogue. Raises ValueError for a malformed or a used id or slug."""
+    """Enter a rule into the catalogue. Raises ValueError for a malformed, used or retired id or slug."""
     if not _ID.fullmatch(rule_id) or not _SLUG.fullmatch(slug):
         raise ValueError(f"malformed rule {rule_id} {slug}")
-    for known in _rules.values():
+    taken: list[Rule | RetiredRule] = [*RETIRED, *_rules.values()]
+    for known in taken:
         if rule_id == known.id or slug == known.slug:
             raise ValueError(f"rule {rule_id} {slug} clashes with {known.id} {known.slug}")
     rule = Rule(rule_id, slug, severity, summary, home)
@@ -148,8 +186,14 @@ def all_rules() -> tuple[Rule, ...]:
 
 def rule_of(name: str) -> Rule | None:
     """Return the declared rule with this id or slug (any case), or None."""
+    return _named(name, _rules.values())
+
+
+def retired_rule_of(name: str) -> RetiredRule | None:
+    """The same for the rules that are no longer checked."""
+    return _named(name, RETIRED)
+
+
+def _named(name: str, rules: Iterable[_Named]) -> _Named | None:
     wanted = name.strip().casefold()
-    for rule in _rules.values():
-        if wanted in (rule.id.casefold(), rule.slug):
-            return rule
-    return None
+    return next((rule for rule in rules if wanted in (rule.id.casefold(), rule.slug)), None)

@@ -129,6 +129,13 @@ def test_explain_works_without_any_file(name: str) -> None:
     assert "int32" in done.output
 
 
+@pytest.mark.parametrize("name", ["GW307", "rate-not-a-divisor"])
+def test_explain_says_that_a_rule_is_retired(name: str) -> None:
+    done = check("--explain", name)
+    assert done.exit_code == 0
+    assert done.output.startswith("# GW307 rate-not-a-divisor: retired\n\nThis rule is no longer checked. ")
+
+
 def test_explain_all_lists_every_rule_once() -> None:
     lines = check("--explain", "all").output.splitlines()
     assert [line[:5] for line in lines] == sorted({line[:5] for line in lines})

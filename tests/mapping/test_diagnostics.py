@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.mapping import diagnostics, syntax
-from gatewayd.mapping.diagnostics import Position, Related, Severity, rule_of
+from gatewayd.mapping.diagnostics import RETIRED, Position, Related, Severity, retired_rule_of, rule_of
 
 
 def test_position_reads_as_editors_follow_it() -> None:
@@ -46,9 +46,23 @@ def test_unknown_rule_is_none() -> None:
 
 @pytest.mark.parametrize(
     "rule_id,slug",
-    [("GW901", "new"), ("GW1", "new"), ("GW199", "Not Kebab"), ("GW101", "new"), ("GW199", "yaml-syntax")],
+    [
+        ("GW901", "new"),
+        ("GW1", "new"),
+        ("GW199", "Not Kebab"),
+        ("GW101", "new"),
+        ("GW199", "yaml-syntax"),
+        ("GW307", "new"),
+        ("GW199", "foreign-port"),
+    ],
 )
-def test_malformed_and_used_ids_are_refused(rule_id: str, slug: str) -> None:
-    """Ids and slugs are well formed and unique."""
+def test_malformed_used_and_retired_ids_are_refused(rule_id: str, slug: str) -> None:
+    """Ids and slugs are well formed and unique, for ever."""
     with pytest.raises(ValueError, match=rule_id):
         diagnostics.declare(rule_id, slug, "summary")
+
+
+@pytest.mark.parametrize("rule", RETIRED, ids=lambda rule: rule.id)
+def test_retired_rules_are_found_by_id_and_slug(rule: diagnostics.RetiredRule) -> None:
+    assert retired_rule_of(rule.id.lower()) is retired_rule_of(rule.slug) is rule
+    assert rule_of(rule.id) is None

@@ -9,7 +9,7 @@ import sys
 from itertools import groupby
 from pathlib import Path
 
-from gatewayd.mapping.diagnostics import FAMILIES, Rule, all_rules
+from gatewayd.mapping.diagnostics import FAMILIES, RETIRED, RetiredRule, Rule, all_rules
 from gatewayd.mapping.rules import run
 
 __all__ = ["catalogue", "complete", "explanation"]
@@ -21,8 +21,10 @@ def complete() -> tuple[Rule, ...]:
     return all_rules()
 
 
-def explanation(rule: Rule) -> str:
-    """What the rule is about, as Markdown."""
+def explanation(rule: Rule | RetiredRule) -> str:
+    """What the rule is about, or why it is no longer checked, as Markdown."""
+    if isinstance(rule, RetiredRule):
+        return f"# {rule.id} {rule.slug}: retired\n\nThis rule is no longer checked. {rule.reason}\n"
     head = f"# {rule.id} {rule.slug}: {rule.summary}"
     kind = f"Family: {rule.family}. Severity: {rule.severity.value}."
     return f"{head}\n\n{kind}\n\n{rule.why}\n"
@@ -39,6 +41,8 @@ def catalogue(rules: tuple[Rule, ...]) -> str:
             f"| [{rule.id}](#{rule.folder.lower()}) | {rule.slug} | {rule.severity.value} | {rule.summary} |\n"
             for rule in group
         )
+    parts.append(_RETIRED)
+    parts.extend(f"| {rule.id} | {rule.slug} | {rule.reason} |\n" for rule in RETIRED)
     parts.append("\n## Why\n")
     parts.extend(f"\n### {rule.folder}\n\n{rule.why}\n" for rule in rules)
     return "".join(parts)
@@ -57,6 +61,15 @@ and `related`, a list of `file`, `line`, `column`, `message`. Keys are only ever
 annotations for GitHub's workflows.
 
 This page is generated: `python -m gatewayd.mapping.rules.catalogue docs/reference`.
+"""
+
+_RETIRED = """
+## Retired
+
+These rules are no longer checked. Their ids and names are not given to other rules.
+
+| id | name | why it went |
+|---|---|---|
 """
 
 

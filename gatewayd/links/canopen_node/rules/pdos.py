@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from gatewayd.canopen.cob_ids import Function, is_restricted
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction
-from gatewayd.links.canopen_node.bus_load import FIRST_EVENT_TYPE, pdo_bits
+from gatewayd.links.canopen_node.bus_load import FIRST_EVENT_TYPE
 from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo, node_of
 from gatewayd.links.canopen_node.pdo_layout import PDO_BITS, PDO_NUMBERS
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.report.wording import cob, number, seconds
+from gatewayd.report.wording import cob, seconds
 
 __all__ = ["cob_id_place"]
 
@@ -228,29 +228,6 @@ def producer_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
     if node is not None and node.part.spec.sync.producer and node.part.spec.sync.period is None:
         message = f"node {node.part.spec.node} is to produce SYNC without a period"
         yield rule.at(node.part.at("sync", "producer"), message, hint="add `period: 10ms` to `sync`")
-
-
-@cell_rule(
-    "GW418", "inhibit-below-frame-time", "an inhibit time shorter than the frame itself", Severity.WARNING
-)
-def inhibit_below_frame_time(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Inhibit times without effect."""
-    node = node_of(cell)
-    if node is None:
-        return
-    reported: set[Position] = set()
-    for pdo in node.pdos:
-        duration = pdo_bits(pdo) / node.part.spec.bitrate
-        if pdo.transmission < FIRST_EVENT_TYPE or pdo.inhibit is None or pdo.inhibit >= duration:
-            continue
-        place = _key_place(node, pdo, "inhibit")
-        if place not in reported:
-            reported.add(place)
-            message = (
-                f"the inhibit time of {pdo.label}, {seconds(pdo.inhibit)}, is shorter than its frame "
-                f"({number(round(duration * 1000, 2))}ms at {node.part.spec.bitrate} bit/s)"
-            )
-            yield rule.at(place, message, hint="use some times the length of the frame, such as 10ms")
 
 
 @cell_rule("GW419", "event-below-inhibit", "an event time shorter than the inhibit time", Severity.WARNING)

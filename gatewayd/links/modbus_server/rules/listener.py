@@ -1,4 +1,4 @@
-"""Rules GW205 to GW208 and GW216 to GW219: the Modbus listener, its units and its peers."""
+"""Rules GW206 to GW208, GW216, GW217 and GW219: the Modbus listener, its units and its peers."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 
 __all__: list[str] = []
 
-_MODBUS_PORTS = (502, 802)
-_FIRST_FREE_PORT = 1024
 _LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
 _SHARED = ("connections", "idle_timeout")
 
@@ -97,18 +95,6 @@ def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         message = f"{modbus.spec.listen} serves every network of this machine, and there is no access list"
         hint = "add `allow: [192.168.1.0/24]` with the networks that may connect"
         yield rule.at(modbus.at("listen"), message, hint=hint)
-
-
-@cell_rule("GW218", "foreign-port", "a privileged port that belongs to another service", Severity.WARNING)
-def foreign_port(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Low ports other than Modbus's own."""
-    modbus = cell.document.part(Modbus)
-    if modbus is None:
-        return
-    port = modbus.spec.listen.port
-    if port < _FIRST_FREE_PORT and port not in _MODBUS_PORTS:
-        message = f"port {port} is reserved for another service"
-        yield rule.at(modbus.at("listen"), message, hint="use 502, or a port from 1024 on such as 1502")
 
 
 @cell_rule(

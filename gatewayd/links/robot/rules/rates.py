@@ -1,18 +1,16 @@
-"""Rules GW306, GW307, GW314 and GW607: how often the controller sends."""
+"""Rules GW306, GW314 and GW607: how often the controller sends."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import floor, isclose
 
 from gatewayd.links.robot.rates import MIN_RATE, package_period
 from gatewayd.links.robot.rules.controller import controller
 from gatewayd.links.robot.sections import Robot
-from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
+from gatewayd.mapping.diagnostics import Diagnostic, Rule
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.report.wording import number, seconds
-from gatewayd.rtde.catalogue import Series
 
 __all__: list[str] = []
 
@@ -31,24 +29,6 @@ def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if frequency > series.base_rate:
             message = f"{number(frequency)} {what} per second, but series {series.word} runs at {series.base_rate} Hz"
             yield rule.at(position, message, hint=f"ask for {series.base_rate} or less")
-
-
-@cell_rule("GW307", "rate-not-a-divisor", "a rate that the controller cannot make", Severity.WARNING)
-def rate_not_a_divisor(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Frequencies between two steps of the controller."""
-    robot = cell.document.part(Robot)
-    if robot is None or robot.spec.frequency < MIN_RATE:
-        return
-    series, _ = controller(cell.document)
-    base, wanted = (series or Series.E).base_rate, robot.spec.frequency
-    steps = base / wanted
-    if steps < 1 or isclose(steps, round(steps), rel_tol=1e-3):
-        return
-    real = base / floor(steps)
-    message = f"{number(wanted)} Hz does not divide {base} Hz: the controller will send {real:.4g} Hz"
-    below = base / (floor(steps) + 1)
-    hint = f"write {real:.4g} or {below:.4g}"
-    yield rule.at(robot.at("frequency"), message, hint=hint)
 
 
 @cell_rule("GW314", "rate-too-low", "a rate of less than one package in ten seconds")
