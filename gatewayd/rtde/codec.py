@@ -29,7 +29,6 @@ MAX_PACKAGE = 0xFFFF
 """Largest package, header included: what its size field can say."""
 
 _HEADER = struct.Struct(">HB")
-_DATA_HEADER = struct.Struct(">HBB")
 _DATA = int(PackageType.DATA_PACKAGE)
 _SHOWN = 16
 _MOST_REQUESTS = 16

@@ -16,25 +16,9 @@ from collections.abc import Callable, Iterable, Mapping
 from enum import Enum, auto
 from typing import ClassVar, NamedTuple
 
+from gatewayd.rtde import messages
 from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.claims import Claims, HandshakeError, is_long, sort_types
-from gatewayd.rtde.messages import (
-    NOT_FOUND,
-    ControllerMessage,
-    ControllerVersion,
-    DataPackage,
-    ExecutableMessage,
-    GetControllerVersion,
-    InputsSetup,
-    OutputsSetup,
-    Pause,
-    PauseReply,
-    ProtocolVersionReply,
-    RequestProtocolVersion,
-    SetupOutputs,
-    Start,
-    StartReply,
-)
 from gatewayd.rtde.reading import Reading
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.session import (
@@ -97,7 +81,7 @@ class Notice(Enum):
 class NextStep(NamedTuple):
     """What follows from a message."""
 
-    send: ExecutableMessage | None = None
+    send: messages.ExecutableMessage | None = None
     event: Notice | None = None
 
 
@@ -114,7 +98,7 @@ class Negotiation:
         """What is awaited."""
         self.claims = Claims(wishes.wanted_inputs(), wishes.watchdog, limited=wishes.limited)
         """The inputs."""
-        self.controller: ControllerVersion | None = None
+        self.controller: messages.ControllerVersion | None = None
         """The controller's software, once it is known."""
         self.took_long_list = False
         """Whether the controller has accepted a list longer than every controller takes."""
@@ -163,35 +147,35 @@ class Negotiation:
         """Whether the answer that is due is that to a list which an old controller may refuse for its length."""
         return is_long(self._asked if self.state is State.OUTPUTS else self.claims.asked)
 
-    def begin(self) -> ExecutableMessage:
+    def begin(self) -> messages.ExecutableMessage:
         """The first message."""
         self.state = State.VERSION_2
-        return RequestProtocolVersion(2)
+        return messages.RequestProtocolVersion(2)
 
-    def handle(self, message: ControllerMessage) -> NextStep:
+    def handle(self, message: messages.ControllerMessage) -> NextStep:
         """Take an answer; a data package out of season is no matter."""
         action = self._TABLE.get((self.state, type(message)))
         if action is not None:
             return action(self, message)
-        if isinstance(message, DataPackage):
+        if isinstance(message, messages.DataPackage):
             return _NOTHING
         raise self._misplaced(message)
 
-    def retry_claims(self) -> ExecutableMessage | None:
+    def retry_claims(self) -> messages.ExecutableMessage | None:
         """Ask again for inputs that were in use, if any are and no answer is due."""
         if self.waiting:
             return None
         self.claims.retry()
         return self.claims.request()
 
-    def join(self, fields: Iterable[str]) -> ExecutableMessage | None:
+    def join(self, fields: Iterable[str]) -> messages.ExecutableMessage | None:
         """Have unread registers share a recipe with the others: at once, or when no answer is due (then None)."""
         joining = frozenset(fields)
         self._joined |= joining
         self.claims.join(joining)
         return None if self.waiting else self.claims.request()
 
-    def probe(self) -> ExecutableMessage | None:
+    def probe(self) -> messages.ExecutableMessage | None:
         """Ask for an answer that comes behind everything the controller sent before; `Notice.PROBED` when it is there.
 
         None before the session is complete. An answer that is still due to an earlier probe is waited for first.
@@ -199,23 +183,23 @@ class Negotiation:
         if not self._reported:
             return None
         self._probes += 1
-        return GetControllerVersion()
+        return messages.GetControllerVersion()
 
-    def pause(self) -> ExecutableMessage | None:
+    def pause(self) -> messages.ExecutableMessage | None:
         """Stop the output: at once, or as soon as the negotiation gets there (then None)."""
         self._run = False
         if self.state is not State.RUNNING:
             return None
         self.state = State.PAUSING
-        return Pause()
+        return messages.Pause()
 
-    def resume(self) -> ExecutableMessage | None:
+    def resume(self) -> messages.ExecutableMessage | None:
         """Start the output again: at once, or as soon as the negotiation gets there (then None)."""
         self._run = True
         if self.state is not State.PAUSED:
             return None
         self.state = State.RESUMING
-        return Start()
+        return messages.Start()
 
     def session(self, round_trip: float = 0.0) -> Session:
         """What has been agreed. Only after `Notice.STARTED`."""
@@ -237,18 +221,18 @@ class Negotiation:
 
     # the way to the session
 
-    def _version_2_answered(self, reply: ProtocolVersionReply) -> NextStep:
+    def _version_2_answered(self, reply: messages.ProtocolVersionReply) -> NextStep:
         if reply.accepted:
             self._version = 2
-            return self._go(State.CONTROLLER, GetControllerVersion())
-        return self._go(State.VERSION_1, RequestProtocolVersion(1))
+            return self._go(State.CONTROLLER, messages.GetControllerVersion())
+        return self._go(State.VERSION_1, messages.RequestProtocolVersion(1))
 
-    def _version_1_answered(self, reply: ProtocolVersionReply) -> NextStep:
+    def _version_1_answered(self, reply: messages.ProtocolVersionReply) -> NextStep:
         if not reply.accepted:
             raise HandshakeError("the controller speaks neither protocol version 2 nor 1")
-        return self._go(State.CONTROLLER, GetControllerVersion())
+        return self._go(State.CONTROLLER, messages.GetControllerVersion())
 
-    def _controller_answered(self, version: ControllerVersion) -> NextStep:
+    def _controller_answered(self, version: messages.ControllerVersion) -> NextStep:
         self.controller = version
         if self._wishes.read_back and not self._reading.limited:
             return self._ask_outputs()
@@ -267,10 +251,10 @@ class Negotiation:
             return self._ask_outputs(event)
         self.claims.take_change()
         if self._run:
-            return self._go(State.STARTING, Start(), event)
+            return self._go(State.STARTING, messages.Start(), event)
         return self._go(State.PAUSED, None, self._complete())
 
-    def _claim(self) -> ExecutableMessage | None:
+    def _claim(self) -> messages.ExecutableMessage | None:
         """The next request for inputs; registers that turned out not to be readable go apart."""
         request = self.claims.request()
         if request is None and not self.claims.busy and self._is_read():
@@ -294,7 +278,7 @@ class Negotiation:
 
     def _set_up(self, state: State, names: tuple[str, ...], event: Notice | None) -> NextStep:
         self._asked = names
-        return self._go(state, SetupOutputs(names, self._frequency()), event)
+        return self._go(state, messages.SetupOutputs(names, self._frequency()), event)
 
     def _frequency(self) -> float | None:
         """What to ask for; None in protocol version 1, which cannot choose."""
@@ -307,9 +291,9 @@ class Negotiation:
         self._period = (rate // frequency) / rate
         return frequency
 
-    def _outputs_answered(self, reply: OutputsSetup) -> NextStep:
+    def _outputs_answered(self, reply: messages.OutputsSetup) -> NextStep:
         names = self._asked
-        if reply.recipe == 0 and NOT_FOUND not in reply.types and is_long(names):
+        if reply.recipe == 0 and messages.NOT_FOUND not in reply.types and is_long(names):
             return self._list_refused()
         types, refused = sort_types(names, reply.types)
         if self._agreed is not None and (refused or tuple(types) != self._agreed.types):
@@ -333,12 +317,12 @@ class Negotiation:
         self.claims.limit()
         return self._advance()
 
-    def _inputs_answered(self, reply: InputsSetup) -> NextStep:
+    def _inputs_answered(self, reply: messages.InputsSetup) -> NextStep:
         self._take_claim(reply)
         return self._advance()
 
-    def _started(self, message: StartReply | DataPackage) -> NextStep:
-        if isinstance(message, DataPackage):
+    def _started(self, message: messages.StartReply | messages.DataPackage) -> NextStep:
+        if isinstance(message, messages.DataPackage):
             assert self._outputs is not None
             if len(message.payload) != self._outputs.size:
                 return _NOTHING
@@ -346,7 +330,7 @@ class Negotiation:
             return self._start_refused()
         event = Notice.RESUMED if self.state is State.RESUMING else self._complete()
         if not self._run:
-            return self._go(State.PAUSING, Pause(), event)
+            return self._go(State.PAUSING, messages.Pause(), event)
         return self._rest(State.RUNNING, event)
 
     def _start_refused(self) -> NextStep:
@@ -366,7 +350,7 @@ class Negotiation:
 
     # readings
 
-    def _piece_answered(self, reply: OutputsSetup) -> NextStep:
+    def _piece_answered(self, reply: messages.OutputsSetup) -> NextStep:
         types, refused = sort_types(self._asked, reply.types)
         if refused:
             self._reading.refuse(refused)
@@ -376,25 +360,25 @@ class Negotiation:
                 "the controller refused the output recipe of a reading without naming a field"
             )
         self._reading.expect(Recipe(self._asked, types))
-        return self._go(State.READING_START, Start())
+        return self._go(State.READING_START, messages.Start())
 
-    def _reading_started(self, message: StartReply | DataPackage) -> NextStep:
+    def _reading_started(self, message: messages.StartReply | messages.DataPackage) -> NextStep:
         """A package before the answer proves the start; the reading is the next, which surely is of this piece."""
-        if isinstance(message, StartReply) and not message.accepted:
+        if isinstance(message, messages.StartReply) and not message.accepted:
             raise HandshakeError("the controller refused to start the output of a reading")
         return self._go(State.READING, None)
 
-    def _read(self, package: DataPackage) -> NextStep:
+    def _read(self, package: messages.DataPackage) -> NextStep:
         if not self._reading.take(package.payload):
             return _NOTHING
-        return self._go(State.READING_PAUSE, Pause())
+        return self._go(State.READING_PAUSE, messages.Pause())
 
-    def _reading_paused(self, _: PauseReply) -> NextStep:
+    def _reading_paused(self, _: messages.PauseReply) -> NextStep:
         return self._advance()
 
     # while there is a session
 
-    def _more_inputs_answered(self, reply: InputsSetup) -> NextStep:
+    def _more_inputs_answered(self, reply: messages.InputsSetup) -> NextStep:
         self._take_claim(reply)
         return self._settle()
 
@@ -409,7 +393,7 @@ class Negotiation:
             changed = event is None and self.claims.take_change()
             return NextStep(None, Notice.INPUTS_CHANGED if changed else event)
         if self.state is State.RUNNING:
-            return self._go(State.READING_PAUSE, Pause(), event)
+            return self._go(State.READING_PAUSE, messages.Pause(), event)
         return self._advance(event) if self.state is State.PAUSED else NextStep(None, event)
 
     def _rest(self, state: State, event: Notice) -> NextStep:
@@ -417,32 +401,34 @@ class Negotiation:
         self.state = state
         return self._settle(event)
 
-    def _started_late(self, message: StartReply) -> NextStep:
+    def _started_late(self, message: messages.StartReply) -> NextStep:
         if not message.accepted:
             raise HandshakeError("the controller refused to start the output")
         return _NOTHING
 
-    def _paused(self, _: PauseReply) -> NextStep:
+    def _paused(self, _: messages.PauseReply) -> NextStep:
         if self._run:
-            return self._go(State.RESUMING, Start(), Notice.PAUSED)
+            return self._go(State.RESUMING, messages.Start(), Notice.PAUSED)
         return self._rest(State.PAUSED, Notice.PAUSED)
 
-    def _probed(self, version: ControllerVersion) -> NextStep:
+    def _probed(self, version: messages.ControllerVersion) -> NextStep:
         if not self._probes:
             raise self._misplaced(version)
         self._probes -= 1
         return _NOTHING if self._probes else NextStep(None, Notice.PROBED)
 
-    def _take_claim(self, reply: InputsSetup) -> None:
+    def _take_claim(self, reply: messages.InputsSetup) -> None:
         asked = self.claims.asked
         self.claims.answer(reply)
         self.took_long_list |= bool(reply.recipe) and is_long(asked)
 
-    def _go(self, state: State, send: ExecutableMessage | None, event: Notice | None = None) -> NextStep:
+    def _go(
+        self, state: State, send: messages.ExecutableMessage | None, event: Notice | None = None
+    ) -> NextStep:
         self.state = state
         return NextStep(send, event)
 
-    def _misplaced(self, message: ControllerMessage) -> HandshakeError:
+    def _misplaced(self, message: messages.ControllerMessage) -> HandshakeError:
         return HandshakeError(
             f"the controller sent {type(message).__name__} while {self.state.value} was awaited"
         )
@@ -461,31 +447,31 @@ class Negotiation:
         return (*outputs, *inputs)
 
     _TABLE: ClassVar[Mapping[tuple[State, type], Callable[..., NextStep]]] = {
-        (State.VERSION_2, ProtocolVersionReply): _version_2_answered,
-        (State.VERSION_1, ProtocolVersionReply): _version_1_answered,
-        (State.CONTROLLER, ControllerVersion): _controller_answered,
-        (State.INPUTS, InputsSetup): _inputs_answered,
-        (State.READING_SETUP, OutputsSetup): _piece_answered,
-        (State.READING_START, StartReply): _reading_started,
-        (State.READING_START, DataPackage): _reading_started,
-        (State.READING, StartReply): _started_late,
-        (State.READING, DataPackage): _read,
-        (State.READING_PAUSE, StartReply): _started_late,
-        (State.READING_PAUSE, PauseReply): _reading_paused,
-        (State.OUTPUTS, OutputsSetup): _outputs_answered,
-        (State.STARTING, StartReply): _started,
-        (State.STARTING, DataPackage): _started,
-        (State.RUNNING, StartReply): _started_late,
-        (State.RUNNING, InputsSetup): _more_inputs_answered,
-        (State.PAUSING, StartReply): _started_late,
-        (State.PAUSING, InputsSetup): _more_inputs_answered,
-        (State.PAUSING, PauseReply): _paused,
-        (State.PAUSED, InputsSetup): _more_inputs_answered,
-        (State.RESUMING, StartReply): _started,
-        (State.RESUMING, DataPackage): _started,
-        (State.RESUMING, InputsSetup): _more_inputs_answered,
+        (State.VERSION_2, messages.ProtocolVersionReply): _version_2_answered,
+        (State.VERSION_1, messages.ProtocolVersionReply): _version_1_answered,
+        (State.CONTROLLER, messages.ControllerVersion): _controller_answered,
+        (State.INPUTS, messages.InputsSetup): _inputs_answered,
+        (State.READING_SETUP, messages.OutputsSetup): _piece_answered,
+        (State.READING_START, messages.StartReply): _reading_started,
+        (State.READING_START, messages.DataPackage): _reading_started,
+        (State.READING, messages.StartReply): _started_late,
+        (State.READING, messages.DataPackage): _read,
+        (State.READING_PAUSE, messages.StartReply): _started_late,
+        (State.READING_PAUSE, messages.PauseReply): _reading_paused,
+        (State.OUTPUTS, messages.OutputsSetup): _outputs_answered,
+        (State.STARTING, messages.StartReply): _started,
+        (State.STARTING, messages.DataPackage): _started,
+        (State.RUNNING, messages.StartReply): _started_late,
+        (State.RUNNING, messages.InputsSetup): _more_inputs_answered,
+        (State.PAUSING, messages.StartReply): _started_late,
+        (State.PAUSING, messages.InputsSetup): _more_inputs_answered,
+        (State.PAUSING, messages.PauseReply): _paused,
+        (State.PAUSED, messages.InputsSetup): _more_inputs_answered,
+        (State.RESUMING, messages.StartReply): _started,
+        (State.RESUMING, messages.DataPackage): _started,
+        (State.RESUMING, messages.InputsSetup): _more_inputs_answered,
         **dict.fromkeys(
-            ((state, ControllerVersion) for state in State if state not in _BEFORE_PROBES), _probed
+            ((state, messages.ControllerVersion) for state in State if state not in _BEFORE_PROBES), _probed
         ),
     }
     """State and kind of answer -> what to do with it; everything else is out of place."""

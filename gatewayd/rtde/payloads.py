@@ -9,27 +9,10 @@ from the controller has neither lengths nor source.
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from gatewayd.rtde.messages import (
-    ControllerMessage,
-    ControllerVersion,
-    DataPackage,
-    ExecutableMessage,
-    GetControllerVersion,
-    InputsSetup,
-    OutputsSetup,
-    PackageType,
-    Pause,
-    PauseReply,
-    ProtocolVersionReply,
-    RequestProtocolVersion,
-    SetupInputs,
-    SetupOutputs,
-    Start,
-    StartReply,
-    TextMessage,
-)
+from gatewayd.rtde import messages
+from gatewayd.rtde.messages import ControllerMessage, ExecutableMessage, PackageType, TextMessage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -52,6 +35,8 @@ _VERSION = struct.Struct(">4I")
 _DOUBLE = struct.Struct(">d")
 _MAX_TEXT = 0xFF
 _MIN_TEXT = 3
+
+_Message = TypeVar("_Message")
 
 
 class MalformedPayloadError(Exception):
@@ -105,114 +90,88 @@ def _decode_text_v1(payload: bytes) -> TextMessage:
     return TextMessage(_text(payload[1:]), "", payload[0])
 
 
-def _decode_version_reply(payload: bytes) -> ProtocolVersionReply:
-    _expect(payload, 1)
-    return ProtocolVersionReply(payload[0] != 0)
-
-
-def _decode_controller_version(payload: bytes) -> ControllerVersion:
+def _decode_controller_version(payload: bytes) -> messages.ControllerVersion:
     _expect(payload, _VERSION.size)
-    return ControllerVersion(*_VERSION.unpack(payload))
+    return messages.ControllerVersion(*_VERSION.unpack(payload))
 
 
-def _decode_data(payload: bytes) -> DataPackage:
+def _decode_data(payload: bytes) -> messages.DataPackage:
     _at_least(payload, 1)
-    return DataPackage(payload[0], payload[1:])
+    return messages.DataPackage(payload[0], payload[1:])
 
 
-def _decode_data_v1(payload: bytes) -> DataPackage:
-    return DataPackage(None, payload)
-
-
-def _decode_outputs_setup(payload: bytes) -> OutputsSetup:
-    _at_least(payload, 1)
-    return OutputsSetup(payload[0], _names(payload[1:]))
-
-
-def _decode_outputs_setup_v1(payload: bytes) -> OutputsSetup:
-    return OutputsSetup(None, _names(payload))
-
-
-def _decode_inputs_setup(payload: bytes) -> InputsSetup:
-    _at_least(payload, 1)
-    return InputsSetup(payload[0], _names(payload[1:]))
-
-
-def _decode_start_reply(payload: bytes) -> StartReply:
-    _expect(payload, 1)
-    return StartReply(payload[0] != 0)
-
-
-def _decode_pause_reply(payload: bytes) -> PauseReply:
-    _expect(payload, 1)
-    return PauseReply(payload[0] != 0)
-
-
-def _decode_request_version(payload: bytes) -> RequestProtocolVersion:
+def _decode_request_version(payload: bytes) -> messages.RequestProtocolVersion:
     _expect(payload, _UINT16.size)
-    return RequestProtocolVersion(_UINT16.unpack(payload)[0])
+    return messages.RequestProtocolVersion(*_UINT16.unpack(payload))
 
 
-def _decode_get_version(payload: bytes) -> GetControllerVersion:
-    _expect(payload, 0)
-    return GetControllerVersion()
-
-
-def _decode_setup_outputs(payload: bytes) -> SetupOutputs:
+def _decode_setup_outputs(payload: bytes) -> messages.SetupOutputs:
     _at_least(payload, _DOUBLE.size)
-    return SetupOutputs(_names(payload[_DOUBLE.size :]), _DOUBLE.unpack_from(payload)[0])
+    return messages.SetupOutputs(_names(payload[_DOUBLE.size :]), *_DOUBLE.unpack_from(payload))
 
 
-def _decode_setup_outputs_v1(payload: bytes) -> SetupOutputs:
-    return SetupOutputs(_names(payload))
+def _setup_reply(reply: Callable[[int, tuple[str, ...]], _Message]) -> Callable[[bytes], _Message]:
+    """Decoder of a recipe id and a list of types."""
+
+    def decode(payload: bytes) -> _Message:
+        _at_least(payload, 1)
+        return reply(payload[0], _names(payload[1:]))
+
+    return decode
 
 
-def _decode_setup_inputs(payload: bytes) -> SetupInputs:
-    return SetupInputs(_names(payload))
+def _acceptance(reply: Callable[[bool], _Message]) -> Callable[[bytes], _Message]:
+    """Decoder of one byte that accepts or refuses."""
+
+    def decode(payload: bytes) -> _Message:
+        _expect(payload, 1)
+        return reply(payload[0] != 0)
+
+    return decode
 
 
-def _decode_start(payload: bytes) -> Start:
-    _expect(payload, 0)
-    return Start()
+def _bare(request: _Message) -> Callable[[bytes], _Message]:
+    """Decoder of a request without a payload."""
 
+    def decode(payload: bytes) -> _Message:
+        _expect(payload, 0)
+        return request
 
-def _decode_pause(payload: bytes) -> Pause:
-    _expect(payload, 0)
-    return Pause()
+    return decode
 
 
 FROM_CONTROLLER: ControllerDecoders = {
-    PackageType.REQUEST_PROTOCOL_VERSION: _decode_version_reply,
+    PackageType.REQUEST_PROTOCOL_VERSION: _acceptance(messages.ProtocolVersionReply),
     PackageType.GET_URCONTROL_VERSION: _decode_controller_version,
     PackageType.TEXT_MESSAGE: _decode_text,
     PackageType.DATA_PACKAGE: _decode_data,
-    PackageType.SETUP_OUTPUTS: _decode_outputs_setup,
-    PackageType.SETUP_INPUTS: _decode_inputs_setup,
-    PackageType.START: _decode_start_reply,
-    PackageType.PAUSE: _decode_pause_reply,
+    PackageType.SETUP_OUTPUTS: _setup_reply(messages.OutputsSetup),
+    PackageType.SETUP_INPUTS: _setup_reply(messages.InputsSetup),
+    PackageType.START: _acceptance(messages.StartReply),
+    PackageType.PAUSE: _acceptance(messages.PauseReply),
 }
 """Package type -> decoder of what a controller sends in protocol version 2."""
 FROM_CONTROLLER_V1: ControllerDecoders = {
     **FROM_CONTROLLER,
     PackageType.TEXT_MESSAGE: _decode_text_v1,
-    PackageType.DATA_PACKAGE: _decode_data_v1,
-    PackageType.SETUP_OUTPUTS: _decode_outputs_setup_v1,
+    PackageType.DATA_PACKAGE: lambda payload: messages.DataPackage(None, payload),
+    PackageType.SETUP_OUTPUTS: lambda payload: messages.OutputsSetup(None, _names(payload)),
 }
 """The same in protocol version 1."""
 FROM_EXECUTABLE: ExecutableDecoders = {
     PackageType.REQUEST_PROTOCOL_VERSION: _decode_request_version,
-    PackageType.GET_URCONTROL_VERSION: _decode_get_version,
+    PackageType.GET_URCONTROL_VERSION: _bare(messages.GetControllerVersion()),
     PackageType.TEXT_MESSAGE: _decode_text,
     PackageType.DATA_PACKAGE: _decode_data,
     PackageType.SETUP_OUTPUTS: _decode_setup_outputs,
-    PackageType.SETUP_INPUTS: _decode_setup_inputs,
-    PackageType.START: _decode_start,
-    PackageType.PAUSE: _decode_pause,
+    PackageType.SETUP_INPUTS: lambda payload: messages.SetupInputs(_names(payload)),
+    PackageType.START: _bare(messages.Start()),
+    PackageType.PAUSE: _bare(messages.Pause()),
 }
 """Package type -> decoder of what a client sends in protocol version 2."""
 FROM_EXECUTABLE_V1: ExecutableDecoders = {
     **FROM_EXECUTABLE,
-    PackageType.SETUP_OUTPUTS: _decode_setup_outputs_v1,
+    PackageType.SETUP_OUTPUTS: lambda payload: messages.SetupOutputs(_names(payload)),
 }
 """The same in protocol version 1."""
 
@@ -236,21 +195,21 @@ def encode_executable(message: ExecutableMessage, version: int) -> tuple[Package
     Texts are cut to 255 bytes. ValueError for what the version cannot say: no recipe id, no frequency.
     """
     match message:
-        case DataPackage(recipe, payload):
+        case messages.DataPackage(recipe, payload):
             return PackageType.DATA_PACKAGE, _recipe(recipe) + payload
-        case RequestProtocolVersion(requested):
+        case messages.RequestProtocolVersion(requested):
             return PackageType.REQUEST_PROTOCOL_VERSION, _UINT16.pack(requested)
-        case GetControllerVersion():
+        case messages.GetControllerVersion():
             return PackageType.GET_URCONTROL_VERSION, b""
         case TextMessage():
             return PackageType.TEXT_MESSAGE, _encode_text(message)
-        case SetupOutputs(names, frequency):
+        case messages.SetupOutputs(names, frequency):
             return PackageType.SETUP_OUTPUTS, _frequency(frequency, version) + _joined(names)
-        case SetupInputs(names):
+        case messages.SetupInputs(names):
             return PackageType.SETUP_INPUTS, _joined(names)
-        case Start():
+        case messages.Start():
             return PackageType.START, b""
-        case Pause():
+        case messages.Pause():
             return PackageType.PAUSE, b""
 
 
@@ -270,21 +229,21 @@ def encode_controller(message: ControllerMessage, version: int) -> tuple[Package
     to what fits. ValueError for a missing recipe id in version 2.
     """
     match message:
-        case DataPackage(recipe, payload):
+        case messages.DataPackage(recipe, payload):
             return PackageType.DATA_PACKAGE, payload if version == 1 else _recipe(recipe) + payload
-        case ProtocolVersionReply(accepted):
+        case messages.ProtocolVersionReply(accepted):
             return PackageType.REQUEST_PROTOCOL_VERSION, bytes((accepted,))
-        case ControllerVersion(major, minor, bugfix, build):
+        case messages.ControllerVersion(major, minor, bugfix, build):
             return PackageType.GET_URCONTROL_VERSION, _VERSION.pack(major, minor, bugfix, build)
         case TextMessage(text, _, level):
             if version == 1:
                 return PackageType.TEXT_MESSAGE, bytes((level,)) + text.encode("utf-8", "backslashreplace")
             return PackageType.TEXT_MESSAGE, _encode_text(message)
-        case OutputsSetup(recipe, types):
+        case messages.OutputsSetup(recipe, types):
             return PackageType.SETUP_OUTPUTS, (b"" if version == 1 else _recipe(recipe)) + _joined(types)
-        case InputsSetup(recipe, types):
+        case messages.InputsSetup(recipe, types):
             return PackageType.SETUP_INPUTS, _recipe(recipe) + _joined(types)
-        case StartReply(accepted):
+        case messages.StartReply(accepted):
             return PackageType.START, bytes((accepted,))
-        case PauseReply(accepted):
+        case messages.PauseReply(accepted):
             return PackageType.PAUSE, bytes((accepted,))

@@ -11,29 +11,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from gatewayd.rtde import messages
 from gatewayd.rtde.codec import MAX_PACKAGE, ControllerProtocol, ProtocolError
-from gatewayd.rtde.messages import (
-    ERROR_WORDS,
-    IN_USE,
-    NOT_FOUND,
-    ControllerMessage,
-    ControllerVersion,
-    DataPackage,
-    ExecutableMessage,
-    GetControllerVersion,
-    InputsSetup,
-    OutputsSetup,
-    Pause,
-    PauseReply,
-    ProtocolVersionReply,
-    RequestProtocolVersion,
-    SetupInputs,
-    SetupOutputs,
-    Start,
-    StartReply,
-    TextLevel,
-    TextMessage,
-)
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.controller import Controller
@@ -51,13 +30,13 @@ SOURCE = "URControl"
 _OUTPUT_RECIPE = 1
 _DATA_HEAD = 4
 _STEPS: Mapping[type, FaultStep] = {
-    RequestProtocolVersion: FaultStep.VERSION,
-    GetControllerVersion: FaultStep.CONTROLLER,
-    SetupOutputs: FaultStep.OUTPUTS,
-    SetupInputs: FaultStep.INPUTS,
-    Start: FaultStep.START,
-    Pause: FaultStep.PAUSE,
-    DataPackage: FaultStep.WRITE,
+    messages.RequestProtocolVersion: FaultStep.VERSION,
+    messages.GetControllerVersion: FaultStep.CONTROLLER,
+    messages.SetupOutputs: FaultStep.OUTPUTS,
+    messages.SetupInputs: FaultStep.INPUTS,
+    messages.Start: FaultStep.START,
+    messages.Pause: FaultStep.PAUSE,
+    messages.DataPackage: FaultStep.WRITE,
 }
 _log = logging.getLogger(__name__)
 
@@ -107,11 +86,11 @@ class SimulatorSession:
         text = self._controller.faults.text_on_connect
         if text is None:
             return b""
-        return self._protocol.send(TextMessage(text, SOURCE, TextLevel.WARNING))
+        return self._protocol.send(messages.TextMessage(text, SOURCE, messages.TextLevel.WARNING))
 
-    def text(self, message: str, level: TextLevel) -> bytes:
+    def text(self, message: str, level: messages.TextLevel) -> bytes:
         """A text message to the client, in the layout of the version it speaks."""
-        return self._protocol.send(TextMessage(message, SOURCE, level))
+        return self._protocol.send(messages.TextMessage(message, SOURCE, level))
 
     def receive(self, data: bytes) -> bytes:
         """The answers to `data`, in order. Raises ProtocolError for bytes that are not RTDE, DroppedError for a fault.
@@ -133,7 +112,7 @@ class SimulatorSession:
             return b""
         self._pass(FaultStep.DATA)
         recipe = _OUTPUT_RECIPE if self._protocol.version > 1 else None
-        return self._protocol.send(DataPackage(recipe, self._view.payload()))
+        return self._protocol.send(messages.DataPackage(recipe, self._view.payload()))
 
     def close(self) -> None:
         """Give up every claim."""
@@ -145,55 +124,55 @@ class SimulatorSession:
             message = f"fault at {step.value}:{self._steps[step]}"
             raise DroppedError(message)
 
-    def _handle(self, message: ExecutableMessage) -> None:
+    def _handle(self, message: messages.ExecutableMessage) -> None:
         step = _STEPS.get(type(message))
         if step is not None:
             self._pass(step)
         match message:
-            case DataPackage():
+            case messages.DataPackage():
                 self._data(message)
-            case SetupOutputs():
+            case messages.SetupOutputs():
                 self._setup_outputs(message)
-            case SetupInputs():
+            case messages.SetupInputs():
                 self._setup_inputs(message)
-            case RequestProtocolVersion():
+            case messages.RequestProtocolVersion():
                 newest = 1 if self._controller.faults.v1_only else 2
-                self._answer(ProtocolVersionReply(1 <= message.version <= newest))
-            case GetControllerVersion():
-                self._answer(ControllerVersion(*self._controller.version, build=0))
-            case Start():
+                self._answer(messages.ProtocolVersionReply(1 <= message.version <= newest))
+            case messages.GetControllerVersion():
+                self._answer(messages.ControllerVersion(*self._controller.version, build=0))
+            case messages.Start():
                 self._started = self._view is not None
-                self._answer(StartReply(self._started))
-            case Pause():
+                self._answer(messages.StartReply(self._started))
+            case messages.Pause():
                 self._started = False
-                self._answer(PauseReply(accepted=True))
-            case TextMessage():
+                self._answer(messages.PauseReply(accepted=True))
+            case messages.TextMessage():
                 _log.info("%s says (level %d) %s: %s", self, message.level, message.source, message.message)
 
-    def _answer(self, message: ControllerMessage) -> None:
+    def _answer(self, message: messages.ControllerMessage) -> None:
         self._out.append(self._protocol.send(message))
 
-    def _complain(self, message: str, level: TextLevel = TextLevel.ERROR) -> None:
+    def _complain(self, message: str, level: messages.TextLevel = messages.TextLevel.ERROR) -> None:
         _log.info("%s: %s", self, message)
-        self._answer(TextMessage(message, SOURCE, level))
+        self._answer(messages.TextMessage(message, SOURCE, level))
 
-    def _setup_outputs(self, message: SetupOutputs) -> None:
+    def _setup_outputs(self, message: messages.SetupOutputs) -> None:
         if not self._answers(message.names):
             return
         kinds = [self._controller.output_type(name) for name in message.names]
-        types = tuple(kind.word if kind else NOT_FOUND for kind in kinds)
-        valid = bool(types) and NOT_FOUND not in types and not self._is_too_long(message.names)
+        types = tuple(kind.word if kind else messages.NOT_FOUND for kind in kinds)
+        valid = bool(types) and messages.NOT_FOUND not in types and not self._is_too_long(message.names)
         if valid and not self._fits([kind for kind in kinds if kind]):
             self._complain("the output recipe is larger than a data package")
             valid = False
         self._view = self._controller.store.view(message.names) if valid else None
         self._period = self._controller.period(message.frequency)
         if self._protocol.version > 1:
-            self._reply(OutputsSetup(_OUTPUT_RECIPE if valid else 0, types))
+            self._reply(messages.OutputsSetup(_OUTPUT_RECIPE if valid else 0, types))
         else:
-            self._reply(OutputsSetup(None, types))
+            self._reply(messages.OutputsSetup(None, types))
 
-    def _setup_inputs(self, message: SetupInputs) -> None:
+    def _setup_inputs(self, message: messages.SetupInputs) -> None:
         if not message.names:
             _log.info("%s: empty input recipe, not confirmed", self)
             return
@@ -202,17 +181,17 @@ class SimulatorSession:
         kinds = [self._controller.input_type(name) for name in message.names]
         taken = self._controller.claims.taken(self, message.names)
         types = tuple(
-            NOT_FOUND if kind is None else IN_USE if name in taken else kind.word
+            messages.NOT_FOUND if kind is None else messages.IN_USE if name in taken else kind.word
             for name, kind in zip(message.names, kinds, strict=True)
         )
-        self._reply(InputsSetup(self._add_inputs(message.names, types, kinds), types))
+        self._reply(messages.InputsSetup(self._add_inputs(message.names, types, kinds), types))
 
     def _add_inputs(
         self, names: tuple[str, ...], types: Sequence[str], kinds: Sequence[DataType | None]
     ) -> int:
         """The id of the new recipe, its fields claimed; 0 and nothing claimed if it cannot be."""
         known = [kind for kind in kinds if kind is not None]
-        if not ERROR_WORDS.isdisjoint(types) or self._is_too_long(names):
+        if not messages.ERROR_WORDS.isdisjoint(types) or self._is_too_long(names):
             return 0
         if len(self._inputs) >= MOST_INPUT_RECIPES:
             self._complain(f"a connection has {MOST_INPUT_RECIPES} input recipes at most")
@@ -226,7 +205,7 @@ class SimulatorSession:
         self._inputs.append(_InputRecipe(Recipe(names, known), tuple(cells), effects(names)))
         return len(self._inputs)
 
-    def _data(self, message: DataPackage) -> None:
+    def _data(self, message: messages.DataPackage) -> None:
         number = message.recipe or 0
         if not 1 <= number <= len(self._inputs):
             self._complain(f"data package for unknown input recipe {number}")
@@ -253,7 +232,7 @@ class SimulatorSession:
     def _is_too_long(self, names: tuple[str, ...]) -> bool:
         return self._controller.faults.long_lists is not LongLists.TAKE and _size(names) > STRICT_LIST_BYTES
 
-    def _reply(self, message: OutputsSetup | InputsSetup) -> None:
+    def _reply(self, message: messages.OutputsSetup | messages.InputsSetup) -> None:
         """Answer a setup; a list of types too long for a package becomes a complaint."""
         try:
             self._answer(message)
