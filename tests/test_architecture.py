@@ -36,10 +36,10 @@ LAYERS: dict[str, set[str]] = {
     "gatewayd": set(),
     "loop": {"loop"},
     "core": {"core"},
-    "rtde": {"loop", "rtde"},
+    "rtde": {"loop", "report.format", "rtde"},
     "modbus": {"core.definition", "modbus"},
     "canopen": {"canopen", "core.definition", "loop"},
-    "simulator": {"rtde", "simulator"},
+    "simulator": {"report.format", "rtde", "simulator"},
     "mapping": {
         "core.definition",
         "links.contract",

@@ -12,68 +12,21 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from gatewayd.loop.progress import wait_with_progress
 from gatewayd.rtde.claims import InputRecipe
-from gatewayd.rtde.connection import ClientHandler, Connection, Tolerances
+from gatewayd.rtde.connection import ClientHandler, Connection
 from gatewayd.rtde.lists import ListMemory
-from gatewayd.rtde.loss import Loss, LossReason, connect_failure
-from gatewayd.rtde.negotiation import Session, Unavailable, Wishes
+from gatewayd.rtde.loss import Loss, connect_failure
 from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.resolve import resolve
-from gatewayd.rtde.types import DEFAULT_PORT
+from gatewayd.rtde.session import ClientSettings, Session
 
-__all__ = [
-    "ClientHandler",
-    "ClientSettings",
-    "Loss",
-    "LossReason",
-    "RtdeClient",
-    "Session",
-    "Statistics",
-    "Unavailable",
-]
+__all__ = ["RtdeClient"]
 
 _KEEPALIVE = (("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCNT", 3))
-
-
-@dataclass(frozen=True, slots=True)
-class ClientSettings:
-    """Where the controller is, what is wanted of it, and how long to wait. Times in seconds."""
-
-    host: str
-    """Name or address."""
-    port: int = DEFAULT_PORT
-    outputs: tuple[str, ...] = ()
-    """Fields to subscribe; `timestamp` is subscribed by itself."""
-    inputs: tuple[str, ...] = ()
-    """Fields to claim."""
-    watchdog: str | None = None
-    """Input field that gets a recipe of its own, so that nothing else feeds it."""
-    frequency: float = 0.0
-    """Packages per second; 0: the controller's own rate. The controller divides its rate by a whole number."""
-    read_back: bool = True
-    """Subscribe the claimed `input_*` fields too, as far as the controller takes so long a list.
-
-    Else they are read right after they were claimed and not again.
-    """
-    connect_timeout: float = 2.0
-    handshake_timeout: float = 2.0
-    """For each answer of the set-up."""
-    data_timeout: float = 1.0
-    """Without a package while the output runs, five periods at least: the connection is taken for dead."""
-    first_data_timeout: float = 30.0
-    """The same before the first package: a controller whose safety set-up is unconfirmed sends none for a while."""
-    claim_retry: float = 1.0
-    """Between attempts to claim inputs that are in use."""
-    backoff: float = 0.05
-    """Before the first new connection; doubles with each failure."""
-    backoff_limit: float = 2.0
-    """Longest wait before a new connection."""
-    write_buffer: int = 65536
-    """Unsent bytes at which a controller that does not read is given up."""
 
 
 class RtdeClient:
@@ -84,17 +37,9 @@ class RtdeClient:
         """Counters over all sessions."""
         self._settings = settings
         self._handler = handler
-        self._address = f"{settings.host}:{settings.port}"
-        self._tolerances = Tolerances(
-            settings.handshake_timeout,
-            settings.data_timeout,
-            settings.first_data_timeout,
-            settings.claim_retry,
-            settings.write_buffer,
-        )
         self._connection: Connection | None = None
         self._lists = ListMemory()
-        self._paused = False
+        self._paused = not settings.running
 
     @property
     def session(self) -> Session | None:
@@ -163,13 +108,17 @@ class RtdeClient:
 
     async def _session(self) -> tuple[Loss, float]:
         """One connection: how it ended, and for how long a session was up."""
-        wishes = self._wishes()
+        settings = replace(
+            self._settings,
+            limited=self._settings.limited or self._lists.limited,
+            running=not self._paused,
+        )
         try:
             connection = await wait_with_progress(
-                self._connect(wishes), self._count, self._settings.connect_timeout
+                self._connect(settings), self._count, settings.connect_timeout
             )
         except OSError as error:
-            return connect_failure(error, self._address), 0.0
+            return connect_failure(error, settings.address), 0.0
         self._connection = connection
         try:
             loss = await connection.done
@@ -182,16 +131,13 @@ class RtdeClient:
             return loss, 0.0
         return replace(loss, started=True), asyncio.get_running_loop().time() - connection.started_at
 
-    async def _connect(self, wishes: Wishes) -> Connection:
+    async def _connect(self, settings: ClientSettings) -> Connection:
         loop = asyncio.get_running_loop()
-        async with asyncio.timeout(self._settings.connect_timeout):
+        async with asyncio.timeout(settings.connect_timeout):
             connected = await self._open_socket(loop)
             try:
                 _, connection = await loop.create_connection(
-                    lambda: Connection(
-                        self._address, wishes, self._tolerances, self._handler, self.statistics
-                    ),
-                    sock=connected,
+                    lambda: Connection(settings, self._handler, self.statistics), sock=connected
                 )
             except BaseException:
                 connected.close()
@@ -230,15 +176,3 @@ class RtdeClient:
 
     def _count(self) -> None:
         self.statistics.progress += 1
-
-    def _wishes(self) -> Wishes:
-        settings = self._settings
-        return Wishes(
-            settings.outputs,
-            settings.inputs,
-            settings.watchdog,
-            settings.frequency,
-            settings.read_back,
-            self._lists.limited,
-            not self._paused,
-        )

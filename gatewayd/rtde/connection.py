@@ -6,7 +6,6 @@ import asyncio
 import math
 import struct
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import ClassVar, Protocol, cast
 
 from gatewayd.rtde.claims import HandshakeError, InputRecipe
@@ -20,12 +19,13 @@ from gatewayd.rtde.messages import (
     TextLevel,
     TextMessage,
 )
-from gatewayd.rtde.negotiation import TIMESTAMP, Negotiation, Notice, Session, Wishes
+from gatewayd.rtde.negotiation import Negotiation, Notice
 from gatewayd.rtde.pace import Pace, Statistics
 from gatewayd.rtde.recipe import Recipe, Scalar
+from gatewayd.rtde.session import TIMESTAMP, ClientSettings, Session
 from gatewayd.rtde.types import DataType
 
-__all__ = ["ClientHandler", "Connection", "Tolerances"]
+__all__ = ["ClientHandler", "Connection"]
 
 _TIMESTAMP = struct.Struct(">d")
 _FIRST_CLAIM_RETRY = 0.1
@@ -62,33 +62,10 @@ class ClientHandler(Protocol):
         """A probe was answered `delay` seconds after it was sent; infinity: it was not, within the handshake's time."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tolerances:
-    """How long a connection waits, in seconds, and how much it buffers, in bytes."""
-
-    handshake: float
-    """For each answer."""
-    data: float
-    """Between packages; five periods at least."""
-    first_data: float
-    """For the first package: until the safety set-up is confirmed a controller sends none."""
-    claim_retry: float
-    """Between attempts to claim inputs in use; the first ones come quicker."""
-    write_buffer: int
-    """Unsent bytes at which the connection is given up."""
-
-
 class Connection(asyncio.Protocol):
     """Sockets to negotiation and back. `done` becomes the loss, or the exception of a handler."""
 
-    def __init__(
-        self,
-        address: str,
-        wishes: Wishes,
-        tolerances: Tolerances,
-        handler: ClientHandler,
-        statistics: Statistics,
-    ) -> None:
+    def __init__(self, settings: ClientSettings, handler: ClientHandler, statistics: Statistics) -> None:
         loop = asyncio.get_running_loop()
         self.done: asyncio.Future[Loss] = loop.create_future()
         """How the connection ended."""
@@ -97,12 +74,11 @@ class Connection(asyncio.Protocol):
         self.started_at: float | None = None
         """When the set-up was complete."""
         self._loop = loop
-        self._address = address
-        self._tolerances = tolerances
+        self._settings = settings
         self._handler = handler
         self._statistics = statistics
         self._codec = ClientProtocol()
-        self._negotiation = Negotiation(wishes)
+        self._negotiation = Negotiation(settings)
         self._transport: asyncio.Transport | None = None
         self._complained = False
         self._lost = loop.create_future()
@@ -119,7 +95,7 @@ class Connection(asyncio.Protocol):
         self._clocked = False
         self._period = 0.0
         self._pace: Pace | None = None
-        self._patience = tolerances.first_data
+        self._patience = settings.first_data_timeout
         self._heard = 0.0
         self._measured = 0.0
 
@@ -158,13 +134,13 @@ class Connection(asyncio.Protocol):
         if question is None:
             return False
         self._probed_at = self._loop.time()
-        self._probe = self._loop.call_later(self._tolerances.handshake, self._probe_unanswered)
+        self._probe = self._loop.call_later(self._settings.handshake_timeout, self._probe_unanswered)
         self._write(question)
         return not self.done.done()
 
     def reconnect(self, text: str) -> None:
         """End the connection for a reason of the user's; what was sent is still delivered."""
-        self._conclude(Loss(LossReason.RECONNECT, f"{self._address}: {text}"))
+        self._conclude(Loss(LossReason.RECONNECT, f"{self._settings.address}: {text}"))
 
     async def pause(self) -> None:
         """Have the output paused; returns when the controller has answered or the connection is lost."""
@@ -203,7 +179,7 @@ class Connection(asyncio.Protocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """See asyncio.Protocol."""
         self._lost.set_result(None)
-        self._conclude(connection_failure(exc if isinstance(exc, OSError) else None, self._address))
+        self._conclude(connection_failure(exc if isinstance(exc, OSError) else None, self._settings.address))
 
     def _guarded(self, work: Callable[[], None]) -> None:
         """Do what calls handlers. asyncio would log their exceptions and go on; so `run` raises them."""
@@ -276,7 +252,7 @@ class Connection(asyncio.Protocol):
         if pace is None or not packages or self.done.done():
             return None
         self._heard = now
-        self._patience = max(self._tolerances.data, _PERIODS_OF_PATIENCE * self._period)
+        self._patience = max(self._settings.data_timeout, _PERIODS_OF_PATIENCE * self._period)
         (*older, newest), packages[:] = packages, ()
         try:
             values = self._outputs.unpack(newest.payload)
@@ -346,7 +322,7 @@ class Connection(asyncio.Protocol):
         assert transport is not None
         transport.write(self._codec.send(message))
         waiting = transport.get_write_buffer_size()
-        if waiting > self._tolerances.write_buffer:
+        if waiting > self._settings.write_buffer:
             self._fail(
                 LossReason.CONGESTED, f"the controller does not take what is sent: {waiting} bytes wait"
             )
@@ -354,7 +330,7 @@ class Connection(asyncio.Protocol):
     def _request(self, message: ExecutableMessage) -> None:
         self._write(message)
         self._asked_at = self._loop.time()
-        self._await(self._tolerances.handshake)
+        self._await(self._settings.handshake_timeout)
 
     def _await(self, seconds: float) -> None:
         self._disarm()
@@ -381,7 +357,9 @@ class Connection(asyncio.Protocol):
             self._fail(LossReason.SILENT, _silence(self._patience, first=self.session is None))
             return
         what = self._negotiation.awaited
-        self._fail(LossReason.UNANSWERED, f"{what} did not come within {self._tolerances.handshake:g} s")
+        self._fail(
+            LossReason.UNANSWERED, f"{what} did not come within {self._settings.handshake_timeout:g} s"
+        )
 
     def gap(self) -> None:
         """The process stood still until now: what the controller sent meanwhile is still to be read."""
@@ -398,11 +376,13 @@ class Connection(asyncio.Protocol):
         if self._pace is not None and now - self._measured >= _MEASURE_EVERY:
             self._pace.measure(now)
             self._measured = now
-        self._check = self._loop.call_later(min(self._tolerances.data / 4, _MEASURE_EVERY / 2), self._watch)
+        self._check = self._loop.call_later(
+            min(self._settings.data_timeout / 4, _MEASURE_EVERY / 2), self._watch
+        )
 
     def _schedule_retry(self) -> None:
         if self._retry is None and self._negotiation.claims.retriable and not self.done.done():
-            delay = min(self._retry_delay, self._tolerances.claim_retry)
+            delay = min(self._retry_delay, self._settings.claim_retry)
             self._retry_delay = 2 * delay
             self._retry = self._loop.call_later(delay, self._retry_claims)
 
@@ -425,7 +405,7 @@ class Connection(asyncio.Protocol):
         )
 
     def _fail(self, reason: LossReason, text: str) -> None:
-        self._conclude(Loss(reason, f"{self._address}: {text}"))
+        self._conclude(Loss(reason, f"{self._settings.address}: {text}"))
         if self._transport is not None:
             self._transport.abort()
 

@@ -21,27 +21,9 @@ from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.claims import Claims, HandshakeError, is_long, sort_types
 from gatewayd.rtde.reading import Reading
 from gatewayd.rtde.recipe import Recipe
-from gatewayd.rtde.session import (
-    TIMESTAMP,
-    TOO_LONG,
-    Session,
-    Unavailable,
-    Wishes,
-    input_hint,
-    output_hint,
-)
+from gatewayd.rtde.session import TOO_LONG, Session, Unavailable, Wishes, input_hint, output_hint
 
-__all__ = [
-    "TIMESTAMP",
-    "TOO_LONG",
-    "Negotiation",
-    "NextStep",
-    "Notice",
-    "Session",
-    "State",
-    "Unavailable",
-    "Wishes",
-]
+__all__ = ["Negotiation", "NextStep", "Notice", "State"]
 
 _RATE_V1 = 125
 _RATE_UNKNOWN = {True: 500, False: 125}

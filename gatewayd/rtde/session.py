@@ -5,12 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from gatewayd.report.format import address
 from gatewayd.rtde.catalogue import OUTPUTS, Series, likely_holders
 from gatewayd.rtde.claims import InputRecipe
 from gatewayd.rtde.messages import IN_USE, NOT_FOUND, ControllerVersion
 from gatewayd.rtde.recipe import Recipe, Scalar
+from gatewayd.rtde.types import DEFAULT_PORT
 
-__all__ = ["TIMESTAMP", "TOO_LONG", "Session", "Unavailable", "Wishes", "input_hint", "output_hint"]
+__all__ = [
+    "TIMESTAMP",
+    "TOO_LONG",
+    "ClientSettings",
+    "Session",
+    "Unavailable",
+    "Wishes",
+    "input_hint",
+    "output_hint",
+]
 
 TIMESTAMP = "timestamp"
 """The output that is always subscribed, first: it shows skipped and late packages, and a restarted controller."""
@@ -27,11 +38,14 @@ class Wishes:
     inputs: tuple[str, ...] = ()
     """Fields to claim."""
     watchdog: str | None = None
-    """Input field that gets a recipe of its own; need not be in `inputs`."""
+    """Input field that gets a recipe of its own, so that nothing else feeds it; need not be in `inputs`."""
     frequency: float = 0.0
-    """Output packages per second; 0: as many as the controller makes."""
+    """Packages per second; 0: the controller's own rate. The controller divides its rate by a whole number."""
     read_back: bool = True
-    """Subscribe the wanted `input_*` fields too, after the outputs, to go on reading them."""
+    """Subscribe the claimed `input_*` fields too, after the outputs, as far as the controller takes so long a list.
+
+    Else they are read right after they were claimed and not again.
+    """
     limited: bool = False
     """Send no list of names of more than `OLD_LIST_LIMIT` bytes: the controller does not take it."""
     running: bool = True
@@ -52,6 +66,35 @@ class Wishes:
             for name in self.wanted_inputs()
             if name.startswith("input_") and name in OUTPUTS and name not in self.outputs
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClientSettings(Wishes):
+    """Where the controller is, what is wanted of it, and how long to wait. Times in seconds."""
+
+    host: str
+    """Name or address."""
+    port: int = DEFAULT_PORT
+    connect_timeout: float = 2.0
+    handshake_timeout: float = 2.0
+    """For each answer of the set-up."""
+    data_timeout: float = 1.0
+    """Without a package while the output runs, five periods at least: the connection is taken for dead."""
+    first_data_timeout: float = 30.0
+    """The same before the first package: a controller whose safety set-up is unconfirmed sends none for a while."""
+    claim_retry: float = 1.0
+    """Between attempts to claim inputs that are in use; the first ones come quicker."""
+    backoff: float = 0.05
+    """Before the first new connection; doubles with each failure."""
+    backoff_limit: float = 2.0
+    """Longest wait before a new connection."""
+    write_buffer: int = 65536
+    """Unsent bytes at which a controller that does not read is given up."""
+
+    @property
+    def address(self) -> str:
+        """Host and port for reading."""
+        return address(self.host, self.port)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,1 +1,1 @@
-"""A Universal Robots controller to connect to: its RTDE interface, without a robot. Imports `gatewayd.rtde` only."""
+"""A Universal Robots controller to connect to: its RTDE interface, without a robot. It stands on `gatewayd.rtde`."""

@@ -10,6 +10,7 @@ import stat
 import sys
 from collections.abc import Awaitable, Callable
 
+from gatewayd.report.format import address
 from gatewayd.simulator.control import Control
 from gatewayd.simulator.server import SimulatedController
 
@@ -29,8 +30,7 @@ async def serve(simulator: SimulatedController, *, control: bool) -> None:
         loop.add_signal_handler(number, stop.set)
     async with simulator:
         reader = asyncio.create_task(_commands(Control(simulator), stop)) if control else None
-        host = f"[{simulator.host}]" if ":" in simulator.host else simulator.host
-        _say(f"listening on {host}:{simulator.port}", stop)
+        _say(f"listening on {address(simulator.host, simulator.port)}", stop)
         await stop.wait()
         if reader is not None:
             reader.cancel()

@@ -15,7 +15,9 @@ from gatewayd.core.cell import Cell
 from gatewayd.links.robot.plan import robot_of
 from gatewayd.links.robot.runtime import RobotLink
 from gatewayd.mapping.loader import load
-from gatewayd.rtde.client import ClientSettings, Loss, RtdeClient
+from gatewayd.rtde.client import RtdeClient
+from gatewayd.rtde.loss import Loss
+from gatewayd.rtde.session import ClientSettings
 
 __all__ = ["resident_kilobytes"]
 
@@ -40,8 +42,8 @@ class FastLink(RobotLink):
         super().__init__(robot_of(plan), self.cell)
         robot = robot_of(plan)
         settings = ClientSettings(
-            robot.host,
-            robot.port,
+            host=robot.host,
+            port=robot.port,
             outputs=robot.outputs,
             inputs=robot.inputs,
             handshake_timeout=0.05,

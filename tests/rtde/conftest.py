@@ -14,7 +14,9 @@ import pytest
 from gatewayd.rtde import client, messages
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
 from gatewayd.rtde.codec import ControllerProtocol
+from gatewayd.rtde.loss import Loss
 from gatewayd.rtde.recipe import Recipe, Scalar
+from gatewayd.rtde.session import ClientSettings, Session
 from gatewayd.rtde.types import DataType
 
 Connected = Callable[..., AbstractAsyncContextManager[tuple[client.RtdeClient, "Notebook"]]]
@@ -218,9 +220,9 @@ class Notebook:
     """A handler that keeps what it is told."""
 
     def __init__(self) -> None:
-        self.sessions: list[client.Session] = []
-        self.changes: list[client.Session] = []
-        self.losses: list[client.Loss] = []
+        self.sessions: list[Session] = []
+        self.changes: list[Session] = []
+        self.losses: list[Loss] = []
         self.texts: list[messages.TextMessage] = []
         self.delays: list[float] = []
         self.packages: list[tuple[Scalar, ...]] = []
@@ -228,7 +230,7 @@ class Notebook:
         """Names of the calls about sessions, packages and inputs, in their order."""
         self.client: client.RtdeClient | None = None
 
-    def session_started(self, session: client.Session) -> None:
+    def session_started(self, session: Session) -> None:
         self.sessions.append(session)
         self.calls.append("session_started")
 
@@ -237,11 +239,11 @@ class Notebook:
         self.packages.append(values)
         self.calls.append("values")
 
-    def inputs_changed(self, session: client.Session) -> None:
+    def inputs_changed(self, session: Session) -> None:
         self.changes.append(session)
         self.calls.append("inputs_changed")
 
-    def session_lost(self, loss: client.Loss) -> None:
+    def session_lost(self, loss: Loss) -> None:
         self.losses.append(loss)
         self.calls.append("session_lost")
 
@@ -286,7 +288,7 @@ def connected(controller: Controller) -> Connected:
     @asynccontextmanager
     async def run(**settings: Any) -> AsyncIterator[tuple[client.RtdeClient, Notebook]]:
         notebook = Notebook()
-        wanted = client.ClientSettings(**{"host": "127.0.0.1", "port": controller.port, **settings})
+        wanted = ClientSettings(**{"host": "127.0.0.1", "port": controller.port, **settings})
         one = client.RtdeClient(wanted, notebook)
         task = asyncio.create_task(one.run())
         try:

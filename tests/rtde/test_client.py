@@ -8,7 +8,7 @@ import pytest
 
 from gatewayd.rtde import messages
 from gatewayd.rtde.catalogue import Series
-from gatewayd.rtde.client import LossReason
+from gatewayd.rtde.loss import LossReason
 from tests.rtde.conftest import send
 
 if TYPE_CHECKING:

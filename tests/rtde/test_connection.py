@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from gatewayd.rtde import messages
-from gatewayd.rtde.client import ClientSettings, LossReason, RtdeClient
+from gatewayd.rtde.client import RtdeClient
+from gatewayd.rtde.loss import LossReason
+from gatewayd.rtde.session import ClientSettings
 from tests.rtde.conftest import send
 
 if TYPE_CHECKING:
@@ -238,7 +240,7 @@ async def test_an_exception_of_a_handler_ends_the_client(error: Exception, contr
 
     handler: Any = Failing()
     with pytest.raises(type(error), match="a bug"):
-        await RtdeClient(ClientSettings("127.0.0.1", controller.port), handler).run()
+        await RtdeClient(ClientSettings(host="127.0.0.1", port=controller.port), handler).run()
 
 
 async def test_pausing_ends_with_the_connection(

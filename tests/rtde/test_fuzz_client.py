@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from gatewayd.rtde.client import LossReason
+from gatewayd.rtde.loss import LossReason
 from tests.rtde.conftest import send
 
 if TYPE_CHECKING:

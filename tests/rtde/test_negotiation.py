@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.claims import HandshakeError
-from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice, State, Wishes
+from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice, State
+from gatewayd.rtde.session import Wishes
 from tests.rtde.pure_controller import PureController
 
 E_SERIES = m.ControllerVersion(5, 12, 0, 1101)

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.catalogue import INPUTS
 from gatewayd.rtde.claims import OLD_LIST_LIMIT, REGISTERS_KEY
-from gatewayd.rtde.negotiation import Negotiation, Notice, State, Wishes
+from gatewayd.rtde.negotiation import Negotiation, Notice, State
 from gatewayd.rtde.reading import Reading, fitting
 from gatewayd.rtde.recipe import Recipe
-from gatewayd.rtde.session import Session
+from gatewayd.rtde.session import Session, Wishes
 from gatewayd.rtde.types import DataType
 from tests.rtde.pure_controller import Conversation, PureController
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from gatewayd.rtde.catalogue import Series
-from gatewayd.rtde.client import LossReason
+from gatewayd.rtde.loss import LossReason
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import Faults
 from gatewayd.simulator.server import SimulatedController

@@ -29,8 +29,10 @@ from gatewayd.loop import clock
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address
 from gatewayd.rtde.claims import WATCHDOG_KEY
-from gatewayd.rtde.client import ClientSettings, Loss, LossReason, RtdeClient, Session
+from gatewayd.rtde.client import RtdeClient
+from gatewayd.rtde.loss import Loss, LossReason
 from gatewayd.rtde.messages import TextMessage
+from gatewayd.rtde.session import ClientSettings, Session
 
 __all__ = ["LAST_WORDS", "LOSS_INTERVAL", "RUNTIME", "RobotLink"]
 
@@ -58,8 +60,8 @@ class RobotLink(SourceLink):
         watchdog, variables = plan.watchdog, cell.definition.variables
         self._client = RtdeClient(
             ClientSettings(
-                plan.host,
-                plan.port,
+                host=plan.host,
+                port=plan.port,
                 outputs=all_outputs(plan.outputs, variables),
                 inputs=all_inputs(plan.inputs, variables),
                 watchdog=watchdog.field if watchdog is not None else None,
@@ -97,7 +99,7 @@ class RobotLink(SourceLink):
     def health(self) -> LinkHealth:
         """The session; how fresh what it brings is, the cell knows."""
         where = address(self._plan.host, self._plan.port)
-        trouble = self._loss_reported[0].removeprefix(f"{self._plan.host}:{self._plan.port}: ")
+        trouble = self._loss_reported[0].removeprefix(f"{where}: ")
         figures = {"address": where, "trouble": trouble, "watchdog": self._watchdog_fed()}
         if self._client.session is not None:
             return LinkHealth("Robot", Level.GOOD, "connected", where, figures=figures)
@@ -280,9 +282,9 @@ class RobotLink(SourceLink):
         reported, at = self._loss_reported
         if not loss.started and (loss.text != reported or now - at >= LOSS_INTERVAL):
             self._loss_reported = (loss.text, now)
-            address = f"{self._plan.host}:{self._plan.port}"
+            where = address(self._plan.host, self._plan.port)
             log.warning(
-                "no robot", extra=fields(cell=self._cell.definition.name, robot=address, reason=loss.text)
+                "no robot", extra=fields(cell=self._cell.definition.name, robot=where, reason=loss.text)
             )
 
     def probed(self, delay: float) -> None:

@@ -6,8 +6,8 @@ from gatewayd.core.definition import Direction, ValueKind, Variable
 from gatewayd.links.robot.availability import unavailable
 from gatewayd.rtde.claims import REGISTERS_KEY, InputRecipe
 from gatewayd.rtde.messages import ControllerVersion
-from gatewayd.rtde.negotiation import Session, Unavailable
 from gatewayd.rtde.recipe import Recipe
+from gatewayd.rtde.session import Session, Unavailable
 from gatewayd.rtde.types import DataType
 
 INT32 = (-(2**31), 2**31 - 1)
