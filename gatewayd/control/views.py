@@ -14,7 +14,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import OPERATOR, Direction, Fallback, FallbackKind
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality
-from gatewayd.links.contract import Description, Place
+from gatewayd.links.contract import Description
 from gatewayd.links.registry import kind_of, kinds
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.event_text import EventRecord
@@ -76,7 +76,7 @@ def declare(plan: Plan) -> Declared:
     """What the plan says."""
     links = described(plan)
     variables = tuple(
-        _declaration(plan, index) | _places(links, index) for index in range(len(plan.cell.variables))
+        _declaration(plan, index) | _places(plan, links, index) for index in range(len(plan.cell.variables))
     )
     return Declared(plan, links, variables)
 
@@ -100,13 +100,14 @@ def _declaration(plan: Plan, index: int) -> Json:
     return cast("Json", found)
 
 
-def _places(links: Mapping[str, Description], index: int) -> Json:
-    found: Json = {}
-    for kind in kinds():
+def _places(plan: Plan, links: Mapping[str, Description], index: int) -> Json:
+    """By name of the link, and at the key of each kind that has places."""
+    found: Json = {kind.key: None if kind.has_one_place else [] for kind in kinds() if kind.place}
+    for name, link in links.items():
+        kind = kind_of(plan.links[name].kind)
         if kind.place:
-            its: list[Place] = list(links[kind.key].places.get(index, ())) if kind.key in links else []
-            places = [place.fields for place in its]
-            found[kind.key] = (places[0] if places else None) if kind.has_one_place else places
+            places = [place.fields for place in link.places.get(index, ())]
+            found[name] = (places[0] if places else None) if kind.has_one_place else places
     return found
 
 
@@ -121,7 +122,7 @@ def cell_view(served: ServedCell, declared: Declared, now: float) -> Json:
         fingerprint=f"{definition.fingerprint:08X}",
         healthy=verdict.healthy,
         problems=list(verdict.problems),
-        links=[_link(name, verdict, declared.links[name]) for name in declared.links],
+        links=[_link(name, verdict, declared) for name in declared.links],
         writers=[_writer(cell, index, now) for index in range(len(definition.writers))],
         variables={"total": len(quality)} | {its.name.lower(): quality.count(its) for its in Quality},
         locks={
@@ -137,12 +138,12 @@ def cell_view(served: ServedCell, declared: Declared, now: float) -> Json:
     return {**found, **_objects_of_links(served, declared, now)}
 
 
-def _link(name: str, verdict: CellVerdict, description: Description) -> LinkStatus:
+def _link(name: str, verdict: CellVerdict, declared: Declared) -> LinkStatus:
     part: PicturePart = verdict.links.get(name, verdict.robot)
     return LinkStatus(
         name=name,
-        title=kind_of(name).title,
-        address=description.address,
+        title=kind_of(declared.plan.links[name].kind).title,
+        address=declared.links[name].address,
         level=part.level.name.lower(),
         words=part.words,
         detail=part.detail,
@@ -150,17 +151,15 @@ def _link(name: str, verdict: CellVerdict, description: Description) -> LinkStat
 
 
 def _objects_of_links(served: ServedCell, declared: Declared, now: float) -> Json:
-    """What each kind of link promises (`LinkKind.fields`); null where the cell has none of it."""
-    found: Json = {}
-    for kind in kinds():
-        link = served.links.get(kind.key)
-        if link is None:
-            found[kind.key] = None
-            continue
-        known = {**declared.links[kind.key].fields, **link.health().figures}
+    """What its kind promises of each link (`LinkKind.fields`), by name; null at the keys of kinds that name none."""
+    found: Json = {kind.key: None for kind in kinds()}
+    for name, description in declared.links.items():
+        link = served.links[name]
+        known = {**description.fields, **link.health().figures}
         if link is served.source:
             known |= _source(served.cell, now)
-        found[kind.key] = {name: known.get(name) for name in kind.fields}
+        kind = kind_of(declared.plan.links[name].kind)
+        found[name] = {field: known.get(field) for field in kind.fields}
     return found
 
 

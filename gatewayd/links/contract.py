@@ -46,7 +46,10 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class LinkMetric:
-    """A gauge or counter (`..._total`) with one sample for each link, whose cell is its label."""
+    """A gauge or counter (`..._total`) with one sample for each link, whose cell is its label.
+
+    A link that is not named as its kind has its name in one more label, `link`.
+    """
 
     name: str
     figure: str
@@ -285,7 +288,7 @@ class Context:
     shared: SharedPart | None = None
     """What the kind shares, as `LinkRuntime.share` made it."""
     former: Link | None = None
-    """The link that this one replaces, whose `run` has ended or will have before this one's begins."""
+    """The link of this name, maybe of another kind, whose `run` has ended or will have before this one's begins."""
 
 
 class LinkRuntime:

@@ -39,8 +39,14 @@ LINK_KINDS = (
 @cache
 def kinds() -> tuple[LinkKind, ...]:
     """All kinds, in order."""
-    found = (import_module(f"{package}.declaration").KIND for package in LINK_KINDS)
-    return tuple(kind for kind in found if isinstance(kind, LinkKind))
+    return tuple(map(_kind_in, LINK_KINDS))
+
+
+def _kind_in(package: str) -> LinkKind:
+    kind = import_module(f"{package}.declaration").KIND
+    if not isinstance(kind, LinkKind):
+        raise TypeError(f"{package}.declaration.KIND is no LinkKind")
+    return kind
 
 
 @cache

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 from gatewayd.core.definition import CellDefinition
 
@@ -23,6 +23,8 @@ class LinkPlan:
     """
 
     __slots__ = ()
+    kind: ClassVar[str]
+    """Key of the kind of link that makes links of it."""
 
 
 _LinkPlan = TypeVar("_LinkPlan", bound=LinkPlan)
@@ -36,7 +38,7 @@ class Plan:
     """Path of the mapping file as given."""
     cell: CellDefinition
     links: Mapping[str, LinkPlan] = field(default_factory=dict)
-    """By name of the link: the key of its section."""
+    """By name of the link; one that a section of its own declares has the key of that."""
 
     def of(self, kind: type[_LinkPlan]) -> dict[str, _LinkPlan]:
         """The links of one kind by name."""

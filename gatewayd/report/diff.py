@@ -233,15 +233,19 @@ def _cuts_owners_off(changes: Changes, owned: Collection[str]) -> Iterator[str]:
 
 
 def _moved(changes: Changes, link: str) -> Iterable[str]:
-    old = changes.old.links.get(link)
-    return () if old is None else kind_of(link).moved(old, changes.new.links.get(link, old))
+    old, new = changes.old.links.get(link), changes.new.links.get(link)
+    if old is None:
+        return ()
+    return kind_of(old.kind).moved(old, new if new is not None and new.kind == old.kind else old)
 
 
 def _disturbed(changes: Changes) -> Iterator[str]:
     """What the links object to themselves."""
     old, new = changes.old, changes.new
-    for name in old.links.keys() & new.links.keys():
-        yield from kind_of(name).disturbs(old.links[name], new.links[name], old.cell, new.cell)
+    for name, link in old.links.items():
+        successor = new.links.get(name)
+        if successor is not None and successor.kind == link.kind:
+            yield from kind_of(link.kind).disturbs(link, successor, old.cell, new.cell)
 
 
 def _members(plan: Plan, group: str) -> set[str]:

@@ -28,8 +28,9 @@ _BIT_WORD = re.compile(r"(input|output)_bit_registers(\d+)_to_\d+")
 
 def described(plan: Plan) -> dict[str, Description]:
     """What each link says of itself, by name, in the order of their kinds."""
-    names = sorted(plan.links, key=[kind.key for kind in kinds()].index)
-    return {name: kind_of(name).describe(plan.links[name], plan.cell) for name in names}
+    order = [kind.key for kind in kinds()]
+    links = sorted(plan.links.items(), key=lambda named: order.index(named[1].kind))
+    return {name: kind_of(link.kind).describe(link, plan.cell) for name, link in links}
 
 
 def variables(plan: Plan) -> dict[str, Facts]:

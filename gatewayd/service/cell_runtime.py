@@ -25,9 +25,9 @@ class CellRuntime:
         plan: Plan,
         state: Path,
         now: float,
-        shared: Callable[[str], SharedPart | None] = lambda _name: None,
+        shared: Callable[[str], SharedPart | None] = lambda _kind: None,
     ) -> None:
-        """`state`: directory of what the cell keeps across restarts; `shared`: what the links of a kind share."""
+        """`state`: directory of what the cell keeps across restarts; `shared`: what links share, by their kind."""
         self.plan = plan
         self._state = state
         self._shared = shared
@@ -45,6 +45,10 @@ class CellRuntime:
         found = [link.reachable for link in self.links.values() if link.reachable is not None]
         return any(found) or not found
 
+    def of_kind(self, kind: str) -> list[Link]:
+        """Its links of one kind."""
+        return [link for name, link in self.links.items() if self.plan.links[name].kind == kind]
+
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`: the cell judges the time first, then its links."""
         self.cell.gap(since, now)
@@ -59,9 +63,8 @@ class CellRuntime:
             if name not in staying:
                 link.release(now)
         succession = self._hand_over(plan.cell, now)
-        self.plan = plan
+        self.plan, self.links = plan, {}
         self.cell = self._set_up(succession.cell)
-        self.links = {}
         for name, link_plan in plan.links.items():
             if name in staying:
                 former[name].rebind(link_plan, self.cell, now)
@@ -90,9 +93,11 @@ class CellRuntime:
         return cell
 
     def _make(self, name: str, now: float, former: Link | None = None) -> Link:
-        context = Context(now, self._state, self._shared(name), former)
-        return runtime_of(name).make(self.plan.links[name], self.cell, context)
+        plan = self.plan.links[name]
+        context = Context(now, self._state, self._shared(plan.kind), former)
+        return runtime_of(plan.kind).make(plan, self.cell, context)
 
 
 def _fits(name: str, before: Plan, after: Plan) -> bool:
-    return kind_of(name).fits(before.links[name], after.links[name], before.cell, after.cell)
+    old, new = before.links[name], after.links[name]
+    return old.kind == new.kind and kind_of(new.kind).fits(old, new, before.cell, after.cell)

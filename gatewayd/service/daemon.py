@@ -65,11 +65,12 @@ class Daemon:
         """A counter for each part that has to go on: shared parts, cores, links. 0: it has not begun."""
         found = self.shared.progress()
         for runtime in self.runtimes:
-            name = runtime.plan.cell.name
-            found[f"core of {name}"] = runtime.cell.health.heartbeat
-            for link in runtime.links.values():
+            cell = runtime.plan.cell.name
+            found[f"core of {cell}"] = runtime.cell.health.heartbeat
+            for name, link in runtime.links.items():
                 if link.progress is not None:
-                    found[f"{link.title} of {name}"] = link.progress + self._rests[link]
+                    own_name = "" if name == runtime.plan.links[name].kind else f" {name}"
+                    found[f"{link.title}{own_name} of {cell}"] = link.progress + self._rests[link]
         return found
 
     def troubles(self) -> list[str]:

@@ -31,16 +31,16 @@ class AllPrepared:
 
 
 class SharedParts:
-    """The parts by name of the links; made when the first link of a kind is."""
+    """The parts by key of the kind; made when the first link of a kind is."""
 
     def __init__(self) -> None:
         self._parts: dict[str, SharedPart | None] = {}
 
-    def of(self, name: str) -> SharedPart | None:
-        """What the links of this name share; None: nothing."""
-        if name not in self._parts:
-            self._parts[name] = runtime_of(name).share()
-        return self._parts[name]
+    def of(self, kind: str) -> SharedPart | None:
+        """What the links of this kind share; None: nothing."""
+        if kind not in self._parts:
+            self._parts[kind] = runtime_of(kind).share()
+        return self._parts[kind]
 
     def __iter__(self) -> Iterator[SharedPart]:
         return (part for part in self._parts.values() if part is not None)
@@ -56,8 +56,8 @@ class SharedParts:
     async def prepare(self, plans: Sequence[Plan]) -> AllPrepared:
         """Have ready what these plans need. Raises PrepareError, and nothing has changed."""
         for plan in plans:
-            for name in plan.links:
-                self.of(name)
+            for link in plan.links.values():
+                self.of(link.kind)
         found = AllPrepared()
         try:
             for part in self:
@@ -69,10 +69,9 @@ class SharedParts:
 
     def serve(self, runtimes: Sequence[CellRuntime], successors: Mapping[Cell, Cell]) -> None:
         """Serve the links of these cells, and no others."""
-        for name, part in self._parts.items():
+        for kind, part in self._parts.items():
             if part is not None:
-                links = [runtime.links[name] for runtime in runtimes if name in runtime.links]
-                part.serve(links, successors)
+                part.serve([link for runtime in runtimes for link in runtime.of_kind(kind)], successors)
 
     async def close(self) -> None:
         """Take nothing more."""

@@ -207,6 +207,8 @@ PROCESS_METRICS = {
 """What prometheus-client tells of the process itself."""
 
 _INFO = {info.name: info for info in METRICS}
+LINK_LABEL = "link"
+"""Behind all others, the name of a link that is not called as its kind: a cell may have several of that."""
 _Sample = tuple[tuple[str, ...], float]
 _LEVELS = {False: 0.0, True: 1.0}
 
@@ -317,14 +319,16 @@ def _owners(cell: Cell) -> dict[str, list[_Sample]]:
 def _links(runtime: CellRuntime) -> dict[str, list[_Sample]]:
     found: dict[str, list[_Sample]] = {}
     for name, link in runtime.links.items():
-        figures = link.health().figures
-        for metric in kind_of(name).metrics:
+        figures, kind = link.health().figures, kind_of(runtime.plan.links[name].kind)
+        for metric in kind.metrics:
             first = str(figures[metric.shared[1]]) if metric.shared else runtime.cell.definition.name
+            own_name = () if metric.shared or name == kind.key else (name,)
             value = figures.get(metric.figure)
+            samples = found.setdefault(metric.name, [])
             if isinstance(value, Mapping):
-                found[metric.name] = [((first, label), number) for label, number in value.items()]
+                samples += (((first, label, *own_name), number) for label, number in value.items())
             elif isinstance(value, int | float):
-                found[metric.name] = [((first,), float(value))]
+                samples.append(((first, *own_name), float(value)))
     return found
 
 
@@ -342,7 +346,8 @@ def _family(info: MetricInfo, samples: Iterable[_Sample] = ()) -> Metric:
     if info.kind is MetricKind.HISTOGRAM:
         return HistogramMetricFamily(info.name, info.meaning, labels=info.labels)
     make = CounterMetricFamily if info.kind is MetricKind.COUNTER else GaugeMetricFamily
-    family = make(info.name, info.meaning, labels=info.labels)
+    # Samples that have no further value have no such label either.
+    family = make(info.name, info.meaning, labels=(*info.labels, LINK_LABEL))
     for labels, value in samples:
         family.add_metric(list(map(printable, labels)), value)
     return family

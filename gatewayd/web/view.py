@@ -85,7 +85,8 @@ def layout(runtime: CellRuntime) -> dict[str, object]:
     return {
         "cell": definition.name,
         "fingerprint": _fingerprint(runtime.cell),
-        **{kind.key: links.get(kind.key) for kind in kinds()},
+        **{kind.key: None for kind in kinds()},
+        **links,
         "robot": next(link.address for name, link in declared.links.items() if name not in links),
         "writers": [{"name": writer.name, "timeout": writer.timeout} for writer in definition.writers],
         "locks": [_lock(lock, runtime.cell) for lock in definition.locks],

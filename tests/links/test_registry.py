@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+from inspect import getmembers, isclass
+
+import pytest
+
 from gatewayd.core.status_layout import FIELDS, HEADER_WORDS
 from gatewayd.links.registry import LINK_KINDS, kind_of, kinds, status_fields
+from gatewayd.mapping.plan import LinkPlan
 
 
 def test_every_package_has_a_kind_with_a_key_of_its_own() -> None:
@@ -25,3 +31,17 @@ def test_kinds_have_metrics_of_their_own() -> None:
     names = [metric.name for kind in kinds() for metric in kind.metrics]
     assert len(names) == len(set(names))
     assert all(name.startswith("gatewayd_") for name in names)
+
+
+def test_plans_know_their_kind() -> None:
+    for package, kind in zip(LINK_KINDS, kinds(), strict=True):
+        module = import_module(f"{package}.plan")
+        found = [its for _, its in getmembers(module, isclass) if its.__module__ == module.__name__]
+        assert [plan.kind for plan in found if issubclass(plan, LinkPlan)] == [kind.key]
+
+
+def test_a_kind_that_is_none_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gatewayd.links.robot.declaration.KIND", "robot")
+    kinds.cache_clear()
+    with pytest.raises(TypeError, match=r"gatewayd\.links\.robot\.declaration\.KIND is no LinkKind"):
+        kinds()

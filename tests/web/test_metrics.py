@@ -13,6 +13,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from gatewayd.core.cell import Cell
 from gatewayd.links.contract import Link, LinkHealth
 from gatewayd.mapping.loader import load
+from gatewayd.mapping.plan import LinkPlan
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS, Exposition, MetricKind
@@ -103,10 +104,14 @@ def test_the_local_operator_owns_under_a_name(probes: Probes, cell: Cell) -> Non
 
 
 def test_counters_of_a_can_node_are_told_by_name(probes: Probes, runtime: CellRuntime) -> None:
+    class NodePlan(LinkPlan):
+        kind = "canopen"
+
     class Node(Link):
         def health(self) -> LinkHealth:
             return LinkHealth(figures={"bus_state": 6, "counters": {"received": 5, "overruns": 1}})
 
+    runtime.plan = runtime.plan.with_links(canopen=NodePlan())
     runtime.links["canopen"] = Node()
     samples = read(probes)
     assert one(samples, "gatewayd_can_total", cell="press", counter="received") == 5

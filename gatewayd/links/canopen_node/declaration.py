@@ -26,7 +26,7 @@ def _numbered(names: Iterable[tuple[int, str]]) -> str:
 class CanopenNode(LinkKind):
     """The kind with the section `canopen`."""
 
-    key = "canopen"
+    key = CanopenPlan.kind
     title = "CANopen node"
     fields = {  # noqa: RUF012 - never changed
         "channel": "interface:channel of the bus",

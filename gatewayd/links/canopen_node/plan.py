@@ -72,6 +72,8 @@ class PdoPlan:
 class CanopenPlan(LinkPlan):
     """One node on one bus."""
 
+    kind = "canopen"
+
     interface: str
     """Interface of python-can; `socketcan` has a path of its own."""
     channel: str

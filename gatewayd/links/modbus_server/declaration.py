@@ -17,7 +17,7 @@ __all__ = ["KIND"]
 class ModbusServer(LinkKind):
     """The kind with the section `modbus`."""
 
-    key = "modbus"
+    key = ModbusPlan.kind
     title = "Modbus TCP server"
     usual = True
     fields = {  # noqa: RUF012 - never changed

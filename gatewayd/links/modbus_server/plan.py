@@ -38,6 +38,8 @@ class Placement:
 class ModbusPlan(LinkPlan):
     """One unit on one listener."""
 
+    kind = "modbus"
+
     host: str
     port: int
     unit: int

@@ -17,7 +17,7 @@ __all__ = ["KIND"]
 class RobotKind(LinkKind):
     """The kind with the section `robot`."""
 
-    key = "robot"
+    key = RobotPlan.kind
     title = "Universal Robots controller"
     usual = True
     fields = {  # noqa: RUF012 - never changed

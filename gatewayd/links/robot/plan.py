@@ -24,6 +24,8 @@ class WatchdogPlan:
 class RobotPlan(LinkPlan):
     """How to reach the controller and what to ask of it."""
 
+    kind = "robot"
+
     host: str
     port: int
     frequency: float
@@ -39,4 +41,4 @@ class RobotPlan(LinkPlan):
 
 def robot_of(plan: Plan) -> RobotPlan:
     """The controller of a cell."""
-    return plan.of(RobotPlan)["robot"]
+    return plan.the(RobotPlan)

@@ -264,3 +264,39 @@ def test_the_watchdog_looks_after_it(served: Served) -> None:
     words = ["env", "-C", served.tree, sys.executable, "-c", program, served.file, served.file.parent]
     names = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=True).stdout
     assert "lines link of press" in names.splitlines()
+
+
+def test_a_cell_has_two_of_it(tree: Path, tmp_path: Path) -> None:
+    """Links go by their names, and each knows its kind; one is moved by a reload, the other stays."""
+    program = shutil.copy(HERE / "two_links.py", tree)
+    ports = {name: free_port() for name in ("robot", "modbus", "listen", "to")}
+    file = mapping(tmp_path / "press.yaml", VARIABLES, **ports)
+    words = ["env", "-C", tree, sys.executable, program, file, tmp_path, free_port(), free_port()]
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    before, after = found["before"], found["after"]
+    status = before["status"]
+    assert [link["name"] for link in status["links"]] == ["robot", "modbus", "left", "right"]
+    assert {link["title"] for link in status["links"][2:]} == {"JSON lines over UDP"}
+    assert status["lines"] is None
+    assert status["left"]["sent"] > status["right"]["sent"] > 0
+    assert before["variable"]["left"] == before["variable"]["right"] == {"name": "speed"}
+    assert before["page"]["lines"] is None
+    assert before["page"]["left"]["listen"] != before["page"]["right"]["listen"]
+    assert [place for place in before["places"] if place[1] == "speed"] == [
+        ["left", "speed"],
+        ["right", "speed"],
+    ]
+    outwards = [line.rpartition(" ")[0] for line in before["metrics"] if 'direction="out"' in line]
+    assert outwards == [
+        f'gatewayd_lines_total{{cell="press",direction="out",link="{name}"}}' for name in ("left", "right")
+    ]
+    assert {"lines link left of press", "lines link right of press"} < before["progress"].keys()
+    assert "~ right: " in found["diff"]
+    assert "left" not in found["diff"]
+    assert sum("lines would go to" in text for text in found["objections"]) == 1
+    assert any(text.startswith("right would move while `speed` is owned") for text in found["objections"])
+    assert after["ids"]["left"] == before["ids"]["left"]
+    assert after["ids"]["right"] != before["ids"]["right"]
+    assert after["progress"]["lines link right of press"] == 0

@@ -18,7 +18,7 @@ __all__ = ["KIND"]
 class UdpLines(LinkKind):
     """The kind with the section `lines`."""
 
-    key = "lines"
+    key = LinesPlan.kind
     title = "JSON lines over UDP"
     fields = {"listen": "host:port of the socket", "to": "who gets the lines", "sent": "lines sent"}  # noqa: RUF012
     place = "name that the lines have for it, or null"

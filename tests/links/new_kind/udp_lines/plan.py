@@ -13,6 +13,8 @@ __all__ = ["LinesPlan"]
 class LinesPlan(LinkPlan):
     """One socket of one cell."""
 
+    kind = "lines"
+
     listen: tuple[str, int]
     to: tuple[str, int]
     period: float
