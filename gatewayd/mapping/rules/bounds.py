@@ -18,9 +18,9 @@ MAX_WRITERS = 32
 """The status block has a record for so many."""
 
 
-@cell_rule("GW119", "too-many", "more variables or writers than one cell can hold")
+@cell_rule("GW119")
 def too_many(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """The first variable and the first writer beyond the limit."""
+    """More variables or writers than one cell can hold."""
     if len(cell.variables) > MAX_VARIABLES:
         variable = cell.variables[MAX_VARIABLES]
         message = (
@@ -36,9 +36,9 @@ def too_many(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(writers[MAX_WRITERS].key, message, hint=hint)
 
 
-@plant_rule("GW124", "duplicate-cell", "two files describe a cell of the same name")
+@plant_rule("GW124")
 def duplicate_cell(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """Equal names of cells."""
+    """Two files describe a cell of the same name."""
     first: dict[str, ExpandedCell] = {}
     for cell in cells:
         name = cell.document.cell
@@ -49,9 +49,9 @@ def duplicate_cell(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagno
             yield rule.at(cell.document.at("cell"), message, hint="rename one of the two", related=related)
 
 
-@cell_rule("GW221", "unmapped-variable", "a variable that no fieldbus can see", Severity.WARNING)
+@cell_rule("GW221", Severity.WARNING)
 def unmapped_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Lines without a place by any kind of link."""
+    """A variable that no fieldbus can see."""
     examples = alternatives([language.place_example for language in languages() if language.place_example])
     for part in cell.document.variables.values():
         if not any(language.places_of(part, cell.document) for language in languages()):

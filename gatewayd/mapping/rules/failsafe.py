@@ -37,9 +37,9 @@ _MOTION_WORDS = frozenset(
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
 
 
-@cell_rule("GW601", "fallback-outside-limits", "a fallback value outside the limits")
+@cell_rule("GW601")
 def fallback_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`on_release` values beyond `limits`."""
+    """A fallback value outside the limits."""
     for variable in _lines(cell):
         limits, value = variable.spec.limits, variable.spec.on_release.value
         if limits is None or value is None or isinstance(value, bool) or limits[0] > limits[1]:
@@ -54,9 +54,9 @@ def fallback_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
             yield rule.at(variable.at("on_release"), message, hint=hint, related=related)
 
 
-@cell_rule("GW602", "fallback-type", "a fallback value that the variable cannot have")
+@cell_rule("GW602")
 def fallback_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Fallback values of another type or beyond the type's range."""
+    """A fallback value that the variable cannot have."""
     for variable in _lines(cell):
         for key, fallback in (
             ("on_release", variable.spec.on_release),
@@ -85,9 +85,9 @@ def _mismatch(variable: ExpandedVariable, value: float) -> str | None:
     return None if fits else f"a whole number from {variable.low} to {variable.high}"
 
 
-@cell_rule("GW603", "held-motion", "a motion command that stays on when its owner is lost", Severity.WARNING)
+@cell_rule("GW603", Severity.WARNING)
 def held_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`hold` at motion commands without supervision."""
+    """A motion command that stays on when its owner is lost."""
     for variable, silent in silent_motion(cell):
         if variable.spec.on_release.kind is FallbackKind.HOLD:
             message = (
@@ -97,9 +97,9 @@ def held_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.at("on_release"), message, hint=hint)
 
 
-@cell_rule("GW604", "unsupervised-motion", "a motion command whose owner nobody supervises", Severity.WARNING)
+@cell_rule("GW604", Severity.WARNING)
 def unsupervised_motion(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Motion commands without supervision whose fallback would stop the motion."""
+    """A motion command whose owner nobody supervises."""
     for variable, silent in silent_motion(cell):
         if variable.spec.on_release.kind is not FallbackKind.HOLD:
             writer = cell.document.writers[silent]
@@ -125,9 +125,9 @@ def _is_motion(variable: ExpandedVariable) -> bool:
     return variable.moves or not words.isdisjoint(_MOTION_WORDS)
 
 
-@cell_rule("GW605", "policy-of-other-side", "on_stale or valid at an input, or on_release at an output")
+@cell_rule("GW605")
 def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Policies that belong to the other direction."""
+    """On_stale or valid at an input, or on_release at an output."""
     policies = {key: what for one in languages() for key, what in one.output_policies.items()}
     for variable in _lines(cell):
         is_input = variable.direction is Direction.INPUT
@@ -144,9 +144,9 @@ def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
                 yield rule.at(variable.part.key_at(key), message, hint=f"remove `{key}`: {what}")
 
 
-@cell_rule("GW608", "limits-inverted", "limits that no value can satisfy")
+@cell_rule("GW608")
 def limits_inverted(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Limits with the least not below the greatest."""
+    """Limits that no value can satisfy."""
     for variable in _lines(cell):
         limits = variable.spec.limits
         if limits is not None and limits[0] >= limits[1]:
@@ -156,9 +156,9 @@ def limits_inverted(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.at("limits"), message, hint=hint)
 
 
-@cell_rule("GW609", "limits-outside-type", "limits beyond what the robot's register can hold")
+@cell_rule("GW609")
 def limits_outside_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Limits of integers beyond their type."""
+    """Limits beyond what the robot's register can hold."""
     for variable in _lines(cell):
         limits = variable.spec.limits
         if limits is None or variable.low is None or variable.high is None:
@@ -174,9 +174,9 @@ def limits_outside_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             )
 
 
-@cell_rule("GW610", "limits-without-effect", "limits where nothing can be limited")
+@cell_rule("GW610")
 def limits_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Limits of bits, and clamping of outputs."""
+    """Limits where nothing can be limited."""
     for variable in _lines(cell):
         if variable.kind is ValueKind.BOOL and variable.spec.limits is not None:
             message = f"`{variable.part.name}` is a bit ({variable.target}) and has limits"
@@ -186,9 +186,9 @@ def limits_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
             yield rule.at(variable.part.key_at("clamp"), message, hint="remove `clamp`")
 
 
-@cell_rule("GW611", "clear-outside-limits", "a fallback of zero that the limits exclude", Severity.WARNING)
+@cell_rule("GW611", Severity.WARNING)
 def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`clear` at inputs whose limits exclude 0."""
+    """A fallback of zero that the limits exclude."""
     for variable in _lines(cell):
         limits = variable.spec.limits
         if variable.direction is Direction.OUTPUT or variable.kind is ValueKind.BOOL or limits is None:
@@ -208,9 +208,9 @@ def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
             yield rule.at(variable.at("on_release" if written else "limits"), message, hint=hint)
 
 
-@cell_rule("GW612", "clamp-without-limits", "clamping without limits")
+@cell_rule("GW612")
 def clamp_without_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`clamp` at inputs without `limits`."""
+    """Clamping without limits."""
     for variable in _lines(cell):
         if variable.spec.clamp and variable.spec.limits is None and variable.direction is Direction.INPUT:
             message = f"`{variable.part.name}` is to be clamped, but has no limits"

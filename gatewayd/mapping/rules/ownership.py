@@ -21,9 +21,9 @@ _RESERVED = (ANY, "free", "gateway", "operator", "robot", "undeclared")
 _POLICY = ("owner", "lease", "takeover")
 
 
-@cell_rule("GW501", "no-writer", "input variables in a file without writers")
+@cell_rule("GW501")
 def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """The first input of a file without writers."""
+    """Input variables in a file without writers."""
     if cell.document.declared("writers") or cell.document.writers:
         return
     inputs = [variable for variable in cell.variables if variable.direction is Direction.INPUT]
@@ -38,9 +38,9 @@ def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(inputs[0].position, message, hint=hint)
 
 
-@cell_rule("GW502", "unknown-writer", "an owner that is not among the writers")
+@cell_rule("GW502")
 def unknown_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Names of owners and required writers that are not declared."""
+    """An owner that is not among the writers."""
     known = cell.document.declared("writers")
     if not known and definer().key not in cell.document.sections:
         return
@@ -56,9 +56,9 @@ def unknown_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 break
 
 
-@cell_rule("GW503", "writer-twice", "a writer that stands twice in one list")
+@cell_rule("GW503")
 def writer_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Repeated names in lists of owners."""
+    """A writer that stands twice in one list."""
     for part in _owned(cell.document):
         owners = part.spec.owner or ()
         for index, name in enumerate(owners):
@@ -70,9 +70,9 @@ def writer_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 yield rule.at(part.at("owner", index), message, hint=hint, related=related)
 
 
-@cell_rule("GW506", "group-of-one", "a group with a single variable", Severity.WARNING)
+@cell_rule("GW506", Severity.WARNING)
 def group_of_one(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Groups with one member."""
+    """A group with a single variable."""
     if not _is_whole(cell):
         return
     for lock in cell.locks:
@@ -84,9 +84,9 @@ def group_of_one(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(lock.group.key, message, hint=hint, related=related)
 
 
-@cell_rule("GW507", "member-with-own-owner", "a member of a group with an owner or lease of its own")
+@cell_rule("GW507")
 def member_with_own_owner(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`owner`, `lease` or `takeover` beside `group`."""
+    """A member of a group with an owner or lease of its own."""
     for part in cell.document.variables.values():
         if part.spec.group is None:
             continue
@@ -101,9 +101,9 @@ def member_with_own_owner(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
                 yield rule.at(part.key_at(key), message, hint=hint, related=related)
 
 
-@cell_rule("GW508", "short-lease", "a lease that ends before its owner can count as lost", Severity.WARNING)
+@cell_rule("GW508", Severity.WARNING)
 def short_lease(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Leases below 100ms or below a time-out of an owner."""
+    """A lease that ends before its owner can count as lost."""
     for lock in _distinct(cell.locks):
         if lock.lease is None:
             continue
@@ -127,9 +127,9 @@ def short_lease(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 break
 
 
-@cell_rule("GW509", "idle-writer", "a writer that may write nothing", Severity.WARNING)
+@cell_rule("GW509", Severity.WARNING)
 def idle_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Writers that no owner list and no watchdog names."""
+    """A writer that may write nothing."""
     if not _is_whole(cell):
         return
     named = {name for name, _, _ in _named_writers(cell.document)}
@@ -145,9 +145,9 @@ def idle_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.key, message, hint="name it as `owner` of a variable, or remove it")
 
 
-@cell_rule("GW510", "unknown-group", "a group that is not declared")
+@cell_rule("GW510")
 def unknown_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`group` with a name that is not declared."""
+    """A group that is not declared."""
     known = cell.document.declared("groups")
     for part in cell.document.variables.values():
         name = part.spec.group
@@ -156,9 +156,9 @@ def unknown_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.at("group"), f"the group `{name}` of `{part.name}` is not declared", hint=hint)
 
 
-@cell_rule("GW511", "unused-group", "a group without a member", Severity.WARNING)
+@cell_rule("GW511", Severity.WARNING)
 def unused_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Groups that no variable names."""
+    """A group without a member."""
     if not _is_whole(cell):
         return
     used = {part.spec.group for part in cell.document.variables.values()}
@@ -168,9 +168,9 @@ def unused_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(group.key, message, hint=f"write `group: {group.name}` at its variables")
 
 
-@cell_rule("GW512", "takeover-of-nobody", "takeover where there is no order of owners", Severity.WARNING)
+@cell_rule("GW512", Severity.WARNING)
 def takeover_of_nobody(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`takeover: true` without a list."""
+    """Takeover where there is no order of owners."""
     for part in _owned(cell.document):
         owners = part.spec.owner or (ANY,)
         if part.spec.takeover and len(owners) == 1:
@@ -181,9 +181,9 @@ def takeover_of_nobody(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.key_at("takeover"), message, hint=hint)
 
 
-@cell_rule("GW513", "owner-of-output", "an owner of a variable that nobody writes")
+@cell_rule("GW513")
 def owner_of_output(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`owner`, `lease`, `takeover` or `group` at an output."""
+    """An owner of a variable that nobody writes."""
     seen: set[str] = set()
     for variable in cell.variables:
         if variable.direction is Direction.INPUT or variable.part.name in seen:
@@ -196,11 +196,9 @@ def owner_of_output(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 yield rule.at(variable.part.key_at(key), message, hint=hint)
 
 
-@cell_rule(
-    "GW514", "endless-lock", "a shared variable that a silent writer can keep for ever", Severity.WARNING
-)
+@cell_rule("GW514", Severity.WARNING)
 def endless_lock(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Shared locks without a lease whose owners are not all supervised."""
+    """A shared variable that a silent writer can keep for ever."""
     for lock, silent in endless_locks(cell):
         message = f"`{lock.name}` has no lease, and its owner `{silent}` no timeout"
         related = (Related(cell.document.writers[silent].key, f"`{silent}` is here"),)
@@ -216,9 +214,9 @@ def endless_locks(cell: ExpandedCell) -> Iterator[tuple[ExpandedLock, str]]:
             yield lock, silent[0]
 
 
-@cell_rule("GW516", "any-among-owners", "the word any in a list of owners")
+@cell_rule("GW516")
 def any_among_owners(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`any` in lists of more than one owner."""
+    """The word any in a list of owners."""
     for part in _owned(cell.document):
         owners = part.spec.owner or ()
         if len(owners) > 1 and ANY in owners:
@@ -227,9 +225,9 @@ def any_among_owners(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.at("owner", owners.index(ANY)), message, hint=hint)
 
 
-@cell_rule("GW517", "reserved-writer-name", "a writer with a name that the gateway uses itself")
+@cell_rule("GW517")
 def reserved_writer_name(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Writers named like parties that no mapping declares."""
+    """A writer with a name that the gateway uses itself."""
     for writer in cell.document.writers.values():
         if writer.name in _RESERVED:
             message = f"`{writer.name}` is a name that the gateway uses itself"

@@ -14,11 +14,9 @@ from gatewayd.report.wording import names_and_more
 __all__: list[str] = []
 
 
-@cell_rule(
-    "GW518", "inherited-value", "a held variable that the next owner of its group inherits", Severity.WARNING
-)
+@cell_rule("GW518", Severity.WARNING)
 def inherited_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """The first member with `hold` in each group that is taken over in pieces."""
+    """A held variable that the next owner of its group inherits."""
     for lock in _taken_over(cell):
         held = [member for member in _members(cell, lock) if member.spec.on_release.kind is FallbackKind.HOLD]
         if lock.whole or not held:
@@ -31,9 +29,9 @@ def inherited_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(first.at("on_release"), message, hint=hint, related=related)
 
 
-@cell_rule("GW519", "split-group", "a group that no single request can take over whole", Severity.WARNING)
+@cell_rule("GW519", Severity.WARNING)
 def split_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Groups with an owner that ranks above another and cannot write them in one request."""
+    """A group that no single request can take over whole."""
     for lock in _taken_over(cell):
         members = _members(cell, lock)
         for name in lock.owners[:-1]:

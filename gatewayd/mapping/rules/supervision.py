@@ -16,14 +16,9 @@ from gatewayd.report.wording import names_and_more
 __all__: list[str] = []
 
 
-@cell_rule(
-    "GW521",
-    "unsupervised-writer",
-    "a writer that keeps what it owns when its program hangs",
-    Severity.WARNING,
-)
+@cell_rule("GW521", Severity.WARNING)
 def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Writers without supervision, unless another rule has reported already what that leads to."""
+    """A writer that keeps what it owns when its program hangs."""
     reported = {name for _, name in silent_motion(cell)}
     reported |= {name for _, name in endless_locks(cell)}
     reported |= {named.name for language in languages() for named in language.names_writers(cell.document)}
@@ -45,9 +40,9 @@ def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(writer.key, message, hint=hint)
 
 
-@cell_rule("GW522", "key-without-effect", "a key that nothing in the file lets act")
+@cell_rule("GW522")
 def key_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`timeout_counts`, `grace`, `whole` and `adopt_for` where they mean nothing."""
+    """A key that nothing in the file lets act."""
     yield from _writers(rule, cell)
     takeovers = {lock.name for lock in cell.locks if lock.takeover and len(lock.owners) > 1}
     used = {lock.name for lock in cell.locks if lock.group is not None}

@@ -28,9 +28,9 @@ from gatewayd.report.wording import cob
 __all__: list[str] = []
 
 
-@plant_rule("GW407", "bus-cob-id-clash", "two cells on one bus that send with the same COB-ID")
+@plant_rule("GW407")
 def bus_cob_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """TPDOs of one cell that another cell sends too, or that are a service of it."""
+    """Two cells on one bus that send with the same COB-ID."""
     for nodes in _buses(cells):
         used: dict[int, tuple[CanopenCell, str, Position]] = {}
         for node in nodes:
@@ -54,9 +54,9 @@ def bus_cob_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diag
                 yield rule.at(place, message, hint="choose another COB-ID", related=related)
 
 
-@plant_rule("GW408", "node-id-clash", "two cells with the same node-ID on one bus")
+@plant_rule("GW408")
 def node_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """Equal node-IDs on one channel."""
+    """Two cells with the same node-ID on one bus."""
     for nodes in _buses(cells):
         first: dict[int, CanopenCell] = {}
         for node in nodes:
@@ -69,9 +69,9 @@ def node_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnos
                 yield rule.at(node.part.at("node"), message, hint=hint, related=related)
 
 
-@plant_rule("GW428", "bit-rate-clash", "two cells on one bus with different bit-rates")
+@plant_rule("GW428")
 def bit_rate_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """Different bit-rates on one channel."""
+    """Two cells on one bus with different bit-rates."""
     for first, *others in _buses(cells):
         for node in others:
             spec, other = node.part.spec, first.part.spec
@@ -84,9 +84,9 @@ def bit_rate_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagno
                 yield rule.at(node.part.at("bitrate"), message, hint=hint, related=related)
 
 
-@plant_rule("GW429", "two-sync-producers", "two cells that send the same SYNC")
+@plant_rule("GW429")
 def two_sync_producers(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """Second producers of a COB-ID."""
+    """Two cells that send the same SYNC."""
     for nodes in _buses(cells):
         first: dict[int, CanopenCell] = {}
         for node in nodes:
@@ -99,15 +99,15 @@ def two_sync_producers(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Di
                 yield rule.at(node.part.at("sync", "producer"), message, hint=hint, related=related)
 
 
-@plant_rule("GW426", "bus-load-high", "a bus that can be loaded with more than 40 %", Severity.WARNING)
+@plant_rule("GW426", Severity.WARNING)
 def bus_load_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """Buses between the two thresholds."""
+    """A bus that can be loaded with more than 40 %."""
     yield from _loaded(rule, cells, lambda share: WARNING_ABOVE < share <= ERROR_ABOVE)
 
 
-@plant_rule("GW427", "bus-load-too-high", "a bus that can be loaded with more than 70 %")
+@plant_rule("GW427")
 def bus_load_too_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """Buses above the second threshold."""
+    """A bus that can be loaded with more than 70 %."""
     yield from _loaded(rule, cells, lambda share: share > ERROR_ABOVE)
 
 

@@ -22,11 +22,9 @@ _REAL32_DIGITS = 2**24
 _RPDO = "RPDO"
 
 
-@cell_rule(
-    "GW401", "no-canopen-section", "variables or writers on CANopen in a file without a canopen section"
-)
+@cell_rule("GW401")
 def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """The first variable, else the first writer, that names CANopen."""
+    """Variables or writers on CANopen in a file without a canopen section."""
     if cell.document.has("canopen"):
         return
     hint = "add `canopen: {channel: can0, bitrate: 500000, node: 16}`"
@@ -42,9 +40,9 @@ def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             return
 
 
-@cell_rule("GW413", "canopen-type", "a CANopen type that does not suit the robot's type")
+@cell_rule("GW413")
 def canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Types of another kind."""
+    """A CANopen type that does not suit the robot's type."""
     for variable, one in _lines(cell):
         place = place_of(variable)
         if not one.fits and place is not None:
@@ -59,9 +57,9 @@ def _suited(variable: ExpandedVariable) -> str:
     return "REAL64 or REAL32" if variable.kind is ValueKind.FLOAT else "an INTEGER or UNSIGNED type"
 
 
-@cell_rule("GW414", "real32-loss", "a double of the robot in a REAL32 that loses digits", Severity.WARNING)
+@cell_rule("GW414", Severity.WARNING)
 def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Reals that are REAL32 without their line saying so, and those for which it is never enough."""
+    """A double of the robot in a REAL32 that loses digits."""
     for variable, one in _lines(cell):
         place = place_of(variable)
         if one.plan.type is not CanType.REAL32 or variable.kind is not ValueKind.FLOAT:
@@ -77,14 +75,9 @@ def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_type_place(variable), message, hint=hint)
 
 
-@cell_rule(
-    "GW415",
-    "narrow-canopen-type",
-    "an integer from the robot in a CANopen type too small for it",
-    Severity.WARNING,
-)
+@cell_rule("GW415", Severity.WARNING)
 def narrow_canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Integer outputs in types that do not hold their range."""
+    """An integer from the robot in a CANopen type too small for it."""
     for variable, one in _lines(cell):
         bounds = variable.range
         if variable.direction is Direction.INPUT or bounds is None or not one.fits:
@@ -99,9 +92,9 @@ def narrow_canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_type_place(variable), message, hint=hint)
 
 
-@cell_rule("GW420", "watched-itself", "a writer whose heartbeat is that of this node")
+@cell_rule("GW420")
 def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Writers with the node-ID of the cell."""
+    """A writer whose heartbeat is that of this node."""
     canopen = cell.document.part(Canopen)
     if canopen is None:
         return
@@ -114,9 +107,9 @@ def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.at("node"), message, hint=hint, related=related)
 
 
-@cell_rule("GW421", "unknown-bit-rate", "a bit-rate that CANopen does not have")
+@cell_rule("GW421")
 def unknown_bit_rate(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Bit-rates outside the list."""
+    """A bit-rate that CANopen does not have."""
     canopen = cell.document.part(Canopen)
     if canopen is None or canopen.spec.bitrate in BIT_RATES:
         return
@@ -126,14 +119,9 @@ def unknown_bit_rate(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     yield rule.at(canopen.at("bitrate"), message, hint=f"write {near}, if that is the bit-rate of the bus")
 
 
-@cell_rule(
-    "GW422",
-    "idle-canopen-writer",
-    "a writer by PDO or SDO where there is nothing for it to write",
-    Severity.WARNING,
-)
+@cell_rule("GW422", Severity.WARNING)
 def idle_canopen_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Writers whose service carries no input."""
+    """A writer by PDO or SDO where there is nothing for it to write."""
     node = node_of(cell)
     if node is None or len(cell.document.declared("variables")) > len(cell.document.variables):
         return
@@ -148,9 +136,9 @@ def idle_canopen_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.at("canopen"), message, hint=hint)
 
 
-@cell_rule("GW423", "out-of-reach", "an input that none of its owners can write where it lies")
+@cell_rule("GW423")
 def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Inputs in RPDOs that no RPDO writer owns, and inputs without any common way."""
+    """An input that none of its owners can write where it lies."""
     if not cell.document.writers:
         return
     for variable in _inputs(cell):
@@ -173,9 +161,9 @@ def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.position, message, hint=hint)
 
 
-@cell_rule("GW432", "owner-elsewhere", "an owner that cannot write where the variable lies", Severity.WARNING)
+@cell_rule("GW432", Severity.WARNING)
 def owner_elsewhere(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Named owners without a common way, where another one has one."""
+    """An owner that cannot write where the variable lies."""
     reported: set[Position] = set()
     for variable in _inputs(cell):
         assert variable.lock is not None
@@ -211,9 +199,9 @@ def _inputs(cell: ExpandedCell) -> Iterator[ExpandedVariable]:
             yield variable
 
 
-@cell_rule("GW424", "two-canopen-writers", "two writers for one service of the node")
+@cell_rule("GW424")
 def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Second writers by RPDO, and by SDO."""
+    """Two writers for one service of the node."""
     writers = [(writer, writer.spec.by(CanopenWriter)) for writer in cell.document.writers.values()]
     for service in ("by_rpdo", "by_sdo"):
         found = [(writer, spec) for writer, spec in writers if getattr(spec, service)]
@@ -227,9 +215,9 @@ def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(other.at("canopen"), message, hint=hint, related=related)
 
 
-@cell_rule("GW425", "half-supervision", "a watched heartbeat without a node, a time, or CANopen")
+@cell_rule("GW425")
 def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`node` without `heartbeat` and the other way round, and either without `canopen`."""
+    """A watched heartbeat without a node, a time, or CANopen."""
     for writer in cell.document.writers.values():
         spec = writer.spec.by(CanopenWriter)
         given = [key for key in ("node", "heartbeat") if getattr(spec, key) is not None]
@@ -250,14 +238,9 @@ def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.key_at(given[0]), message, hint=hint)
 
 
-@cell_rule(
-    "GW435",
-    "timeout-of-silence",
-    "a timeout for a CANopen writer that may be silent for good reason",
-    Severity.WARNING,
-)
+@cell_rule("GW435", Severity.WARNING)
 def timeout_of_silence(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`timeout` of RPDO writers without a heartbeat where no RPDO has to come."""
+    """A timeout for a CANopen writer that may be silent for good reason."""
     node = node_of(cell)
     if node is None:
         return

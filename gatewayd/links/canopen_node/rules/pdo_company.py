@@ -14,14 +14,9 @@ from gatewayd.mapping.rules.registry import cell_rule
 __all__: list[str] = []
 
 
-@cell_rule(
-    "GW433",
-    "silenced-neighbour",
-    "a variable whose PDO stops because of another variable in it",
-    Severity.WARNING,
-)
+@cell_rule("GW433", Severity.WARNING)
 def silenced_neighbour(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Outputs with `exception` beside outputs with another policy."""
+    """A variable whose PDO stops because of another variable in it."""
     reported: set[Position] = set()
     for pdo in _pdos(cell, Direction.OUTPUT):
         variables = [cell.variables[entry.variable] for entry in pdo.entries]
@@ -44,11 +39,9 @@ def silenced_neighbour(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(place, message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW434", "contended-pdo", "variables in one PDO that may be held by different owners", Severity.WARNING
-)
+@cell_rule("GW434", Severity.WARNING)
 def contended_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """RPDOs with variables of several locks, one of which somebody else may own."""
+    """Variables in one PDO that may be held by different owners."""
     reported: set[Position] = set()
     for pdo in _pdos(cell, Direction.INPUT):
         locked = list(_locked(cell, pdo))

@@ -14,9 +14,9 @@ from gatewayd.report.wording import did_you_mean
 __all__: list[str] = []
 
 
-@cell_rule("GW410", "unknown-pdo", "a PDO that is not declared")
+@cell_rule("GW410")
 def unknown_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Names of PDOs at variables."""
+    """A PDO that is not declared."""
     node = node_of(cell)
     if node is None:
         return
@@ -31,9 +31,9 @@ def unknown_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.at("canopen", "pdo"), message, hint=hint)
 
 
-@cell_rule("GW411", "variable-in-two-pdos", "a variable in two PDOs, or twice in one")
+@cell_rule("GW411")
 def variable_in_two_pdos(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Variables that are wanted once more."""
+    """A variable in two PDOs, or twice in one."""
     for wrong in _once(cell, MemberProblem.TAKEN, MemberProblem.OBJECT_ONLY):
         assert wrong.variable is not None
         variable = cell.variables[wrong.variable]
@@ -49,9 +49,9 @@ def variable_in_two_pdos(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         yield rule.at(place, message, hint=f"remove it from `{wrong.pdo}` or from `{wrong.other}`")
 
 
-@cell_rule("GW412", "empty-pdo", "a PDO that carries nothing")
+@cell_rule("GW412")
 def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """PDOs of the file without variables."""
+    """A PDO that carries nothing."""
     node = node_of(cell)
     if node is None or len(cell.document.declared("variables")) > len(cell.document.variables):
         return
@@ -65,9 +65,9 @@ def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(node.part.key_at("pdos", name), message, hint=hint)
 
 
-@cell_rule("GW430", "unknown-pdo-variable", "a PDO that names a variable that does not exist")
+@cell_rule("GW430")
 def unknown_pdo_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Members without a line, and members that a family does not have."""
+    """A PDO that names a variable that does not exist."""
     declared = cell.document.declared("variables")
     unresolved = {missing.part.name for missing in cell.unresolved}
     for wrong in _once(cell, MemberProblem.UNKNOWN):

@@ -26,9 +26,9 @@ _KEYS = {Direction.INPUT: "rpdo", Direction.OUTPUT: "tpdo"}
 _WORDS = {Direction.INPUT: "towards the robot", Direction.OUTPUT: "from the robot"}
 
 
-@cell_rule("GW402", "pdo-too-long", "a PDO with more than 64 bits")
+@cell_rule("GW402")
 def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """PDOs of the file beyond eight bytes."""
+    """A PDO with more than 64 bits."""
     for pdo in _pdos(cell):
         if pdo.bits > PDO_BITS:
             name = next(name for name, end in _contents(cell, pdo) if end > PDO_BITS)
@@ -39,9 +39,9 @@ def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(pdo.position, message, hint=hint)
 
 
-@cell_rule("GW403", "pdo-misaligned", "a number in a PDO that does not begin at a byte")
+@cell_rule("GW403")
 def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """The first number of each PDO off a byte boundary."""
+    """A number in a PDO that does not begin at a byte."""
     for pdo in _pdos(cell):
         for offset, entry in pdo.offsets:
             if entry.plan.type is not CanType.BOOLEAN and offset % 8:
@@ -52,9 +52,9 @@ def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 break
 
 
-@cell_rule("GW404", "mixed-pdo", "a PDO with variables of both directions")
+@cell_rule("GW404")
 def mixed_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """The first variable of each PDO that flows the other way."""
+    """A PDO with variables of both directions."""
     for pdo in _pdos(cell):
         other = next((entry for entry in pdo.entries if entry.direction is not pdo.direction), None)
         if other is not None:
@@ -74,9 +74,9 @@ class _Use:
     place: Position
 
 
-@cell_rule("GW405", "cob-id-clash", "one COB-ID for two services of the node")
+@cell_rule("GW405")
 def cob_id_clash(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """COB-IDs of PDOs and of SYNC that are used already."""
+    """One COB-ID for two services of the node."""
     node = node_of(cell)
     if node is None:
         return
@@ -111,9 +111,9 @@ def _services(node: CanopenCell) -> Iterator[_Use]:
     yield _Use(Function.TIME, "TIME", place)
 
 
-@cell_rule("GW406", "restricted-cob-id", "a COB-ID that no PDO and no SYNC may have")
+@cell_rule("GW406")
 def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Restricted COB-IDs of SYNC and PDOs, and in the declared ranges."""
+    """A COB-ID that no PDO and no SYNC may have."""
     node = node_of(cell)
     if node is None:
         return
@@ -135,9 +135,9 @@ def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(place, f"{what} has the COB-ID {cob(cob_id)}, which is reserved", hint=hint)
 
 
-@cell_rule("GW409", "too-few-cob-ids", "more PDOs than COB-IDs")
+@cell_rule("GW409")
 def too_few_cob_ids(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """How many are missing in each direction, and which would do."""
+    """More PDOs than COB-IDs."""
     node = node_of(cell)
     if node is None:
         return
@@ -185,9 +185,9 @@ def _spans(cob_ids: list[int]) -> str:
     return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
 
 
-@cell_rule("GW431", "pdo-key-of-other-side", "a key of a PDO that means nothing in its direction")
+@cell_rule("GW431")
 def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`event` at RPDOs, `deadline` at TPDOs, `sync_start` where no SYNC counts."""
+    """A key of a PDO that means nothing in its direction."""
     node = node_of(cell)
     for pdo in _pdos(cell):
         assert node is not None
@@ -206,11 +206,9 @@ def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
             yield rule.at(place, message, hint="remove `sync_start`, or write `transmission: sync`")
 
 
-@cell_rule(
-    "GW416", "sync-without-period", "synchronous PDOs, and nobody says how often SYNC comes", Severity.WARNING
-)
+@cell_rule("GW416", Severity.WARNING)
 def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """The first synchronous PDO of a node without a period."""
+    """Synchronous PDOs, and nobody says how often SYNC comes."""
     node = node_of(cell)
     if node is None or node.part.spec.sync.period is not None:
         return
@@ -221,18 +219,18 @@ def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(_key_place(node, pdo, "transmission"), message, hint=hint)
 
 
-@cell_rule("GW417", "producer-without-period", "a SYNC producer without a period")
+@cell_rule("GW417")
 def producer_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`producer: true` alone."""
+    """A SYNC producer without a period."""
     node = node_of(cell)
     if node is not None and node.part.spec.sync.producer and node.part.spec.sync.period is None:
         message = f"node {node.part.spec.node} is to produce SYNC without a period"
         yield rule.at(node.part.at("sync", "producer"), message, hint="add `period: 10ms` to `sync`")
 
 
-@cell_rule("GW419", "event-below-inhibit", "an event time shorter than the inhibit time", Severity.WARNING)
+@cell_rule("GW419", Severity.WARNING)
 def event_below_inhibit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Event timers that the inhibit time always delays."""
+    """An event time shorter than the inhibit time."""
     node = node_of(cell)
     if node is None:
         return

@@ -22,9 +22,9 @@ _FLOAT_DIGITS = {"float32": 1 << 24, "float64": 1 << 53}
 _MIN_STEPS = 10
 
 
-@cell_rule("GW701", "time-in-float32", "the controller's time in a float32", Severity.WARNING)
+@cell_rule("GW701", Severity.WARNING)
 def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Growing reals in a float32."""
+    """The controller's time in a float32."""
     for placement in _numbers(cell):
         if placement.type == "float32" and placement.variable.grows:
             message = (
@@ -33,9 +33,9 @@ def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint="use `type: float64`")
 
 
-@cell_rule("GW702", "fraction-lost", "a real in an integer type without a scale", Severity.WARNING)
+@cell_rule("GW702", Severity.WARNING)
 def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Doubles in integer types without a written scale."""
+    """A real in an integer type without a scale."""
     for placement in _numbers(cell):
         if (
             placement.variable.kind is ValueKind.FLOAT
@@ -51,11 +51,9 @@ def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
 
-@cell_rule(
-    "GW703", "narrow-integer", "an integer from the robot in a register too small for it", Severity.WARNING
-)
+@cell_rule("GW703", Severity.WARNING)
 def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Integer outputs in types that do not hold their range."""
+    """An integer from the robot in a register too small for it."""
     for placement in _numbers(cell):
         variable = placement.variable
         bounds = variable.range
@@ -73,9 +71,9 @@ def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
 
-@cell_rule("GW704", "coarse-scale", "a scale too coarse for the limits", Severity.WARNING)
+@cell_rule("GW704", Severity.WARNING)
 def coarse_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Scales of doubles with fewer than ten steps between the limits."""
+    """A scale too coarse for the limits."""
     for placement in _numbers(cell):
         limits = placement.variable.spec.limits
         if (
@@ -107,9 +105,9 @@ def _fine(span: float) -> float:
     return scale
 
 
-@cell_rule("GW705", "limit-not-reachable", "a limit that the register type cannot express", Severity.WARNING)
+@cell_rule("GW705", Severity.WARNING)
 def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Limits of inputs beyond what type, scale and offset reach."""
+    """A limit that the register type cannot express."""
     for placement in _numbers(cell):
         variable, limits = placement.variable, placement.variable.spec.limits
         if variable.direction is Direction.OUTPUT or limits is None or placement.type == "bool":
@@ -128,18 +126,18 @@ def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
 
-@cell_rule("GW706", "scale-of-zero", "a scale of zero")
+@cell_rule("GW706")
 def scale_of_zero(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Scales of zero."""
+    """A scale of zero."""
     zero = [item for item in placements_of(cell) if item.problem is PlacementProblem.SCALE_OF_ZERO]
     for placement in first_of_each_line(zero):
         message = f"`{placement.variable.name}` has the scale 0"
         yield rule.at(_key(placement, "scale"), message, hint="leave `scale` out, or write for example 0.1")
 
 
-@cell_rule("GW707", "scaled-bit", "scale, offset or order at a bit")
+@cell_rule("GW707")
 def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Number conversions of bits."""
+    """Scale, offset or order at a bit."""
     for placement in first_of_each_line(placements_of(cell)):
         spec = placement.spec
         keys = [key for key in ("scale", "offset") if getattr(spec, key) is not None]
@@ -150,9 +148,9 @@ def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, key), message, hint=f"remove `{key}`")
 
 
-@cell_rule("GW708", "uneven-scale", "an integer with a scale that does not come out even", Severity.WARNING)
+@cell_rule("GW708", Severity.WARNING)
 def uneven_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Scales of integers that need rounding."""
+    """An integer with a scale that does not come out even."""
     for placement in _numbers(cell):
         variable = placement.variable
         if variable.kind is not ValueKind.INT or placement.type == "bool":
@@ -177,11 +175,9 @@ def _whole(value: float) -> bool:
     return isfinite(value) and isclose(value, round(value), rel_tol=1e-9)
 
 
-@cell_rule(
-    "GW709", "integer-in-real", "an integer in a real that has too few digits for it", Severity.WARNING
-)
+@cell_rule("GW709", Severity.WARNING)
 def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Integers in reals with fewer digits."""
+    """An integer in a real that has too few digits for it."""
     for placement in _numbers(cell):
         variable, digits = placement.variable, _FLOAT_DIGITS.get(placement.type)
         bounds = variable.range
@@ -196,9 +192,9 @@ def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
 
-@cell_rule("GW710", "number-as-bool", "a number shown as 0 or 1", Severity.WARNING)
+@cell_rule("GW710", Severity.WARNING)
 def number_as_bool(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Numbers with the type bool."""
+    """A number shown as 0 or 1."""
     for placement in _numbers(cell):
         variable = placement.variable
         if placement.type == "bool" and variable.kind is not ValueKind.BOOL:
@@ -209,9 +205,9 @@ def number_as_bool(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
 
-@cell_rule("GW711", "fallback-not-shown", "a stale value that the register cannot show", Severity.WARNING)
+@cell_rule("GW711", Severity.WARNING)
 def fallback_not_shown(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`on_stale` values that come back from the register as something else."""
+    """A stale value that the register cannot show."""
     for placement in _numbers(cell):
         variable = placement.variable
         value, codec = variable.spec.on_stale.value, placement.codec

@@ -19,9 +19,9 @@ _LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
 _SHARED = ("connections", "idle_timeout")
 
 
-@plant_rule("GW206", "unit-clash", "two cells with the same unit on one listener")
+@plant_rule("GW206")
 def unit_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """Equal units on equal listen addresses."""
+    """Two cells with the same unit on one listener."""
     first: dict[tuple[str, int], tuple[ExpandedCell, Part[Modbus]]] = {}
     for cell, modbus in _listeners(cells):
         listen, unit = str(modbus.spec.listen), modbus.spec.unit
@@ -35,9 +35,9 @@ def unit_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic
         yield rule.at(modbus.at("unit"), message, hint=hint, related=related)
 
 
-@plant_rule("GW207", "listen-clash", "two listeners that ask for the same port")
+@plant_rule("GW207")
 def listen_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """Wildcard and single addresses on one port."""
+    """Two listeners that ask for the same port."""
     by_port: dict[int, list[Part[Modbus]]] = {}
     for _, modbus in _listeners(cells):
         listen = modbus.spec.listen
@@ -51,11 +51,9 @@ def listen_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnost
         known.append(modbus)
 
 
-@plant_rule(
-    "GW208", "listener-settings", "cells on one listener disagree about its connections", Severity.WARNING
-)
+@plant_rule("GW208", Severity.WARNING)
 def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """Different settings for equal listen addresses."""
+    """Cells on one listener disagree about its connections."""
     first: dict[str, tuple[ExpandedCell, Part[Modbus]]] = {}
     for cell, modbus in _listeners(cells):
         other, earlier = first.setdefault(str(modbus.spec.listen), (cell, modbus))
@@ -70,9 +68,9 @@ def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Dia
                 yield rule.at(modbus.at(key), message, hint=hint, related=related)
 
 
-@cell_rule("GW216", "writer-shut-out", "a writer that the access list does not let in")
+@cell_rule("GW216")
 def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Writers without a network that `allow` reaches."""
+    """A writer that the access list does not let in."""
     modbus = cell.document.part(Modbus)
     if modbus is None or not modbus.spec.allow:
         return
@@ -87,9 +85,9 @@ def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.at("modbus"), message, hint=hint, related=related)
 
 
-@cell_rule("GW217", "open-listener", "a listener on every address without an access list", Severity.WARNING)
+@cell_rule("GW217", Severity.WARNING)
 def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Wildcard listeners without `allow`."""
+    """A listener on every address without an access list."""
     modbus = cell.document.part(Modbus)
     if modbus is not None and not modbus.spec.allow and ip_address(modbus.spec.listen.host).is_unspecified:
         message = f"{modbus.spec.listen} serves every network of this machine, and there is no access list"
@@ -97,14 +95,9 @@ def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(modbus.at("listen"), message, hint=hint)
 
 
-@cell_rule(
-    "GW219",
-    "unreachable-listener",
-    "a writer elsewhere, and a listener that only this machine reaches",
-    Severity.WARNING,
-)
+@cell_rule("GW219", Severity.WARNING)
 def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Loopback listeners with writers from outside."""
+    """A writer elsewhere, and a listener that only this machine reaches."""
     modbus = cell.document.part(Modbus)
     if modbus is None or not ip_address(modbus.spec.listen.host).is_loopback:
         return

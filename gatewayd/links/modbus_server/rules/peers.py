@@ -16,9 +16,9 @@ from gatewayd.mapping.rules.registry import cell_rule
 __all__: list[str] = []
 
 
-@cell_rule("GW504", "same-peer", "two writers with the same address")
+@cell_rule("GW504")
 def same_peer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Equal networks of one or of two writers."""
+    """Two writers with the same address."""
     first: dict[Network, tuple[Part[WriterSpec], Position]] = {}
     for writer, network, position in _peers(cell.document):
         if network not in first:
@@ -32,11 +32,9 @@ def same_peer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(position, message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW505", "overlapping-peers", "the network of one writer holds the address of another", Severity.WARNING
-)
+@cell_rule("GW505", Severity.WARNING)
 def overlapping_peers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Networks of one writer inside those of another."""
+    """The network of one writer holds the address of another."""
     holders: dict[Network, tuple[Part[WriterSpec], Position]] = {}
     peers = list(_peers(cell.document))
     for writer, network, position in peers:

@@ -30,9 +30,9 @@ _READ_ONLY = (Area.INPUT, Area.DISCRETE)
 _KEYS = {Area.HOLDING: "holding", Area.INPUT: "input", Area.COIL: "coil", Area.DISCRETE: "discrete"}
 
 
-@cell_rule("GW202", "beyond-last-address", "a value that runs past address 65535")
+@cell_rule("GW202")
 def beyond_last_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Placements that do not fit below the end of their area."""
+    """A value that runs past address 65535."""
     beyond = [item for item in placements_of(cell) if item.problem is PlacementProblem.BEYOND_END]
     for placement in first_of_each_line(beyond):
         last = placement.address + placement.words - 1
@@ -44,9 +44,9 @@ def beyond_last_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(placement.position, message, hint=hint)
 
 
-@cell_rule("GW203", "status-block", "a variable in the registers of the status block")
+@cell_rule("GW203")
 def status_block(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Register placements at 60000 and above."""
+    """A variable in the registers of the status block."""
     inside = [
         item
         for item in placements_of(cell)
@@ -60,9 +60,9 @@ def status_block(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(placement.position, message, hint="place it below 60000")
 
 
-@cell_rule("GW204", "traditional-address", "an address that looks like 40001 counting")
+@cell_rule("GW204")
 def traditional_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Written addresses in the range of the traditional notation of their area."""
+    """An address that looks like 40001 counting."""
     for placement in first_of_each_line(placements_of(cell)):
         address = placement.spec.address
         if address in _TRADITIONAL.get(placement.area, ()):
@@ -77,9 +77,9 @@ def traditional_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(placement.position, message, hint=hint)
 
 
-@cell_rule("GW209", "number-in-bit", "a number in a place that holds a single bit")
+@cell_rule("GW209")
 def number_in_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Numbers in coils, discrete inputs and single bits."""
+    """A number in a place that holds a single bit."""
     wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.NUMBER_IN_BIT]
     for placement in first_of_each_line(wrong):
         variable = placement.variable
@@ -92,9 +92,9 @@ def number_in_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(placement.position, message, hint=hint)
 
 
-@cell_rule("GW210", "input-in-read-only-area", "an input variable that lies only where nobody can write")
+@cell_rule("GW210")
 def input_in_read_only_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Inputs all of whose placements are read-only."""
+    """An input variable that lies only where nobody can write."""
     for _, group in groupby(placements_of(cell), key=lambda item: item.variable.part.name):
         placements = list(group)
         first = placements[0]
@@ -109,9 +109,9 @@ def input_in_read_only_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
             yield rule.at(first.position, message, hint=f"place it in a writable area: {{{area}: N}}")
 
 
-@cell_rule("GW211", "bit-without-place", "type bit at a whole register")
+@cell_rule("GW211")
 def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Type `bit` without a bit number."""
+    """Type bit at a whole register."""
     wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.BIT_WITHOUT_PLACE]
     for placement in first_of_each_line(wrong):
         message = f"`{placement.variable.name}` has the type bit, but {where(placement)} is a whole register"
@@ -119,23 +119,18 @@ def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(placement.position, message, hint=hint)
 
 
-@cell_rule("GW222", "type-of-bit", "a number type for a place that holds a single bit")
+@cell_rule("GW222")
 def type_of_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Number types at single bits."""
+    """A number type for a place that holds a single bit."""
     wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.TYPE_IN_BIT]
     for placement in first_of_each_line(wrong):
         message = f"`{placement.variable.name}` has the type {placement.spec.type} at {where(placement)}"
         yield rule.at(placement.position, message, hint="leave `type` out")
 
 
-@cell_rule(
-    "GW212",
-    "split-value",
-    "a value that a client reading or writing in full blocks cuts in two",
-    Severity.WARNING,
-)
+@cell_rule("GW212", Severity.WARNING)
 def split_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Values across multiples of 125 registers from the start of their block, 123 for writing."""
+    """A value that a client reading or writing in full blocks cuts in two."""
     reported: set[tuple[str, int]] = set()
     for area in (Area.HOLDING, Area.INPUT):
         placed = [item for item in placements_of(cell) if item.area is area and item.problem is None]
@@ -170,9 +165,9 @@ def _cut(placements: list[ExpandedPlacement], limit: int) -> Iterator[tuple[Expa
             yield placement, start, start + (block + 1) * limit
 
 
-@cell_rule("GW213", "mixed-directions", "a register that mixes bits of both directions")
+@cell_rule("GW213")
 def mixed_directions(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Holding registers with input bits and output bits."""
+    """A register that mixes bits of both directions."""
     packed = [item for item in placements_of(cell) if item.bit is not None and item.area is Area.HOLDING]
     first: dict[int, ExpandedPlacement] = {}
     reported: set[tuple[str, str]] = set()
@@ -195,9 +190,9 @@ def _register(placement: ExpandedPlacement) -> str:
     return f"{AREA_WORDS[placement.area]} {placement.address} ({placement.area.notation(placement.address)})"
 
 
-@cell_rule("GW214", "register-overlap", "two variables at the same place of an area")
+@cell_rule("GW214")
 def register_overlap(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Overlaps of like with like."""
+    """Two variables at the same place of an area."""
     for later, earlier, count in _overlaps(cell, mixed=False):
         more = f", and {count - 1} more of these lines" if count > 1 else ""
         message = (
@@ -210,9 +205,9 @@ def register_overlap(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(later.position, message, hint=hint, related=related)
 
 
-@cell_rule("GW215", "bit-in-number", "a register that holds bits and a number")
+@cell_rule("GW215")
 def bit_in_number(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Overlaps of a packed bit with a number."""
+    """A register that holds bits and a number."""
     for later, earlier, _ in _overlaps(cell, mixed=True):
         message = (
             f"`{later.variable.name}` lies at {where(later)}, inside the same register as "
@@ -290,9 +285,9 @@ def _first(addresses: range) -> int:
     return addresses[0]
 
 
-@cell_rule("GW220", "no-modbus-section", "variables with Modbus addresses in a file without a modbus section")
+@cell_rule("GW220")
 def no_modbus_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Placements without a listener."""
+    """Variables with Modbus addresses in a file without a modbus section."""
     placements = placements_of(cell)
     if not placements or cell.document.has("modbus"):
         return

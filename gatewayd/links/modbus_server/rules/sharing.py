@@ -17,14 +17,9 @@ from gatewayd.modbus.areas import Area
 __all__: list[str] = []
 
 
-@cell_rule(
-    "GW520",
-    "shared-register",
-    "a bit of several possible owners in a register with bits of other locks",
-    Severity.WARNING,
-)
+@cell_rule("GW520", Severity.WARNING)
 def shared_register(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """The first such bit of each line."""
+    """A bit of several possible owners in a register with bits of other locks."""
     reported: set[str] = set()
     with_coil = {place.variable.index for place in placements_of(cell) if place.area is Area.COIL}
     for bits in _registers(cell):

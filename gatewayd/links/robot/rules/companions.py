@@ -14,34 +14,27 @@ from gatewayd.rtde.companions import Companions, companions
 __all__: list[str] = []
 
 
-@cell_rule("GW310", "missing-mask", "a speed slider or robot output without the mask that makes it act")
+@cell_rule("GW310")
 def missing_mask(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Masked inputs whose mask is not mapped."""
+    """A speed slider or robot output without the mask that makes it act."""
     for variable, mask, _ in _without(cell, _mask):
         if mask not in _mapped(cell):
             message = f"`{variable.name}` ({variable.target}) has no effect without `{mask}`"
             yield rule.at(variable.at("robot"), message, hint=f"map `{mask}` as a variable too")
 
 
-@cell_rule(
-    "GW316", "missing-mask-bit", "a robot output whose own bit of the mask is not mapped", Severity.WARNING
-)
+@cell_rule("GW316", Severity.WARNING)
 def missing_mask_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Masked inputs whose mask is mapped in other bits only."""
+    """A robot output whose own bit of the mask is not mapped."""
     for variable, mask, bit in _without(cell, _mask):
         if mask in _mapped(cell):
             message = f"`{variable.name}` ({variable.target}) has no effect without bit {bit} of `{mask}`"
             yield rule.at(variable.at("robot"), message, hint=f"map `{mask}.{bit}` as a variable too")
 
 
-@cell_rule(
-    "GW315",
-    "missing-domain",
-    "an analog output without what says whether it is a current or a voltage",
-    Severity.WARNING,
-)
+@cell_rule("GW315", Severity.WARNING)
 def missing_domain(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Analog outputs whose domain is not mapped."""
+    """An analog output without what says whether it is a current or a voltage."""
     for variable, domain, bit in _without(cell, _domain):
         message = f"`{variable.name}` ({variable.target}) acts as a current or a voltage without saying which"
         yield rule.at(variable.at("robot"), message, hint=f"map `{domain}.{bit}` as a variable too")

@@ -29,9 +29,9 @@ _UPPER_INPUTS = frozenset(
 )
 
 
-@cell_rule("GW301", "unknown-field", "a name that no RTDE guide and no implementation knows")
+@cell_rule("GW301")
 def unknown_field(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """References and the watchdog with an unknown field."""
+    """A name that no RTDE guide and no implementation knows."""
     for part, error in unresolved(cell):
         if error.problem is ReferenceProblem.UNKNOWN_FIELD:
             message = f"the robot has no field `{error.name}` (variable `{part.name}`)"
@@ -56,9 +56,9 @@ def _suggestion(name: str) -> str:
     return "did you mean " + " or ".join(f"`{item}`" for item in close) + "?"
 
 
-@cell_rule("GW303", "field-not-in-version", "a field that the controller software does not have yet")
+@cell_rule("GW303")
 def field_not_in_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Fields that come later than the given software."""
+    """A field that the controller software does not have yet."""
     series, version = controller(cell.document)
     if series is None:
         return
@@ -76,9 +76,9 @@ def field_not_in_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         yield rule.at(variable.at("robot"), message, hint=hint)
 
 
-@cell_rule("GW312", "series-and-version", "a software version that does not belong to the series")
+@cell_rule("GW312")
 def series_and_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Major versions of another series."""
+    """A software version that does not belong to the series."""
     robot = cell.document.part(Robot)
     if robot is None or robot.spec.version is None:
         return
@@ -94,9 +94,9 @@ def series_and_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(robot.at("version"), message, hint=f"write `series: {belongs.word}`", related=related)
 
 
-@cell_rule("GW304", "no-such-part", "a register, element or bit that the field does not have")
+@cell_rule("GW304")
 def no_such_part(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """References beyond or beside what a field consists of."""
+    """A register, element or bit that the field does not have."""
     for part, error in unresolved(cell):
         if error.problem in _PARTS:
             message, hint = _PARTS[error.problem]
@@ -131,9 +131,9 @@ def _last(error: UnresolvedReference) -> int:
     return error.limit if error.problem is ReferenceProblem.NO_SUCH_REGISTER else error.limit - 1
 
 
-@cell_rule("GW305", "input-mapped-twice", "two input variables on the same register or bits of the robot")
+@cell_rule("GW305")
 def input_mapped_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Inputs that share bits of a field."""
+    """Two input variables on the same register or bits of the robot."""
     owners: dict[tuple[str, int | None], dict[int | None, ExpandedVariable]] = {}
     reported: set[tuple[str, str]] = set()
     for variable in cell.variables:
@@ -153,11 +153,9 @@ def input_mapped_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(variable.at("robot"), message, hint=hint, related=related)
 
 
-@cell_rule(
-    "GW308", "long-recipe", "more field names than an old controller takes in one request", Severity.WARNING
-)
+@cell_rule("GW308", Severity.WARNING)
 def long_recipe(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Output recipes beyond 2048 bytes for software that has the limit."""
+    """More field names than an old controller takes in one request."""
     series, version = controller(cell.document)
     robot = cell.document.part(Robot)
     limited = series is Series.CB3 or (
@@ -188,9 +186,9 @@ def _length(names: Sequence[str]) -> int:
     return len(",".join(("timestamp", *names)))
 
 
-@cell_rule("GW309", "upper-range", "an input register outside the range for fieldbuses", Severity.WARNING)
+@cell_rule("GW309", Severity.WARNING)
 def upper_range(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Upper input registers, once per line, and the watchdog's."""
+    """An input register outside the range for fieldbuses."""
     hint = "use integers and doubles 0 to 23, bits 0 to 63"
     seen: set[str] = set()
     for variable in cell.variables:
@@ -204,9 +202,9 @@ def upper_range(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(watchdog[1], message, hint=hint)
 
 
-@plant_rule("GW313", "robot-claimed-twice", "two cells that claim the same input of one robot")
+@plant_rule("GW313")
 def robot_claimed_twice(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """Equal input fields of one controller in two cells."""
+    """Two cells that claim the same input of one robot."""
     claimed: dict[tuple[str, int, str], tuple[ExpandedCell, str, Position]] = {}
     for cell in cells:
         robot = cell.document.part(Robot)

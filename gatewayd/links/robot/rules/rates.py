@@ -15,9 +15,9 @@ from gatewayd.report.wording import number, seconds
 __all__: list[str] = []
 
 
-@cell_rule("GW306", "rate-above-base", "a rate above the controller's own")
+@cell_rule("GW306")
 def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Frequencies of packages and of the watchdog above the base rate."""
+    """A rate above the controller's own."""
     series, _ = controller(cell.document)
     robot = cell.document.part(Robot)
     if robot is None or series is None:
@@ -31,9 +31,9 @@ def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(position, message, hint=f"ask for {series.base_rate} or less")
 
 
-@cell_rule("GW314", "rate-too-low", "a rate of less than one package in ten seconds")
+@cell_rule("GW314")
 def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Frequencies below 0.1 Hz that are not 0."""
+    """A rate of less than one package in ten seconds."""
     robot = cell.document.part(Robot)
     if robot is not None and 0 < robot.spec.frequency < MIN_RATE:
         message = f"{number(robot.spec.frequency)} Hz is less than one package in ten seconds"
@@ -41,9 +41,9 @@ def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(robot.at("frequency"), message, hint=hint)
 
 
-@cell_rule("GW607", "stale-too-soon", "stale_after shorter than the time between two packages")
+@cell_rule("GW607")
 def stale_too_soon(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`stale_after` below the package period."""
+    """Stale_after shorter than the time between two packages."""
     robot = cell.document.part(Robot)
     if robot is None or robot.spec.stale_after is None or 0 < robot.spec.frequency < MIN_RATE:
         return

@@ -14,9 +14,9 @@ from gatewayd.mapping.rules.registry import cell_rule
 __all__: list[str] = []
 
 
-@cell_rule("GW613", "valid-without-program", "valid: running where no robot program writes", Severity.WARNING)
+@cell_rule("GW613", Severity.WARNING)
 def valid_without_program(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """`valid` at outputs that are no registers, and at a robot none of whose output registers are mapped."""
+    """Valid: running where no robot program writes."""
     outputs = [variable for variable in cell.variables if variable.direction is Direction.OUTPUT]
     for variable in outputs:
         if (

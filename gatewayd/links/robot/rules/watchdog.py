@@ -18,9 +18,9 @@ __all__: list[str] = []
 _WATCHDOG_TYPES = (DataType.INT32, DataType.DOUBLE)
 
 
-@cell_rule("GW302", "watchdog-field", "a watchdog on a field that cannot be fed")
+@cell_rule("GW302")
 def watchdog_field(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Watchdogs on outputs and on fields that are no plain number."""
+    """A watchdog on a field that cannot be fed."""
     watchdog = fed_field(cell.document)
     if watchdog is None:
         return
@@ -34,9 +34,9 @@ def watchdog_field(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(position, f"`{name}` comes from the robot and cannot be fed", hint=hint)
 
 
-@cell_rule("GW311", "watchdog-mapped", "a variable on the register of the watchdog")
+@cell_rule("GW311")
 def watchdog_mapped(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Input variables on the watchdog's field."""
+    """A variable on the register of the watchdog."""
     watchdog = fed_field(cell.document)
     if watchdog is None:
         return
@@ -49,11 +49,9 @@ def watchdog_mapped(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             return
 
 
-@cell_rule(
-    "GW515", "unsupervised-watchdog", "a watchdog that requires a writer without a timeout", Severity.WARNING
-)
+@cell_rule("GW515", Severity.WARNING)
 def unsupervised_watchdog(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Required writers without `timeout`."""
+    """A watchdog that requires a writer without a timeout."""
     for required in LANGUAGE.names_writers(cell.document):
         writer = cell.document.writers.get(required.name)
         if writer is not None and not is_supervised(writer.spec):

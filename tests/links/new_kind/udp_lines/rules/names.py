@@ -13,9 +13,9 @@ from ..language import ExpandedLines  # noqa: TID252 - the package is copied to 
 __all__: list[str] = []
 
 
-@cell_rule("GW801", "name-of-two", "two variables with one name in lines")
+@cell_rule("GW801")
 def name_of_two(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """Names that come again."""
+    """Two variables with one name in lines."""
     lines = cell.link(ExpandedLines)
     first: dict[str, Position] = {}
     for variable, name, position in lines.names if lines is not None else ():
