@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from datetime import UTC, datetime, timedelta
 
-from gatewayd.canopen.cob_ids import BASIC_FRAME, Function, is_restricted
+from gatewayd.canopen.cob_ids import BASIC_FRAME, Function, is_assignable
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, variable
+from gatewayd.canopen.dictionary import Abort, AbortCode, Entry, Object, variable
 from gatewayd.canopen.frame import Frame
 
 __all__ = ["CONSUMER", "EPOCH", "TimeConsumer", "time_of_day"]
@@ -36,15 +36,9 @@ class TimeConsumer:
 
     def __init__(self, *, on_time: Callable[[datetime, float], None], changed: Callable[[], None]) -> None:
         self._on_time = on_time
-        self._cob_id = Entry(
-            0,
-            "COB-ID TIME",
-            CanType.UNSIGNED32,
-            Access.RW,
-            CanType.UNSIGNED32.pack(CONSUMER | Function.TIME),
-            stored=True,
-            check=_check_cob_id,
-            changed=changed,
+        default = CONSUMER | Function.TIME
+        self._cob_id = Entry.parameter(
+            0, "COB-ID TIME", CanType.UNSIGNED32, default, check=_check_cob_id, changed=changed
         )
 
     @property
@@ -65,6 +59,5 @@ class TimeConsumer:
 
 def _check_cob_id(data: bytes) -> None:
     # Bit 30 would make this node a producer, which it cannot be.
-    number = int.from_bytes(data, "little")
-    if number & ~(CONSUMER | BASIC_FRAME) or is_restricted(number & BASIC_FRAME):
+    if not is_assignable(int.from_bytes(data, "little"), CONSUMER):
         raise Abort(AbortCode.INVALID_VALUE)

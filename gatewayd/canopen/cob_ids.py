@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = [
-    "BASIC_FRAME",
-    "INVALID",
-    "Function",
-    "is_restricted",
-    "predefined_pdo",
-]
+__all__ = ["BASIC_FRAME", "INVALID", "Function", "is_assignable", "is_restricted", "predefined_pdo"]
 
 BASIC_FRAME = 0x7FF
 """Mask of an 11-bit identifier."""
@@ -49,6 +43,11 @@ _RESTRICTED = (
 def is_restricted(can_id: int) -> bool:
     """Whether no configurable service (PDO, SYNC, TIME, EMCY) may have this identifier."""
     return any(low <= can_id <= high for low, high in _RESTRICTED)
+
+
+def is_assignable(entry: int, flags: int) -> bool:
+    """Whether a COB-ID entry holds nothing but some of `flags` and an 11-bit identifier that a service may have."""
+    return not entry & ~(flags | BASIC_FRAME) and not is_restricted(entry & BASIC_FRAME)
 
 
 def predefined_pdo(number: int, node: int, *, transmit: bool) -> int | None:

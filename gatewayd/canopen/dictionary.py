@@ -137,6 +137,29 @@ class Entry:
     def __post_init__(self) -> None:
         self.value = self.default
 
+    @classmethod
+    def parameter(
+        cls,
+        subindex: int,
+        name: str,
+        kind: CanType,
+        default: int,
+        *,
+        plus_node: bool = False,
+        check: Callable[[bytes], None] | None = None,
+        changed: Callable[[], None] | None = None,
+    ) -> Entry:
+        """One that a client may write and have stored."""
+        entry = cls(subindex, name, kind, Access.RW, kind.pack(default), plus_node=plus_node, stored=True)
+        entry.check, entry.changed = check, changed
+        return entry
+
+    @classmethod
+    def constant(cls, subindex: int, name: str, number: int, *, plus_node: bool = False) -> Entry:
+        """An UNSIGNED32 that no client can write."""
+        u32 = CanType.UNSIGNED32
+        return cls(subindex, name, u32, Access.RO, u32.pack(number), plus_node=plus_node)
+
     @property
     def number(self) -> int:
         """The stored value as an unsigned integer."""
@@ -148,8 +171,11 @@ class Entry:
 
     def write(self, data: bytes) -> None:
         """Check a value and store it, or hand it to the sink. Raises Abort."""
-        self._check_length(data)
-        self._check_range(data)
+        size = self.type.size
+        if size is not None:
+            if len(data) != size:
+                raise Abort(AbortCode.TOO_LONG if len(data) > size else AbortCode.TOO_SHORT)
+            self._check_range(data)
         if self.sink is not None:
             self.sink(data)
             return
@@ -159,15 +185,10 @@ class Entry:
         if self.changed is not None:
             self.changed()
 
-    def _check_length(self, data: bytes) -> None:
-        size = self.type.size
-        if size is not None and len(data) != size:
-            raise Abort(AbortCode.TOO_LONG if len(data) > size else AbortCode.TOO_SHORT)
-
     def _check_range(self, data: bytes) -> None:
         if self.type is CanType.BOOLEAN and data[0] > 1:
             raise Abort(AbortCode.VALUE_TOO_HIGH)
-        if self.type.size is None or (self.low is None and self.high is None):
+        if self.low is None and self.high is None:
             return
         value = self.type.unpack(data)
         if self.high is not None and value > self.high:
@@ -192,12 +213,8 @@ class Dictionary:
 
     def __init__(self, objects: Iterable[Object], permit: Callable[[int], None] | None = None) -> None:
         self._permit = permit
-        self._objects = {one.index: one for one in sorted(objects, key=lambda one: one.index)}
-        self._entries = {
-            index << 8 | entry.subindex: entry
-            for index, one in self._objects.items()
-            for entry in one.entries
-        }
+        self._objects = {item.index: item for item in sorted(objects, key=lambda item: item.index)}
+        self._entries = {item.index << 8 | entry.subindex: entry for item in self for entry in item.entries}
 
     def __iter__(self) -> Iterator[Object]:
         return iter(self._objects.values())

@@ -12,8 +12,10 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable
 from enum import IntEnum, IntFlag
+from functools import partial, reduce
+from operator import or_
 
-from gatewayd.canopen.cob_ids import BASIC_FRAME, INVALID, Function, is_restricted
+from gatewayd.canopen.cob_ids import BASIC_FRAME, INVALID, Function, is_assignable
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
@@ -93,20 +95,11 @@ class Emergency:
         self._not_before = -math.inf
         self.lost = 0
         """Messages that found the queue full and pushed the oldest one out."""
-        self._register = Entry(
-            0, "Error register", CanType.UNSIGNED8, Access.RO, b"\0", source=self._read_register
+        u32, default = CanType.UNSIGNED32, Function.EMCY + node
+        self._cob_id = Entry.parameter(
+            0, "COB-ID EMCY", u32, default, plus_node=True, check=self._check_cob_id
         )
-        self._cob_id = Entry(
-            0,
-            "COB-ID EMCY",
-            CanType.UNSIGNED32,
-            Access.RW,
-            CanType.UNSIGNED32.pack(Function.EMCY + node),
-            plus_node=True,
-            stored=True,
-            check=self._check_cob_id,
-        )
-        self._inhibit = Entry(0, "Inhibit time EMCY", CanType.UNSIGNED16, Access.RW, bytes(2), stored=True)
+        self._inhibit = Entry.parameter(0, "Inhibit time EMCY", CanType.UNSIGNED16, 0)
 
     @property
     def inhibit(self) -> float:
@@ -116,10 +109,7 @@ class Emergency:
     @property
     def register(self) -> Register:
         """The error register."""
-        value = Register(0)
-        for bits in self._active.values():
-            value |= bits
-        return value
+        return reduce(or_, self._active.values(), Register(0))
 
     def active(self, code: int, instance: int = 0) -> bool:
         """Whether the error is active."""
@@ -127,20 +117,13 @@ class Emergency:
 
     def objects(self) -> Iterable[Object]:
         """1001h, 1003h, 1014h, 1015h."""
-        yield variable(0x1001, self._register)
-        count = Entry(
-            0, "Number of errors", CanType.UNSIGNED8, Access.RW, b"\0", source=self._count, sink=self._forget
-        )
+        u8, u32 = CanType.UNSIGNED8, CanType.UNSIGNED32
+        register = Entry(0, "Error register", u8, Access.RO, b"\0", source=lambda: bytes([self.register]))
+        yield variable(0x1001, register)
+        count = Entry(0, "Number of errors", u8, Access.RW, b"\0", source=self._count, sink=self._forget)
         fields = (
-            Entry(
-                number,
-                f"Standard error field {number}",
-                CanType.UNSIGNED32,
-                Access.RO,
-                bytes(4),
-                source=self._reader(number),
-            )
-            for number in range(1, HISTORY + 1)
+            Entry(n, f"Standard error field {n}", u32, Access.RO, bytes(4), source=partial(self._field, n))
+            for n in range(1, HISTORY + 1)
         )
         yield array(0x1003, "Pre-defined error field", (count, *fields))
         yield variable(0x1014, self._cob_id)
@@ -205,9 +188,6 @@ class Emergency:
         self._waiting.append(message)
         self.tick(now)
 
-    def _read_register(self) -> bytes:
-        return bytes([self.register])
-
     def _count(self) -> bytes:
         return bytes([len(self._history)])
 
@@ -216,19 +196,14 @@ class Emergency:
             raise Abort(AbortCode.INVALID_VALUE)
         self._history.clear()
 
-    def _reader(self, number: int) -> Callable[[], bytes]:
-        def read() -> bytes:
-            if number > len(self._history):
-                raise Abort(AbortCode.NO_DATA)
-            return self._history[number - 1].to_bytes(4, "little")
-
-        return read
+    def _field(self, number: int) -> bytes:
+        if number > len(self._history):
+            raise Abort(AbortCode.NO_DATA)
+        return self._history[number - 1].to_bytes(4, "little")
 
     def _check_cob_id(self, data: bytes) -> None:
         """Only 11-bit identifiers; another identifier only after the valid bit was taken away."""
         new, old = int.from_bytes(data, "little"), self._cob_id.number
-        identifier = new & BASIC_FRAME
-        if new & ~(INVALID | BASIC_FRAME) or is_restricted(identifier):
-            raise Abort(AbortCode.INVALID_VALUE)
-        if not (new | old) & INVALID and new != old:
+        moved = new != old and not (new | old) & INVALID
+        if moved or not is_assignable(new, INVALID):
             raise Abort(AbortCode.INVALID_VALUE)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Access, Entry, Object, variable
+from gatewayd.canopen.dictionary import Entry, Object, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.gap import spared
 from gatewayd.canopen.nmt import NmtState
@@ -46,8 +46,8 @@ class NodeGuarding:
         self._asked = -math.inf
         self._is_lost = False
         self._spared = False
-        self._time = self._parameter("Guard time", CanType.UNSIGNED16)
-        self._factor = self._parameter("Life time factor", CanType.UNSIGNED8)
+        self._time = Entry.parameter(0, "Guard time", CanType.UNSIGNED16, 0, changed=self._supervise)
+        self._factor = Entry.parameter(0, "Life time factor", CanType.UNSIGNED8, 0, changed=self._supervise)
 
     def objects(self) -> Iterable[Object]:
         """100Ch and 100Dh."""
@@ -104,9 +104,6 @@ class NodeGuarding:
     def next_deadline(self, now: float) -> float:
         """When `tick` has something to do."""
         return self._due
-
-    def _parameter(self, name: str, kind: CanType) -> Entry:
-        return Entry(0, name, kind, Access.RW, kind.pack(0), stored=True, changed=self._supervise)
 
     def _supervise(self) -> None:
         life = self._time.number * self._factor.number / 1000

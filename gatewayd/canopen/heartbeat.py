@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, variable
+from gatewayd.canopen.dictionary import Abort, AbortCode, Entry, Object, array, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.gap import spared
 from gatewayd.canopen.nmt import NmtState
@@ -49,14 +50,8 @@ class HeartbeatProducer:
         self._due = math.inf
         self.withheld = 0
         """Heartbeats that were due and not sent because the core did not live."""
-        self._period = Entry(
-            0,
-            "Producer heartbeat time",
-            CanType.UNSIGNED16,
-            Access.RW,
-            CanType.UNSIGNED16.pack(milliseconds),
-            stored=True,
-            changed=self._changed,
+        self._period = Entry.parameter(
+            0, "Producer heartbeat time", CanType.UNSIGNED16, milliseconds, changed=self._changed
         )
 
     @property
@@ -159,23 +154,19 @@ class HeartbeatConsumer:
         self._back = back
         self._nodes_changed = changed
         self._stale = False
-        self._watched: dict[int, _Watched] = {}
-        count = max(MIN_CONSUMERS, len(consumers))
-        defaults = [one.node << 16 | one.timeout for one in consumers] + [0] * (count - len(consumers))
+        defaults = [consumer.node << 16 | consumer.timeout for consumer in consumers]
+        defaults += [0] * (MIN_CONSUMERS - len(consumers))
         self._entries = tuple(
-            Entry(
+            Entry.parameter(
                 number,
                 f"Consumer heartbeat time {number}",
                 CanType.UNSIGNED32,
-                Access.RW,
-                CanType.UNSIGNED32.pack(default),
-                stored=True,
+                default,
+                check=partial(self._check, number),
+                changed=self._mark,
             )
             for number, default in enumerate(defaults, 1)
         )
-        for entry in self._entries:
-            entry.check = self._checker(entry)
-            entry.changed = self._mark
         self._watched = self._configured()
 
     @property
@@ -212,10 +203,8 @@ class HeartbeatConsumer:
 
     def resume(self, former: HeartbeatConsumer) -> None:
         """Go on watching as another consumer did, where both watch the same."""
-        for node, watched in former._watched.items():
-            present = self._watched.get(node)
-            if present is not None and present.timeout == watched.timeout:
-                self._watched[node] = watched
+        for watched in former._watched.values():
+            self._keep(watched)
 
     def receive(self, frame: Frame, now: float) -> None:
         """A frame with COB-ID 700h + node-ID."""
@@ -253,40 +242,39 @@ class HeartbeatConsumer:
         """Changed entries wait for their first heartbeat; the others go on as they were."""
         self._stale = False
         old, self._watched = self._watched, self._configured()
-        for node, watched in old.items():
-            present = self._watched.get(node)
-            if present is not None and present.timeout == watched.timeout:
-                self._watched[node] = watched
-            elif watched.state is Watch.LOST:
-                self._back(node, now)
+        for watched in old.values():
+            if not self._keep(watched) and watched.state is Watch.LOST:
+                self._back(watched.node, now)
         self._nodes_changed()
+
+    def _keep(self, watched: _Watched) -> bool:
+        """Go on with a node as it stands, if it is still watched, and for the same time."""
+        if self.time(watched.node) != watched.timeout:
+            return False
+        self._watched[watched.node] = watched
+        return True
 
     def _configured(self) -> dict[int, _Watched]:
         found = {}
         for entry in self._entries:
-            node, milliseconds = entry.number >> 16 & 0xFF, entry.number & 0xFFFF
+            node, milliseconds = _split(entry.number)
             if node and milliseconds:
                 found[node] = _Watched(node, milliseconds / 1000)
         return found
 
-    def _checker(self, entry: Entry) -> Callable[[bytes], None]:
-        def check(data: bytes) -> None:
-            number = int.from_bytes(data, "little")
-            node, milliseconds = number >> 16, number & 0xFFFF
-            if node > 127:
-                raise Abort(AbortCode.INVALID_VALUE)
-            if (
-                node
-                and milliseconds
-                and any(_watches(other, node) for other in self._entries if other is not entry)
-            ):
-                raise Abort(AbortCode.PARAMETER_INCOMPATIBLE)
-
-        return check
+    def _check(self, subindex: int, data: bytes) -> None:
+        number = int.from_bytes(data, "little")
+        if number >> 16 > 127:
+            raise Abort(AbortCode.INVALID_VALUE)
+        node, milliseconds = _split(number)
+        others = (_split(entry.number) for entry in self._entries if entry.subindex != subindex)
+        if node and milliseconds and any(other == node and time for other, time in others):
+            raise Abort(AbortCode.PARAMETER_INCOMPATIBLE)
 
     def _mark(self) -> None:
         self._stale = True
 
 
-def _watches(entry: Entry, node: int) -> bool:
-    return entry.number >> 16 & 0xFF == node and entry.number & 0xFFFF != 0
+def _split(number: int) -> tuple[int, int]:
+    """The node and the milliseconds in an entry of 1016h; either is 0 where nobody is watched."""
+    return number >> 16 & 0xFF, number & 0xFFFF

@@ -51,18 +51,10 @@ class Identity:
 
 def identity_objects(identity: Identity, status: Callable[[], int]) -> Iterable[Object]:
     """1000h, 1002h, 1008h to 100Ah, 1018h. `status` tells the flags of the status block."""
-    yield variable(0x1000, _number(0, "Device type", 0))
-    yield variable(
-        0x1002,
-        Entry(
-            0,
-            "Manufacturer status register",
-            CanType.UNSIGNED32,
-            Access.RO,
-            bytes(4),
-            source=lambda: CanType.UNSIGNED32.pack(status()),
-        ),
-    )
+    yield variable(0x1000, Entry.constant(0, "Device type", 0))
+    register = Entry.constant(0, "Manufacturer status register", 0)
+    register.source = lambda: CanType.UNSIGNED32.pack(status())
+    yield variable(0x1002, register)
     yield variable(0x1008, _text("Manufacturer device name", "gatewayd"))
     yield variable(0x1009, _text("Manufacturer hardware version", "none"))
     yield variable(0x100A, _text("Manufacturer software version", __version__))
@@ -70,10 +62,10 @@ def identity_objects(identity: Identity, status: Callable[[], int]) -> Iterable[
         0x1018,
         "Identity object",
         (
-            _number(1, "Vendor-ID", identity.vendor),
-            _number(2, "Product code", identity.product),
-            _number(3, "Revision number", identity.revision),
-            _number(4, "Serial number", identity.serial),
+            Entry.constant(1, "Vendor-ID", identity.vendor),
+            Entry.constant(2, "Product code", identity.product),
+            Entry.constant(3, "Revision number", identity.revision),
+            Entry.constant(4, "Serial number", identity.serial),
         ),
     )
 
@@ -90,14 +82,8 @@ class ErrorBehaviour:
     """1029h: the change of NMT state after a communication error (heartbeat, guarding, bus-off)."""
 
     def __init__(self) -> None:
-        self._communication = Entry(
-            1,
-            "Communication error",
-            CanType.UNSIGNED8,
-            Access.RW,
-            b"\0",
-            stored=True,
-            check=_check_behaviour,
+        self._communication = Entry.parameter(
+            1, "Communication error", CanType.UNSIGNED8, 0, check=_check_behaviour
         )
 
     def objects(self) -> Iterable[Object]:
@@ -112,10 +98,6 @@ class ErrorBehaviour:
 def _check_behaviour(data: bytes) -> None:
     if data[0] > 2:
         raise Abort(AbortCode.INVALID_VALUE)
-
-
-def _number(subindex: int, name: str, value: int) -> Entry:
-    return Entry(subindex, name, CanType.UNSIGNED32, Access.RO, CanType.UNSIGNED32.pack(value))
 
 
 def _text(name: str, text: str) -> Entry:

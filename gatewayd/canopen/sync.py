@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from gatewayd.canopen.cob_ids import BASIC_FRAME, is_restricted
+from gatewayd.canopen.cob_ids import BASIC_FRAME, is_assignable
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, variable
+from gatewayd.canopen.dictionary import Abort, AbortCode, Entry, Object, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
 
 __all__ = ["MAX_COUNTER", "MIN_PERIOD", "PRODUCER", "SyncPlan", "SyncService"]
@@ -63,36 +63,17 @@ class SyncService:
         """SYNC messages heard or sent."""
         self.missed = 0
         """SYNC messages that were due and that the bus did not take."""
-        u32 = CanType.UNSIGNED32
-        self._cob_id = Entry(
-            0,
-            "COB-ID SYNC",
-            u32,
-            Access.RW,
-            u32.pack(plan.cob_id | (PRODUCER if plan.producer else 0)),
-            stored=True,
-            check=self._check_cob_id,
-            changed=self._configured,
+        u8, u32, changed = CanType.UNSIGNED8, CanType.UNSIGNED32, self._configured
+        cob_id = plan.cob_id | (PRODUCER if plan.producer else 0)
+        self._cob_id = Entry.parameter(
+            0, "COB-ID SYNC", u32, cob_id, check=self._check_cob_id, changed=changed
         )
-        self._period = Entry(
-            0,
-            "Communication cycle period",
-            u32,
-            Access.RW,
-            u32.pack(plan.period),
-            stored=True,
-            check=_check_period,
-            changed=self._configured,
+        self._period = Entry.parameter(
+            0, "Communication cycle period", u32, plan.period, check=_check_period, changed=changed
         )
-        self._window = Entry(0, "Synchronous window length", u32, Access.RW, u32.pack(0), stored=True)
-        self._overflow = Entry(
-            0,
-            "Synchronous counter overflow value",
-            CanType.UNSIGNED8,
-            Access.RW,
-            bytes([plan.counter]),
-            stored=True,
-            check=self._check_overflow,
+        self._window = Entry.parameter(0, "Synchronous window length", u32, 0)
+        self._overflow = Entry.parameter(
+            0, "Synchronous counter overflow value", u8, plan.counter, check=self._check_overflow
         )
 
     @property
@@ -152,7 +133,8 @@ class SyncService:
         self._due = self._due + period if now < self._due + period else now + period
         if not self._allowed():
             return
-        counter = self._next_counter()
+        overflow = self._overflow.number
+        counter = self._counter % overflow + 1 if overflow else None
         frame = Frame(self.cob_id, b"" if counter is None else bytes([counter]))
         if not self._send(frame, Priority.AT_ONCE):
             self.missed += 1
@@ -169,11 +151,6 @@ class SyncService:
         self.count += 1
         self._on_sync(counter, now)
 
-    def _next_counter(self) -> int | None:
-        if not self._overflow.number:
-            return None
-        return self._counter % self._overflow.number + 1
-
     def _configured(self) -> None:
         # The first SYNC has to come within one period: the next tick sends it.
         self._counter = 0
@@ -182,10 +159,8 @@ class SyncService:
 
     def _check_cob_id(self, data: bytes) -> None:
         new, old = int.from_bytes(data, "little"), self._cob_id.number
-        identifier = new & BASIC_FRAME
-        if new & ~(PRODUCER | _DO_NOT_CARE | BASIC_FRAME) or is_restricted(identifier):
-            raise Abort(AbortCode.INVALID_VALUE)
-        if old & new & PRODUCER and identifier != old & BASIC_FRAME:
+        moved = old & new & PRODUCER and (old ^ new) & BASIC_FRAME
+        if moved or not is_assignable(new, PRODUCER | _DO_NOT_CARE):
             raise Abort(AbortCode.INVALID_VALUE)
 
     def _check_overflow(self, data: bytes) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Dictionary, Entry, variable
-from gatewayd.canopen.sdo import SdoServer
+from gatewayd.canopen.sdo.server import SdoServer
 
 INDEX = 0x2005
 

@@ -13,18 +13,21 @@ from collections.abc import Callable
 from enum import Enum
 from typing import ClassVar
 
-from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary
+from gatewayd.canopen.cob_ids import Function
+from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary, Entry, Object, record
 from gatewayd.canopen.sdo import protocol
 from gatewayd.canopen.sdo.protocol import BLOCK_SEGMENTS, REQUESTS, Request
-from gatewayd.canopen.sdo.transfers import (
-    MAX_BLOCK_SEGMENTS,
-    BlockDownload,
-    BlockUpload,
-    Download,
-    Upload,
-)
+from gatewayd.canopen.sdo.transfers import MAX_BLOCK_SEGMENTS, BlockDownload, BlockUpload, Download, Upload
 
-__all__ = ["LONGEST_DOWNLOAD", "SLOWEST_FRAME", "SUB_BLOCK_TIMEOUT", "TIMEOUT", "SdoServer", "SdoState"]
+__all__ = [
+    "LONGEST_DOWNLOAD",
+    "SLOWEST_FRAME",
+    "SUB_BLOCK_TIMEOUT",
+    "TIMEOUT",
+    "SdoServer",
+    "SdoState",
+    "server_parameter",
+]
 
 TIMEOUT = 1.0
 """Seconds without a frame after which a transfer is aborted."""
@@ -42,6 +45,19 @@ _SIZE = struct.Struct("<4xI")
 _CRC = struct.Struct("<xH5x")
 _TOGGLE = 0x10
 _CRC_SUPPORTED = 0x04
+
+
+def server_parameter(node: int) -> Object:
+    """1200h: the COB-IDs of the default server, which follow the node-ID and which nobody can change (7.5.2.33)."""
+    request, response = Function.SDO_REQUEST + node, Function.SDO_RESPONSE + node
+    return record(
+        0x1200,
+        "SDO server parameter",
+        (
+            Entry.constant(1, "COB-ID client to server", request, plus_node=True),
+            Entry.constant(2, "COB-ID server to client", response, plus_node=True),
+        ),
+    )
 
 
 class SdoState(Enum):
@@ -64,18 +80,6 @@ Act = Callable[["SdoServer", bytes], list[bytes]]
 class SdoServer:
     """One SDO channel."""
 
-    __slots__ = (
-        "_block_download",
-        "_block_upload",
-        "_dictionary",
-        "_download",
-        "_heard",
-        "_longest",
-        "_multiplexer",
-        "_upload",
-        "state",
-    )
-
     def __init__(self, dictionary: Dictionary, longest: int = LONGEST_DOWNLOAD) -> None:
         """`longest`: bytes that a download may have."""
         self._dictionary = dictionary
@@ -87,10 +91,10 @@ class SdoServer:
     def reset(self) -> None:
         """Forget the transfer without a word: the node leaves the states in which SDO is served."""
         self.state = SdoState.IDLE
-        self._download: Download | None = None
-        self._upload: Upload | None = None
-        self._block_download: BlockDownload | None = None
-        self._block_upload: BlockUpload | None = None
+        self._download = Download(None, self._longest)
+        self._upload = Upload(b"")
+        self._block_download = BlockDownload(self._download, checked=False)
+        self._block_upload = BlockUpload(b"", MAX_BLOCK_SEGMENTS, checked=False)
 
     def receive(self, data: bytes, now: float) -> list[bytes]:
         """The answers to a frame of the client; frames that are not 8 bytes long are ignored."""
@@ -111,18 +115,17 @@ class SdoServer:
         """What the client's silence leads to."""
         if now < self.next_deadline(now):
             return []
-        if self._block_download is not None and self._block_download.pending:
-            return self._acknowledge(self._block_download)
+        if self._block_download.pending:
+            return self._acknowledge()
         return self._abort(AbortCode.TIMED_OUT)
 
     def next_deadline(self, now: float) -> float:
         """When `tick` will have something to do; infinity without a transfer."""
         if self.state is SdoState.IDLE:
             return math.inf
-        download, upload = self._block_download, self._block_upload
-        if download is not None and download.pending:
+        if self._block_download.pending:
             return self._heard + SUB_BLOCK_TIMEOUT
-        return self._heard + TIMEOUT + (upload.sent * SLOWEST_FRAME if upload is not None else 0.0)
+        return self._heard + TIMEOUT + self._block_upload.sent * SLOWEST_FRAME
 
     # -- beginning and ending ------------------------------------------------------------------------------------
 
@@ -179,7 +182,6 @@ class SdoServer:
 
     def _take_segment(self, data: bytes) -> list[bytes]:
         download, command = self._download, data[0]
-        assert download is not None
         toggle = download.toggle
         if command & _TOGGLE != toggle:
             raise Abort(AbortCode.TOGGLE)
@@ -203,7 +205,6 @@ class SdoServer:
 
     def _give_segment(self, data: bytes) -> list[bytes]:
         upload = self._upload
-        assert upload is not None
         if data[0] & _TOGGLE != upload.toggle:
             raise Abort(AbortCode.TOGGLE)
         segment = upload.segment()
@@ -224,19 +225,15 @@ class SdoServer:
         return [protocol.block_download_initiated(self._multiplexer, MAX_BLOCK_SEGMENTS, checked=checked)]
 
     def _take_block_segment(self, data: bytes) -> list[bytes]:
-        block = self._block_download
-        assert block is not None
-        return self._acknowledge(block) if block.receive(data) else []
+        return self._acknowledge() if self._block_download.receive(data) else []
 
-    def _acknowledge(self, block: BlockDownload) -> list[bytes]:
-        if block.complete:
+    def _acknowledge(self) -> list[bytes]:
+        if self._block_download.complete:
             self.state = SdoState.BLOCK_DOWNLOAD_END
-        return [block.acknowledge()]
+        return [self._block_download.acknowledge()]
 
     def _end_block_download(self, data: bytes) -> list[bytes]:
-        block = self._block_download
-        assert block is not None
-        self._write(block.whole(data[0] >> 2 & 7, *_CRC.unpack(data)))
+        self._write(self._block_download.whole(data[0] >> 2 & 7, *_CRC.unpack(data)))
         return [protocol.block_download_ended()]
 
     # -- block upload --------------------------------------------------------------------------------------------
@@ -253,13 +250,11 @@ class SdoServer:
         return [protocol.block_upload_initiated(self._multiplexer, len(value), checked=checked)]
 
     def _start_block_upload(self, _data: bytes) -> list[bytes]:
-        assert self._block_upload is not None
         self.state = SdoState.BLOCK_UPLOAD
         return self._block_upload.sub_block()
 
     def _next_sub_block(self, data: bytes) -> list[bytes]:
         block = self._block_upload
-        assert block is not None
         block.acknowledge(data[1], data[2])
         if not block.done:
             return block.sub_block()

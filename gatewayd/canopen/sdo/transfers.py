@@ -5,12 +5,8 @@ from __future__ import annotations
 from binascii import crc_hqx
 
 from gatewayd.canopen.dictionary import Abort, AbortCode
-from gatewayd.canopen.sdo.protocol import (
-    SEGMENT,
-    block_download_acknowledged,
-    block_upload_ended,
-    upload_segment,
-)
+from gatewayd.canopen.sdo import protocol
+from gatewayd.canopen.sdo.protocol import SEGMENT
 
 __all__ = ["MAX_BLOCK_SEGMENTS", "BlockDownload", "BlockUpload", "Download", "Upload"]
 
@@ -23,8 +19,6 @@ _LAST = 0x80
 
 class Download:
     """Collects the data of a download, never more than `longest` bytes."""
-
-    __slots__ = ("_data", "_limit", "_size", "toggle")
 
     def __init__(self, size: int | None, longest: int) -> None:
         """`size`: what the client has announced, if it has. Raises Abort if that is too much."""
@@ -55,8 +49,6 @@ class Download:
 class Upload:
     """Hands out data segment by segment."""
 
-    __slots__ = ("_data", "_position", "toggle")
-
     def __init__(self, data: bytes) -> None:
         self.toggle = 0
         """Toggle bit that the next request must have."""
@@ -72,13 +64,11 @@ class Upload:
         """The next frame."""
         data = self._data[self._position : self._position + SEGMENT]
         self._position += SEGMENT
-        return upload_segment(self.toggle, data, last=self.done)
+        return protocol.upload_segment(self.toggle, data, last=self.done)
 
 
 class BlockDownload:
     """Puts the sub-blocks of a block download together. What comes out of sequence is left to be sent again."""
-
-    __slots__ = ("_checked", "_download", "_last", "_taken", "pending")
 
     def __init__(self, download: Download, *, checked: bool) -> None:
         """`checked`: the client makes a CRC."""
@@ -118,7 +108,7 @@ class BlockDownload:
         """The frame that tells how far the sub-block was taken; the next one begins."""
         taken, self._taken = self._taken, 0
         self.pending = False
-        return block_download_acknowledged(taken, MAX_BLOCK_SEGMENTS)
+        return protocol.block_download_acknowledged(taken, MAX_BLOCK_SEGMENTS)
 
     def whole(self, unused: int, crc: int) -> bytes:
         """All the data; `unused` bytes of the last segment are none. Raises Abort for a wrong size or CRC."""
@@ -132,8 +122,6 @@ class BlockDownload:
 
 class BlockUpload:
     """Hands out data sub-block by sub-block."""
-
-    __slots__ = ("_acknowledged", "_checked", "_data", "_segments", "sent")
 
     def __init__(self, data: bytes, segments: int, *, checked: bool) -> None:
         """`segments`: how many the first sub-block may have; `checked`: the client wants a CRC. Raises Abort."""
@@ -176,7 +164,7 @@ class BlockUpload:
     def end(self) -> bytes:
         """The frame that ends the upload."""
         crc = crc_hqx(self._data, 0) if self._checked else 0
-        return block_upload_ended(self._total * SEGMENT - len(self._data), crc)
+        return protocol.block_upload_ended(self._total * SEGMENT - len(self._data), crc)
 
 
 def _sub_block(segments: int) -> int:

@@ -23,8 +23,7 @@ from gatewayd.canopen.heartbeat import HeartbeatConsumer, HeartbeatProducer
 from gatewayd.canopen.identity import Identity, identity_objects
 from gatewayd.canopen.lss import LssSlave
 from gatewayd.canopen.nmt import ALLOWED, UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
-from gatewayd.canopen.sdo import SdoServer
-from gatewayd.canopen.sdo.parameters import server_parameter
+from gatewayd.canopen.sdo.server import SdoServer, server_parameter
 from gatewayd.canopen.sync import SyncService
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
@@ -447,7 +446,7 @@ class Node:
             return self._peers.asking(self.plan.sdo_writer, self._now)
 
         yield from identity_objects(identity, lambda: int.from_bytes(status.read(1, 1, self._now), "big"))
-        yield from server_parameter(self.parameters.node)
+        yield server_parameter(self.parameters.node)
         for service in (
             self.emergency,
             self.sync,

@@ -6,7 +6,7 @@ import pytest
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Dictionary, Entry, array, record, variable
-from gatewayd.canopen.sdo import SdoServer
+from gatewayd.canopen.sdo.server import SdoServer
 
 
 def _names() -> list[Entry]:

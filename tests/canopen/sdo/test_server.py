@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import AbortCode, Access, Dictionary, Entry, variable
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, variable
 from gatewayd.canopen.sdo.server import (
     LONGEST_DOWNLOAD,
     SLOWEST_FRAME,
@@ -19,6 +19,7 @@ from gatewayd.canopen.sdo.server import (
     TIMEOUT,
     SdoServer,
     SdoState,
+    server_parameter,
 )
 
 ABORT = b"\x80\x05\x20\x00" + struct.pack("<I", AbortCode.GENERAL)
@@ -453,10 +454,9 @@ def test_block_download_that_never_ends_is_bounded(server: SdoServer) -> None:
     answers: list[str] = []
     while AbortCode.OUT_OF_MEMORY.to_bytes(4, "little").hex() not in "".join(answers):
         answers = [ask(server, bytes((number,)).hex() + b"abcdefg".hex()) for number in range(1, 128)]
-        assert (
-            server._block_download is None or len(server._block_download._download._data) <= LONGEST_DOWNLOAD
-        )
-    assert server._block_download is None
+        assert len(server._block_download._download._data) <= LONGEST_DOWNLOAD
+    assert server.state is SdoState.IDLE
+    assert not server._block_download._download._data
 
 
 # -- every entry (OD 01 to 09) -------------------------------------------------------------------------------------
@@ -572,3 +572,17 @@ def test_no_frame_raises_and_nothing_incomplete_is_written(frames: list[tuple[by
             assert answers[0][0] in (0x60, 0x20, 0x30, 0xA1)
         assert all(len(one) <= 100 for one in written)
         assert server.state is not SdoState.IDLE or server.next_deadline(now) == math.inf
+
+
+def test_cob_ids_follow_the_node_id_and_cannot_be_changed() -> None:
+    """CiA 301, 7.5.2.33: the default server is read-only."""
+    objects = Dictionary([server_parameter(16)])
+    assert [objects.read(0x1200, sub) for sub in range(3)] == [
+        b"\x02",
+        (0x610).to_bytes(4, "little"),
+        (0x590).to_bytes(4, "little"),
+    ]
+    assert all(entry.plus_node for one in objects for entry in one.entries[1:])
+    with pytest.raises(Abort) as caught:
+        objects.write(0x1200, 1, (0x620).to_bytes(4, "little"))
+    assert caught.value.code is AbortCode.READ_ONLY

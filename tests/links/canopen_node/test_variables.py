@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, ObjectCode, Pdo
-from gatewayd.canopen.sdo import SdoServer
+from gatewayd.canopen.sdo.server import SdoServer
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import (
