@@ -1,8 +1,7 @@
-"""A CAN bus as the node sees it: what every driver offers, and whom it tells."""
+"""How a CAN bus is, and to whom its driver reports."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
@@ -10,7 +9,7 @@ from typing import Protocol
 from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.frame import Frame
 
-__all__ = ["DRAIN", "Bus", "BusCounters", "BusError", "BusHandler", "BusState"]
+__all__ = ["DRAIN", "BusCounters", "BusError", "BusHandler", "BusState"]
 
 DRAIN = 64
 """Most frames that a driver reads before the loop has its turn."""
@@ -62,19 +61,19 @@ class BusCounters:
     receive_buffer: int = 0
     """Bytes that were granted for received frames; 0: not known."""
     tx_errors: int = 0
-    """The controller's transmit error counter, as last told."""
+    """The controller's transmit error counter, as last reported."""
     rx_errors: int = 0
     """Its receive error counter."""
 
 
 class BusHandler(Protocol):
-    """Whom a driver tells. Called from within the loop; must not raise. `now` is monotonic seconds."""
+    """To whom a driver reports. Called from within the loop; must not raise. `now` is monotonic seconds."""
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
         """Received frames in their order, at most `DRAIN`."""
 
     def on_error(self, error: ErrorFrame, now: float) -> None:
-        """The controller reports an error; a change of state that follows from it is told by `on_state` after it."""
+        """The controller reports an error; the state that follows from it is reported by `on_state` afterwards."""
 
     def on_lost(self, count: int, now: float) -> None:
         """So many received frames found no room and are lost (EMCY 8110h)."""
@@ -84,38 +83,3 @@ class BusHandler(Protocol):
 
     def on_writable(self, now: float) -> None:
         """A frame was refused for want of room; now there may be some."""
-
-
-class Bus(Protocol):
-    """A driver: reopens by itself whatever comes back, and never configures an interface."""
-
-    counters: BusCounters
-
-    @property
-    def state(self) -> BusState:
-        """ABSENT until it is opened."""
-
-    @property
-    def bitrate(self) -> int | None:
-        """Bit/s that the controller is really set to, where that can be known."""
-
-    async def open(self) -> None:
-        """Start. An interface that is not there is waited for; BusError if waiting cannot help."""
-
-    def close(self) -> None:
-        """Stop, without a last `on_state`."""
-
-    def send(self, frame: Frame) -> bool:
-        """Hand over a frame, without waiting. False: not now; `on_writable` or `on_state` will tell when."""
-
-    def lags(self, bit_rate: int | None) -> bool:
-        """Whether a frame that is sent now would be late, because older ones still wait for the bus."""
-
-    def catch_up(self) -> bool:
-        """Hand over all received frames that wait, instead of leaving the loop its turns in between.
-
-        False: they were so many that it has to be called again.
-        """
-
-    def set_filters(self, can_ids: Iterable[int], remote_ids: Iterable[int] = ()) -> None:
-        """Receive data frames of `can_ids` and remote frames of `remote_ids`, and nothing else."""

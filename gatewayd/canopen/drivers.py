@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from gatewayd.canopen.bus import Bus, BusHandler
+from gatewayd.canopen.bus import BusHandler
 from gatewayd.canopen.socketcan import SocketCanBus
+from gatewayd.canopen.supervised import SupervisedBus
 
 __all__ = ["make_bus"]
 
 
-def make_bus(interface: str, channel: str, bitrate: int, handler: BusHandler) -> Bus:
+def make_bus(interface: str, channel: str, bitrate: int, handler: BusHandler) -> SupervisedBus:
     """The driver for an interface of python-can, not opened yet; `socketcan` has one of our own.
 
     `bitrate` is what interfaces are set to that have no configuration of their own; the kernel's have one.

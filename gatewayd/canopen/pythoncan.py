@@ -69,14 +69,8 @@ class PythonCanBus(SupervisedBus):
         self._descriptor = -1
         self._readiness, self._room = select.poll(), select.poll()
         self._ask = ASK
-        self._looking: asyncio.TimerHandle | None = None
         self._reading: asyncio.Handle | None = None
         self._opening: asyncio.Task[None] | None = None
-
-    @property
-    def bitrate(self) -> int | None:
-        """What the interface was told to use; most cannot tell what they do use."""
-        return None
 
     async def open(self) -> None:
         """Start. BusError if python-can has no such interface, lacks a package for it, or refuses the settings."""
@@ -85,14 +79,11 @@ class PythonCanBus(SupervisedBus):
         self._looking = self._loop.call_later(LOOK, self._look)
 
     def close(self) -> None:
-        """Stop."""
-        if self._looking is not None:
-            self._looking.cancel()
-            self._looking = None
+        """Stop, and give up an attempt to open it."""
         if self._opening is not None:
             self._opening.cancel()
             self._opening = None
-        self._release()
+        super().close()
 
     def set_filters(self, can_ids: Iterable[int], remote_ids: Iterable[int] = ()) -> None:
         """Filter in the adapter where it can, and here in any case."""
@@ -101,13 +92,10 @@ class PythonCanBus(SupervisedBus):
         if self._bus is not None:
             self._filter_in_adapter(self._bus)
 
-    def send(self, frame: Frame) -> bool:
-        """Hand a frame to the interface, if it carries frames and has room."""
-        if self._bus is None or self._full or not self._supervisor.state.carries:
-            self.counters.refused += 1
+    def _give(self, frame: Frame) -> bool:
+        if self._bus is None:
             return False
         if self._descriptor >= 0 and not self._room.poll(0):
-            self.counters.refused += 1
             self._wait_for_room(self._descriptor)
             return False
         message = can.Message(
@@ -121,24 +109,29 @@ class PythonCanBus(SupervisedBus):
         try:
             self._bus.send(message, timeout=0)
         except (can.CanError, OSError, ValueError) as error:
-            self.counters.refused += 1
             if isinstance(error, TimeoutError | BlockingIOError):
                 self._wait_for_room(self._descriptor)
             else:
                 self._lose(error)
             return False
-        self.counters.sent += 1
-        self._handed_over = clock.now()
         return True
 
     def _pending(self) -> int:
-        """Bytes that the operating system has not passed on; an adapter's own buffers are not known."""
-        return _unsent(self._descriptor) if self._descriptor >= 0 else 0
+        """Bytes that the operating system has not passed on: of a connection those not sent yet, of a serial port all.
+
+        An adapter's own buffers are not known.
+        """
+        if self._descriptor < 0:
+            return 0
+        for request in (_SIOCOUTQNSD, termios.TIOCOUTQ):
+            with contextlib.suppress(OSError):
+                return int(_INT.unpack(fcntl.ioctl(self._descriptor, request, bytes(_INT.size)))[0])
+        return 0
 
     # Receiving
 
     def catch_up(self) -> bool:
-        """See Bus; for at most `CATCH_UP` seconds."""
+        """Hand over what waits, for at most `CATCH_UP` seconds."""
         end = clock.now() + CATCH_UP
         while self._bus is not None and not self._read(self._bus):
             if clock.now() >= end:
@@ -150,7 +143,6 @@ class PythonCanBus(SupervisedBus):
         clock.judged_now()
         if self._bus is not None and not self._read(self._bus) and self._reading is None:
             # What the interface has read already, no descriptor announces.
-            assert self._loop is not None
             self._reading = self._loop.call_soon(self._read_on)
 
     def _read_on(self) -> None:
@@ -159,7 +151,6 @@ class PythonCanBus(SupervisedBus):
 
     def _look_for_frames(self) -> None:
         """There is no descriptor: ask, the more often the more comes."""
-        assert self._loop is not None
         clock.judged_now()
         before = self.counters.received
         if self._bus is None:
@@ -207,7 +198,6 @@ class PythonCanBus(SupervisedBus):
 
     def _look(self) -> None:
         """Open what is closed, ask an adapter that knows its state for it, and come again."""
-        assert self._loop is not None
         now = clock.now()
         self._looking = self._loop.call_later(LOOK, self._look)
         if self._bus is None:
@@ -219,11 +209,8 @@ class PythonCanBus(SupervisedBus):
             except (can.CanError, OSError) as error:
                 self._lose(error)
                 return
-            self._feed(
-                BusSignal.OFF if off else BusSignal.UP,
-                now,
-                f"{self._name} is {'off the bus' if off else 'up'}",
-            )
+            signal, words = (BusSignal.OFF, "off the bus") if off else (BusSignal.UP, "up")
+            self._feed(signal, now, f"{self._name} is {words}")
 
     @property
     def _name(self) -> str:
@@ -246,7 +233,6 @@ class PythonCanBus(SupervisedBus):
             self._opening = None
 
     async def _acquire(self) -> None:
-        assert self._loop is not None
         self._supervisor.failed(clock.now())  # until it is known better
         try:
             bus = await in_daemon_thread(self._make, f"open {self._name}", can.BusABC.shutdown)
@@ -257,7 +243,8 @@ class PythonCanBus(SupervisedBus):
         self._supervisor.opened()
         self.counters.opened += 1
         self._filter_in_adapter(bus)
-        self._descriptor = _descriptor(bus)
+        with contextlib.suppress(NotImplementedError, can.CanError, OSError):
+            self._descriptor = bus.fileno()
         self._readiness, self._room = select.poll(), select.poll()
         if self._descriptor >= 0:
             self._readiness.register(self._descriptor, select.POLLIN)
@@ -289,11 +276,12 @@ class PythonCanBus(SupervisedBus):
             ) from error
         port = _serial_port(bus)
         if port is not None:
-            port.flush = _do_nothing  # it would wait until the wire has carried the frame
-            connection = _connection(port)
-            if connection is not None:
+            port.flush = lambda: None  # it would wait until the wire has carried the frame
+            # A port at the other end of a TCP connection (`socket://`).
+            connection = getattr(port, "_socket", None)
+            if isinstance(connection, socket.socket):
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                port.close = partial(_hang_up, port)
+                port.close = partial(_hang_up, port, connection)
         return bus
 
     def _filter_in_adapter(self, bus: can.BusABC) -> None:
@@ -313,35 +301,16 @@ class PythonCanBus(SupervisedBus):
         if self._reading is not None:
             self._reading.cancel()
             self._reading = None
-        if self._descriptor >= 0 and self._loop is not None:
+        if self._descriptor >= 0:
             self._loop.remove_reader(self._descriptor)
         port = _serial_port(bus)
         if port is not None and (broken or not self._room.poll(0)):
-            with contextlib.suppress(
-                Exception
-            ):  # saying goodbye to a device that takes nothing would wait for ever
+            # Saying goodbye to a device that takes nothing would wait for ever.
+            with contextlib.suppress(Exception):
                 port.close()
         self._descriptor = -1
         with contextlib.suppress(Exception):  # a driver may raise anything about a device that is gone
             bus.shutdown()
-
-
-def _descriptor(bus: can.BusABC) -> int:
-    """What the loop can watch; -1 if there is nothing."""
-    try:
-        return bus.fileno()
-    except (NotImplementedError, can.CanError, OSError):
-        return -1
-
-
-def _unsent(descriptor: int) -> int:
-    """Bytes that the operating system still has: of a connection those not sent yet, of a serial port all."""
-    for request in (_SIOCOUTQNSD, termios.TIOCOUTQ):
-        try:
-            return int(_INT.unpack(fcntl.ioctl(descriptor, request, bytes(_INT.size)))[0])
-        except OSError:
-            continue
-    return 0
 
 
 def _serial_port(bus: can.BusABC) -> Any:
@@ -349,19 +318,7 @@ def _serial_port(bus: can.BusABC) -> Any:
     return getattr(bus, "serialPortOrig", None)
 
 
-def _connection(port: Any) -> socket.socket | None:
-    """Of a serial port at the other end of a TCP connection (`socket://`)."""
-    found = getattr(port, "_socket", None)
-    return found if isinstance(found, socket.socket) else None
-
-
-def _hang_up(port: Any) -> None:
+def _hang_up(port: Any, connection: socket.socket) -> None:
     """Close the connection below the port. The port's own `close` sleeps for 0.3 s then, and the loop with it."""
-    connection = _connection(port)
-    if connection is not None:
-        connection.close()
+    connection.close()
     port.is_open = False
-
-
-def _do_nothing() -> None:
-    pass

@@ -12,12 +12,12 @@ import socket
 import struct
 from collections.abc import Iterable
 
-from gatewayd.canopen.bus import DRAIN, BusError, BusHandler, BusState
+from gatewayd.canopen.bus import DRAIN, BusError, BusHandler
 from gatewayd.canopen.errors import ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.interface import ControllerState, Interface, InterfaceReader
 from gatewayd.canopen.supervised import SupervisedBus
-from gatewayd.canopen.supervision import LOOK, BusSignal, event_of_errno
+from gatewayd.canopen.supervision import FAILURES, LOOK, BusSignal
 from gatewayd.loop import clock
 
 __all__ = ["RECEIVE_BUFFER", "SEND_BUFFER", "SocketCanBus", "filters", "pack", "seen"]
@@ -29,7 +29,7 @@ RECEIVE_BUFFER = 2 << 20
 SEND_BUFFER = 2304
 """Bytes asked for: the least that the kernel gives, room for some six frames. What is in there goes out late when a
 bus that stood still recovers, so that it must not be much; the interface's own queue takes more (txqueuelen, by
-default ten), so that the kernel tells when there is room."""
+default ten), so that the kernel reports when there is room."""
 
 _FRAME = struct.Struct("=IB3x8s")
 """struct can_frame: identifier with flags, length, eight bytes."""
@@ -100,7 +100,6 @@ class SocketCanBus(SupervisedBus):
         self._index = 0
         self._lost = 0
         self._reader: InterfaceReader | None = None
-        self._looking: asyncio.TimerHandle | None = None
 
     @property
     def bitrate(self) -> int | None:
@@ -123,11 +122,8 @@ class SocketCanBus(SupervisedBus):
         self._look()
 
     def close(self) -> None:
-        """Stop."""
-        if self._looking is not None:
-            self._looking.cancel()
-            self._looking = None
-        self._release()
+        """Stop, and ask the kernel no more."""
+        super().close()
         if self._reader is not None:
             self._reader.close()
             self._reader = None
@@ -138,23 +134,18 @@ class SocketCanBus(SupervisedBus):
         if self._socket is not None:
             self._socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, self._filters)
 
-    def send(self, frame: Frame) -> bool:
-        """Hand a frame to the kernel, if the bus carries frames and there is room."""
-        if self._socket is None or self._full or self._supervisor.state < BusState.PASSIVE:
-            self.counters.refused += 1
+    def _give(self, frame: Frame) -> bool:
+        if self._socket is None:
             return False
         try:
             self._socket.send(pack(frame))
         except OSError as error:
-            self.counters.refused += 1
             if error.errno in _NO_ROOM:
-                # Of the end of a full queue of the interface (ENOBUFS) the kernel tells nobody.
+                # The end of a full queue of the interface (ENOBUFS) is not reported by the kernel.
                 self._wait_for_room(self._socket.fileno() if error.errno == errno.EAGAIN else -1)
             else:
                 self._failed(error)
             return False
-        self.counters.sent += 1
-        self._handed_over = clock.now()
         return True
 
     def _pending(self) -> int:
@@ -163,7 +154,7 @@ class SocketCanBus(SupervisedBus):
     # Receiving
 
     def catch_up(self) -> bool:
-        """See Bus."""
+        """Hand over all that wait, which are never too many."""
         self._read(clock.now(), CATCH_UP_FRAMES)
         return True
 
@@ -196,7 +187,7 @@ class SocketCanBus(SupervisedBus):
     def _count_lost(self, raw: socket.socket, now: float) -> None:
         """Ask the kernel for its count of frames that found no room, the one that SO_RXQ_OVFL attaches to frames.
 
-        Asked for with each look it costs nothing per frame, and tells of the last frames too, which none follows.
+        Asked for with each look it costs nothing per frame, and counts the last frames too, which none follows.
         """
         total = _memory(raw)[_MEMINFO_DROPS]
         lost = (total - self._lost) & 0xFFFF_FFFF
@@ -209,16 +200,13 @@ class SocketCanBus(SupervisedBus):
 
     def _failed(self, error: OSError) -> None:
         """A send or receive failed: believe it, and look at once, for the reason may be gone already."""
-        now = clock.now()
-        self._feed(
-            event_of_errno(error.errno or 0) or BusSignal.GONE, now, f"{self._channel}: {error.strerror}"
-        )
-        if event_of_errno(error.errno or 0) is not BusSignal.DOWN:
+        signal = FAILURES.get(error.errno or 0, BusSignal.GONE)
+        self._feed(signal, clock.now(), f"{self._channel}: {error.strerror}")
+        if signal is not BusSignal.DOWN:
             self._release()
 
     def _look(self) -> None:
         """Look at the interface, open it if it is another one, and come again."""
-        assert self._loop is not None
         assert self._reader is not None
         now = clock.now()
         self._looking = self._loop.call_later(LOOK, self._look)
@@ -244,24 +232,18 @@ class SocketCanBus(SupervisedBus):
         if not found.up:
             return f"{name} is down; `ip link set {name} up` brings it up"
         if not found.carrier:
-            restart = (
-                f"the kernel restarts it after {found.restart_ms} ms"
-                if found.restart_ms
-                else f"it stays off until {name} is taken down and up (restart-ms is not set)"
-            )
+            restart = f"it stays off until {name} is taken down and up (restart-ms is not set)"
+            if found.restart_ms:
+                restart = f"the kernel restarts it after {found.restart_ms} ms"
             return f"{name} is off the bus; {restart}"
-        counted = (
-            f" ({found.tx_errors} transmit, {found.rx_errors} receive errors)"
-            if found.rx_errors is not None
-            else ""
-        )
-        return f"{name} is up{counted}"
+        if found.rx_errors is None:
+            return f"{name} is up"
+        return f"{name} is up ({found.tx_errors} transmit, {found.rx_errors} receive errors)"
 
     # The socket
 
     def _acquire(self, found: Interface, now: float) -> bool:
         """Open the socket; False if it has to be tried again later."""
-        assert self._loop is not None
         if not self._supervisor.may_open(now):
             return False
         try:
@@ -296,8 +278,7 @@ class SocketCanBus(SupervisedBus):
         if self._socket is None:
             return
         self._forget_waiting()
-        if self._loop is not None:
-            self._loop.remove_reader(self._socket)
+        self._loop.remove_reader(self._socket)
         self._socket.close()
         self._socket = None
         self._index = 0

@@ -1,13 +1,15 @@
-"""What every driver does alike: keep the state of its bus, count, call its handler, and wait for room to send."""
+"""A CAN bus as the node sees it, and what all drivers do alike: keep its state, count, report, wait for room."""
 
 from __future__ import annotations
 
 import asyncio
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
 
 from gatewayd.canopen.bus import BusCounters, BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.frame import Frame
-from gatewayd.canopen.supervision import BusSignal, Supervisor, event_of_error
+from gatewayd.canopen.supervision import BusSignal, Supervisor, signal_of_error
 from gatewayd.loop import clock
 
 __all__ = ["LAG", "ROOM_RETRY", "SupervisedBus"]
@@ -18,42 +20,90 @@ LAG = 0.005
 """Seconds after which a frame that was taken should have gone out."""
 _LAG_BITS = 1350
 """Bits that may go before it: ten frames. On slow buses they take longer than `LAG`."""
+_PASSIVE = BusState.PASSIVE
 
 
-class SupervisedBus:
-    """The part of a driver that knows no interface. It is used in the loop."""
+class SupervisedBus(ABC):
+    """A driver, used in the loop: reopens by itself whatever comes back, and never configures an interface."""
+
+    _loop: asyncio.AbstractEventLoop
+    """Set when the driver is opened."""
 
     def __init__(self, handler: BusHandler) -> None:
         self.counters = BusCounters()
         self._handler = handler
         self._supervisor = Supervisor()
-        self._loop: asyncio.AbstractEventLoop | None = None
-        """Set when the driver is opened."""
+        self._looking: asyncio.TimerHandle | None = None
+        """The next look at the interface."""
         self._full = False
-        """A frame was refused for want of room, and `on_writable` was not told since."""
+        """A frame was refused for want of room, and `on_writable` was not called since."""
         self._writable = -1
-        """The descriptor that will tell of room; -1 where there is none, or nothing is waited for."""
+        """The descriptor that is watched for room; -1 where there is none, or nothing is waited for."""
         self._retrying: asyncio.TimerHandle | None = None
         self._handed_over = 0.0
         """When the last frame was taken."""
 
     @property
     def state(self) -> BusState:
-        """As far as the interface tells it."""
+        """As far as the interface shows it; ABSENT until it is opened."""
         return self._supervisor.state
 
+    @property
+    def bitrate(self) -> int | None:
+        """Bit/s that the controller is really set to, where that can be known."""
+        return None
+
+    @abstractmethod
+    async def open(self) -> None:
+        """Start. An interface that is not there is waited for; BusError if waiting cannot help."""
+
+    def close(self) -> None:
+        """Stop, without a last `on_state`."""
+        if self._looking is not None:
+            self._looking.cancel()
+            self._looking = None
+        self._release()
+
+    @abstractmethod
+    def set_filters(self, can_ids: Iterable[int], remote_ids: Iterable[int] = ()) -> None:
+        """Receive data frames of `can_ids` and remote frames of `remote_ids`, and nothing else."""
+
+    @abstractmethod
+    def catch_up(self) -> bool:
+        """Hand over all received frames that wait, instead of leaving the loop its turns in between.
+
+        False: they were so many that it has to be called again.
+        """
+
+    def send(self, frame: Frame) -> bool:
+        """Hand over a frame, without waiting. False: not now; `on_writable` or `on_state` is called when it can be."""
+        if self._full or self._supervisor.state < _PASSIVE or not self._give(frame):
+            self.counters.refused += 1
+            return False
+        self.counters.sent += 1
+        self._handed_over = clock.now()
+        return True
+
     def lags(self, bit_rate: int | None) -> bool:
-        """Whether frames that were taken some time ago have still not gone out, as far as that can be known."""
+        """Whether a frame that is sent now would be late, as far as that can be known: older ones wait for the bus."""
         lag = max(LAG, _LAG_BITS / bit_rate) if bit_rate else LAG
         return clock.now() - self._handed_over > lag and self._pending() > 0
 
+    @abstractmethod
+    def _give(self, frame: Frame) -> bool:
+        """Give a frame to the open interface. False: there is no room, which is waited for now, or it has failed."""
+
+    @abstractmethod
     def _pending(self) -> int:
         """Bytes that were taken and have not gone out; 0 where nobody knows."""
-        return 0
 
-    def _feed(self, event: BusSignal, now: float, reason: str) -> None:
-        """Judge an event, and tell of the state if it is another one now."""
-        if not self._supervisor.feed(event, now):
+    @abstractmethod
+    def _release(self) -> None:
+        """Close the interface, if it is open."""
+
+    def _feed(self, signal: BusSignal, now: float, reason: str) -> None:
+        """Judge a signal, and report the state if it is another one now."""
+        if not self._supervisor.feed(signal):
             return
         state = self._supervisor.state
         if state is BusState.BUS_OFF:
@@ -82,21 +132,20 @@ class SupervisedBus:
         if report.tx_errors is not None and report.rx_errors is not None:
             self.counters.tx_errors, self.counters.rx_errors = report.tx_errors, report.rx_errors
         self._handler.on_error(report, now)
-        event = event_of_error(report)
-        if event is not None:
-            self._feed(event, now, f"the controller reports: {report}")
+        signal = signal_of_error(report)
+        if signal is not None:
+            self._feed(signal, now, f"the controller reports: {report}")
 
     def _wait_for_room(self, descriptor: int) -> None:
-        """Tell when `descriptor` can be written; with -1, after `ROOM_RETRY`."""
-        assert self._loop is not None
+        """Report when `descriptor` can be written; with -1, after `ROOM_RETRY`."""
         self._full = True
         self._writable = descriptor
         if descriptor >= 0:
-            self._loop.add_writer(descriptor, self._tell_room)
+            self._loop.add_writer(descriptor, self._report_room)
         else:
-            self._retrying = self._loop.call_later(ROOM_RETRY, self._tell_room)
+            self._retrying = self._loop.call_later(ROOM_RETRY, self._report_room)
 
-    def _tell_room(self) -> None:
+    def _report_room(self) -> None:
         self._forget_waiting()
         self._handler.on_writable(clock.now())
 
@@ -106,6 +155,6 @@ class SupervisedBus:
         if self._retrying is not None:
             self._retrying.cancel()
             self._retrying = None
-        if self._writable >= 0 and self._loop is not None:
+        if self._writable >= 0:
             self._loop.remove_writer(self._writable)
             self._writable = -1

@@ -1,7 +1,7 @@
 """How a bus is judged: from what the kernel shows, what the controller reports and what sending fails with.
 
-Pure. What is *seen* (a look at the interface) is the truth of that moment and counts in every state. What is *told* by
-an error frame comes at once, but may be old: it counts only while frames go through, so that a report read late from
+Pure. What is *seen* (a look at the interface) is the truth of that moment and counts in every state. What is *reported*
+by an error frame comes at once, but may be old: it counts only while frames go through, so that a report read late from
 the buffer cannot revive a bus that is down or off.
 """
 
@@ -15,14 +15,14 @@ from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.errors import ControllerFlags, ErrorClass, ErrorFrame
 
 __all__ = [
+    "FAILURES",
     "LOOK",
     "RETRY",
     "RETRY_LIMIT",
     "TRANSITIONS",
     "BusSignal",
     "Supervisor",
-    "event_of_errno",
-    "event_of_error",
+    "signal_of_error",
 ]
 
 LOOK = 0.1
@@ -34,7 +34,7 @@ RETRY_LIMIT = 2.0
 
 
 class BusSignal(Enum):
-    """What befalls a bus."""
+    """What happens to a bus."""
 
     GONE = auto()
     """Seen: there is no such interface."""
@@ -49,13 +49,13 @@ class BusSignal(Enum):
     ACTIVE = auto()
     """Seen: error-active."""
     UP = auto()
-    """Seen: it carries frames; how well, the driver does not tell."""
-    TOLD_OFF = auto()
+    """Seen: it carries frames; how well, the driver does not say."""
+    REPORTED_OFF = auto()
     REPORTED_PASSIVE = auto()
     REPORTED_WARNING = auto()
     REPORTED_ACTIVE = auto()
-    TOLD_RESTARTED = auto()
-    """Told: the controller is back on the bus."""
+    REPORTED_RESTARTED = auto()
+    """Reported: the controller is back on the bus."""
 
 
 _SEEN = {
@@ -66,8 +66,8 @@ _SEEN = {
     BusSignal.WARNING: BusState.WARNING,
     BusSignal.ACTIVE: BusState.ACTIVE,
 }
-_TOLD = {
-    BusSignal.TOLD_OFF: BusState.BUS_OFF,
+_REPORTED = {
+    BusSignal.REPORTED_OFF: BusState.BUS_OFF,
     BusSignal.REPORTED_PASSIVE: BusState.PASSIVE,
     BusSignal.REPORTED_WARNING: BusState.WARNING,
     BusSignal.REPORTED_ACTIVE: BusState.ACTIVE,
@@ -75,40 +75,32 @@ _TOLD = {
 
 TRANSITIONS = MappingProxyType(
     {(state, event): target for state in BusState for event, target in _SEEN.items()}
-    | {(state, event): target for state in BusState if state.carries for event, target in _TOLD.items()}
+    | {(state, event): target for state in BusState if state.carries for event, target in _REPORTED.items()}
     | {
         (BusState.ABSENT, BusSignal.UP): BusState.ACTIVE,
         (BusState.DOWN, BusSignal.UP): BusState.ACTIVE,
         (BusState.BUS_OFF, BusSignal.UP): BusState.ACTIVE,
-        (BusState.BUS_OFF, BusSignal.TOLD_RESTARTED): BusState.ACTIVE,
+        (BusState.BUS_OFF, BusSignal.REPORTED_RESTARTED): BusState.ACTIVE,
     }
 )
-"""State and event -> next state; what is not here changes nothing."""
+"""State and signal -> next state; what is not here changes nothing."""
 
 _REPORTS = (
     (ControllerFlags.RX_PASSIVE | ControllerFlags.TX_PASSIVE, BusSignal.REPORTED_PASSIVE),
     (ControllerFlags.RX_WARNING | ControllerFlags.TX_WARNING, BusSignal.REPORTED_WARNING),
     (ControllerFlags.ACTIVE, BusSignal.REPORTED_ACTIVE),
 )
-_FAILURES = {
-    errno.ENETDOWN: BusSignal.DOWN,
-    errno.ENODEV: BusSignal.GONE,
-    errno.ENXIO: BusSignal.GONE,
-}
+FAILURES = {errno.ENETDOWN: BusSignal.DOWN, errno.ENODEV: BusSignal.GONE, errno.ENXIO: BusSignal.GONE}
+"""What the error number of a failed send or receive says of the interface; others say nothing of it."""
 
 
-def event_of_error(error: ErrorFrame) -> BusSignal | None:
-    """What an error frame tells of the state; None if it tells nothing of it."""
+def signal_of_error(error: ErrorFrame) -> BusSignal | None:
+    """What an error frame says of the state; None if it says nothing of it."""
     if error.classes & ErrorClass.BUS_OFF:
-        return BusSignal.TOLD_OFF
+        return BusSignal.REPORTED_OFF
     if error.classes & ErrorClass.RESTARTED:
-        return BusSignal.TOLD_RESTARTED
-    return next((event for flags, event in _REPORTS if error.controller & flags), None)
-
-
-def event_of_errno(number: int) -> BusSignal | None:
-    """What a failed send or receive tells of the interface; None if it tells nothing of it."""
-    return _FAILURES.get(number)
+        return BusSignal.REPORTED_RESTARTED
+    return next((signal for flags, signal in _REPORTS if error.controller & flags), None)
 
 
 class Supervisor:
@@ -116,19 +108,13 @@ class Supervisor:
 
     def __init__(self) -> None:
         self.state = BusState.ABSENT
-        self.since = 0.0
-        """When it came into this state."""
         self._retry_at = 0.0
         self._wait = RETRY
 
-    def feed(self, event: BusSignal, now: float) -> bool:
-        """Judge an event; whether the state is another one now."""
-        target = TRANSITIONS.get((self.state, event), self.state)
-        if target is self.state:
-            return False
-        self.state = target
-        self.since = now
-        return True
+    def feed(self, signal: BusSignal) -> bool:
+        """Judge a signal; whether the state is another one now."""
+        old, self.state = self.state, TRANSITIONS.get((self.state, signal), self.state)
+        return self.state is not old
 
     def may_open(self, now: float) -> bool:
         """Whether it is time for an attempt."""

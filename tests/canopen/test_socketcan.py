@@ -60,7 +60,7 @@ def wire() -> Iterator[tuple[SocketCanBus, Recorder, socket.socket]]:
     recorder = Recorder()
     bus = SocketCanBus("can0", recorder)
     bus._socket = ours
-    bus._supervisor.feed(BusSignal.UP, 0.0)
+    bus._supervisor.feed(BusSignal.UP)
     with contextlib.closing(ours), contextlib.closing(theirs):
         yield bus, recorder, theirs
 

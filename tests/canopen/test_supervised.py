@@ -13,6 +13,7 @@ import pytest
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.errors import decode
 from gatewayd.canopen.frame import Frame
+from gatewayd.canopen.socketcan import SocketCanBus
 from gatewayd.canopen.supervised import ROOM_RETRY, SupervisedBus
 from gatewayd.canopen.supervision import BusSignal
 from gatewayd.loop import clock
@@ -29,7 +30,7 @@ def recorder() -> Recorder:
 
 @pytest.fixture
 async def bus(recorder: Recorder) -> SupervisedBus:
-    bus = SupervisedBus(recorder)
+    bus = SocketCanBus("can0", recorder)
     bus._loop = asyncio.get_running_loop()
     bus._feed(BusSignal.UP, 0.0, "up")
     return bus
@@ -113,7 +114,7 @@ def test_what_was_read_while_the_process_was_stopped_is_no_news() -> None:
 
     async def read() -> tuple[float, float]:
         clock.on_gap(lambda _gap: order.append("gap"))
-        bus = SupervisedBus(handler)
+        bus = SocketCanBus("can0", handler)
         before = clock.judged_now()
         time.sleep(2 * clock.GAP)  # noqa: ASYNC251 - as SIGSTOP would: the loop does not turn
         bus._hand_over([Frame(0x201, bytes(8))], [], before)

@@ -9,23 +9,28 @@ import pytest
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.errors import decode
 from gatewayd.canopen.supervision import (
+    FAILURES,
     RETRY,
     RETRY_LIMIT,
     TRANSITIONS,
     BusSignal,
     Supervisor,
-    event_of_errno,
-    event_of_error,
+    signal_of_error,
 )
 
 SEEN = [BusSignal.GONE, BusSignal.DOWN, BusSignal.OFF, BusSignal.PASSIVE, BusSignal.WARNING, BusSignal.ACTIVE]
-TOLD = [BusSignal.TOLD_OFF, BusSignal.REPORTED_PASSIVE, BusSignal.REPORTED_WARNING, BusSignal.REPORTED_ACTIVE]
+REPORTED = [
+    BusSignal.REPORTED_OFF,
+    BusSignal.REPORTED_PASSIVE,
+    BusSignal.REPORTED_WARNING,
+    BusSignal.REPORTED_ACTIVE,
+]
 
 
 def after(*events: BusSignal) -> BusState:
     supervisor = Supervisor()
     for event in events:
-        supervisor.feed(event, 0.0)
+        supervisor.feed(event)
     return supervisor.state
 
 
@@ -34,7 +39,7 @@ def test_what_is_seen_counts_in_every_state(event: BusSignal) -> None:
     assert len({TRANSITIONS[state, event] for state in BusState}) == 1
 
 
-@pytest.mark.parametrize("event", TOLD)
+@pytest.mark.parametrize("event", REPORTED)
 @pytest.mark.parametrize("state", [BusState.ABSENT, BusState.DOWN, BusState.BUS_OFF])
 def test_late_report_does_not_revive_a_bus_that_carries_nothing(state: BusState, event: BusSignal) -> None:
     assert (state, event) not in TRANSITIONS
@@ -44,28 +49,27 @@ def test_controller_gets_worse_and_better() -> None:
     assert after(BusSignal.UP) is BusState.ACTIVE
     assert after(BusSignal.UP, BusSignal.REPORTED_WARNING) is BusState.WARNING
     assert after(BusSignal.UP, BusSignal.REPORTED_WARNING, BusSignal.REPORTED_PASSIVE) is BusState.PASSIVE
-    assert after(BusSignal.UP, BusSignal.REPORTED_PASSIVE, BusSignal.TOLD_OFF) is BusState.BUS_OFF
-    assert after(BusSignal.UP, BusSignal.TOLD_OFF, BusSignal.TOLD_RESTARTED) is BusState.ACTIVE
+    assert after(BusSignal.UP, BusSignal.REPORTED_PASSIVE, BusSignal.REPORTED_OFF) is BusState.BUS_OFF
+    assert after(BusSignal.UP, BusSignal.REPORTED_OFF, BusSignal.REPORTED_RESTARTED) is BusState.ACTIVE
     assert after(BusSignal.UP, BusSignal.REPORTED_PASSIVE, BusSignal.REPORTED_ACTIVE) is BusState.ACTIVE
 
 
-def test_look_that_tells_nothing_of_the_controller_leaves_the_report_standing() -> None:
+def test_look_that_shows_nothing_of_the_controller_leaves_the_report_standing() -> None:
     assert after(BusSignal.UP, BusSignal.REPORTED_PASSIVE, BusSignal.UP) is BusState.PASSIVE
-    assert after(BusSignal.UP, BusSignal.TOLD_OFF, BusSignal.UP) is BusState.ACTIVE
+    assert after(BusSignal.UP, BusSignal.REPORTED_OFF, BusSignal.UP) is BusState.ACTIVE
 
 
 def test_only_a_change_is_one() -> None:
     supervisor = Supervisor()
-    assert supervisor.feed(BusSignal.ACTIVE, 3.0)
-    assert not supervisor.feed(BusSignal.ACTIVE, 4.0)
-    assert supervisor.since == 3.0
+    assert supervisor.feed(BusSignal.ACTIVE)
+    assert not supervisor.feed(BusSignal.ACTIVE)
 
 
 @pytest.mark.parametrize(
     "can_id, data, event",
     [
-        (0x040, bytes(8), BusSignal.TOLD_OFF),
-        (0x100, bytes(8), BusSignal.TOLD_RESTARTED),
+        (0x040, bytes(8), BusSignal.REPORTED_OFF),
+        (0x100, bytes(8), BusSignal.REPORTED_RESTARTED),
         (0x204, bytes([0, 0x08, 0, 0, 0, 0, 100, 0]), BusSignal.REPORTED_WARNING),
         (0x204, bytes([0, 0x30, 0, 0, 0, 0, 130, 140]), BusSignal.REPORTED_PASSIVE),
         (0x204, bytes([0, 0x40, 0, 0, 0, 0, 1, 2]), BusSignal.REPORTED_ACTIVE),
@@ -73,15 +77,15 @@ def test_only_a_change_is_one() -> None:
         (0x088, bytes([0, 0, 4, 0, 0, 0, 0, 0]), None),
     ],
 )
-def test_what_an_error_frame_tells(can_id: int, data: bytes, event: BusSignal | None) -> None:
-    assert event_of_error(decode(can_id, data)) is event
+def test_what_an_error_frame_reports(can_id: int, data: bytes, event: BusSignal | None) -> None:
+    assert signal_of_error(decode(can_id, data)) is event
 
 
-def test_what_a_failed_send_tells() -> None:
-    assert event_of_errno(errno.ENETDOWN) is BusSignal.DOWN
-    assert event_of_errno(errno.ENXIO) is BusSignal.GONE
-    assert event_of_errno(errno.ENODEV) is BusSignal.GONE
-    assert event_of_errno(errno.ENOBUFS) is None
+def test_what_a_failed_send_says() -> None:
+    assert FAILURES[errno.ENETDOWN] is BusSignal.DOWN
+    assert FAILURES[errno.ENXIO] is BusSignal.GONE
+    assert FAILURES[errno.ENODEV] is BusSignal.GONE
+    assert errno.ENOBUFS not in FAILURES
 
 
 def test_attempts_to_open_get_rarer_up_to_a_limit() -> None:

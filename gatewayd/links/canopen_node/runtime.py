@@ -13,13 +13,14 @@ from contextlib import suppress
 from dataclasses import asdict
 from datetime import datetime
 
-from gatewayd.canopen.bus import Bus, BusError, BusState
+from gatewayd.canopen.bus import BusError, BusState
 from gatewayd.canopen.drivers import make_bus
 from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.lss import BIT_RATES
 from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.queue import Transmitter
+from gatewayd.canopen.supervised import SupervisedBus
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.links.canopen_node.declaration import BUS_STATES, NMT_STATES
@@ -56,7 +57,7 @@ class CanLink(Link, Observer):
     def __init__(self, plan: CanopenPlan, cell: Cell, store: Store) -> None:
         self._plan = plan
         self._cell = cell
-        self._bus: Bus | None = None
+        self._bus: SupervisedBus | None = None
         self._transmitter = Transmitter(
             self._offer,
             self._renew,

@@ -350,7 +350,7 @@ async def test_a_bus_that_was_stuck_for_seconds_gets_nothing_old(station: Statio
         stuck.link.node.frames_lost(1, clock.now())
         assert stuck.heard == []
         assert stuck.link.node.sync.count == count
-        bus._tell_room()
+        bus._report_room()
         await asyncio.sleep(0)
         first = {can_id: stuck.frames(can_id) for can_id in (0x080, HEARTBEAT, 0x085, 0x285)}
         assert len(first[0x080]) <= 1
