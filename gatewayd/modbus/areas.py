@@ -1,10 +1,26 @@
-"""The four data tables of Modbus."""
+"""The four data tables of Modbus, and how much of them one request reads or writes."""
 
 from __future__ import annotations
 
 from enum import Enum
+from typing import Final
 
-__all__ = ["AREA_NAMES", "Area"]
+__all__ = [
+    "AREA_NAMES",
+    "MAX_READ_BITS",
+    "MAX_READ_REGISTERS",
+    "MAX_WRITE_BITS",
+    "MAX_WRITE_REGISTERS",
+    "MAX_WRITE_WITH_READ",
+    "Area",
+]
+
+# Application Protocol V1.1b3, 6.1, 6.3, 6.11, 6.12 and 6.17.
+MAX_READ_BITS: Final = 2000
+MAX_READ_REGISTERS: Final = 125
+MAX_WRITE_BITS: Final = 1968
+MAX_WRITE_REGISTERS: Final = 123
+MAX_WRITE_WITH_READ: Final = 121
 
 
 class Area(Enum):

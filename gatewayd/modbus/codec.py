@@ -24,8 +24,8 @@ __all__ = ["ORDERS", "TYPES", "Codec", "NumberFormat", "make_codec"]
 
 Buffer: TypeAlias = bytes | bytearray | memoryview
 
-ORDERS: Final = ("ABCD", "CDAB", "BADC", "DCBA")
-"""Word and byte orders."""
+ORDERS: Final = {"ABCD": (">", False), "CDAB": ("<", True), "BADC": (">", True), "DCBA": ("<", False)}
+"""Word and byte orders: byte order of `struct`, and whether the two bytes of every word are exchanged after it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,9 @@ def _compiled(
     type_name: str, order: str, kind: ValueKind, linear: tuple[float, float], struct_code: str | None
 ) -> Codec:
     number, (scale, offset) = TYPES[type_name], linear
-    pack, unpack = _ORDERS[order](number)
+    byte_order, swapped = ORDERS[order]
+    layout = Struct(byte_order + number.code)
+    pack, unpack = _swapping(layout) if swapped else (layout.pack, layout.unpack)
     plain = scale == 1 and offset == 0
     encode = _plain_encoder(number, pack, kind) if plain else _encoder(number, pack, scale, offset)
     decode = _plain_decoder(number, unpack, kind) if plain else _decoder(unpack, scale, offset, kind)
@@ -148,26 +150,8 @@ Pack: TypeAlias = "Callable[[Value], bytes]"
 Unpack: TypeAlias = "Callable[[Buffer], tuple[int | float, ...]]"
 
 
-def _big(number: NumberFormat) -> tuple[Pack, Unpack]:
-    layout = Struct(">" + number.code)
-    return layout.pack, layout.unpack
-
-
-def _little(number: NumberFormat) -> tuple[Pack, Unpack]:
-    layout = Struct("<" + number.code)
-    return layout.pack, layout.unpack
-
-
-def _big_swapped(number: NumberFormat) -> tuple[Pack, Unpack]:
-    return _swapped(*_big(number))
-
-
-def _little_swapped(number: NumberFormat) -> tuple[Pack, Unpack]:
-    return _swapped(*_little(number))
-
-
-def _swapped(pack: Pack, unpack: Unpack) -> tuple[Pack, Unpack]:
-    return (lambda value: _swap(pack(value))), (lambda data: unpack(_swap(data)))
+def _swapping(layout: Struct) -> tuple[Pack, Unpack]:
+    return (lambda value: _swap(layout.pack(value))), (lambda data: layout.unpack(_swap(data)))
 
 
 def _swap(data: Buffer) -> bytes:
@@ -175,9 +159,6 @@ def _swap(data: Buffer) -> bytes:
     out = bytearray(data)
     out[0::2], out[1::2] = data[1::2], data[0::2]
     return bytes(out)
-
-
-_ORDERS: Final = {"ABCD": _big, "CDAB": _little_swapped, "BADC": _big_swapped, "DCBA": _little}
 
 
 def _plain_encoder(number: NumberFormat, pack: Pack, kind: ValueKind) -> Pack:

@@ -18,7 +18,7 @@ from gatewayd.core.definition import (
     Writer,
 )
 from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, PdoPlan, canopen_of
-from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
+from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan, robot_of
 from gatewayd.mapping.compile import compile_plan
 from gatewayd.mapping.expand import expand
@@ -276,7 +276,7 @@ def test_a_canopen_section_changes_nothing_for_those_without() -> None:
 
 def test_without_a_modbus_section_there_is_no_modbus_plan() -> None:
     text = "gatewayd: 1\ncell: c\nrobot: {host: r}\nvariables: {a: {robot: robot_mode}}"
-    assert modbus_of(compiled(text)) is None
+    assert not compiled(text).of(ModbusPlan)
 
 
 @pytest.mark.parametrize(

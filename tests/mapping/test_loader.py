@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gatewayd.core.definition import Direction
-from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
+from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together, read_bytes
 from gatewayd.mapping.source import MAX_BYTES
@@ -177,7 +177,7 @@ def test_plans_are_consistent(made: list[tuple[str, str, int, str, str]]) -> Non
         assert all(owner < len(cell.writers) for owner in lock.owners)
     for variable in cell.variables:
         assert (variable.lock is not None) == (variable.direction is Direction.INPUT)
-    assert modbus_of(plan) is not None
+    assert plan.of(ModbusPlan)
     for placement in plan.the(ModbusPlan).placements:
         variable = cell.variables[placement.variable]
         if placement.codec is not None:

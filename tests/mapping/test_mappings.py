@@ -8,7 +8,7 @@ import pytest
 
 from gatewayd.core.definition import Direction
 from gatewayd.links.canopen_node.plan import CanopenPlan
-from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
+from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.loader import Loaded, load, load_together
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.areas import Area
@@ -60,7 +60,7 @@ def test_keeps_its_fingerprint(name: str) -> None:
 def test_listens_on_loopback_and_says_how_to_change_it(name: str) -> None:
     text = (MAPPINGS / name).read_text()
     assert text.startswith("# yaml-language-server: $schema=schema.json\n")
-    modbus = modbus_of(plan(name))
+    modbus = plan(name).of(ModbusPlan).get("modbus")
     assert (modbus is None) == (name == "canopen-only.yaml")
     if modbus is not None:
         assert modbus.host == "127.0.0.1"

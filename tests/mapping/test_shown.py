@@ -10,7 +10,7 @@ import pytest
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Variable
 from gatewayd.links.canopen_node.pdo.codec import fit
-from gatewayd.links.modbus_server.plan import ModbusPlan, modbus_of
+from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.loader import load
 
 FLOAT32 = float.fromhex("0x1.fffffep+127")
@@ -71,7 +71,7 @@ def test_a_register_is_off_by_less_than_a_step_exactly_within_the_bounds(
     line = f"robot: output_double_register_0, modbus: {{holding: 0, type: {type_name}, scale: {scale}}}"
     loaded = load((HEAD + f"  a: {{{line}}}\n").encode(), "cell.yaml")
     assert loaded.plan is not None
-    assert modbus_of(loaded.plan) is not None
+    assert loaded.plan.of(ModbusPlan)
     (placement,) = loaded.plan.the(ModbusPlan).placements
     (one,) = loaded.plan.cell.variables
     assert one.shown is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gatewayd.links.contract import Description, Place
-from gatewayd.links.modbus_server.plan import ModbusPlan, Network, Placement
+from gatewayd.links.modbus_server.plan import ModbusPlan, Placement, network_text
 from gatewayd.modbus.areas import AREA_NAMES
 from gatewayd.report.format import address, exact, seconds
 
@@ -17,13 +17,13 @@ def description(plan: ModbusPlan) -> Description:
         places.setdefault(placement.variable, []).append(_place(placement))
     networks: dict[int, list[str]] = {}
     for network, writer in plan.writers:
-        networks.setdefault(writer, []).append(_network(network))
+        networks.setdefault(writer, []).append(network_text(network))
     listen = address(plan.host, plan.port)
     return Description(
         settings={
             "listen": listen,
             "unit": str(plan.unit),
-            "allow": ", ".join(map(_network, plan.allow)) or "everybody",
+            "allow": ", ".join(map(network_text, plan.allow)) or "everybody",
             "connections": str(plan.connections),
             "idle_timeout": seconds(plan.idle_timeout) or "none",
             "gaps": "zero" if plan.fill_gaps else "refuse",
@@ -37,21 +37,12 @@ def description(plan: ModbusPlan) -> Description:
 
 def _place(placement: Placement) -> Place:
     """`holding 100 (400101) int32`, `holding 0.3 (400001.3)`, `coil 5 (000006)`."""
-    bit = "" if placement.bit is None else f".{placement.bit}"
-    area = AREA_NAMES[placement.area]
-    within = f"{placement.address}{bit}"
-    notation = f"{placement.area.notation(placement.address)}{bit}"
-    codec = placement.codec
+    area, notation, codec = AREA_NAMES[placement.area], placement.notation, placement.codec
     return Place(
-        text=f"{area} {within} ({notation}){_encoding(placement)}",
-        fields={
-            "area": area,
-            "address": placement.address,
-            "bit": placement.bit,
-            "notation": notation,
-        },
+        text=f"{area} {placement.place} ({notation}){_encoding(placement)}",
+        fields={"area": area, "address": placement.address, "bit": placement.bit, "notation": notation},
         area=area,
-        address=within,
+        address=placement.place,
         notation=notation,
         type="bit" if codec is None else f"{codec.type} {codec.order}".strip(),
     )
@@ -66,7 +57,3 @@ def _encoding(placement: Placement) -> str:
     scale = "" if codec.scale == 1 else f" * {exact(codec.scale)}"
     offset = f" + {exact(codec.offset)}" if codec.offset else ""
     return f" {codec.type}{order}{scale}{offset}"
-
-
-def _network(network: Network) -> str:
-    return str(network.network_address) if network.num_addresses == 1 else str(network)

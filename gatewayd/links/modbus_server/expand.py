@@ -11,6 +11,7 @@ from enum import Enum, auto
 from typing import Final
 
 from gatewayd.core.definition import ValueKind
+from gatewayd.links.modbus_server.plan import Located
 from gatewayd.links.modbus_server.sections import Modbus, ModbusPlaces, PlacementSpec
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Document
@@ -47,7 +48,7 @@ class PlacementProblem(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class ExpandedPlacement:
+class ExpandedPlacement(Located):
     """Where one variable lies in a Modbus area."""
 
     variable: ExpandedVariable
@@ -66,26 +67,6 @@ class ExpandedPlacement:
     codec: Codec | None
     """None for single bits and where `problem` is set."""
     problem: PlacementProblem | None = None
-
-    @property
-    def words(self) -> int:
-        """Addresses covered: registers, or 1 for a coil, a discrete input or a packed bit."""
-        return self.codec.words if self.codec is not None else 1
-
-    @property
-    def addresses(self) -> range:
-        """Addresses covered."""
-        return range(self.address, self.address + self.words)
-
-    @property
-    def notation(self) -> str:
-        """The 4xxxxx form, with the bit where there is one: `400001.3`."""
-        return self.area.notation(self.address) + ("" if self.bit is None else f".{self.bit}")
-
-    @property
-    def place(self) -> str:
-        """The address as the file counts: `100` or `100.3`."""
-        return str(self.address) if self.bit is None else f"{self.address}.{self.bit}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,34 +131,21 @@ def _placement(
     address, bit = place
     single = bit is not None or spec.area.of_bits
     type_name = spec.type or ("bit" if single else _default_type(variable))
-    order, scale, offset = spec.order or default_order, spec.scale, spec.offset
+    order = spec.order or default_order
+    scale = 1.0 if spec.scale is None else spec.scale
+    offset = 0.0 if spec.offset is None else spec.offset
     problem = _bit_problem(variable, spec) if single else _number_problem(spec, type_name)
     codec = None
     if not single and problem is None:
+        low, high = variable.low, variable.high
         codec = make_codec(
-            type_name,
-            order,
-            kind=variable.kind,
-            scale=1.0 if scale is None else scale,
-            offset=0.0 if offset is None else offset,
-            low=variable.low,
-            high=variable.high,
+            type_name, order, kind=variable.kind, scale=scale, offset=offset, low=low, high=high
         )
     if problem is None and address + (codec.words if codec is not None else 1) > 0x10000:
         problem = PlacementProblem.BEYOND_END
+    shown = "bit" if single else type_name
     return ExpandedPlacement(
-        variable,
-        spec,
-        position,
-        spec.area,
-        address,
-        bit,
-        "bit" if single else type_name,
-        order,
-        1.0 if scale is None else scale,
-        0.0 if offset is None else offset,
-        codec,
-        problem,
+        variable, spec, position, spec.area, address, bit, shown, order, scale, offset, codec, problem
     )
 
 

@@ -18,15 +18,16 @@ from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.links.modbus_server.registers import (
-    MAX_BITS,
-    MAX_REGISTERS,
-    BitTable,
-    RegisterImage,
-    RegisterTable,
-)
+from gatewayd.links.modbus_server.registers import BitTable, RegisterImage, RegisterTable
 from gatewayd.links.registry import status_fields
 from gatewayd.modbus import identification
+from gatewayd.modbus.areas import (
+    MAX_READ_BITS,
+    MAX_READ_REGISTERS,
+    MAX_WRITE_BITS,
+    MAX_WRITE_REGISTERS,
+    MAX_WRITE_WITH_READ,
+)
 from gatewayd.modbus.identification import Identification
 
 __all__ = ["EXCEPTION_OF", "ExceptionCode", "Unit", "exception", "execute"]
@@ -76,9 +77,6 @@ class Unit:
 Answer = bytes | ExceptionCode
 _Function = Callable[[Unit, Requester, bytes, float], Answer]
 
-_MAX_WRITTEN_BITS = 1968
-_MAX_WRITTEN_REGISTERS = 123
-_MAX_WRITTEN_WITH_READ = 121
 _COIL_ON = 0xFF00
 _STATUS_END = status_layout.BASE + status_layout.LENGTH
 
@@ -90,8 +88,10 @@ _READ_WRITE = struct.Struct(">HHHHB")
 
 def execute(unit: Unit, requester: Requester, pdu: bytes, now: float) -> bytes:
     """The answer to a request of `requester`."""
-    function = _FUNCTIONS.get(pdu[0])
-    answer = ExceptionCode.ILLEGAL_FUNCTION if function is None else function(unit, requester, pdu, now)
+    serve, sizes = _FUNCTIONS.get(pdu[0], (None, ()))
+    if serve is None:
+        return exception(pdu[0], ExceptionCode.ILLEGAL_FUNCTION)
+    answer = serve(unit, requester, pdu, now) if len(pdu) in sizes else ExceptionCode.ILLEGAL_VALUE
     return exception(pdu[0], answer) if isinstance(answer, ExceptionCode) else answer
 
 
@@ -103,27 +103,9 @@ def exception(function: int, code: ExceptionCode) -> bytes:
 # -- reading ----------------------------------------------------------------------------------------------------------
 
 
-def _read_coils(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
-    return _read_bits(unit.image.coils, pdu)
-
-
-def _read_discrete(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
-    return _read_bits(unit.image.discrete, pdu)
-
-
-def _read_holding(unit: Unit, _requester: Requester, pdu: bytes, now: float) -> Answer:
-    return _read_registers(unit, unit.image.holding, pdu, now)
-
-
-def _read_input(unit: Unit, _requester: Requester, pdu: bytes, now: float) -> Answer:
-    return _read_registers(unit, unit.image.input, pdu, now)
-
-
 def _read_bits(table: BitTable, pdu: bytes) -> Answer:
-    if len(pdu) != 5:
-        return ExceptionCode.ILLEGAL_VALUE
     address, count = _TWO_WORDS.unpack_from(pdu, 1)
-    if not 1 <= count <= MAX_BITS:
+    if not 1 <= count <= MAX_READ_BITS:
         return ExceptionCode.ILLEGAL_VALUE
     if table.readable.reach[address] < count:
         return _unreadable(table.readable.mapped[address], count)
@@ -132,10 +114,8 @@ def _read_bits(table: BitTable, pdu: bytes) -> Answer:
 
 
 def _read_registers(unit: Unit, table: RegisterTable, pdu: bytes, now: float) -> Answer:
-    if len(pdu) != 5:
-        return ExceptionCode.ILLEGAL_VALUE
     address, count = _TWO_WORDS.unpack_from(pdu, 1)
-    if not 1 <= count <= MAX_REGISTERS:
+    if not 1 <= count <= MAX_READ_REGISTERS:
         return ExceptionCode.ILLEGAL_VALUE
     refused = _refuse_registers(table, address, count)
     if refused is not None:
@@ -169,8 +149,6 @@ def _of_status(address: int, count: int) -> bool:
 
 
 def _write_coil(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
-    if len(pdu) != 5:
-        return ExceptionCode.ILLEGAL_VALUE
     address, value = _TWO_WORDS.unpack_from(pdu, 1)
     if value not in {0, _COIL_ON}:
         return ExceptionCode.ILLEGAL_VALUE
@@ -178,17 +156,13 @@ def _write_coil(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
 
 
 def _write_register(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
-    if len(pdu) != 5:
-        return ExceptionCode.ILLEGAL_VALUE
     (address, _value) = _TWO_WORDS.unpack_from(pdu, 1)
     return _write_registers(unit, requester, address, pdu[3:], now) or pdu
 
 
 def _write_coils(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
-    if len(pdu) < 6:
-        return ExceptionCode.ILLEGAL_VALUE
     address, count, size = _WRITE_MULTIPLE.unpack_from(pdu, 1)
-    if not 1 <= count <= _MAX_WRITTEN_BITS or size != (count + 7) >> 3 or len(pdu) != 6 + size:
+    if not 1 <= count <= MAX_WRITE_BITS or size != (count + 7) >> 3 or len(pdu) != 6 + size:
         return ExceptionCode.ILLEGAL_VALUE
     packed = int.from_bytes(pdu[6:], "little")
     bits = [bool(packed >> position & 1) for position in range(count)]
@@ -196,17 +170,13 @@ def _write_coils(unit: Unit, requester: Requester, pdu: bytes, now: float) -> An
 
 
 def _write_multiple(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
-    if len(pdu) < 6:
-        return ExceptionCode.ILLEGAL_VALUE
     address, count, size = _WRITE_MULTIPLE.unpack_from(pdu, 1)
-    if not 1 <= count <= _MAX_WRITTEN_REGISTERS or size != 2 * count or len(pdu) != 6 + size:
+    if not 1 <= count <= MAX_WRITE_REGISTERS or size != 2 * count or len(pdu) != 6 + size:
         return ExceptionCode.ILLEGAL_VALUE
     return _write_registers(unit, requester, address, pdu[6:], now) or pdu[:5]
 
 
 def _mask_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
-    if len(pdu) != 7:
-        return ExceptionCode.ILLEGAL_VALUE
     address, and_mask, or_mask = _MASK.unpack_from(pdu, 1)
     if _of_status(address, 1):
         present = int.from_bytes(unit.status.read(address - status_layout.BASE, 1, now), "big")
@@ -216,10 +186,8 @@ def _mask_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
 
 
 def _read_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
-    if len(pdu) < 10:
-        return ExceptionCode.ILLEGAL_VALUE
     first, count, address, written, size = _READ_WRITE.unpack_from(pdu, 1)
-    if not (1 <= count <= MAX_REGISTERS and 1 <= written <= _MAX_WRITTEN_WITH_READ):
+    if not (1 <= count <= MAX_READ_REGISTERS and 1 <= written <= MAX_WRITE_WITH_READ):
         return ExceptionCode.ILLEGAL_VALUE
     if size != 2 * written or len(pdu) != 10 + size:
         return ExceptionCode.ILLEGAL_VALUE
@@ -252,23 +220,19 @@ def _apply(
     unit: Unit, requester: Requester, changes: list[Change] | Refusal, now: float
 ) -> ExceptionCode | None:
     """Hand all changes of one request to the cell at once, and every refusal of ours to its records."""
+    refusal: Refusal | None
+    value: Value | None = None
     if isinstance(changes, Refusal):
-        unit.cell.refuse(requester, changes, now)
-        return EXCEPTION_OF[changes.reason]
-    if requester.writer is None:
-        refusal: Refusal | None = _refuse_undeclared(unit, requester, changes, now)
+        refusal = changes
+    elif requester.writer is None:
+        # A peer that may write nothing is refused even if it wrote what is there already.
+        variable, value = (changes[0].variable, changes[0].value) if changes else (None, None)
+        refusal = Refusal(Reason.NOT_WRITABLE, variable)
     else:
         refusal = unit.cell.write(requester, changes, now)
-    return EXCEPTION_OF[refusal.reason] if refusal is not None else None
-
-
-def _refuse_undeclared(unit: Unit, requester: Requester, changes: list[Change], now: float) -> Refusal:
-    """A peer that may write nothing is refused even if it wrote what is there already."""
-    variable: int | None = changes[0].variable if changes else None
-    value: Value | None = changes[0].value if changes else None
-    refusal = Refusal(Reason.NOT_WRITABLE, variable)
+        return None if refusal is None else EXCEPTION_OF[refusal.reason]
     unit.cell.refuse(requester, refusal, now, value)
-    return refusal
+    return EXCEPTION_OF[refusal.reason]
 
 
 def _identify(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
@@ -278,16 +242,19 @@ def _identify(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Ans
     return ExceptionCode(answer) if isinstance(answer, int) else answer
 
 
-_FUNCTIONS: dict[int, _Function] = {
-    1: _read_coils,
-    2: _read_discrete,
-    3: _read_holding,
-    4: _read_input,
-    5: _write_coil,
-    6: _write_register,
-    15: _write_coils,
-    16: _write_multiple,
-    22: _mask_write,
-    23: _read_write,
-    identification.FUNCTION: _identify,
+_TWO_WORDS_ONLY = range(5, 6)
+_WITH_DATA = range(6, 254)
+_FUNCTIONS: dict[int, tuple[_Function, range]] = {
+    1: (lambda unit, _requester, pdu, _now: _read_bits(unit.image.coils, pdu), _TWO_WORDS_ONLY),
+    2: (lambda unit, _requester, pdu, _now: _read_bits(unit.image.discrete, pdu), _TWO_WORDS_ONLY),
+    3: (lambda unit, _, pdu, now: _read_registers(unit, unit.image.holding, pdu, now), _TWO_WORDS_ONLY),
+    4: (lambda unit, _, pdu, now: _read_registers(unit, unit.image.input, pdu, now), _TWO_WORDS_ONLY),
+    5: (_write_coil, _TWO_WORDS_ONLY),
+    6: (_write_register, _TWO_WORDS_ONLY),
+    15: (_write_coils, _WITH_DATA),
+    16: (_write_multiple, _WITH_DATA),
+    22: (_mask_write, range(7, 8)),
+    23: (_read_write, range(10, 254)),
+    identification.FUNCTION: (_identify, range(1, 254)),
 }
+"""What serves a function, and how many bytes its requests may have; whether the data is whole is for it to check."""

@@ -15,8 +15,7 @@ from gatewayd.links.modbus_server.expand import (
     expand_modbus,
     placements_of,
 )
-from gatewayd.links.modbus_server.plan import ModbusPlan, Network, Placement
-from gatewayd.links.modbus_server.rules.wording import peer
+from gatewayd.links.modbus_server.plan import ModbusPlan, Network, Placement, network_text
 from gatewayd.links.modbus_server.sections import Modbus, ModbusPlaces, ModbusWriter, PlacementSpec
 from gatewayd.mapping.diagnostics import Related
 from gatewayd.mapping.document import Document, Part
@@ -24,13 +23,12 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.model import VariableSpec, WriterSpec
 from gatewayd.mapping.reach import Reach, scaled
 from gatewayd.mapping.section import Section
-from gatewayd.modbus.areas import Area
+from gatewayd.modbus.areas import MAX_WRITE_BITS, MAX_WRITE_REGISTERS, Area
 from gatewayd.modbus.codec import TYPES, Codec
 
 __all__ = ["LANGUAGE"]
 
-_MAX_WRITE: Final = {Area.HOLDING: 123, Area.COIL: 1968}
-"""Registers and coils that one request writes at most (Application Protocol V1.1b3, 6.11 and 6.12)."""
+_MAX_WRITE: Final = {Area.HOLDING: MAX_WRITE_REGISTERS, Area.COIL: MAX_WRITE_BITS}
 _SYNONYMS: Final = {
     ("type", "BOOL"): "bit",
     ("type", "INT"): "int16",
@@ -89,7 +87,7 @@ class ModbusLanguage(LinkLanguage):
 
     def names(self, writer: WriterSpec) -> Sequence[str]:
         """Its addresses and networks."""
-        return [peer(network) for network in writer.by(ModbusWriter).modbus]
+        return [network_text(network) for network in writer.by(ModbusWriter).modbus]
 
     def writes_whole(
         self, writer: WriterSpec, variables: Sequence[ExpandedVariable], cell: ExpandedCell

@@ -5,21 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from ipaddress import IPv4Network, IPv6Network
 
-from gatewayd.mapping.plan import LinkPlan, Plan
+from gatewayd.mapping.plan import LinkPlan
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import Codec
 
-__all__ = ["ModbusPlan", "Network", "Placement", "modbus_of"]
+__all__ = ["Located", "ModbusPlan", "Network", "Placement", "network_text"]
 
 Network = IPv4Network | IPv6Network
 
 
-@dataclass(frozen=True, slots=True)
-class Placement:
-    """Where one variable lies in a Modbus area, and how its number is written there."""
+def network_text(network: Network) -> str:
+    """An address, or a network with its length."""
+    return str(network.network_address) if network.num_addresses == 1 else str(network)
 
-    variable: int
-    """Index into `CellDefinition.variables`."""
+
+class Located:
+    """What lies in a Modbus area: the properties of everything with these fields."""
+
+    __slots__ = ()
     area: Area
     address: int
     """Protocol address from 0: of the first register, or of the coil."""
@@ -30,8 +33,35 @@ class Placement:
 
     @property
     def words(self) -> int:
-        """Addresses covered: registers, or 1 for a coil or a packed bit."""
+        """Addresses covered: registers, or 1 for a coil, a discrete input or a packed bit."""
         return self.codec.words if self.codec is not None else 1
+
+    @property
+    def addresses(self) -> range:
+        """Addresses covered."""
+        return range(self.address, self.address + self.words)
+
+    @property
+    def place(self) -> str:
+        """The address as the file counts: `100` or `100.3`."""
+        return str(self.address) if self.bit is None else f"{self.address}.{self.bit}"
+
+    @property
+    def notation(self) -> str:
+        """The 4xxxxx form, with the bit where there is one: `400001.3`."""
+        return self.area.notation(self.address) + ("" if self.bit is None else f".{self.bit}")
+
+
+@dataclass(frozen=True, slots=True)
+class Placement(Located):
+    """Where one variable lies in a Modbus area, and how its number is written there."""
+
+    variable: int
+    """Index into `CellDefinition.variables`."""
+    area: Area
+    address: int
+    bit: int | None
+    codec: Codec | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +82,3 @@ class ModbusPlan(LinkPlan):
     placements: tuple[Placement, ...]
     writers: tuple[tuple[Network, int], ...]
     """Peer network -> writer, most specific first."""
-
-
-def modbus_of(plan: Plan) -> ModbusPlan | None:
-    """The Modbus unit of a cell; None: it has none."""
-    return plan.of(ModbusPlan).get("modbus")

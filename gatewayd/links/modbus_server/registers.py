@@ -17,15 +17,10 @@ from gatewayd.core.definition import Direction
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
 from gatewayd.links.modbus_server.runs import Run, bit_runs, number_runs, words_of_bits
-from gatewayd.modbus.areas import Area
+from gatewayd.modbus.areas import MAX_READ_BITS, MAX_READ_REGISTERS, Area
 from gatewayd.modbus.codec import Codec
 
-__all__ = ["MAX_BITS", "MAX_REGISTERS", "BitTable", "Readable", "RegisterImage", "RegisterTable"]
-
-MAX_REGISTERS = 125
-"""Registers of one read (V1.1b3, 6.3)."""
-MAX_BITS = 2000
-"""Coils or discrete inputs of one read (V1.1b3, 6.1)."""
+__all__ = ["BitTable", "Readable", "RegisterImage", "RegisterTable"]
 
 _ADDRESSES = 65536
 _WORD = struct.Struct(">H")
@@ -131,7 +126,7 @@ class RegisterTable:
             for placement in placements
             for word in range(placement.words)
         }
-        self.readable = Readable(_filled(covered) if fill_gaps else covered, MAX_REGISTERS)
+        self.readable = Readable(_filled(covered) if fill_gaps else covered, MAX_READ_REGISTERS)
         self._addresses_of = _addresses_by_variable(placements)
         self._items: dict[int, _Number | _Bits] = {
             item.address + word: item for item in _items(placements, cell) for word in range(item.words)
@@ -199,7 +194,7 @@ class BitTable:
         """Bits by address, the first one in the least significant bit of the first byte."""
         self._cell = cell
         self._variables = {placement.address: placement.variable for placement in placements}
-        self.readable = Readable(_filled(self._variables) if fill_gaps else self._variables, MAX_BITS)
+        self.readable = Readable(_filled(self._variables) if fill_gaps else self._variables, MAX_READ_BITS)
         self._addresses_of = _addresses_by_variable(placements)
 
     def hold_back(self, variables: frozenset[int]) -> None:

@@ -14,8 +14,8 @@ from typing import Any
 
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import ExceptionCode, Unit, exception, execute
-from gatewayd.links.modbus_server.registers import MAX_REGISTERS
 from gatewayd.loop import clock
+from gatewayd.modbus.areas import MAX_READ_REGISTERS
 from gatewayd.modbus.frames import FrameBuffer, FramingError, encode, split
 
 __all__ = ["ModbusSession", "UnitAccess"]
@@ -120,5 +120,6 @@ def _heads(key: int) -> tuple[bytes, ...]:
     """For every quantity, what stands between transaction id and registers in the answer to a read."""
     unit, function = key >> 8, key & 0xFF
     return tuple(
-        _HEAD.pack(0, 3 + 2 * quantity, unit, function, 2 * quantity) for quantity in range(MAX_REGISTERS + 1)
+        _HEAD.pack(0, 3 + 2 * quantity, unit, function, 2 * quantity)
+        for quantity in range(MAX_READ_REGISTERS + 1)
     )

@@ -13,7 +13,8 @@ from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import Unit
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.links.modbus_server.registers import MAX_BITS, MAX_REGISTERS, Readable, RegisterImage
+from gatewayd.links.modbus_server.registers import Readable, RegisterImage
+from gatewayd.modbus.areas import MAX_READ_BITS, MAX_READ_REGISTERS
 
 IndexOf = Callable[[str], int]
 
@@ -21,7 +22,7 @@ IndexOf = Callable[[str], int]
 @given(
     st.sets(st.integers(0, 65535) | st.integers(0, 300), max_size=300),
     st.sets(st.integers(0, 300), max_size=50),
-    st.sampled_from([MAX_REGISTERS, MAX_BITS]),
+    st.sampled_from([MAX_READ_REGISTERS, MAX_READ_BITS]),
 )
 def test_reach_is_the_number_of_readable_addresses_in_a_row(
     mapped: set[int], held_back: set[int], longest: int
@@ -38,7 +39,7 @@ def test_reach_is_the_number_of_readable_addresses_in_a_row(
 
 def test_holding_back_happens_in_place() -> None:
     """Connections keep a reference to the table."""
-    readable = Readable(range(10), MAX_REGISTERS)
+    readable = Readable(range(10), MAX_READ_REGISTERS)
     reach = readable.reach
     readable.hold_back(frozenset({5}))
     assert (reach[0], reach[5], reach[6]) == (5, 0, 4)
@@ -49,7 +50,7 @@ def test_holding_back_happens_in_place() -> None:
 def test_gaps_can_read_as_zero(cell: Cell, plan_of: Callable[..., ModbusPlan]) -> None:
     """Only between mapped addresses, and only for reading."""
     image = RegisterImage(plan_of(fill_gaps=True), cell)
-    assert image.holding.readable.reach[18] == MAX_REGISTERS
+    assert image.holding.readable.reach[18] == MAX_READ_REGISTERS
     assert image.holding.readable.reach[501] == 1
     assert image.holding.readable.reach[502] == 0
     assert image.discrete.readable.reach[35] == 6

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from ipaddress import ip_address, ip_network
 
-from gatewayd.links.modbus_server.plan import Network
-from gatewayd.links.modbus_server.rules.wording import peer
+from gatewayd.links.modbus_server.plan import Network, network_text
 from gatewayd.links.modbus_server.sections import Modbus, ModbusWriter
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.document import Part
@@ -78,10 +77,10 @@ def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if writer.spec.by(ModbusWriter).modbus and not any(
             _meet(network, modbus.spec.allow) for network in writer.spec.by(ModbusWriter).modbus
         ):
-            shown = ", ".join(map(peer, writer.spec.by(ModbusWriter).modbus[:3]))
+            shown = ", ".join(map(network_text, writer.spec.by(ModbusWriter).modbus[:3]))
             message = f"the access list of the listener shuts the writer `{writer.name}` ({shown}) out"
             related = (Related(modbus.at("allow"), "the access list is here"),)
-            hint = f"add {peer(writer.spec.by(ModbusWriter).modbus[0])} to `allow`"
+            hint = f"add {network_text(writer.spec.by(ModbusWriter).modbus[0])} to `allow`"
             yield rule.at(writer.at("modbus"), message, hint=hint, related=related)
 
 
@@ -105,7 +104,7 @@ def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         if writer.spec.by(ModbusWriter).modbus and not any(
             _meet(network, _LOOPBACK) for network in writer.spec.by(ModbusWriter).modbus
         ):
-            shown = peer(writer.spec.by(ModbusWriter).modbus[0])
+            shown = network_text(writer.spec.by(ModbusWriter).modbus[0])
             message = (
                 f"the writer `{writer.name}` ({shown}) cannot reach {modbus.spec.listen}, "
                 "which only this machine can"

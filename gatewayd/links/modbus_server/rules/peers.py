@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gatewayd.links.modbus_server.plan import Network
-from gatewayd.links.modbus_server.rules.wording import peer
+from gatewayd.links.modbus_server.plan import Network, network_text
 from gatewayd.links.modbus_server.sections import ModbusWriter
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.document import Document, Part
@@ -26,8 +25,8 @@ def same_peer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             continue
         other, place = first[network]
         whom = "the writer itself" if other is writer else f"the writer `{other.name}`"
-        message = f"{peer(network)} of the writer `{writer.name}` already stands for {whom}"
-        related = (Related(place, f"{peer(network)} first used here"),)
+        message = f"{network_text(network)} of the writer `{writer.name}` already stands for {whom}"
+        related = (Related(place, f"{network_text(network)} first used here"),)
         hint = "give each writer its own address, or make one writer of the two"
         yield rule.at(position, message, hint=hint, related=related)
 
@@ -48,7 +47,7 @@ def overlapping_peers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             if holder is not None and holder[0] is not writer:
                 wide = network.supernet(new_prefix=length)
                 message = (
-                    f"{peer(network)} of the writer `{writer.name}` lies in {wide} of `{holder[0].name}`; "
+                    f"{network_text(network)} of the writer `{writer.name}` lies in {wide} of `{holder[0].name}`; "
                     f"it counts as `{writer.name}`"
                 )
                 related = (Related(holder[1], f"{wide} of `{holder[0].name}`"),)

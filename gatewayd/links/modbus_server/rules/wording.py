@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from gatewayd.links.modbus_server.expand import ExpandedPlacement
-from gatewayd.links.modbus_server.plan import Network
 from gatewayd.modbus.areas import Area
 
-__all__ = ["AREA_WORDS", "first_of_each_line", "peer", "where"]
+__all__ = ["AREA_WORDS", "first_of_each_line", "where"]
 
 AREA_WORDS = {
     Area.HOLDING: "holding register",
@@ -38,8 +37,3 @@ def first_of_each_line(placements: Iterable[ExpandedPlacement]) -> Iterator[Expa
         if key not in seen:
             seen.add(key)
             yield placement
-
-
-def peer(network: Network) -> str:
-    """An address, or a network with its length."""
-    return str(network.network_address) if network.num_addresses == 1 else str(network)
