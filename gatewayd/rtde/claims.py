@@ -21,6 +21,7 @@ from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
 
 __all__ = [
+    "MAX_RECIPES",
     "OLD_LIST_LIMIT",
     "REFUSED",
     "REGISTERS_KEY",
@@ -29,6 +30,7 @@ __all__ = [
     "HandshakeError",
     "InputRecipe",
     "is_long",
+    "list_size",
     "recipe_key",
     "sort_types",
 ]
@@ -42,8 +44,9 @@ REFUSED = "REFUSED"
 
 OLD_LIST_LIMIT = 2048
 """Bytes of a list of names that every controller takes (older guide, "Introduction"); newer ones take far more."""
+MAX_RECIPES = 255
+"""Input recipes of a connection; ids count from 1."""
 
-_LAST_ID = 255
 _IDS_FOR_RETRIES = 64
 """Recipe ids that joins leave over for inputs that become free later."""
 _RETRIED = frozenset({IN_USE, REFUSED})
@@ -70,9 +73,14 @@ def recipe_key(name: str) -> str:
     return next((family for family in _FAMILIES if name.startswith(family)), name)
 
 
+def list_size(names: Sequence[str]) -> int:
+    """Bytes of a list of names."""
+    return len(",".join(names))
+
+
 def is_long(names: Sequence[str]) -> bool:
     """Whether an old controller may refuse a list of these names for its length."""
-    return len(",".join(names)) > OLD_LIST_LIMIT
+    return list_size(names) > OLD_LIST_LIMIT
 
 
 def sort_types(names: Sequence[str], words: Sequence[str]) -> tuple[list[DataType], dict[str, str]]:
@@ -236,7 +244,7 @@ class Claims:
 
         No effect for others, nor once few recipe ids are left.
         """
-        if self._used < _LAST_ID - _IDS_FOR_RETRIES:
+        if self._used < MAX_RECIPES - _IDS_FOR_RETRIES:
             alone = {group.key for group in self._groups if group.held is not None}
             self._joining |= {name: None for name in fields if name in alone and name in self._order}
 
@@ -248,7 +256,7 @@ class Claims:
             self._take_in()
         if not self._queue:
             return None
-        if self._used >= _LAST_ID:
+        if self._used >= MAX_RECIPES:
             self._exhausted = True
             self._queue.clear()
             return None

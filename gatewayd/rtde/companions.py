@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-__all__ = ["COMPANIONS", "Companions", "companions", "masked_by"]
+__all__ = ["COMPANIONS", "Companions"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,15 +24,6 @@ class Companions:
     """Its bit for the whole value; None: bit for bit, each bit of the mask stands for the same bit of the value."""
     type: str | None = None
     """The field whose same bit selects the domain: 0 current, 1 voltage; None: the value has only one meaning."""
-
-    def bit_of(self, bit: int | None) -> int:
-        """The mask's bit for this bit of the value, or for the whole of it (None). ValueError if there is none such."""
-        if self.bit is not None:
-            return self.bit
-        if bit is None:
-            msg = f"{self.mask} masks single bits"
-            raise ValueError(msg)
-        return bit
 
 
 _DIGITAL = ("standard", "configurable", "tool")
@@ -49,14 +40,4 @@ COMPANIONS: Mapping[str, Companions] = MappingProxyType(
         },
     }
 )
-"""Value field -> what it acts through. Every other input acts by itself."""
-
-
-def companions(field: str) -> Companions | None:
-    """What an input acts through; None if it acts by itself, as registers and the masks themselves do."""
-    return COMPANIONS.get(field)
-
-
-def masked_by(mask: str) -> tuple[str, ...]:
-    """The value fields that act through this mask field; empty for what is no mask."""
-    return tuple(field for field, needs in COMPANIONS.items() if needs.mask == mask)
+"""Value field -> what it acts through. Every other input acts by itself, as registers and the masks themselves do."""

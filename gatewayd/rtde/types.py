@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Mapping
 from enum import Enum
 
-__all__ = ["DEFAULT_PORT", "DataType"]
+__all__ = ["DEFAULT_PORT", "INTEGER_RANGES", "DataType"]
 
 DEFAULT_PORT = 30004
 """TCP port of the RTDE interface."""
+
+INTEGER_RANGES: Mapping[str, tuple[int, int]] = {
+    "B": (0, 0xFF),
+    "I": (0, 0xFFFF_FFFF),
+    "Q": (0, 0xFFFF_FFFF_FFFF_FFFF),
+    "i": (-0x8000_0000, 0x7FFF_FFFF),
+}
+"""Least and greatest element of the integer types, by `DataType.code`."""
 
 
 class DataType(Enum):
@@ -31,11 +41,18 @@ class DataType(Enum):
         """`struct` format character of one element."""
         self.count = count
         """Number of elements: 1, or the length of the vector."""
+        self.bits = 8 * struct.calcsize(">" + code) if code in INTEGER_RANGES else None
+        """Bits of one element of an integer type; None for the others."""
 
     @property
     def format(self) -> str:
         """`struct` format of the whole value, without byte order."""
         return self.code * self.count
+
+    @property
+    def element(self) -> DataType:
+        """The type of one element."""
+        return next(kind for kind in DataType if kind.code == self.code)
 
     @property
     def is_vector(self) -> bool:

@@ -24,15 +24,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
 
 from gatewayd.rtde.catalogue import suggest
+from gatewayd.rtde.types import INTEGER_RANGES
 from gatewayd.simulator.faults import DropAt
 from gatewayd.simulator.server import SimulatedController
-from gatewayd.simulator.store import RANGES, Scalar
+from gatewayd.simulator.store import Scalar
 
 __all__ = ["Control"]
 
-_Command = Callable[[str], Awaitable[str | None]]
+_Command = Callable[[str], str | Awaitable[None] | None]
 _WORDS = {"true": True, "false": False, "on": True, "off": False}
 
 
@@ -41,24 +43,25 @@ class Control:
 
     def __init__(self, simulator: SimulatedController) -> None:
         self.quit = False
-        """Whether the simulator was told to stop."""
+        """Whether `quit` was asked for."""
         self._simulator = simulator
+        self._controller = simulator.controller
         self._commands: Mapping[str, _Command] = {
             "get": self._get,
             "set": self._set,
             "overwrite": self._overwrite,
-            "hold": self._hold,
-            "free": self._free,
-            "freeze": self._freeze,
-            "creep": self._creep,
-            "silence": self._silence,
-            "pause": self._pause,
+            "hold": lambda rest: self._controller.hold(_fields(rest)),
+            "free": lambda rest: self._controller.free(_fields(rest)),
+            "freeze": partial(self._switch, "freeze"),
+            "creep": partial(self._switch, "creep"),
+            "silence": partial(self._switch, "silence"),
+            "pause": lambda rest: simulator.pause(_seconds(rest)),
             "delay": self._delay,
             "drop-at": self._drop_at,
-            "drop-clients": self._drop_clients,
-            "text": self._text,
-            "restart": self._restart,
-            "clients": self._clients,
+            "drop-clients": lambda _: str(simulator.drop_clients()),
+            "text": simulator.say,
+            "restart": lambda _: simulator.restart(),
+            "clients": lambda _: str(simulator.clients),
             "quit": self._quit,
         }
 
@@ -69,70 +72,48 @@ class Control:
         if command is None:
             return f"error unknown command {name!r}; there are: {', '.join(self._commands)}"
         try:
-            result = await command(rest.strip())
+            result = command(rest.strip())
+            if isinstance(result, Awaitable):
+                await result
+                result = None
         except (ValueError, OSError) as error:
             return f"error {error}"
         except KeyError as error:
             return f"error {_unknown(str(error.args[0]))}"
         return "ok" if result is None else f"ok {result}"
 
-    async def _get(self, rest: str) -> str:
-        return ",".join(
-            str(v).lower() if isinstance(v, bool) else str(v) for v in self._simulator.controller.get(rest)
-        )
+    def _get(self, rest: str) -> str:
+        values = self._controller.get(rest)
+        return ",".join(str(value).lower() if isinstance(value, bool) else str(value) for value in values)
 
-    async def _set(self, rest: str) -> None:
+    def _set(self, rest: str) -> None:
         field, _, text = rest.partition(" ")
-        self._simulator.set(field, *self._values(field, text))
+        self._controller.set(field, self._values(field, text))
 
-    async def _overwrite(self, rest: str) -> None:
+    def _overwrite(self, rest: str) -> None:
         field, _, text = rest.partition(" ")
-        self._simulator.overwrite(field, *(() if text.strip() == "off" else self._values(field, text)))
+        self._controller.overwrite(field, None if text.strip() == "off" else self._values(field, text))
 
-    def _values(self, field: str, text: str) -> list[Scalar]:
-        code = self._simulator.controller.store.type(field).code
-        return [_value(item.strip(), code) for item in text.split(",")]
+    def _switch(self, fault: str, text: str) -> None:
+        if text not in ("on", "off"):
+            message = f"on or off, not {text!r}"
+            raise ValueError(message)
+        setattr(self._simulator.faults, fault, text == "on")
 
-    async def _hold(self, rest: str) -> None:
-        self._simulator.hold(*_fields(rest))
-
-    async def _free(self, rest: str) -> None:
-        self._simulator.free(*_fields(rest))
-
-    async def _freeze(self, rest: str) -> None:
-        self._simulator.faults.freeze = _switch(rest)
-
-    async def _silence(self, rest: str) -> None:
-        self._simulator.faults.silence = _switch(rest)
-
-    async def _creep(self, rest: str) -> None:
-        self._simulator.faults.creep = _switch(rest)
-
-    async def _pause(self, rest: str) -> None:
-        self._simulator.pause(_seconds(rest))
-
-    async def _delay(self, rest: str) -> None:
+    def _delay(self, rest: str) -> None:
         self._simulator.faults.delay = _seconds(rest)
 
-    async def _drop_at(self, rest: str) -> None:
+    def _drop_at(self, rest: str) -> None:
         faults = self._simulator.faults
         faults.drop_at = None if rest == "off" else DropAt.parse(rest)
         faults.drop_times = 1
 
-    async def _drop_clients(self, _rest: str) -> str:
-        return str(self._simulator.drop_clients())
-
-    async def _text(self, rest: str) -> None:
-        self._simulator.say(rest)
-
-    async def _restart(self, _rest: str) -> None:
-        await self._simulator.restart()
-
-    async def _clients(self, _rest: str) -> str:
-        return str(self._simulator.clients)
-
-    async def _quit(self, _rest: str) -> None:
+    def _quit(self, _rest: str) -> None:
         self.quit = True
+
+    def _values(self, field: str, text: str) -> list[Scalar]:
+        code = self._controller.store.type(field).code
+        return [_value(item.strip(), code) for item in text.split(",")]
 
 
 def _fields(text: str) -> list[str]:
@@ -141,13 +122,6 @@ def _fields(text: str) -> list[str]:
         message = "which field?"
         raise ValueError(message)
     return fields
-
-
-def _switch(text: str) -> bool:
-    if text not in ("on", "off"):
-        message = f"on or off, not {text!r}"
-        raise ValueError(message)
-    return text == "on"
 
 
 def _seconds(text: str) -> float:
@@ -165,9 +139,9 @@ def _value(text: str, code: str) -> Scalar:
     if code == "d":
         return float(text)
     value = int(text, 0)
-    least, greatest = RANGES.get(code, (0, 1))
-    if not least <= value <= greatest:
-        message = f"{value} is not within {least}..{greatest}"
+    low, high = INTEGER_RANGES.get(code, (0, 1))
+    if not low <= value <= high:
+        message = f"{value} is not within {low}..{high}"
         raise ValueError(message)
     return value
 

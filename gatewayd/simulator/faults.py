@@ -11,10 +11,11 @@ from enum import Enum
 from random import Random
 from typing import NamedTuple
 
+from gatewayd.rtde.catalogue import INPUTS, is_fieldbus_range
+
 __all__ = [
     "ADAPTERS",
     "ADAPTER_FIELDS",
-    "STRICT_LIST_BYTES",
     "DropAt",
     "DroppedError",
     "FaultStep",
@@ -23,35 +24,17 @@ __all__ = [
     "Mangler",
 ]
 
-STRICT_LIST_BYTES = 2048
-"""Longest list of names an old controller takes (guide of 2022, SETUP_OUTPUTS)."""
-
 ADAPTERS = {"profinet": "PROFINET adapter", "ethernet-ip": "EtherNet/IP adapter"}
 """Fieldbus adapters of the controller that act as an RTDE client inside it, and how the log names them."""
 
-ADAPTER_FIELDS: tuple[str, ...] = (
-    "speed_slider_mask",
-    "speed_slider_fraction",
-    "standard_digital_output_mask",
-    "standard_digital_output",
-    "configurable_digital_output_mask",
-    "configurable_digital_output",
-    "tool_digital_output_mask",
-    "tool_digital_output",
-    "standard_analog_output_mask",
-    "standard_analog_output_type",
-    "standard_analog_output_0",
-    "standard_analog_output_1",
-    "input_bit_registers0_to_31",
-    "input_bit_registers32_to_63",
-    *(f"input_int_register_{n}" for n in range(24)),
-    *(f"input_double_register_{n}" for n in range(24)),
+ADAPTER_FIELDS: tuple[str, ...] = tuple(
+    name for name in INPUTS if is_fieldbus_range(name) or not name.startswith(("input_", "external_"))
 )
 """The inputs an enabled adapter claims, as users of real controllers report them."""
 
 
 class LongLists(Enum):
-    """What a controller does with a list of names that is longer than `STRICT_LIST_BYTES`."""
+    """What a controller does with a list of names that is longer than `OLD_LIST_LIMIT`."""
 
     TAKE = "take"
     REFUSE = "refuse"
@@ -116,7 +99,7 @@ class Faults:
     hold: tuple[str, ...] = ()
     """Inputs claimed by the controller itself from the start."""
     long_lists: LongLists = LongLists.TAKE
-    """What becomes of lists of names beyond `STRICT_LIST_BYTES`."""
+    """What becomes of lists of names beyond `OLD_LIST_LIMIT`."""
     unreadable: frozenset[str] = frozenset()
     """Inputs that are NOT_FOUND as outputs: they can be claimed and not be read back."""
     drop_at: DropAt | None = None

@@ -156,18 +156,6 @@ class SimulatedController:
         """Write any field, as the robot would; see `Controller.set`."""
         self.controller.set(field, values)
 
-    def hold(self, *fields: str) -> None:
-        """Claim inputs for the controller itself; see `Controller.hold`."""
-        self.controller.hold(fields)
-
-    def free(self, *fields: str) -> None:
-        """Give up held inputs; see `Controller.free`."""
-        self.controller.free(fields)
-
-    def overwrite(self, field: str, *values: Scalar) -> None:
-        """Write a field in every cycle, whatever clients send; without values no more. See `Controller.overwrite`."""
-        self.controller.overwrite(field, values or None)
-
     def _read_again(self) -> None:
         if not self.paused:
             for connection in self._connections.values():

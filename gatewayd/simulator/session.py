@@ -12,18 +12,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from gatewayd.rtde import messages
+from gatewayd.rtde.claims import MAX_RECIPES, OLD_LIST_LIMIT, is_long, list_size
 from gatewayd.rtde.codec import MAX_PACKAGE, ControllerProtocol, ProtocolError
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.controller import Controller
-from gatewayd.simulator.faults import STRICT_LIST_BYTES, DroppedError, FaultStep, LongLists
+from gatewayd.simulator.faults import DroppedError, FaultStep, LongLists
 from gatewayd.simulator.masks import Effect, effects
 from gatewayd.simulator.store import FieldStore, RecipeView
 
-__all__ = ["MOST_INPUT_RECIPES", "SOURCE", "SimulatorSession"]
+__all__ = ["SOURCE", "SimulatorSession"]
 
-MOST_INPUT_RECIPES = 255
-"""Per connection; ids count from 1, 0 says refused."""
 SOURCE = "URControl"
 """Source of the controller's text messages."""
 
@@ -76,17 +75,10 @@ class SimulatorSession:
     def __str__(self) -> str:
         return self._name
 
-    @property
-    def streaming(self) -> bool:
-        """Whether data packages are being sent."""
-        return self._started and self._view is not None
-
     def greeting(self) -> bytes:
         """What is sent before anything was asked."""
         text = self._controller.faults.text_on_connect
-        if text is None:
-            return b""
-        return self._protocol.send(messages.TextMessage(text, SOURCE, messages.TextLevel.WARNING))
+        return b"" if text is None else self.text(text, messages.TextLevel.WARNING)
 
     def text(self, message: str, level: messages.TextLevel) -> bytes:
         """A text message to the client, in the layout of the version it speaks."""
@@ -111,8 +103,7 @@ class SimulatorSession:
         if controller.cycle % self._period:
             return b""
         self._pass(FaultStep.DATA)
-        recipe = _OUTPUT_RECIPE if self._protocol.version > 1 else None
-        return self._protocol.send(messages.DataPackage(recipe, self._view.payload()))
+        return self._protocol.send(messages.DataPackage(_OUTPUT_RECIPE, self._view.payload()))
 
     def close(self) -> None:
         """Give up every claim."""
@@ -152,9 +143,9 @@ class SimulatorSession:
     def _answer(self, message: messages.ControllerMessage) -> None:
         self._out.append(self._protocol.send(message))
 
-    def _complain(self, message: str, level: messages.TextLevel = messages.TextLevel.ERROR) -> None:
+    def _complain(self, message: str) -> None:
         _log.info("%s: %s", self, message)
-        self._answer(messages.TextMessage(message, SOURCE, level))
+        self._answer(messages.TextMessage(message, SOURCE, messages.TextLevel.ERROR))
 
     def _setup_outputs(self, message: messages.SetupOutputs) -> None:
         if not self._answers(message.names):
@@ -167,10 +158,7 @@ class SimulatorSession:
             valid = False
         self._view = self._controller.store.view(message.names) if valid else None
         self._period = self._controller.period(message.frequency)
-        if self._protocol.version > 1:
-            self._reply(messages.OutputsSetup(_OUTPUT_RECIPE if valid else 0, types))
-        else:
-            self._reply(messages.OutputsSetup(None, types))
+        self._reply(messages.OutputsSetup(_OUTPUT_RECIPE if valid else 0, types))
 
     def _setup_inputs(self, message: messages.SetupInputs) -> None:
         if not message.names:
@@ -193,8 +181,8 @@ class SimulatorSession:
         known = [kind for kind in kinds if kind is not None]
         if not messages.ERROR_WORDS.isdisjoint(types) or self._is_too_long(names):
             return 0
-        if len(self._inputs) >= MOST_INPUT_RECIPES:
-            self._complain(f"a connection has {MOST_INPUT_RECIPES} input recipes at most")
+        if len(self._inputs) >= MAX_RECIPES:
+            self._complain(f"a connection has {MAX_RECIPES} input recipes at most")
             return 0
         if not self._fits(known):
             self._complain("the input recipe is larger than a data package")
@@ -219,10 +207,8 @@ class SimulatorSession:
         """Whether a setup request with these names is answered; by id 0 if the list is too long all the same."""
         if not self._is_too_long(names):
             return True
-        way, text = (
-            self._controller.faults.long_lists,
-            f"list of {_size(names)} bytes is longer than {STRICT_LIST_BYTES}",
-        )
+        way = self._controller.faults.long_lists
+        text = f"list of {list_size(names)} bytes is longer than {OLD_LIST_LIMIT}"
         if way is LongLists.CLOSE:
             raise DroppedError(text)
         if way is LongLists.COMPLAIN:
@@ -230,7 +216,7 @@ class SimulatorSession:
         return way is LongLists.REFUSE
 
     def _is_too_long(self, names: tuple[str, ...]) -> bool:
-        return self._controller.faults.long_lists is not LongLists.TAKE and _size(names) > STRICT_LIST_BYTES
+        return self._controller.faults.long_lists is not LongLists.TAKE and is_long(names)
 
     def _reply(self, message: messages.OutputsSetup | messages.InputsSetup) -> None:
         """Answer a setup; a list of types too long for a package becomes a complaint."""
@@ -242,8 +228,3 @@ class SimulatorSession:
     @staticmethod
     def _fits(kinds: Sequence[DataType]) -> bool:
         return Recipe([""] * len(kinds), kinds).size + _DATA_HEAD <= MAX_PACKAGE
-
-
-def _size(names: tuple[str, ...]) -> int:
-    """Bytes of a list of names."""
-    return sum(map(len, names)) + len(names) - 1

@@ -13,22 +13,14 @@ from operator import itemgetter
 from weakref import WeakValueDictionary
 
 from gatewayd.rtde.recipe import Recipe
-from gatewayd.rtde.types import DataType
+from gatewayd.rtde.types import INTEGER_RANGES, DataType
 from gatewayd.simulator.arm import ControllerMoment, Vector
 from gatewayd.simulator.signals import Signal
 
-__all__ = ["RANGES", "FieldStore", "RecipeView", "Scalar", "fitting"]
+__all__ = ["FieldStore", "RecipeView", "Scalar", "fitting"]
 
 Scalar = int | float
 """An element of a value; BOOL is bool, an int."""
-
-RANGES: Mapping[str, tuple[int, int]] = {
-    "B": (0, 0xFF),
-    "I": (0, 0xFFFF_FFFF),
-    "Q": (0, 0xFFFF_FFFF_FFFF_FFFF),
-    "i": (-0x8000_0000, 0x7FFF_FFFF),
-}
-"""Least and greatest element of the integer types, by `struct` format character."""
 
 
 def fitting(value: Scalar, code: str) -> Scalar:
@@ -39,8 +31,8 @@ def fitting(value: Scalar, code: str) -> Scalar:
         return bool(value)
     if isinstance(value, float) and math.isnan(value):
         return 0
-    least, greatest = RANGES[code]
-    return round(min(max(value, least), greatest))
+    low, high = INTEGER_RANGES[code]
+    return round(min(max(value, low), high))
 
 
 class FieldStore:
@@ -77,11 +69,6 @@ class FieldStore:
         for name, kind in self._types.items():
             value = self._initial.get(name, 0)
             self.write(name, value if isinstance(value, tuple) else (value,) * kind.count)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Every field."""
-        return tuple(self._types)
 
     def type(self, name: str) -> DataType:
         """The type of a field; KeyError if there is none of that name."""

@@ -161,7 +161,7 @@ async def test_an_input_that_is_freed_while_the_clock_stands_still_is_read_befor
             former = seen.sessions[0].inputs["registers"]
             assert FREED not in former.recipe.names
             simulated.faults.freeze = True
-            simulated.free(FREED)
+            simulated.controller.free([FREED])
             await until(lambda: seen.changes)
             await until(lambda: seen.calls[-1] == "values")
             assert client.session is not None

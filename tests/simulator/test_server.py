@@ -187,12 +187,12 @@ async def test_mangled_streams_stay_readable(client: type[Client], fault: str) -
 
 async def test_hold_and_free_at_run_time(simulator: SimulatedController, client: type[Client]) -> None:
     async with client(simulator.port) as one:
-        simulator.hold(INT(3))
+        simulator.controller.hold([INT(3)])
         assert (await one.inputs(INT(2), INT(3))).types == ("INT32", "IN_USE")
-        simulator.free(INT(3))
+        simulator.controller.free([INT(3)])
         assert (await one.inputs(INT(2), INT(3))).recipe == 1
         with pytest.raises(ValueError, match=r"input_int_register_3 is in use by client 1 \(127.0.0.1:"):
-            simulator.hold(INT(3))
+            simulator.controller.hold([INT(3)])
 
 
 async def test_values_are_at_hand(simulator: SimulatedController) -> None:
@@ -268,9 +268,9 @@ async def test_what_is_overwritten_shows_in_the_read_back(
     async with client(simulator.port) as one:
         await one.stream(INT(0))
         await one.inputs(INT(0))
-        simulator.overwrite(INT(0), 99)
+        simulator.controller.overwrite(INT(0), [99])
         one.send(DataPackage(1, struct.pack(">i", 5)))
         await one.until(lambda values: values == (99,))
-        simulator.overwrite(INT(0))
+        simulator.controller.overwrite(INT(0), None)
         one.send(DataPackage(1, struct.pack(">i", 6)))
         await one.until(lambda values: values == (6,))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.rtde.catalogue import INPUTS, Series
+from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Series
 from gatewayd.rtde.codec import ClientProtocol, ProtocolError
 from gatewayd.rtde.messages import (
     ControllerMessage,
@@ -272,7 +272,7 @@ def test_recipes_too_large_for_a_package_are_refused(peer: Peer) -> None:
 
 def test_the_whole_catalogue_fits_one_recipe() -> None:
     controller = Controller(Series.X)
-    names = tuple(name for name in controller.store.names if controller.output_type(name))
+    names = tuple(name for name in {**INPUTS, **OUTPUTS} if controller.output_type(name))
     peer = Peer(controller)
     (reply,) = peer.ask(SetupOutputs(names, 0.0))
     assert isinstance(reply, OutputsSetup)

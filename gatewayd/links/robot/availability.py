@@ -12,12 +12,9 @@ from gatewayd.core.definition import Direction, ValueKind, Variable
 from gatewayd.links.robot.companions import DOMAINS
 from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.rtde.session import Session
-from gatewayd.rtde.types import DataType
+from gatewayd.rtde.types import INTEGER_RANGES, DataType
 
 __all__ = ["unavailable"]
-
-_WIDTHS = {"B": 8, "i": 32, "I": 32, "Q": 64}
-"""Bits of the integer types, by `DataType.code`."""
 
 
 def unavailable(session: Session, variables: Sequence[Variable]) -> dict[int, str]:
@@ -65,15 +62,11 @@ def _domain_unknown(
 
 
 def _carries(answered: DataType, variable: Variable) -> bool:
-    width = _WIDTHS.get(answered.code)
+    width = answered.bits
     if (variable.element or 0) >= answered.count:
         return False
     if variable.bit is not None:
         return width is not None and variable.bit < width
     if variable.kind is ValueKind.INT:
-        return width is not None and (variable.low, variable.high) == _range(answered.code, width)
+        return (variable.low, variable.high) == INTEGER_RANGES.get(answered.code)
     return width is None and (answered.code == "?") == (variable.kind is ValueKind.BOOL)
-
-
-def _range(code: str, width: int) -> tuple[int, int]:
-    return (-(1 << width - 1), (1 << width - 1) - 1) if code.islower() else (0, (1 << width) - 1)

@@ -232,9 +232,9 @@ def _lines(variables: Sequence[Variable], transfer: InputTransfer) -> Iterator[_
     for name, needs in COMPANIONS.items():
         if name not in transfer.slots or needs.mask not in transfer.slots:
             continue
-        bits: Sequence[int | None] = range(_DIGITAL_LINES[name]) if needs.bit is None else (None,)
-        for bit in bits:
-            mask_bit, kind = needs.bit_of(bit), needs.type
+        single = [(bit, bit) for bit in range(_DIGITAL_LINES.get(name, 0))]
+        for bit, mask_bit in single if needs.bit is None else [(None, needs.bit)]:
+            kind = needs.type
             value = carrier(name, bit)
             yield _Line(
                 (name, bit),

@@ -11,16 +11,10 @@ from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import Defined, ExpandedVariable
 from gatewayd.mapping.model import VariableSpec
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field
-from gatewayd.rtde.types import DataType
+from gatewayd.rtde.types import INTEGER_RANGES, DataType
 
 __all__ = ["define", "field_of", "is_program_output"]
 
-_RANGES: Final = {
-    DataType.UINT8: (0, 0xFF),
-    DataType.UINT32: (0, 0xFFFF_FFFF),
-    DataType.UINT64: (0, 0xFFFF_FFFF_FFFF_FFFF),
-    DataType.INT32: (-0x8000_0000, 0x7FFF_FFFF),
-}
 _USUAL: Final = {
     "robot_mode": (-1, 255),
     "joint_mode": (0, 255),
@@ -84,7 +78,7 @@ def _is_of_program(field: str) -> bool:
 def _defined(target: Target, *, running: bool) -> Defined:
     field = target.field.name
     direction = Direction.INPUT if field in INPUTS else Direction.OUTPUT
-    low, high = _RANGES.get(target.type, (None, None))
+    low, high = INTEGER_RANGES.get(target.type.code, (None, None))
     is_output = direction is Direction.OUTPUT
     return Defined(
         target=target.name,
@@ -107,7 +101,7 @@ def _defined(target: Target, *, running: bool) -> Defined:
 def _kind(data_type: DataType) -> ValueKind:
     if data_type is DataType.BOOL:
         return ValueKind.BOOL
-    return ValueKind.INT if data_type in _RANGES else ValueKind.FLOAT
+    return ValueKind.INT if data_type.bits is not None else ValueKind.FLOAT
 
 
 def _counterpart(target: Target) -> str:

@@ -15,13 +15,6 @@ from gatewayd.rtde.types import DataType
 
 __all__ = ["ReferenceProblem", "Target", "UnresolvedReference", "resolve"]
 
-_BITS: Final = {DataType.UINT8: 8, DataType.UINT32: 32, DataType.UINT64: 64, DataType.INT32: 32}
-_ELEMENTS: Final = {
-    DataType.VECTOR3D: DataType.DOUBLE,
-    DataType.VECTOR6D: DataType.DOUBLE,
-    DataType.VECTOR6INT32: DataType.INT32,
-    DataType.VECTOR6UINT32: DataType.UINT32,
-}
 _FAMILIES: Final = {family.prefix: family for family in REGISTERS}
 _BIT_REGISTERS: Final = {"input_bit_register_": "input", "output_bit_register_": "output"}
 _NUMBERED = re.compile(r"(.*_)(0|[1-9][0-9]{0,3})")
@@ -118,11 +111,11 @@ def _elements(whole: Target, wanted: range | None) -> Iterator[Target]:
     for element in wanted if wanted is not None else range(whole.type.count):
         if element >= whole.type.count:
             raise UnresolvedReference(ReferenceProblem.NO_SUCH_ELEMENT, whole.name, whole.type.count)
-        yield Target(f"{whole.name}[{element}]", whole.field, _ELEMENTS[whole.type], whole.bit, element)
+        yield Target(f"{whole.name}[{element}]", whole.field, whole.type.element, whole.bit, element)
 
 
 def _bits(whole: Target, wanted: range) -> Iterator[Target]:
-    width = _BITS.get(whole.type)
+    width = whole.type.bits
     if width is None:
         raise UnresolvedReference(ReferenceProblem.NOT_AN_INTEGER, whole.name)
     for bit in wanted:

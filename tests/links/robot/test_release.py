@@ -375,10 +375,12 @@ async def test_a_mask_bit_acts_only_with_a_value_of_this_session(until: Until) -
 
 async def test_an_analog_output_without_a_domain_is_not_there(until: Until) -> None:
     """0.5 meant as 5 V would be 12 mA: the type is held by somebody else."""
-    async with rigged(ANALOG, prepare=lambda robot: robot.hold("standard_analog_output_type")) as rig:
+    async with rigged(
+        ANALOG, prepare=lambda robot: robot.controller.hold(["standard_analog_output_type"])
+    ) as rig:
         await until(lambda: rig.cell.accepts_writes)
         assert not rig.cell.is_available(VALUE)
         refusal = rig.cell.write(Requester(PLC), [Change(VALUE, 0.5)], time.monotonic())
         assert refusal is not None
-        rig.robot.free("standard_analog_output_type")
+        rig.robot.controller.free(["standard_analog_output_type"])
         await until(lambda: rig.cell.is_available(VALUE))

@@ -211,13 +211,13 @@ async def test_registers_freed_later_are_adopted_and_lose_no_write(rigged: Rigge
     """Writes to the others go on meanwhile; the freed one is taken over as it is."""
 
     def prepare(robot: SimulatedController) -> None:
-        robot.hold("input_double_register_0")
+        robot.controller.hold(["input_double_register_0"])
         robot.set("input_double_register_0", 4.5)
 
     async with rigged(prepare=prepare) as rig:
         await until(lambda: rig.cell.accepts_writes)
         assert not rig.cell.is_available(REAL)
-        rig.robot.free("input_double_register_0")
+        rig.robot.controller.free(["input_double_register_0"])
         number = 0
         while not rig.cell.is_available(REAL):
             number += 1
@@ -404,14 +404,14 @@ async def test_writes_go_on_while_new_registers_wait_for_a_clock_that_stands_sti
     """And so do releases; the new register is unavailable until it was read."""
 
     def prepare(robot: SimulatedController) -> None:
-        robot.hold("input_double_register_0")
+        robot.controller.hold(["input_double_register_0"])
         robot.set("input_double_register_0", 4.5)
 
     async with rigged(prepare=prepare) as rig:
         await until(lambda: rig.cell.accepts_writes)
         rig.cell.writer_connected(Requester(PLC), time.monotonic())
         rig.robot.faults.freeze = True
-        rig.robot.free("input_double_register_0")
+        rig.robot.controller.free(["input_double_register_0"])
         await until(lambda: not rig.link.settled)
         rig.write((NUMBER, 7), (BIT, True))
         await until(lambda: rig.get("input_int_register_0") == 7)
@@ -429,10 +429,10 @@ async def test_writes_go_on_while_new_registers_wait_for_a_clock_that_stands_sti
 
 
 async def test_a_reload_in_that_moment_swallows_nothing(rigged: Rigged, until: Until) -> None:
-    async with rigged(prepare=lambda robot: robot.hold("input_double_register_0")) as rig:
+    async with rigged(prepare=lambda robot: robot.controller.hold(["input_double_register_0"])) as rig:
         await until(lambda: rig.cell.accepts_writes)
         rig.robot.faults.freeze = True
-        rig.robot.free("input_double_register_0")
+        rig.robot.controller.free(["input_double_register_0"])
         await until(lambda: not rig.link.settled)
         for number in range(20):
             rig.write((NUMBER, number))

@@ -9,7 +9,7 @@ from gatewayd.links.robot.rules.controller import unresolved
 from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.rtde.companions import Companions, companions
+from gatewayd.rtde.companions import COMPANIONS, Companions
 
 __all__: list[str] = []
 
@@ -62,7 +62,7 @@ def _without(
         return
     seen: set[tuple[str, str]] = set()
     for variable in cell.variables:
-        needs = companions(variable.field)
+        needs = COMPANIONS.get(variable.field)
         companion = companion_of(needs) if needs is not None else None
         key = variable.part.name, variable.field
         if needs is None or companion is None or companion in broken or key in seen:

@@ -15,10 +15,10 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 from gatewayd.mapping.rules.writers import more_places
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, REGISTERS, Series, SoftwareVersion, suggest
+from gatewayd.rtde.claims import OLD_LIST_LIMIT, list_size
 
 __all__: list[str] = []
 
-_SHORT_LISTS = 2048
 _LONG_LISTS_SINCE = SoftwareVersion(5, 17)
 _UPPER_INPUTS = frozenset(
     f"{family.prefix}{register}"
@@ -166,10 +166,10 @@ def long_recipe(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     outputs = _names(variable for variable in cell.variables if variable.direction is Direction.OUTPUT)
     read_back = _names(variable for variable in cell.variables if variable.field in OUTPUTS)
     names = list(dict.fromkeys((*outputs, *read_back))) if robot.spec.verify else outputs
-    if _length(names) <= _SHORT_LISTS:
+    if _length(names) <= OLD_LIST_LIMIT:
         return
-    message = f"the names of {len(names)} fields take {_length(names)} bytes, this controller takes {_SHORT_LISTS}: "
-    if _length(outputs) > _SHORT_LISTS:
+    message = f"the names of {len(names)} fields take {_length(names)} bytes, this controller takes {OLD_LIST_LIMIT}: "
+    if _length(outputs) > OLD_LIST_LIMIT:
         message += "outputs that have no room have no value"
         hint = "leave fields out"
     else:
@@ -183,7 +183,7 @@ def _names(variables: Iterable[ExpandedVariable]) -> list[str]:
 
 
 def _length(names: Sequence[str]) -> int:
-    return len(",".join(("timestamp", *names)))
+    return list_size(("timestamp", *names))
 
 
 @cell_rule("GW309", Severity.WARNING)
