@@ -15,16 +15,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from gatewayd.core.definition import Direction, Value, Variable
-from gatewayd.links.robot.transfer import InputTransfer
+from gatewayd.links.robot.transfer import InputTransfer, Place
 from gatewayd.rtde.companions import COMPANIONS
 
 __all__ = ["DOMAINS", "STAGE", "Actuation", "Driven", "Key", "Stage", "all_inputs", "all_outputs"]
 
 STAGE = 0.01
-"""Least seconds for which a fallback goes out with its mask set, and never less than two control cycles."""
+"""Seconds at least for which a fallback goes out with its mask set, and never less than two control cycles."""
 CYCLES = 2
 DOMAINS = "analog_io_types"
-"""The output that tells the domain of each analog output, from bit 2 on: 0 current, 1 voltage."""
+"""The output with the domain of each analog output, from bit 2 on: 0 current, 1 voltage."""
 _FIRST_OUTPUT_DOMAIN = 2
 _DOMAIN_BITS = 0b11
 
@@ -36,19 +36,19 @@ _DIGITAL_LINES = {"standard_digital_output": 8, "configurable_digital_output": 8
 
 def all_outputs(mapped: Sequence[str], variables: Sequence[Variable]) -> tuple[str, ...]:
     """Outputs to subscribe: the `mapped` ones, and what the inputs among `variables` need to act as they are meant."""
-    domains = (DOMAINS,) if any(_type_of(variable) for variable in variables) else ()
-    return tuple(dict.fromkeys((*mapped, *domains)))
+    return tuple(dict.fromkeys((*mapped, *((DOMAINS,) if _types(variables) else ()))))
 
 
 def all_inputs(mapped: Sequence[str], variables: Sequence[Variable]) -> tuple[str, ...]:
     """Inputs to claim: the `mapped` ones and their companions."""
-    types = (kind for variable in variables if (kind := _type_of(variable)) is not None)
-    return tuple(dict.fromkeys((*mapped, *types)))
+    return tuple(dict.fromkeys((*mapped, *_types(variables))))
 
 
-def _type_of(variable: Variable) -> str | None:
-    needs = COMPANIONS.get(variable.field) if variable.direction is Direction.INPUT else None
-    return needs.type if needs is not None else None
+def _types(variables: Sequence[Variable]) -> list[str]:
+    """The fields that choose the domains of the inputs among `variables`."""
+    inputs = (variable.field for variable in variables if variable.direction is Direction.INPUT)
+    needs = (COMPANIONS[name] for name in inputs if name in COMPANIONS)
+    return [companions.type for companions in needs if companions.type is not None]
 
 
 @dataclass(slots=True)
@@ -80,44 +80,19 @@ class Stage:
 @dataclass(frozen=True, slots=True)
 class _Line:
     key: Key
-    slot: int
-    bit: int | None
-    mask_slot: int
-    mask_bit: int
-    type_slot: int | None
-    type_bit: int
-    value: int | None
+    place: Place
+    mask: Place
+    type: Place | None
+    bit: int
+    """Its bit of mask and type."""
+    value_by: int | None
     """Index of the variable that carries the value; None: no variable does."""
     is_part: bool
     """Whether that variable is an integer for several lines."""
     is_masked: bool
     """Whether a variable carries the mask bit: only then the line can have been driven."""
-    type: int | None
+    type_by: int | None
     """Index of the variable that carries the domain."""
-
-    def put(self, flat: list[Value], value: Value) -> None:
-        """Set the line's value."""
-        if self.bit is None:
-            flat[self.slot] = value
-        else:
-            flat[self.slot] = _with_bit(flat[self.slot], self.bit, is_set=bool(value))
-
-    def put_mask(self, flat: list[Value], *, is_set: bool) -> None:
-        """Set or clear the mask bit."""
-        flat[self.mask_slot] = _with_bit(flat[self.mask_slot], self.mask_bit, is_set=is_set)
-
-    def put_type(self, flat: list[Value], *, is_set: bool) -> None:
-        """Choose the domain."""
-        assert self.type_slot is not None
-        flat[self.type_slot] = _with_bit(flat[self.type_slot], self.type_bit, is_set=is_set)
-
-    def is_driven(self, flat: Sequence[Value]) -> bool:
-        """Whether the mask bit is set."""
-        return bool(int(flat[self.mask_slot]) >> self.mask_bit & 1)
-
-    def type_of(self, flat: Sequence[Value]) -> bool | None:
-        """The domain in it."""
-        return None if self.type_slot is None else bool(int(flat[self.type_slot]) >> self.type_bit & 1)
 
 
 class Actuation:
@@ -147,10 +122,10 @@ class Actuation:
     def undecided(self, given_at: Sequence[float]) -> list[int]:
         """Domains that somebody has to choose: their outputs were given, and the controller does not say its own."""
         return [
-            line.type
+            line.type_by
             for line in self._lines
-            if line.type is not None and self._present(line) is None and _given(line.value, given_at)
-            if not _given(line.type, given_at)
+            if line.type_by is not None and self._present(line) is None and _given(line.value_by, given_at)
+            if not _given(line.type_by, given_at)
         ]
 
     def compose(
@@ -168,18 +143,18 @@ class Actuation:
         for line in self._lines:
             stage = self._stages.get(line.key)
             if stage is not None:
-                line.put(flat, stage.value)
-                line.put_mask(flat, is_set=True)
-                if stage.domain is not None and line.type_slot is not None:
-                    line.put_type(flat, is_set=stage.domain)
+                line.place.put(flat, stage.value)
+                line.mask.put(flat, value=True)
+                if stage.domain is not None and line.type is not None:
+                    line.type.put(flat, stage.domain)
                 continue
-            acts = _given(line.value, given_at)
-            if line.type_slot is not None and not _given(line.type, given_at):
+            acts = _given(line.value_by, given_at)
+            if line.type is not None and not _given(line.type_by, given_at):
                 domain = self._present(line)
                 acts = acts and domain is not None
-                line.put_type(flat, is_set=bool(domain))
+                line.type.put(flat, bool(domain))
             if not acts:
-                line.put_mask(flat, is_set=False)
+                line.mask.put(flat, value=False)
         return tuple(flat)
 
     def sent(self, flat: Sequence[Value], until: float) -> None:
@@ -188,18 +163,18 @@ class Actuation:
             stage = self._stages.get(line.key)
             if stage is not None:
                 stage.until = until if stage.until is None else stage.until
-            elif line.is_driven(flat):
+            elif line.mask.of(flat):
                 self._driven.lines[line.key] = True
-                domain = line.type_of(flat)
-                if domain is not None:
-                    self._driven.domains[line.key] = domain
+                if line.type is not None:
+                    self._driven.domains[line.key] = bool(line.type.of(flat))
 
     def release(self, index: int, value: Value) -> None:
         """A variable was given its fallback: have it act on every line that it may have driven."""
         for line in self._of(index):
             if line.is_part and not self._driven.may_act(line.key):
                 continue
-            part = bool(int(value) >> line.bit & 1) if line.is_part and line.bit is not None else value
+            mask = line.place.mask if line.is_part else None
+            part = value if mask is None else bool(int(value) & mask)
             domain = self._driven.domains.get(line.key, self._present(line))
             self._stages[line.key] = Stage(part, domain)
             self._driven.lines[line.key] = False
@@ -214,13 +189,13 @@ class Actuation:
         self._driven.releasing.difference_update(line.key for line in self._of(index))
 
     def _of(self, index: int) -> Iterator[_Line]:
-        return (line for line in self._lines if line.value == index and line.is_masked)
+        return (line for line in self._lines if line.value_by == index and line.is_masked)
 
     def _present(self, line: _Line) -> bool | None:
         """The domain that the controller is in."""
-        if self.domains is None or line.type_slot is None:
+        if self.domains is None or line.type is None:
             return None
-        return bool(self.domains >> _FIRST_OUTPUT_DOMAIN + line.type_bit & 1)
+        return bool(self.domains >> _FIRST_OUTPUT_DOMAIN + line.bit & 1)
 
 
 def _lines(variables: Sequence[Variable], transfer: InputTransfer) -> Iterator[_Line]:
@@ -228,6 +203,9 @@ def _lines(variables: Sequence[Variable], transfer: InputTransfer) -> Iterator[_
 
     def carrier(name: str, bit: int | None) -> int | None:
         return carriers.get((name, bit), carriers.get((name, None)))
+
+    def place(name: str, bit: int | None) -> Place:
+        return Place(transfer.slots[name].start, None if bit is None else 1 << bit)
 
     for name, needs in COMPANIONS.items():
         if name not in transfer.slots or needs.mask not in transfer.slots:
@@ -238,11 +216,9 @@ def _lines(variables: Sequence[Variable], transfer: InputTransfer) -> Iterator[_
             value = carrier(name, bit)
             yield _Line(
                 (name, bit),
-                transfer.slots[name].start,
-                bit,
-                transfer.slots[needs.mask].start,
-                mask_bit,
-                transfer.slots[kind].start if kind in transfer.slots else None,
+                place(name, bit),
+                place(needs.mask, mask_bit),
+                place(kind, mask_bit) if kind in transfer.slots else None,
                 mask_bit,
                 value,
                 value is not None and bit is not None and variables[value].bit is None,
@@ -263,7 +239,3 @@ def _unmapped_types(variables: Sequence[Variable], transfer: InputTransfer) -> t
 
 def _given(index: int | None, given_at: Sequence[float]) -> bool:
     return index is not None and given_at[index] > -math.inf
-
-
-def _with_bit(word: Value, bit: int, *, is_set: bool) -> int:
-    return int(word) | 1 << bit if is_set else int(word) & ~(1 << bit)

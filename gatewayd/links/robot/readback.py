@@ -8,23 +8,23 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 from gatewayd.core.definition import Value
-from gatewayd.links.robot.transfer import FieldPart, InputTransfer, Slots
+from gatewayd.links.robot.transfer import InputTransfer, Slots
 
 __all__ = ["VERIFY_AFTER", "Finding", "Package", "ReadBack", "same"]
 
 VERIFY_AFTER = 0.5
-"""Least seconds for which a difference has to last."""
+"""Seconds at least for which a difference has to last."""
 _ROUND_TRIPS = 2
 """Round trips for which a value may be in flight: one that is measured may be quicker than the next."""
-_MOST_SENDS = 1024
+_MAX_SENDS = 1024
 """Values of one field that are remembered; where more are in flight a field is not judged."""
 _FADING = 0.1
 """Share that a quicker round trip has in the measured one."""
-_LONGEST_ROUND_TRIP = 10.0
+_MAX_ROUND_TRIP = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ class ReadBack:
 
     def note(self, name: str, values: Sequence[Value], now: float, *, is_sent: bool) -> None:
         """A field was sent with other values than before, or is known to hold these."""
-        self._history.setdefault(name, deque(maxlen=_MOST_SENDS)).append(_Sent(values, now, is_sent))
+        self._history.setdefault(name, deque(maxlen=_MAX_SENDS)).append(_Sent(values, now, is_sent))
 
     def forget_variables(self) -> None:
         """The variables are others from now on."""
@@ -99,10 +99,10 @@ class ReadBack:
                 continue  # the usual field, in a tenth of the time
             self._measure(name, held, package.now)
             if same(held, sent[wanted]):
-                self._in_flight(transfer.parts[name])
-                finding.agree.update(
-                    part.variable for part in transfer.parts[name] if part.variable in package.differing
-                )
+                for part in transfer.parts[name]:
+                    self._since.pop(part.variable, None)
+                    if part.variable in package.differing:
+                        finding.agree.add(part.variable)
             else:
                 finding.is_settled = False
                 self._judge_field(transfer, name, sent[wanted], package, finding)
@@ -131,7 +131,7 @@ class ReadBack:
                 # Nothing of ours is under way: what is read back is what the controller has made of it since.
                 if not same((value,), (part.of(sent),)):
                     finding.follow[index] = value
-                    _put(part, present, value)
+                    part.put(present, value)
             elif is_in_flight:
                 self._since.pop(index, None)
             elif any(same((value,), (part.of(values),)) for values in recent):
@@ -149,10 +149,6 @@ class ReadBack:
         """Seconds for which what was sent before may still be read back."""
         return max(VERIFY_AFTER, _ROUND_TRIPS * self.round_trip) + package.lag
 
-    def _in_flight(self, parts: Iterable[FieldPart]) -> None:
-        for part in parts:
-            self._since.pop(part.variable, None)
-
     @staticmethod
     def _free(transfer: InputTransfer, name: str, held: Sequence[Value], present: list[Value]) -> None:
         """Bits and elements that no variable carries follow the controller."""
@@ -161,7 +157,7 @@ class ReadBack:
         own = present.copy()
         present[:] = held
         for part in transfer.parts[name]:
-            _put(part, present, part.of(own))
+            part.put(present, part.of(own))
 
     def _recent(self, name: str, since: float) -> list[Sequence[Value]] | None:
         """What the controller may rightly hold: the last value sent before `since`, and all after it."""
@@ -170,7 +166,7 @@ class ReadBack:
             return []
         while len(history) > 1 and history[1].at <= since:
             history.popleft()
-        if len(history) == _MOST_SENDS and history[0].at > since:
+        if len(history) == _MAX_SENDS and history[0].at > since:
             return None
         return [sent.values for sent in history]
 
@@ -184,7 +180,7 @@ class ReadBack:
         if sent is None or not sent.is_sent or not shown:
             return
         took = now - sent.at
-        if took <= _LONGEST_ROUND_TRIP:
+        if took <= _MAX_ROUND_TRIP:
             self.round_trip = max(took, self.round_trip + _FADING * (took - self.round_trip))
 
 
@@ -194,14 +190,6 @@ def same(left: Sequence[Value], right: Sequence[Value]) -> bool:
         a == b or (a != a and b != b)  # noqa: PLR0124
         for a, b in zip(left, right, strict=True)
     )
-
-
-def _put(part: FieldPart, values: list[Value], value: Value) -> None:
-    if part.mask is None:
-        values[part.offset] = value
-    else:
-        word = int(values[part.offset])
-        values[part.offset] = word | part.mask if value else word & ~part.mask
 
 
 def _text(values: Sequence[Value]) -> str:

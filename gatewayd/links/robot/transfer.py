@@ -8,29 +8,42 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 from gatewayd.core.definition import Direction, Value, Variable
 
-__all__ = ["FieldPart", "InputTransfer", "OutputTransfer", "Slots"]
+__all__ = ["FieldPart", "InputTransfer", "OutputTransfer", "Place", "Slots"]
 
 Slots = Mapping[str, slice]
 """Where each field of a recipe lies in its flat tuple."""
 
 
 @dataclass(frozen=True, slots=True)
-class FieldPart:
+class Place:
+    """Where a value lies among others: an element, or one bit of it."""
+
+    offset: int
+    """The element."""
+    mask: int | None
+    """The bit of the element; None: the whole of it."""
+
+    def of(self, values: Sequence[Value]) -> Value:
+        """The value that lies there."""
+        return values[self.offset] if self.mask is None else bool(int(values[self.offset]) & self.mask)
+
+    def put(self, values: list[Value], value: Value) -> None:
+        """Set the value that lies there."""
+        if self.mask is None:
+            values[self.offset] = value
+        else:
+            word = int(values[self.offset])
+            values[self.offset] = word | self.mask if value else word & ~self.mask
+
+
+@dataclass(frozen=True, slots=True)
+class FieldPart(Place):
     """What one variable is in the values of its field."""
 
     variable: int
-    offset: int
-    """Element of the field."""
-    mask: int | None = None
-    """Its bit of the element; None: the whole of it."""
-
-    def of(self, values: Sequence[Value]) -> Value:
-        """The variable's value in the values of its field."""
-        return values[self.offset] if self.mask is None else bool(int(values[self.offset]) & self.mask)
 
 
 class OutputTransfer:
@@ -96,9 +109,13 @@ class InputTransfer:
             for name in self.fields
         }
         """The variables of each field."""
-        self._singles = tuple((index, self._slot(one)) for index, one in wanted if one.bit is None)
+        self._singles = tuple(
+            (index, self._slot(variable)) for index, variable in wanted if variable.bit is None
+        )
         self._bits = tuple(
-            (index, self._slot(one), 1 << one.bit) for index, one in wanted if one.bit is not None
+            (index, self._slot(variable), 1 << variable.bit)
+            for index, variable in wanted
+            if variable.bit is not None
         )
         self.base: list[Value] = [0] * max((slot.stop for slot in slots.values()), default=0)
 
@@ -110,13 +127,11 @@ class InputTransfer:
 
     def adopted(self, fields: Iterable[str]) -> dict[int, Value]:
         """The base as values by variable index, for the variables of `fields`, which are some of the recipe's."""
-        spans = [self.slots[field] for field in fields]
-        wanted = {slot for span in spans for slot in range(span.start, span.stop)}
-        values: dict[int, Value] = {index: self.base[slot] for index, slot in self._singles if slot in wanted}
-        for index, slot, mask in self._bits:
-            if slot in wanted:
-                values[index] = bool(int(self.base[slot]) & mask)
-        return values
+        return {
+            part.variable: part.of(self.base[self.slots[field]])
+            for field in fields
+            for part in self.parts[field]
+        }
 
     def gather(self, values: Sequence[Value]) -> tuple[Value, ...]:
         """The recipe's flat tuple as the image wants it now."""
@@ -132,7 +147,7 @@ class InputTransfer:
         """What no variable carries in the values of a field; zero elsewhere."""
         left = list(values)
         for part in self.parts[field]:
-            left[part.offset] = 0 if part.mask is None else int(left[part.offset]) & ~part.mask
+            part.put(left, 0)
         return left
 
     def _slot(self, variable: Variable) -> int:
@@ -140,17 +155,16 @@ class InputTransfer:
 
 
 def _part(index: int, variable: Variable) -> FieldPart:
-    return FieldPart(index, variable.element or 0, None if variable.bit is None else 1 << variable.bit)
+    return FieldPart(variable.element or 0, None if variable.bit is None else 1 << variable.bit, index)
 
 
-def _runs(pairs: Sequence[tuple[int, int]]) -> Iterable[tuple[slice, slice]]:
+def _runs(pairs: Iterable[tuple[int, int]]) -> list[tuple[slice, slice]]:
     """Merge (image index, flat index) pairs that step together into slices."""
-    if not pairs:
-        return
-    start = pairs[0]
-    for previous, present in pairwise([*pairs, None]):
-        if previous is None:
-            return
-        if present is None or present[0] - previous[0] != 1 or present[1] - previous[1] != 1:
-            yield slice(start[0], previous[0] + 1), slice(start[1], previous[1] + 1)
-            start = present if present is not None else start
+    runs: list[tuple[slice, slice]] = []
+    for target, source in pairs:
+        if runs and (runs[-1][0].stop, runs[-1][1].stop) == (target, source):
+            last_target, last_source = runs.pop()
+            runs.append((slice(last_target.start, target + 1), slice(last_source.start, source + 1)))
+        else:
+            runs.append((slice(target, target + 1), slice(source, source + 1)))
+    return runs
