@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Sequence
 
 from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series, SoftwareVersion
+from gatewayd.rtde.enums import ProgramState
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.arm import ControllerMoment
 from gatewayd.simulator.claims import ControllerClaims
@@ -33,7 +34,6 @@ DEFAULT_UPTIME = 100.0
 INTERNAL = "the controller itself"
 """Owner of the inputs that were claimed with `hold`."""
 
-_RUNNING = 2  # runtime_state
 _CREEP = 1e-9  # seconds a cycle
 _PROGRAM_RUNNING = 0b10  # robot_status_bits
 
@@ -199,7 +199,7 @@ class Controller:
 
     def _running(self) -> bool:
         """Whether the robot program runs; keeps the bit that says so in step."""
-        running = int(self.store.cells[self._state]) == _RUNNING
+        running = int(self.store.cells[self._state]) == ProgramState.RUNNING
         bits = int(self.store.read("robot_status_bits")[0])
         if bool(bits & _PROGRAM_RUNNING) != running:
             self.store.write("robot_status_bits", (bits ^ _PROGRAM_RUNNING,))

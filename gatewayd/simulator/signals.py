@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
+from gatewayd.rtde.enums import JointMode, ProgramState, RobotMode, SafetyStatus, TimeScaleSource
 from gatewayd.simulator.arm import (
     ELBOW,
     ControllerMoment,
@@ -239,16 +240,16 @@ SIGNALS: Mapping[str, Signal] = {
 """Fields that change by themselves."""
 
 INITIAL: Mapping[str, float | Vector] = {
-    "robot_mode": 7,
-    "joint_mode": (253,) * 6,
+    "robot_mode": RobotMode.RUNNING,
+    "joint_mode": (JointMode.RUNNING,) * 6,
     "safety_mode": 1,
-    "safety_status": 1,
+    "safety_status": SafetyStatus.NORMAL,
     "safety_status_bits": 0b1,
     "robot_status_bits": 0b11,
-    "runtime_state": 2,
+    "runtime_state": ProgramState.RUNNING,
     "speed_scaling": 1.0,
     "target_speed_fraction": 1.0,
-    "time_scale_source": 1,
+    "time_scale_source": TimeScaleSource.NOT_SCALED,
     "target_execution_time": 2.0,
     "actual_current_window": (4.0, 4.0, 4.0, 2.0, 2.0, 2.0),
     "tcp_offset": (0.0, 0.0, 0.12, 0.0, 0.0, 0.0),

@@ -3,18 +3,18 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.core.program import STATES, is_running
-
-STOPPING, STOPPED, RUNNING, PAUSING, PAUSED, RESUMING, RETRACTING = range(7)
-"""RTDE's `runtime_state`, as both guides number it."""
+from gatewayd.rtde.enums import ProgramState
 
 
-@pytest.mark.parametrize("state", [RUNNING, PAUSING, PAUSED, RESUMING])
-def test_a_program_that_pauses_still_owns_what_it_wrote(state: int) -> None:
+@pytest.mark.parametrize(
+    "state", [ProgramState.RUNNING, ProgramState.PAUSING, ProgramState.PAUSED, ProgramState.RESUMING]
+)
+def test_a_program_that_pauses_still_owns_what_it_wrote(state: ProgramState) -> None:
     assert is_running(state)
 
 
-@pytest.mark.parametrize("state", [STOPPING, STOPPED, RETRACTING])
-def test_a_program_that_stops_owns_nothing(state: int) -> None:
+@pytest.mark.parametrize("state", [ProgramState.STOPPING, ProgramState.STOPPED, ProgramState.RETRACTING])
+def test_a_program_that_stops_owns_nothing(state: ProgramState) -> None:
     assert not is_running(state)
 
 
@@ -24,4 +24,4 @@ def test_what_nobody_knows_is_not_running(state: int | None) -> None:
 
 
 def test_the_states_are_those_of_rtde() -> None:
-    assert set(STATES) == set(range(RETRACTING + 1))
+    assert set(STATES) == set(ProgramState)

@@ -1,0 +1,105 @@
+"""Meanings of the numbers in RTDE's mode, status and state fields; the field reference lists them for people.
+
+From the newer guide (valid for 5.25.0, 10.12.0 and later, smaller sets before); values it does not list are reserved.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["JointMode", "ProgramState", "RobotMode", "SafetyStatus", "TimeScaleSource"]
+
+
+class RobotMode(IntEnum):
+    """`robot_mode`."""
+
+    NO_CONTROLLER = -1
+    """Only named by UR's client library."""
+    DISCONNECTED = 0
+    CONFIRM_SAFETY = 1
+    BOOTING = 2
+    POWER_OFF = 3
+    POWER_ON = 4
+    IDLE = 5
+    BACKDRIVE = 6
+    RUNNING = 7
+    UPDATING = 8
+    POWERING_OFF = 9
+    ARM_BOOTING = 10
+    ARM_UPDATING = 11
+
+
+class SafetyStatus(IntEnum):
+    """`safety_status`."""
+
+    NORMAL = 1
+    REDUCED = 2
+    PROTECTIVE_STOP = 3
+    RECOVERY = 4
+    SAFEGUARD_STOP = 5
+    SYSTEM_EMERGENCY_STOP = 6
+    ROBOT_EMERGENCY_STOP = 7
+    VIOLATION = 8
+    FAULT = 9
+    AUTOMATIC_MODE_SAFEGUARD_STOP = 12
+    SYSTEM_THREE_POSITION_ENABLING_STOP = 13
+    TP_THREE_POSITION_ENABLING_STOP = 14
+    IMMI_EMERGENCY_STOP = 15
+    IMMI_SAFEGUARD_STOP = 16
+    PROFISAFE_WAITING_FOR_PARAMETERS = 17
+    PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP = 18
+    PROFISAFE_SAFEGUARD_STOP = 19
+    PROFISAFE_EMERGENCY_STOP = 20
+    SAFETY_API_SAFEGUARD_STOP = 22
+
+
+class JointMode(IntEnum):
+    """Each element of `joint_mode`."""
+
+    RESET = 235
+    SHUTTING_DOWN = 236
+    BACKDRIVE = 238
+    POWER_OFF = 239
+    READY_FOR_POWER_OFF = 240
+    NOT_RESPONDING = 245
+    MOTOR_INITIALISATION = 246
+    BOOTING = 247
+    BOOTLOADER = 249
+    VIOLATION = 251
+    FAULT = 252
+    RUNNING = 253
+    IDLE = 255
+
+
+class ProgramState(IntEnum):
+    """`runtime_state`."""
+
+    STOPPING = 0
+    STOPPED = 1
+    RUNNING = 2
+    PAUSING = 3
+    PAUSED = 4
+    RESUMING = 5
+    RETRACTING = 6
+
+
+class TimeScaleSource(IntEnum):
+    """`time_scale_source`: what slows the motion down."""
+
+    OTHER = -1
+    PROGRAM_NOT_RUNNING = 0
+    NOT_SCALED = 1
+    JOINT_TORQUE_LIMIT = 2
+    JOINT_ACCELERATION_LIMIT = 3
+    POWER_SUPPLY_LIMIT = 4
+    MOMENTUM_SAFETY_LIMIT = 5
+    STOPPING_TIME_SAFETY_LIMIT = 6
+    STOPPING_DISTANCE_SAFETY_LIMIT = 7
+    TOOL_SPEED_SAFETY_LIMIT = 8
+    ELBOW_SPEED_SAFETY_LIMIT = 9
+    JOINT_SPEED_SAFETY_LIMIT = 10
+    SAFETY_STATE_TRANSITION = 11
+    SAFETY_API_STOPPING_DISTANCE = 12
+    TOOL_WRENCH_LIMIT = 13
+    EXTERNAL_AXIS_SPEED_LIMIT = 14
+    EXTERNAL_AXIS_STOPPING = 15

@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+from enum import IntEnum
+from pathlib import Path
+
+import pytest
+
+from gatewayd.rtde import enums
+
+REFERENCE = Path(__file__).parents[2] / "docs/reference/rtde.md"
+
+
+@pytest.mark.parametrize(
+    "member, number",
+    [
+        (enums.RobotMode.RUNNING, 7),
+        (enums.RobotMode.ARM_UPDATING, 11),
+        (enums.SafetyStatus.FAULT, 9),
+        (enums.SafetyStatus.SAFETY_API_SAFEGUARD_STOP, 22),
+        (enums.JointMode.READY_FOR_POWER_OFF, 240),
+        (enums.JointMode.IDLE, 255),
+        (enums.ProgramState.RETRACTING, 6),
+        (enums.TimeScaleSource.OTHER, -1),
+        (enums.TimeScaleSource.EXTERNAL_AXIS_STOPPING, 15),
+    ],
+)
+def test_numbers_are_the_guides(member: int, number: int) -> None:
+    assert member == number
+
+
+@pytest.mark.parametrize(
+    "enum, members",
+    [
+        (enums.RobotMode, 13),
+        (enums.SafetyStatus, 19),
+        (enums.JointMode, 13),
+        (enums.ProgramState, 7),
+        (enums.TimeScaleSource, 17),
+    ],
+)
+def test_every_listed_value_has_a_name(enum: type, members: int) -> None:
+    assert len(list(enum)) == members  # type: ignore[call-overload]
+
+
+@pytest.mark.parametrize(
+    "field, enum",
+    [
+        ("robot_mode", enums.RobotMode),
+        ("safety_status", enums.SafetyStatus),
+        ("joint_mode", enums.JointMode),
+        ("runtime_state", enums.ProgramState),
+        ("time_scale_source", enums.TimeScaleSource),
+    ],
+)
+def test_the_field_reference_lists_every_value(field: str, enum: type[IntEnum]) -> None:
+    text = REFERENCE.read_text().partition("## Modes, states and status bits")[2]
+    (row,) = (line for line in text.splitlines() if line.startswith(f"| `{field}` |"))
+    listed = row.split("|")[2].strip().lower()
+    assert listed == ", ".join(f"{member.value} {member.name.lower().replace('_', ' ')}" for member in enum)
