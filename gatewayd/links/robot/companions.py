@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from gatewayd.core.definition import Direction, Value, Variable
-from gatewayd.links.robot.transfer import InputTransfer, Place
+from gatewayd.links.robot.transfer import InputTransfer, ElementPlace
 from gatewayd.rtde.companions import COMPANIONS
 
 __all__ = ["DOMAINS", "STAGE", "Actuation", "Driven", "Key", "Stage", "all_inputs", "all_outputs"]
@@ -80,9 +80,9 @@ class Stage:
 @dataclass(frozen=True, slots=True)
 class _Line:
     key: Key
-    place: Place
-    mask: Place
-    type: Place | None
+    place: ElementPlace
+    mask: ElementPlace
+    type: ElementPlace | None
     bit: int
     """Its bit of mask and type."""
     value_by: int | None
@@ -204,8 +204,8 @@ def _lines(variables: Sequence[Variable], transfer: InputTransfer) -> Iterator[_
     def carrier(name: str, bit: int | None) -> int | None:
         return carriers.get((name, bit), carriers.get((name, None)))
 
-    def place(name: str, bit: int | None) -> Place:
-        return Place(transfer.slots[name].start, None if bit is None else 1 << bit)
+    def place(name: str, bit: int | None) -> ElementPlace:
+        return ElementPlace(transfer.slots[name].start, None if bit is None else 1 << bit)
 
     for name, needs in COMPANIONS.items():
         if name not in transfer.slots or needs.mask not in transfer.slots:

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 from gatewayd.core.definition import Direction, Value, Variable
 
-__all__ = ["FieldPart", "InputTransfer", "OutputTransfer", "Place", "Slots"]
+__all__ = ["FieldPart", "InputTransfer", "OutputTransfer", "ElementPlace", "Slots"]
 
 Slots = Mapping[str, slice]
 """Where each field of a recipe lies in its flat tuple."""
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ElementPlace:
     """Where a value lies among others: an element, or one bit of it."""
 
     offset: int
@@ -40,7 +40,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class FieldPart(Place):
+class FieldPart(ElementPlace):
     """What one variable is in the values of its field."""
 
     variable: int
