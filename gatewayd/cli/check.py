@@ -131,7 +131,7 @@ def _named(files: tuple[str, ...]) -> Iterator[str]:
     from os.path import isdir
     from pathlib import Path
 
-    from gatewayd.service.startup import PATTERN
+    from gatewayd.mapping.compiled import PATTERN
 
     for file in files:
         inside = sorted(Path(file).glob(PATTERN)) if isdir(file) else []  # noqa: PTH112 - as in startup.py

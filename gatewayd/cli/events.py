@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gatewayd.cli.remote import (
     UNREACHABLE,
     cell_option,
-    connect,
     echo_json,
     json_option,
+    on_gateway,
     readable,
-    refusals,
-    socket_option,
 )
+
+if TYPE_CHECKING:
+    from gatewayd.control.client import Client
 
 __all__ = ["command"]
 
@@ -38,7 +38,7 @@ Exit codes:
   2  wrong usage, or no gateway could be reached; with --follow, it has ended
 """,
 )
-@socket_option
+@on_gateway
 @cell_option
 @click.option("-f", "--follow", is_flag=True, help="Go on with what happens, until Ctrl-C.")
 @click.option(
@@ -49,7 +49,7 @@ Exit codes:
 @click.pass_context
 def command(
     context: click.Context,
-    socket: Path | None,
+    client: Client,
     cell: str | None,
     *,
     follow: bool,
@@ -60,19 +60,18 @@ def command(
     """Print the last events of the running gateway: links, locks, refusals, fallbacks, forces."""
     if follow and audit:
         raise click.UsageError("--audit cannot be followed; gatewayd run --audit FILE writes a file that can")
-    client = connect(socket)
-    with refusals():
-        if audit:
-            for record in client.get("/v1/audit", limit=limit, cell=cell)["records"]:
-                _print(record, as_json=as_json)
-        elif not follow:
-            for event in client.get("/v1/events", limit=limit, cell=cell)["events"]:
-                _print(event, as_json=as_json)
-        else:
-            for event in client.follow("/v1/events", follow=1, limit=limit, cell=cell):
-                _print(event, as_json=as_json)
-            click.echo("the gateway has ended", err=True)
-            context.exit(UNREACHABLE)
+    found: Iterable[Mapping[str, Any]]
+    if audit:
+        found = client.get("/v1/audit", limit=limit, cell=cell)["records"]
+    elif follow:
+        found = client.follow("/v1/events", follow=1, limit=limit, cell=cell)
+    else:
+        found = client.get("/v1/events", limit=limit, cell=cell)["events"]
+    for event in found:
+        _print(event, as_json=as_json)
+    if follow:
+        click.echo("the gateway has ended", err=True)
+        context.exit(UNREACHABLE)
 
 
 def _print(found: Mapping[str, Any], *, as_json: bool) -> None:

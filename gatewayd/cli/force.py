@@ -1,9 +1,8 @@
-"""`gatewayd force`: put a value in place of what a variable's source tells, for commissioning, with a time limit."""
+"""`gatewayd force`: put a value in place of what a variable's source reports, for commissioning, with a time limit."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,11 +10,12 @@ from gatewayd.cli.remote import (
     DURATION,
     cell_option,
     complete_variables,
-    connect,
+    on_gateway,
     readable,
-    refusals,
-    socket_option,
 )
+
+if TYPE_CHECKING:
+    from gatewayd.control.client import Client
 
 __all__ = ["command"]
 
@@ -44,9 +44,9 @@ Exit codes:
 @click.option(
     "--for", "seconds", type=DURATION, default="1min", show_default=True, metavar="TIME", help="At most 24h."
 )
-@socket_option
+@on_gateway
 @cell_option
-def command(name: str, value: str, seconds: float, socket: Path | None, cell: str | None) -> None:
+def command(client: Client, name: str, value: str, seconds: float, cell: str | None) -> None:
     """Force variable NAME to VALUE (a number in the robot's unit, or on and off).
 
     An input: the robot gets the value, and its lock is yours so long. An output: the fieldbus sees the value. Declared
@@ -56,11 +56,8 @@ def command(name: str, value: str, seconds: float, socket: Path | None, cell: st
     from gatewayd.report.format import span
     from gatewayd.report.format import value as shown
 
-    body: dict[str, Any] = {"value": _parse(value), "for": seconds}
-    client = connect(socket)
-    with refusals(client, name):
-        path = f"/v1/variables/{segment(name)}/force"
-        found = readable(client.post(path, body if cell is None else {**body, "cell": cell}))
+    body = {"value": _parse(value), "for": seconds, "cell": cell}
+    found = readable(client.post(f"/v1/variables/{segment(name)}/force", body))
     side = "the robot gets it" if found["direction"] == "input" else "the fieldbus sees it"
     click.echo(
         f"{found['name']} is forced to {shown(found['value'], found['unit'])} for {span(seconds)}: {side}"

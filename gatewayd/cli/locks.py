@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,13 +11,14 @@ from gatewayd.cli.remote import (
     DURATION,
     cell_option,
     complete_locks,
-    connect,
     echo_json,
     json_option,
+    on_gateway,
     readable,
-    refusals,
-    socket_option,
 )
+
+if TYPE_CHECKING:
+    from gatewayd.control.client import Client
 
 __all__ = ["command"]
 
@@ -39,22 +39,19 @@ Exit codes:
   2  wrong usage, or no gateway could be reached
 """,
 )
-@socket_option
+@on_gateway
 @cell_option
 @json_option
 @click.pass_context
-def command(context: click.Context, socket: Path | None, cell: str | None, *, as_json: bool) -> None:
+def command(context: click.Context, client: Client, cell: str | None, *, as_json: bool) -> None:
     """Print who owns what and for how long. What you take or release stands in events and audit with your name."""
-    context.obj = {"socket": socket, "cell": cell}
     if context.invoked_subcommand is not None:
         return
-    client = connect(socket)
-    with refusals():
-        locks = client.get("/v1/locks", cell=cell)["locks"]
+    locks = client.get("/v1/locks", cell=cell)["locks"]
     if as_json:
         echo_json(locks)
-        return
-    _print(readable(locks))
+    else:
+        _print(readable(locks))
 
 
 @command.command(
@@ -70,18 +67,16 @@ Examples:
 @click.option(
     "--for", "seconds", type=DURATION, metavar="TIME", help="Give it back after that time: 30s, 10min, 2h."
 )
-@socket_option
+@on_gateway
 @cell_option
-@click.pass_context
-def take(
-    context: click.Context, name: str, seconds: float | None, socket: Path | None, cell: str | None
-) -> None:
+def take(client: Client, name: str, seconds: float | None, cell: str | None) -> None:
     """Take lock NAME (of a variable or group) from whoever holds it, until it is released.
 
     What a writer held falls back to its on_release; what nobody held stays as it is.
     """
-    where = socket or context.obj["socket"], cell or context.obj["cell"]
-    lock = readable(_post(where, name, "take", {} if seconds is None else {"for": seconds}))
+    from gatewayd.control.client import segment
+
+    lock = readable(client.post(f"/v1/locks/{segment(name)}/take", {"for": seconds, "cell": cell}))
     until = "until you release it" if seconds is None else f"for {seconds:g} s"
     members = "" if lock["members"] == [lock["name"]] else f": {_members(lock)}"
     click.echo(f"{lock['name']} is the operator's {until}{members}")
@@ -96,27 +91,14 @@ Examples:
 """,
 )
 @click.argument("name", shell_complete=complete_locks)
-@socket_option
+@on_gateway
 @cell_option
-@click.pass_context
-def release(context: click.Context, name: str, socket: Path | None, cell: str | None) -> None:
+def release(client: Client, name: str, cell: str | None) -> None:
     """Release lock NAME, whoever holds it; the release fallbacks apply. A writer that goes on writing gets it again."""
-    where = socket or context.obj["socket"], cell or context.obj["cell"]
-    lock = readable(_post(where, name, "release", {}))
-    click.echo(f"{lock['name']} is free")
-
-
-def _post(
-    where: tuple[Path | None, str | None], name: str, act: str, body: Mapping[str, Any]
-) -> dict[str, Any]:
     from gatewayd.control.client import segment
 
-    socket, cell = where
-    client = connect(socket)
-    with refusals(client, name):
-        return client.post(
-            f"/v1/locks/{segment(name)}/{act}", body if cell is None else {**body, "cell": cell}
-        )
+    lock = readable(client.post(f"/v1/locks/{segment(name)}/release", {"cell": cell}))
+    click.echo(f"{lock['name']} is free")
 
 
 def _print(locks: list[dict[str, Any]]) -> None:

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from gatewayd.cli.remote import (
-    REFUSED,
-    Refused,
-    Unreachable,
-    echo_json,
-    json_option,
-    readable,
-    socket_option,
-)
+from gatewayd.cli.remote import REFUSED, echo_json, json_option, on_gateway, readable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from gatewayd.control.client import Client
 
 __all__ = ["PATIENCE", "command"]
 
@@ -44,26 +37,22 @@ Exit codes:
 """,
 )
 @click.option("--force", is_flag=True, help="Apply it although it touches what is owned now.")
-@socket_option
+@on_gateway
 @json_option
 @click.pass_context
-def command(context: click.Context, socket: Path | None, *, force: bool, as_json: bool) -> None:
+def command(context: click.Context, client: Client, *, force: bool, as_json: bool) -> None:
     """Have the running gateway read, check and compare its mapping files again, and serve them if that is safe.
 
     Links whose settings did not change stay up; owners and values of variables that did not change stay as they are.
     """
-    import os
-
-    from gatewayd.control.client import Client, ControlError, NoDaemon, find_socket
+    from gatewayd.control.client import ControlError
 
     answer: Mapping[str, Any]
     try:
-        answer = Client(find_socket(socket, os.environ), PATIENCE).post("/v1/reload", {"force": force})
-    except NoDaemon as error:
-        raise Unreachable(str(error)) from error
+        answer = client.post("/v1/reload", {"force": force}, patience=PATIENCE)
     except ControlError as error:
         if "result" not in error.body:
-            raise Refused(str(error)) from error
+            raise
         answer = error.body
     done = answer.get("result") in ("applied", "unchanged")
     if as_json:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -22,18 +22,16 @@ __all__ = [
     "REFUSED",
     "UNREACHABLE",
     "Duration",
-    "Refused",
+    "RemoteError",
     "Unreachable",
     "cell_option",
-    "complete_cells",
     "complete_locks",
     "complete_variables",
-    "connect",
     "echo_json",
     "json_option",
+    "on_gateway",
     "readable",
     "refusals",
-    "socket_option",
 ]
 
 REFUSED, UNREACHABLE = 1, 2
@@ -41,55 +39,68 @@ REFUSED, UNREACHABLE = 1, 2
 _COMPLETION_PATIENCE = 0.5
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
+_Complete = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 
-class Unreachable(click.ClickException):
+class RemoteError(click.ClickException):
+    """The gateway refuses."""
+
+    exit_code = REFUSED
+
+    def __init__(self, error: Exception | str) -> None:
+        super().__init__(printable(str(error)))
+
+
+class Unreachable(RemoteError):
     """No gateway answers."""
 
     exit_code = UNREACHABLE
 
-    def __init__(self, message: str) -> None:
-        super().__init__(printable(message))
 
+def on_gateway(command: Callable[..., None]) -> Callable[..., None]:
+    """Give the command the running gateway as `client`, by the option `--socket`; what it refuses ends the command.
 
-class Refused(click.ClickException):
-    """The gateway does not do it."""
+    A command of a group takes the group's --socket and --cell where it has none of its own.
+    """
 
-    exit_code = REFUSED
+    @click.option(
+        "--socket",
+        type=click.Path(path_type=Path),
+        envvar="GATEWAYD_CONTROL",
+        is_eager=True,
+        help="Control socket of the gateway; found by itself where there is one.",
+    )
+    @wraps(command)
+    def run(**options: Any) -> None:
+        from gatewayd.control.client import Client
 
-    def __init__(self, message: str) -> None:
-        super().__init__(printable(message))
+        group = click.get_current_context().parent
+        for name, value in (group.params if group is not None else {}).items():
+            if name in options:
+                options[name] = options[name] or value
+        client = Client(options.pop("socket"))
+        with refusals(client, options.get("name") or ""):
+            command(client=client, **options)
 
-
-def connect(socket: Path | None) -> Client:
-    """The gateway at the socket, or at one of the usual places. Raises Unreachable."""
-    from gatewayd.control.client import Client, NoDaemon, find_socket
-
-    try:
-        return Client(find_socket(socket, os.environ))
-    except NoDaemon as error:
-        raise Unreachable(str(error)) from error
+    return run
 
 
 @contextmanager
-def refusals(client: Client | None = None, name: str = "") -> Iterator[None]:
-    """Turn what a client raises into an error of the command; with `client`, with names close to `name`."""
+def refusals(client: Client, name: str) -> Iterator[None]:
+    """Turn what the client raises into an error of the command, with names close to `name` if there is none such."""
     from gatewayd.control.client import ControlError, NoDaemon
 
     try:
         yield
     except NoDaemon as error:
-        raise Unreachable(str(error)) from error
+        raise Unreachable(error) from error
     except ControlError as error:
         # The interface names its field; people type an option.
         text = str(error).replace("say which with `cell`", "say which with --cell")
-        kind = _UNKNOWN.get(error.code)
-        if client is not None and kind is not None:
+        kind = {"no_such_variable": "variables", "no_such_lock": "locks"}.get(error.code)
+        if kind is not None:
             text += _meant(client, kind, name)
-        raise Refused(text) from error
-
-
-_UNKNOWN = {"no_such_variable": "variables", "no_such_lock": "locks"}
+        raise RemoteError(text) from error
 
 
 def _meant(client: Client, kind: str, name: str) -> str:
@@ -141,54 +152,30 @@ class Duration(click.ParamType):  # type: ignore[type-arg]
 DURATION = Duration()
 
 
-def _names(context: click.Context, path: str, kind: str) -> list[dict[str, Any]]:
-    """What the running gateway has; nothing if it cannot be asked at once."""
-    from gatewayd.control.client import Client, ControlError, NoDaemon, find_socket
+def _completing(kind: str, path: str, note: Callable[[Mapping[str, Any]], str]) -> _Complete:
+    """Completes names of what the running gateway has, each with a note; nothing if it cannot be asked at once."""
 
-    try:
-        client = Client(find_socket(context.params.get("socket"), os.environ), _COMPLETION_PATIENCE)
-        found = client.get(path, cell=context.params.get("cell"))[kind]
+    def complete(context: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        from gatewayd.control.client import Client, ControlError, NoDaemon
+
+        client = Client(context.params.get("socket"), _COMPLETION_PATIENCE)
+        try:
+            found = client.get(path, cell=context.params.get("cell"))[kind]
+        except (NoDaemon, ControlError, OSError):
+            return []
         # A shell would take what is not printable for something else.
-        return [thing for thing in found if printable(thing["name"]) == thing["name"]]
-    except (NoDaemon, ControlError, OSError):
-        return []
+        return [
+            CompletionItem(item["name"], help=printable(note(item)))
+            for item in found
+            if item["name"].startswith(incomplete) and printable(item["name"]) == item["name"]
+        ]
+
+    return complete
 
 
-def complete_variables(
-    context: click.Context, _param: click.Parameter, incomplete: str
-) -> list[CompletionItem]:
-    """Names of variables, with what they are in the robot."""
-    return [
-        CompletionItem(variable["name"], help=printable(variable["robot"]))
-        for variable in _names(context, "/v1/variables", "variables")
-        if variable["name"].startswith(incomplete)
-    ]
-
-
-def complete_locks(context: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Names of locks, with their owners."""
-    return [
-        CompletionItem(lock["name"], help=printable(lock["owner"] or "free"))
-        for lock in _names(context, "/v1/locks", "locks")
-        if lock["name"].startswith(incomplete)
-    ]
-
-
-def complete_cells(context: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Names of cells."""
-    found = _names(context, "/v1/status", "cells")
-    return [CompletionItem(cell["name"]) for cell in found if cell["name"].startswith(incomplete)]
-
-
-def socket_option(command: _Command) -> _Command:
-    """`--socket`."""
-    return click.option(
-        "--socket",
-        type=click.Path(path_type=Path),
-        envvar="GATEWAYD_CONTROL",
-        is_eager=True,
-        help="Control socket of the gateway; found by itself where there is one.",
-    )(command)
+complete_variables = _completing("variables", "/v1/variables", lambda variable: variable["robot"])
+complete_locks = _completing("locks", "/v1/locks", lambda lock: lock["owner"] or "free")
+_complete_cells = _completing("cells", "/v1/status", lambda _cell: "")
 
 
 def cell_option(command: _Command) -> _Command:
@@ -196,7 +183,7 @@ def cell_option(command: _Command) -> _Command:
     return click.option(
         "--cell",
         metavar="NAME",
-        shell_complete=complete_cells,
+        shell_complete=_complete_cells,
         help="Only this cell, of several in one gateway.",
     )(command)
 

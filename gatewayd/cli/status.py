@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from gatewayd.cli.remote import (
-    cell_option,
-    connect,
-    echo_json,
-    json_option,
-    readable,
-    refusals,
-    socket_option,
-)
+from gatewayd.cli.remote import cell_option, echo_json, json_option, on_gateway, readable
+
+if TYPE_CHECKING:
+    from gatewayd.control.client import Client
 
 __all__ = ["DEGRADED", "command"]
 
@@ -44,21 +38,18 @@ Exit codes:
   2  wrong usage, or no gateway could be reached
 """,
 )
-@socket_option
+@on_gateway
 @cell_option
 @json_option
 @click.pass_context
-def command(context: click.Context, socket: Path | None, cell: str | None, *, as_json: bool) -> None:
+def command(context: click.Context, client: Client, cell: str | None, *, as_json: bool) -> None:
     """Print how the running gateway is: links, rates, ages, owners, refusals, the last events."""
-    client = connect(socket)
-    with refusals():
-        answer = client.get("/v1/status")
-        if cell is not None:
-            events = client.get("/v1/events", limit=_EVENTS, cell=cell)["events"]
-            answer = _narrowed(answer, cell)
-        else:
-            events = client.get("/v1/events", limit=_EVENTS * max(1, len(answer["cells"])))["events"]
-        locks = client.get("/v1/locks", cell=cell)["locks"]
+    answer = client.get("/v1/status")
+    limit = _EVENTS * (max(1, len(answer["cells"])) if cell is None else 1)
+    events = client.get("/v1/events", limit=limit, cell=cell)["events"]
+    locks = client.get("/v1/locks", cell=cell)["locks"]
+    if cell is not None:
+        answer = _narrowed(answer, cell)
     if as_json:
         echo_json(answer)
     else:

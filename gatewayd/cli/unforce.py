@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from gatewayd.cli.remote import cell_option, complete_variables, connect, readable, refusals, socket_option
+from gatewayd.cli.remote import cell_option, complete_variables, on_gateway, readable
+
+if TYPE_CHECKING:
+    from gatewayd.control.client import Client
 
 __all__ = ["command"]
 
@@ -27,30 +30,23 @@ Exit codes:
 )
 @click.argument("name", required=False, shell_complete=complete_variables)
 @click.option("--all", "every", is_flag=True, help="End every force.")
-@socket_option
+@on_gateway
 @cell_option
-def command(name: str | None, socket: Path | None, cell: str | None, *, every: bool) -> None:
+def command(client: Client, name: str | None, cell: str | None, *, every: bool) -> None:
     """End the force of variable NAME: an output shows the truth again, an input its release fallback."""
     from gatewayd.control.client import segment
     from gatewayd.report.format import value
 
     if every == (name is not None):
         raise click.UsageError("name one variable, or use --all")
-    client = connect(socket)
-    with refusals(client, name or ""):
-        if name is not None:
-            wanted = [(name, cell)]
-        else:
-            variables = client.get("/v1/variables", cell=cell)["variables"]
-            wanted = [
-                (variable["name"], variable["cell"])
-                for variable in variables
-                if variable["forced"] is not None
-            ]
-        for forced, its_cell in wanted:
-            body = {} if its_cell is None else {"cell": its_cell}
-            found = readable(client.post(f"/v1/variables/{segment(forced)}/unforce", body))
-            shown = value(found["value"], found["unit"])
-            click.echo(f"{found['name']} is no longer forced: {shown}, {found['quality']}")
+    if name is not None:
+        wanted = [(name, cell)]
+    else:
+        variables = client.get("/v1/variables", cell=cell)["variables"]
+        wanted = [(variable["name"], variable["cell"]) for variable in variables if variable["forced"]]
+    for forced, its_cell in wanted:
+        found = readable(client.post(f"/v1/variables/{segment(forced)}/unforce", {"cell": its_cell}))
+        shown = value(found["value"], found["unit"])
+        click.echo(f"{found['name']} is no longer forced: {shown}, {found['quality']}")
     if not wanted:
         click.echo("nothing is forced")

@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -18,10 +17,8 @@ from gatewayd.cli.remote import (
     DURATION,
     cell_option,
     complete_variables,
-    connect,
+    on_gateway,
     readable,
-    refusals,
-    socket_option,
 )
 from gatewayd.report.printable import printable
 
@@ -67,22 +64,21 @@ Exit codes:
     "--interval", type=DURATION, default="500ms", show_default=True, metavar="TIME", help="From look to look."
 )
 @click.option("--once", is_flag=True, help="One look, as lines.")
-@socket_option
+@on_gateway
 @cell_option
 @click.pass_context
 def command(
-    context: click.Context, text: str, socket: Path | None, cell: str | None, *, interval: float, once: bool
+    context: click.Context, text: str, client: Client, cell: str | None, *, interval: float, once: bool
 ) -> None:
     """Watch values, qualities, ages and owners live; TEXT filters them by name, robot register or owner."""
     from rich.console import Console
 
     from gatewayd.cli.watching import View
 
-    client, console = connect(socket), Console(highlight=False)
+    console = Console(highlight=False)
     interval = max(0.1, interval)
     view = View(filter=text)
-    with refusals():
-        first = _look(client, cell)
+    first = _look(client, cell)
     # Ctrl-C is a way to end it, not to break it off; whatever else ends it leaves the terminal as it was.
     with suppress(KeyboardInterrupt), _ending_on_signals():
         if once or not console.is_terminal or console.is_dumb_terminal or not sys.stdin.isatty():
@@ -109,8 +105,7 @@ def _lines(client: Client, cell: str | None, first: Glimpse, view: View, interva
     click.echo(plain(first, view))
     while interval:
         time.sleep(interval)
-        with refusals():
-            click.echo(plain(_look(client, cell), view))
+        click.echo(plain(_look(client, cell), view))
 
 
 def _live(console: Console, look: Callable[[], Glimpse], first: Glimpse, view: View, interval: float) -> None:

@@ -7,6 +7,7 @@ import json
 import os
 import socket
 from collections.abc import Generator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlencode
@@ -65,21 +66,26 @@ def _is_there(path: Path) -> bool:
 
 
 class Client:
-    """One daemon's control socket. Every call is a connection of its own."""
+    """One daemon's control socket, at `path` or else where one is found. Every call is a connection of its own."""
 
-    def __init__(self, path: Path, patience: float = _PATIENCE) -> None:
-        self.path = path
+    def __init__(self, path: Path | None = None, patience: float = _PATIENCE) -> None:
+        self._named = path
         self._patience = patience
+
+    @cached_property
+    def path(self) -> Path:
+        """The socket; looked for when it is needed. Raises NoDaemon."""
+        return find_socket(self._named, os.environ)
 
     def get(self, path: str, **query: str | int | None) -> dict[str, Any]:
         """Ask: `get("/v1/variables", name="tcp*")`. Raises NoDaemon, ControlError."""
-        connection, response = self._begin("GET", _with_query(path, query), None, self._patience)
-        return self._end(connection, response)
+        return self._end(*self._begin("GET", _with_query(path, query), None, self._patience))
 
-    def post(self, path: str, body: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    def post(
+        self, path: str, body: Mapping[str, Any] | None = None, *, patience: float | None = None
+    ) -> dict[str, Any]:
         """Do: `post("/v1/locks/start/take", {"for": 60})`. Raises NoDaemon, ControlError."""
-        connection, response = self._begin("POST", path, body or {}, self._patience)
-        return self._end(connection, response)
+        return self._end(*self._begin("POST", path, body or {}, patience or self._patience))
 
     def follow(self, path: str, **query: str | int | None) -> Generator[dict[str, Any], None, None]:
         """Every object that comes, until the daemon ends. Raises NoDaemon, ControlError."""

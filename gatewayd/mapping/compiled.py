@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from gatewayd.mapping.diagnostics import Diagnostic, Severity
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["Compiled", "CompiledFile", "Unreadable"]
+__all__ = ["PATTERN", "Compiled", "CompiledFile", "Unreadable"]
+
+PATTERN = "*.yaml"
+"""The mapping files of a directory."""
 
 
 @dataclass(frozen=True, slots=True)

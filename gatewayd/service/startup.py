@@ -9,22 +9,18 @@ from os.path import isdir
 from pathlib import Path
 
 from gatewayd.logs.records import fields
-from gatewayd.mapping.compiled import CompiledFile
+from gatewayd.mapping.compiled import PATTERN, CompiledFile
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.plan import Plan
 from gatewayd.service.compilation import Compilation
 
 __all__ = [
-    "PATTERN",
     "Startup",
     "load_plans",
     "mapping_files",
     "state_directory",
     "tell_findings",
 ]
-
-PATTERN = "*.yaml"
-"""The files of a configuration directory."""
 
 log = logging.getLogger("gatewayd.startup")
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 import pytest
 
-from gatewayd.cli.remote import DURATION, Refused, Unreachable, refusals
-from gatewayd.control.client import ControlError, NoDaemon
+from gatewayd.cli.remote import DURATION, RemoteError, Unreachable, refusals
+from gatewayd.control.client import Client, ControlError, NoDaemon
 
 
 @pytest.mark.parametrize(
@@ -25,9 +25,10 @@ def test_what_is_no_duration(text: str) -> None:
 
 
 def test_refusals_name_the_option_not_the_field() -> None:
-    with pytest.raises(Refused, match="say which with --cell") as caught, refusals():
+    client = Client()
+    with pytest.raises(RemoteError, match="say which with --cell") as caught, refusals(client, "x"):
         raise ControlError(409, "ambiguous", "x is in several cells (a, b): say which with `cell`", {})
     assert caught.value.exit_code == 1
-    with pytest.raises(Unreachable) as gone, refusals():
+    with pytest.raises(Unreachable) as gone, refusals(client, "x"):
         raise NoDaemon("nobody")
     assert gone.value.exit_code == 2
