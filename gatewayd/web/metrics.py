@@ -7,9 +7,11 @@ prometheus-client is here.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from prometheus_client import CollectorRegistry, ProcessCollector, generate_latest
 from prometheus_client.core import HistogramMetricFamily, Metric
@@ -20,14 +22,13 @@ from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
-from gatewayd.links.contract import LinkMetric
 from gatewayd.links.registry import kind_of, kinds
 from gatewayd.loop import clock
 from gatewayd.report.printable import printable
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.web.health import readiness
 from gatewayd.web.histogram import Histogram
-from gatewayd.web.probes import Probes
+from gatewayd.web.probes import CellProbe, Probes
 
 __all__ = ["CONTENT_TYPE", "METRICS", "PROCESS_METRICS", "Exposition", "MetricInfo", "MetricKind"]
 
@@ -53,145 +54,132 @@ class MetricInfo:
     meaning: str
 
 
-def _of_link(metric: LinkMetric) -> MetricInfo:
-    kind = MetricKind.COUNTER if metric.name.endswith("_total") else MetricKind.GAUGE
-    return MetricInfo(metric.name, kind, metric.labels, metric.meaning)
+_TIMES = MetricKind.HISTOGRAM
 
 
-_CELL = ("cell",)
+def _info(name: str, meaning: str, *labels: str, kind: MetricKind | None = None) -> MetricInfo:
+    by_name = MetricKind.COUNTER if name.endswith("_total") else MetricKind.GAUGE
+    return MetricInfo(name, kind or by_name, labels, meaning)
+
+
+class _Moment:
+    """A cell that is served, and what was measured of it, at one moment."""
+
+    def __init__(self, cell: Cell, probe: CellProbe, now: float) -> None:
+        self.cell, self.health, self.probe, self.now = cell, cell.health, probe, now
+
+    def is_up(self) -> bool:
+        """Whether the robot's values are fresh and its inputs can be written."""
+        return self.cell.freshness.state is Source.FRESH and self.cell.accepts_writes
+
+    def input_age(self) -> float:
+        """Seconds since any input was written."""
+        image = self.cell.image
+        return self.now - max((image.times[index] for index in image.inputs), default=-math.inf)
+
+    def locks_owned(self) -> dict[str, float]:
+        """By each writer, and by the local operator if it owns any."""
+        definition, owners = self.cell.definition, self.cell.ownership.owners
+        writers = dict.fromkeys((*range(len(definition.writers)), *owners))
+        return {definition.writer_name(index): owners.count(index) for index in writers if index is not None}
+
+    def writers_up(self) -> dict[str, float]:
+        """By writer."""
+        writers = self.cell.definition.writers
+        return {writer.name: up for writer, up in zip(writers, self.cell.writers.alive, strict=True)}
+
+
+_Value = float | Mapping[str, float]
+"""A number, or numbers by the value of a further label."""
+
+
+class _OfCell(NamedTuple):
+    """A gauge or counter that each cell has."""
+
+    name: str
+    meaning: str
+    read: Callable[[_Moment], _Value]
+    label: str = ""
+    """The further label, if there is one."""
+
+
+_OF_CELLS = (
+    _OfCell("gatewayd_cell_info", "1, with the fingerprint of the mapping",
+        lambda at: {f"{at.cell.definition.fingerprint:08X}": 1}, "fingerprint"),
+    _OfCell("gatewayd_uptime_seconds", "seconds since the cell was first served",
+        lambda at: max(0.0, at.now - at.health.started)),
+    _OfCell("gatewayd_robot_up", "1 while the robot's values are fresh and its inputs can be written",
+        _Moment.is_up),
+    _OfCell("gatewayd_robot_state", "1 for the state the robot is in, 0 for all others",
+        lambda at: {state.name.lower(): state is at.cell.freshness.state for state in Source}, "state"),
+    _OfCell("gatewayd_robot_package_rate_hertz", "packages per second, measured",
+        lambda at: at.health.frequency),
+    _OfCell("gatewayd_robot_age_seconds", "seconds since the robot last told anything new; +Inf: never",
+        lambda at: at.now - at.cell.freshness.last_progress),
+    _OfCell("gatewayd_robot_packages_total", "packages received", lambda at: at.health.packages),
+    _OfCell("gatewayd_robot_packages_skipped_total", "packages the controller left out",
+        lambda at: at.health.skipped),
+    _OfCell("gatewayd_robot_packages_late_total", "packages that came late", lambda at: at.health.late),
+    _OfCell("gatewayd_robot_sessions_total", "sessions with the controller; the first is no reconnect",
+        lambda at: at.health.sessions),
+    _OfCell("gatewayd_robot_watchdog_fed", "1 while the robot's watchdog is fed",
+        lambda at: at.health.watchdog_fed),
+    _OfCell("gatewayd_read_back_mismatches_total", "inputs whose read-back differed from what was written",
+        lambda at: at.health.read_back_mismatches),
+    _OfCell("gatewayd_lag_seconds",
+        "by how much the newest package of the robot is later than the quickest ones were; part of every age",
+        lambda at: at.health.lag),
+    _OfCell("gatewayd_differing", "inputs for which the robot holds something else than it was given",
+        lambda at: at.health.differing),
+    _OfCell("gatewayd_unadopted", "inputs whose content in the robot is not known",
+        lambda at: at.health.unadopted),
+    _OfCell("gatewayd_adoption_seconds",
+        "seconds until adopted inputs without an owner fall back; 0: none will",
+        lambda at: at.health.adoption),
+    _OfCell("gatewayd_gaps_total", "times the gateway stood still: stopped, suspended or starved of the CPU",
+        lambda at: at.health.gaps),
+    _OfCell("gatewayd_variables", "variables by quality",
+        lambda at: {quality.name.lower(): at.cell.image.quality.count(quality) for quality in Quality},
+        "quality"),
+    _OfCell("gatewayd_input_age_seconds", "seconds since any input was last written; +Inf: never",
+        _Moment.input_age),
+    _OfCell("gatewayd_locks", "locks, owned or not", lambda at: len(at.cell.ownership.owners)),
+    _OfCell("gatewayd_locks_owned", "locks that the writer owns; `operator` is the local operator",
+        _Moment.locks_owned, "writer"),
+    _OfCell("gatewayd_writer_up", "1 while the writer is connected and heard in time",
+        _Moment.writers_up, "writer"),
+    _OfCell("gatewayd_writes_accepted_total", "write requests applied", lambda at: at.health.writes_accepted),
+    _OfCell("gatewayd_writes_refused_total", "requests refused", lambda at: at.health.writes_refused),
+    _OfCell("gatewayd_refusals_total",
+        "requests refused by reason; equal ones are added every 10 s, so it may lag behind the total",
+        lambda at: {reason.name.lower(): at.probe.refusals[reason] for reason in Reason}, "reason"),
+    _OfCell("gatewayd_events_total", "events by kind",
+        lambda at: {kind.value: at.probe.events[kind] for kind in EventKind}, "kind"),
+)  # fmt: skip
 METRICS = (
-    MetricInfo("gatewayd_info", MetricKind.GAUGE, ("version",), "1, with the version of the gateway"),
-    MetricInfo("gatewayd_ready", MetricKind.GAUGE, (), "1 while every cell is served, as /readyz tells it"),
-    MetricInfo(
-        "gatewayd_parts_hanging",
-        MetricKind.GAUGE,
-        (),
-        "parts of the gateway that do not turn; /healthz names them",
-    ),
-    MetricInfo(
+    _info("gatewayd_info", "1, with the version of the gateway", "version"),
+    _info("gatewayd_ready", "1 while every cell is served, as /readyz tells it"),
+    _info("gatewayd_parts_hanging", "parts of the gateway that do not turn; /healthz names them"),
+    _info(
         "gatewayd_troubles",
-        MetricKind.GAUGE,
-        (),
         "what is wrong with no cell in particular, say a mapping not served or a reload refused; /readyz names it",
     ),
-    MetricInfo(
-        "gatewayd_loop_lag_seconds",
-        MetricKind.HISTOGRAM,
-        (),
-        "by how much the event loop came late, ten times a second",
+    _info(
+        "gatewayd_loop_lag_seconds", "by how much the event loop came late, ten times a second", kind=_TIMES
     ),
-    MetricInfo(
-        "gatewayd_cell_info",
-        MetricKind.GAUGE,
-        ("cell", "fingerprint"),
-        "1, with the fingerprint of the mapping",
-    ),
-    MetricInfo("gatewayd_uptime_seconds", MetricKind.GAUGE, _CELL, "seconds since the cell was first served"),
-    MetricInfo(
-        "gatewayd_robot_up",
-        MetricKind.GAUGE,
-        _CELL,
-        "1 while the robot's values are fresh and its inputs can be written",
-    ),
-    MetricInfo(
-        "gatewayd_robot_state",
-        MetricKind.GAUGE,
-        ("cell", "state"),
-        "1 for the state the robot is in, 0 for all others",
-    ),
-    MetricInfo("gatewayd_robot_package_rate_hertz", MetricKind.GAUGE, _CELL, "packages per second, measured"),
-    MetricInfo(
-        "gatewayd_robot_age_seconds",
-        MetricKind.GAUGE,
-        _CELL,
-        "seconds since the robot last told anything new; +Inf: never",
-    ),
-    MetricInfo("gatewayd_robot_packages_total", MetricKind.COUNTER, _CELL, "packages received"),
-    MetricInfo(
-        "gatewayd_robot_packages_skipped_total", MetricKind.COUNTER, _CELL, "packages the controller left out"
-    ),
-    MetricInfo("gatewayd_robot_packages_late_total", MetricKind.COUNTER, _CELL, "packages that came late"),
-    MetricInfo(
-        "gatewayd_robot_sessions_total",
-        MetricKind.COUNTER,
-        _CELL,
-        "sessions with the controller; the first is no reconnect",
-    ),
-    MetricInfo("gatewayd_robot_watchdog_fed", MetricKind.GAUGE, _CELL, "1 while the robot's watchdog is fed"),
-    MetricInfo(
-        "gatewayd_read_back_mismatches_total",
-        MetricKind.COUNTER,
-        _CELL,
-        "inputs whose read-back differed from what was written",
-    ),
-    MetricInfo(
-        "gatewayd_lag_seconds",
-        MetricKind.GAUGE,
-        _CELL,
-        "by how much the newest package of the robot is later than the quickest ones were; part of every age",
-    ),
-    MetricInfo(
-        "gatewayd_differing",
-        MetricKind.GAUGE,
-        _CELL,
-        "inputs for which the robot holds something else than it was given",
-    ),
-    MetricInfo(
-        "gatewayd_unadopted", MetricKind.GAUGE, _CELL, "inputs whose content in the robot is not known"
-    ),
-    MetricInfo(
-        "gatewayd_adoption_seconds",
-        MetricKind.GAUGE,
-        _CELL,
-        "seconds until adopted inputs without an owner fall back; 0: none will",
-    ),
-    MetricInfo(
-        "gatewayd_gaps_total",
-        MetricKind.COUNTER,
-        _CELL,
-        "times the gateway stood still: stopped, suspended or starved of the CPU",
-    ),
-    MetricInfo("gatewayd_variables", MetricKind.GAUGE, ("cell", "quality"), "variables by quality"),
-    MetricInfo(
-        "gatewayd_input_age_seconds",
-        MetricKind.GAUGE,
-        _CELL,
-        "seconds since any input was last written; +Inf: never",
-    ),
-    MetricInfo("gatewayd_locks", MetricKind.GAUGE, _CELL, "locks, owned or not"),
-    MetricInfo(
-        "gatewayd_locks_owned",
-        MetricKind.GAUGE,
-        ("cell", "writer"),
-        "locks that the writer owns; `operator` is the local operator",
-    ),
-    MetricInfo(
-        "gatewayd_writer_up",
-        MetricKind.GAUGE,
-        ("cell", "writer"),
-        "1 while the writer is connected and heard in time",
-    ),
-    MetricInfo("gatewayd_writes_accepted_total", MetricKind.COUNTER, _CELL, "write requests applied"),
-    MetricInfo("gatewayd_writes_refused_total", MetricKind.COUNTER, _CELL, "requests refused"),
-    MetricInfo(
-        "gatewayd_refusals_total",
-        MetricKind.COUNTER,
-        ("cell", "reason"),
-        "requests refused by reason; equal ones are added every 10 s, so it may lag behind the total",
-    ),
-    MetricInfo("gatewayd_events_total", MetricKind.COUNTER, ("cell", "kind"), "events by kind"),
-    *(_of_link(metric) for kind in kinds() for metric in kind.metrics),
-    MetricInfo(
+    *(_info(metric.name, metric.meaning, "cell", *filter(None, [metric.label])) for metric in _OF_CELLS),
+    *(_info(metric.name, metric.meaning, *metric.labels) for kind in kinds() for metric in kind.metrics),
+    _info(
         "gatewayd_package_to_image_seconds",
-        MetricKind.HISTOGRAM,
-        _CELL,
         "from the arrival of a robot's package to its values standing in every fieldbus's image",
+        "cell",
+        kind=_TIMES,
     ),
-    MetricInfo(
+    _info(
         "gatewayd_write_to_package_seconds",
-        MetricKind.HISTOGRAM,
-        _CELL,
         "from the arrival of a write to the package with it to the robot, its wait for the control cycle included",
+        "cell",
+        kind=_TIMES,
     ),
 )
 """In the order in which they are reported."""
@@ -206,11 +194,10 @@ PROCESS_METRICS = {
 }
 """What prometheus-client tells of the process itself."""
 
-_INFO = {info.name: info for info in METRICS}
 LINK_LABEL = "link"
 """Behind all others, the name of a link that is not called as its kind: a cell may have several of that."""
-_Sample = tuple[tuple[str, ...], float]
-_LEVELS = {False: 0.0, True: 1.0}
+_Samples = dict[tuple[str, ...], float]
+"""Values of labels -> value."""
 
 
 class Exposition:
@@ -230,7 +217,7 @@ class Exposition:
     def describe(self) -> Iterator[Metric]:
         """Called when registering: names only."""
         for info in METRICS:
-            yield _family(info)
+            yield _histogram(info, {}) if info.kind is MetricKind.HISTOGRAM else _family(info, {})
 
     def collect(self) -> Iterator[Metric]:
         """Called for each `text`."""
@@ -238,124 +225,60 @@ class Exposition:
         daemon, probes = self._probes.daemon, self._probes
         troubles = probes.troubles()
         ready, _ = readiness(probes.verdicts(now), probes.late, troubles)
-        samples: dict[str, list[_Sample]] = {
-            "gatewayd_info": [((self._version,), 1)],
-            "gatewayd_ready": [((), _LEVELS[ready])],
-            "gatewayd_parts_hanging": [((), len(probes.late))],
-            "gatewayd_troubles": [((), len(troubles))],
-        }
-        histograms: dict[str, list[tuple[tuple[str, ...], Histogram]]] = {
-            "gatewayd_loop_lag_seconds": [((), probes.lag)],
-            "gatewayd_package_to_image_seconds": [],
-            "gatewayd_write_to_package_seconds": [],
-        }
+        samples: defaultdict[str, _Samples] = defaultdict(dict)
+        samples["gatewayd_info"] = {(self._version,): 1}
+        samples["gatewayd_ready"] = {(): ready}
+        samples["gatewayd_parts_hanging"] = {(): len(probes.late)}
+        samples["gatewayd_troubles"] = {(): len(troubles)}
+        histograms: defaultdict[str, dict[tuple[str, ...], Histogram]] = defaultdict(dict)
+        histograms["gatewayd_loop_lag_seconds"] = {(): probes.lag}
         for runtime in daemon.runtimes:
             name, probe = runtime.cell.definition.name, probes.of(runtime.cell)
-            for metric, found in _cell(runtime, now).items():
-                samples.setdefault(metric, []).extend(((name, *labels), value) for labels, value in found)
-            for metric, link_samples in _links(runtime).items():
-                samples.setdefault(metric, []).extend(link_samples)
-            for metric, counted in _counted(probe.events, probe.refusals).items():
-                samples.setdefault(metric, []).extend(((name, label), value) for label, value in counted)
-            histograms["gatewayd_package_to_image_seconds"].append(((name,), probe.package_to_image))
-            histograms["gatewayd_write_to_package_seconds"].append(((name,), probe.write_to_package))
+            moment = _Moment(runtime.cell, probe, now)
+            for metric in _OF_CELLS:
+                samples[metric.name] |= _samples(name, metric.read(moment))
+            # What several cells share is reported by each of them, and counts once.
+            for link_metric, found in _links(runtime):
+                samples[link_metric] |= found
+            histograms["gatewayd_package_to_image_seconds"][name,] = probe.package_to_image
+            histograms["gatewayd_write_to_package_seconds"][name,] = probe.write_to_package
         for info in METRICS:
             if info.kind is MetricKind.HISTOGRAM:
                 yield _histogram(info, histograms[info.name])
-            elif samples.get(info.name):
-                # What several cells share is reported by each of them, and counts once.
-                yield _family(info, dict(samples[info.name]).items())
+            elif samples[info.name]:
+                yield _family(info, samples[info.name])
 
 
-def _cell(runtime: CellRuntime, now: float) -> dict[str, list[_Sample]]:
-    cell = runtime.cell
-    health, image = cell.health, cell.image
-    state = cell.freshness.state
-    up = state is Source.FRESH and cell.accepts_writes
-    return {
-        "gatewayd_cell_info": [((f"{cell.definition.fingerprint:08X}",), 1)],
-        "gatewayd_uptime_seconds": [((), max(0.0, now - health.started))],
-        "gatewayd_robot_up": [((), _LEVELS[up])],
-        "gatewayd_robot_state": [((source.name.lower(),), _LEVELS[source is state]) for source in Source],
-        "gatewayd_robot_package_rate_hertz": [((), health.frequency)],
-        "gatewayd_robot_age_seconds": [((), now - cell.freshness.last_progress)],
-        "gatewayd_robot_packages_total": [((), health.packages)],
-        "gatewayd_robot_packages_skipped_total": [((), health.skipped)],
-        "gatewayd_robot_packages_late_total": [((), health.late)],
-        "gatewayd_robot_sessions_total": [((), health.sessions)],
-        "gatewayd_robot_watchdog_fed": [((), _LEVELS[health.watchdog_fed])],
-        "gatewayd_read_back_mismatches_total": [((), health.read_back_mismatches)],
-        "gatewayd_lag_seconds": [((), health.lag)],
-        "gatewayd_differing": [((), health.differing)],
-        "gatewayd_unadopted": [((), health.unadopted)],
-        "gatewayd_adoption_seconds": [((), health.adoption)],
-        "gatewayd_gaps_total": [((), health.gaps)],
-        "gatewayd_variables": [
-            ((quality.name.lower(),), image.quality.count(quality)) for quality in Quality
-        ],
-        "gatewayd_input_age_seconds": [
-            ((), now - max((image.times[i] for i in image.inputs), default=-math.inf))
-        ],
-        "gatewayd_locks": [((), len(cell.ownership.owners))],
-        "gatewayd_writes_accepted_total": [((), health.writes_accepted)],
-        "gatewayd_writes_refused_total": [((), health.writes_refused)],
-        **_owners(cell),
-    }
+def _samples(first: str, value: _Value, *last: str) -> _Samples:
+    if isinstance(value, Mapping):
+        return {(first, label, *last): number for label, number in value.items()}
+    return {(first, *last): value}
 
 
-def _owners(cell: Cell) -> dict[str, list[_Sample]]:
-    owners = cell.ownership.owners
-    names = {index: writer.name for index, writer in enumerate(cell.definition.writers)}
-    names |= {owner: cell.definition.writer_name(owner) for owner in owners if owner is not None}
-    return {
-        "gatewayd_locks_owned": [((name,), owners.count(index)) for index, name in names.items()],
-        "gatewayd_writer_up": [
-            ((writer.name,), _LEVELS[alive])
-            for writer, alive in zip(cell.definition.writers, cell.writers.alive, strict=True)
-        ],
-    }
-
-
-def _links(runtime: CellRuntime) -> dict[str, list[_Sample]]:
-    found: dict[str, list[_Sample]] = {}
+def _links(runtime: CellRuntime) -> Iterator[tuple[str, _Samples]]:
     for name, link in runtime.links.items():
         figures, kind = link.health().figures, kind_of(runtime.plan.links[name].kind)
         for metric in kind.metrics:
             first = str(figures[metric.shared[1]]) if metric.shared else runtime.cell.definition.name
             own_name = () if metric.shared or name == kind.key else (name,)
             value = figures.get(metric.figure)
-            samples = found.setdefault(metric.name, [])
-            if isinstance(value, Mapping):
-                samples += (((first, label, *own_name), number) for label, number in value.items())
-            elif isinstance(value, int | float):
-                samples.append(((first, *own_name), float(value)))
-    return found
+            if isinstance(value, Mapping | int | float):
+                yield metric.name, _samples(first, value, *own_name)
 
 
-def _counted(
-    events: Mapping[EventKind, int], refusals: Mapping[Reason, int]
-) -> dict[str, list[tuple[str, float]]]:
-    return {
-        "gatewayd_events_total": [(kind.value, events.get(kind, 0)) for kind in EventKind],
-        "gatewayd_refusals_total": [(reason.name.lower(), refusals.get(reason, 0)) for reason in Reason],
-    }
-
-
-def _family(info: MetricInfo, samples: Iterable[_Sample] = ()) -> Metric:
-    family: CounterMetricFamily | GaugeMetricFamily | HistogramMetricFamily
-    if info.kind is MetricKind.HISTOGRAM:
-        return HistogramMetricFamily(info.name, info.meaning, labels=info.labels)
+def _family(info: MetricInfo, samples: _Samples) -> Metric:
     make = CounterMetricFamily if info.kind is MetricKind.COUNTER else GaugeMetricFamily
     # Samples that have no further value have no such label either.
-    family = make(info.name, info.meaning, labels=(*info.labels, LINK_LABEL))
-    for labels, value in samples:
-        family.add_metric(list(map(printable, labels)), value)
+    labels = (*info.labels, LINK_LABEL)
+    family: CounterMetricFamily | GaugeMetricFamily = make(info.name, info.meaning, labels=labels)
+    for values, value in samples.items():
+        family.add_metric(list(map(printable, values)), value)
     return family
 
 
-def _histogram(info: MetricInfo, found: Iterable[tuple[tuple[str, ...], Histogram]]) -> Metric:
+def _histogram(info: MetricInfo, found: Mapping[tuple[str, ...], Histogram]) -> Metric:
     family = HistogramMetricFamily(info.name, info.meaning, labels=info.labels)
-    for labels, histogram in found:
+    for labels, histogram in found.items():
         buckets = [
             ("+Inf" if bound == math.inf else f"{bound:g}", count) for bound, count in histogram.buckets()
         ]
