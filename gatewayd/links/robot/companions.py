@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from gatewayd.core.definition import Direction, Value, Variable
-from gatewayd.links.robot.transfer import InputTransfer, ElementPlace
+from gatewayd.links.robot.transfer import ElementPlace, InputTransfer
 from gatewayd.rtde.companions import COMPANIONS
 
 __all__ = ["DOMAINS", "STAGE", "Actuation", "Driven", "Key", "Stage", "all_inputs", "all_outputs"]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from gatewayd.core.definition import Direction, Value, Variable
 
-__all__ = ["FieldPart", "InputTransfer", "OutputTransfer", "ElementPlace", "Slots"]
+__all__ = ["ElementPlace", "FieldPart", "InputTransfer", "OutputTransfer", "Slots"]
 
 Slots = Mapping[str, slice]
 """Where each field of a recipe lies in its flat tuple."""
