@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from functools import partial
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 from typing import Annotated, Any, Final, Literal, NoReturn, TypeAlias
 
@@ -75,16 +76,14 @@ def written(value: object) -> str:
 
 def scalar(value: object, what: str, hint: str) -> str:
     """A plain value as it was written; anything else is refused, since `what` is expected there."""
-    if value is None or isinstance(value, (dict, list, tuple, bool)):
-        kinds = {
-            dict: "a table",
-            list: "a list",
-            tuple: "a list",
-            bool: "true or false",
-            type(None): "nothing",
-        }
-        refuse(syntax.WRONG_TYPE, f"{kinds[type(value)]} stands where {what} is expected", hint)
+    if type(value) in _NO_SCALARS:
+        refuse(syntax.WRONG_TYPE, f"{_NO_SCALARS[type(value)]} stands where {what} is expected", hint)
     return written(value)
+
+
+_NO_SCALARS: Final[dict[type, str]] = {
+    dict: "a table", list: "a list", tuple: "a list", bool: "true or false", type(None): "nothing"
+}  # fmt: skip
 
 
 def _decimal(value: object) -> object:
@@ -319,32 +318,26 @@ def _policy(value: Any, words: tuple[str, ...]) -> Fallback:
     if isinstance(value, bool):
         return Fallback(FallbackKind.VALUE, value)
     if isinstance(value, (int, float)):
-        number = _decimal(value)
-        return Fallback(FallbackKind.VALUE, number)  # type: ignore[arg-type]
+        return Fallback(FallbackKind.VALUE, _decimal(value))  # type: ignore[arg-type]
     text = scalar(value, "a policy", f"write {choices}")
     if text not in words:
         refuse(syntax.BAD_CHOICE, f"`{text}` is not a policy", f"write {choices}")
     return Fallback(FallbackKind(text))
 
 
-def _release_policy(value: object) -> Fallback:
-    return _policy(value, ("clear", "hold"))
-
-
-def _output_policy(value: object) -> Fallback:
-    return _policy(value, ("clear", "hold", "exception"))
-
-
 ReleasePolicy = Annotated[
     InstanceOf[Fallback],
-    BeforeValidator(_release_policy, json_schema_input_type=bool | float | Literal["clear", "hold"]),
+    BeforeValidator(
+        partial(_policy, words=("clear", "hold")),
+        json_schema_input_type=bool | float | Literal["clear", "hold"],
+    ),
 ]
 """What an input is given when its owner is lost."""
 OutputPolicy = Annotated[
     InstanceOf[Fallback],
     BeforeValidator(
-        _output_policy,
+        partial(_policy, words=("clear", "hold", "exception")),
         json_schema_input_type=bool | float | Literal["clear", "hold", "exception"],
     ),
 ]
-"""What the fieldbus sees of an output when the robot stops telling."""
+"""What the fieldbus sees of an output when the robot stops reporting."""

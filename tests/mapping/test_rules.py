@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from gatewayd.core import status_layout as status
-from gatewayd.links.modbus_server.rules import places
 from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
 from gatewayd.mapping.loader import load, load_together
 from gatewayd.mapping.rules import bounds, catalogue
@@ -108,7 +107,6 @@ def test_every_check_has_its_own_rule() -> None:
 
 def test_bounds_are_those_of_the_status_block() -> None:
     """Said twice, so that a check need not import the running core."""
-    assert places.FIRST_STATUS_REGISTER == status.BASE
     assert (bounds.MAX_VARIABLES, bounds.MAX_WRITERS) == (status.MAX_VARIABLES, status.MAX_WRITERS)
 
 

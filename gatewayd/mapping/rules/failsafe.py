@@ -15,24 +15,8 @@ from gatewayd.report.wording import number
 
 __all__ = ["silent_motion"]
 
-_MOTION_WORDS = frozenset(
-    {
-        "drive",
-        "enable",
-        "execute",
-        "go",
-        "home",
-        "jog",
-        "motion",
-        "move",
-        "play",
-        "resume",
-        "run",
-        "speed",
-        "start",
-        "step",
-        "velocity",
-    }
+_MOTION_WORD = re.compile(
+    "drive|enable|execute|go|home|jog|motion|move|play|resume|run|speed|start|step|velocity", re.IGNORECASE
 )
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
 
@@ -58,17 +42,11 @@ def fallback_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
 def fallback_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A fallback value that the variable cannot have."""
     for variable in _lines(cell):
-        for key, fallback in (
-            ("on_release", variable.spec.on_release),
-            ("on_stale", variable.spec.on_stale),
-        ):
-            expected = None if fallback.value is None else _mismatch(variable, fallback.value)
-            if expected is not None and fallback.value is not None:
-                shown = (
-                    str(fallback.value).lower()
-                    if isinstance(fallback.value, bool)
-                    else number(fallback.value)
-                )
+        for key in ("on_release", "on_stale"):
+            value = getattr(variable.spec, key).value
+            expected = None if value is None else _mismatch(variable, value)
+            if expected is not None:
+                shown = str(value).lower() if isinstance(value, bool) else number(value)
                 message = f"`{variable.part.name}` ({variable.target}, {variable.type}) cannot be {shown}"
                 yield rule.at(variable.at(key), message, hint=f"write {expected}")
 
@@ -121,14 +99,13 @@ def silent_motion(cell: ExpandedCell) -> Iterator[tuple[ExpandedVariable, str]]:
 
 
 def _is_motion(variable: ExpandedVariable) -> bool:
-    words = {word.lower() for word in _WORD.findall(variable.part.name)}
-    return variable.moves or not words.isdisjoint(_MOTION_WORDS)
+    return variable.moves or any(map(_MOTION_WORD.fullmatch, _WORD.findall(variable.part.name)))
 
 
 @cell_rule("GW605")
 def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """On_stale or valid at an input, or on_release at an output."""
-    policies = {key: what for one in languages() for key, what in one.output_policies.items()}
+    policies = {key: what for language in languages() for key, what in language.output_policies.items()}
     for variable in _lines(cell):
         is_input = variable.direction is Direction.INPUT
         key, other = ("on_stale", "on_release") if is_input else ("on_release", "on_stale")
@@ -193,17 +170,14 @@ def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         limits = variable.spec.limits
         if variable.direction is Direction.OUTPUT or variable.kind is ValueKind.BOOL or limits is None:
             continue
-        if (
-            variable.spec.on_release.kind is FallbackKind.CLEAR
-            and limits[0] < limits[1]
-            and not limits[0] <= 0 <= limits[1]
-        ):
+        if variable.spec.on_release.kind is not FallbackKind.CLEAR or limits[0] <= 0 <= limits[1]:
+            continue
+        if limits[0] < limits[1]:
             low, high = map(number, limits)
             message = (
                 f"`{variable.part.name}` is cleared to 0 when its owner is lost, outside {low} to {high}"
             )
-            nearest = low if limits[0] > 0 else high
-            hint = f"write `on_release: {nearest}`, or `on_release: hold`"
+            hint = f"write `on_release: {low if limits[0] > 0 else high}`, or `on_release: hold`"
             written = "on_release" in variable.spec.model_fields_set
             yield rule.at(variable.at("on_release" if written else "limits"), message, hint=hint)
 

@@ -41,7 +41,7 @@ def split_group(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             assert lock.group is not None
             message = f"`{name}` cannot take over the group `{lock.name}` with one request"
             apart = (language.apart(members, cell) for language in languages())
-            related = tuple(one for one in apart if one is not None)[:1]
+            related = tuple(place for place in apart if place is not None)[:1]
             hint = "lay its variables side by side, or write `takeover: false`"
             yield rule.at(lock.group.key, message, hint=hint, related=related)
             break

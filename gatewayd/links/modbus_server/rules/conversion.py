@@ -7,7 +7,7 @@ from math import isclose, isfinite
 
 from gatewayd.core.definition import Direction, ValueKind
 from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProblem, placements_of
-from gatewayd.links.modbus_server.rules.wording import first_of_each_line, where
+from gatewayd.links.modbus_server.rules.wording import first_of_each_line, where, wrong
 from gatewayd.links.modbus_server.sections import ModbusPlaces
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
@@ -36,13 +36,8 @@ def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW702", Severity.WARNING)
 def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A real in an integer type without a scale."""
-    for placement in _numbers(cell):
-        if (
-            placement.variable.kind is ValueKind.FLOAT
-            and not TYPES[placement.type].is_real
-            and placement.type != "bool"
-            and placement.spec.scale is None
-        ):
+    for placement in _numbers(cell, ValueKind.FLOAT):
+        if _is_integer(placement) and placement.spec.scale is None:
             message = (
                 f"`{placement.variable.name}` is a real, {placement.type} at {where(placement)} "
                 "shows whole numbers only"
@@ -54,13 +49,9 @@ def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW703", Severity.WARNING)
 def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """An integer from the robot in a register too small for it."""
-    for placement in _numbers(cell):
-        variable = placement.variable
-        bounds = variable.range
-        if variable.direction is Direction.INPUT or variable.kind is not ValueKind.INT or bounds is None:
-            continue
-        low, high = _reach(placement)
-        if TYPES[placement.type].is_real or placement.type == "bool":
+    for placement in _numbers(cell, ValueKind.INT):
+        variable, bounds, (low, high) = placement.variable, placement.variable.range, _reach(placement)
+        if variable.direction is Direction.INPUT or bounds is None or not _is_integer(placement):
             continue
         if bounds[0] < low or bounds[1] > high:
             message = (
@@ -74,26 +65,18 @@ def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW704", Severity.WARNING)
 def coarse_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A scale too coarse for the limits."""
-    for placement in _numbers(cell):
+    for placement in _numbers(cell, ValueKind.FLOAT):
         limits = placement.variable.spec.limits
-        if (
-            limits is None
-            or limits[0] >= limits[1]
-            or placement.variable.kind is not ValueKind.FLOAT
-            or TYPES[placement.type].is_real
-            or placement.type == "bool"
-            or placement.spec.scale is None
-        ):
+        if limits is None or placement.spec.scale is None or not _is_integer(placement):
             continue
-        steps = (limits[1] - limits[0]) / abs(placement.scale)
-        if steps < _MIN_STEPS:
+        span = limits[1] - limits[0]
+        steps = span / abs(placement.scale)
+        if 0 < steps < _MIN_STEPS:
             message = (
                 f"the scale {number(placement.scale)} leaves {number(int(steps) + 1)} values of "
                 f"`{placement.variable.name}` between {number(limits[0])} and {number(limits[1])}"
             )
-            hint = (
-                f"robot value = raw * scale: use a finer scale such as {number(_fine(limits[1] - limits[0]))}"
-            )
+            hint = f"robot value = raw * scale: use a finer scale such as {number(_fine(span))}"
             yield rule.at(_key(placement, "scale"), message, hint=hint)
 
 
@@ -129,8 +112,7 @@ def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW706")
 def scale_of_zero(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A scale of zero."""
-    zero = [item for item in placements_of(cell) if item.problem is PlacementProblem.SCALE_OF_ZERO]
-    for placement in first_of_each_line(zero):
+    for placement in wrong(cell, PlacementProblem.SCALE_OF_ZERO):
         message = f"`{placement.variable.name}` has the scale 0"
         yield rule.at(_key(placement, "scale"), message, hint="leave `scale` out, or write for example 0.1")
 
@@ -151,9 +133,9 @@ def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW708", Severity.WARNING)
 def uneven_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """An integer with a scale that does not come out even."""
-    for placement in _numbers(cell):
+    for placement in _numbers(cell, ValueKind.INT):
         variable = placement.variable
-        if variable.kind is not ValueKind.INT or placement.type == "bool":
+        if placement.type == "bool":
             continue
         if variable.direction is Direction.INPUT:
             even = _whole(placement.scale) and _whole(placement.offset)
@@ -178,10 +160,10 @@ def _whole(value: float) -> bool:
 @cell_rule("GW709", Severity.WARNING)
 def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """An integer in a real that has too few digits for it."""
-    for placement in _numbers(cell):
+    for placement in _numbers(cell, ValueKind.INT):
         variable, digits = placement.variable, _FLOAT_DIGITS.get(placement.type)
         bounds = variable.range
-        if variable.kind is not ValueKind.INT or digits is None or bounds is None:
+        if digits is None or bounds is None:
             continue
         if max(-bounds[0], bounds[1]) > digits:
             message = (
@@ -228,9 +210,16 @@ def _round_trip(codec: Codec, value: float) -> float | None:
     return None if shown is None or not isfinite(shown) else float(shown)
 
 
-def _numbers(cell: ExpandedCell) -> Iterator[ExpandedPlacement]:
-    """The first of each line that lies in whole registers and has a codec."""
-    return (item for item in first_of_each_line(placements_of(cell)) if item.codec is not None)
+def _numbers(cell: ExpandedCell, kind: ValueKind | None = None) -> Iterator[ExpandedPlacement]:
+    """The first of each line that lies in whole registers and has a codec; of one kind, or of all."""
+    for placement in first_of_each_line(placements_of(cell)):
+        if placement.codec is not None and kind in (None, placement.variable.kind):
+            yield placement
+
+
+def _is_integer(placement: ExpandedPlacement) -> bool:
+    """Whether the register type is one of whole numbers."""
+    return not TYPES[placement.type].is_real and placement.type != "bool"
 
 
 def _reach(placement: ExpandedPlacement) -> tuple[float, float]:

@@ -74,13 +74,12 @@ def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     if modbus is None or not modbus.spec.allow:
         return
     for writer in cell.document.writers.values():
-        if writer.spec.by(ModbusWriter).modbus and not any(
-            _meet(network, modbus.spec.allow) for network in writer.spec.by(ModbusWriter).modbus
-        ):
-            shown = ", ".join(map(network_text, writer.spec.by(ModbusWriter).modbus[:3]))
+        networks = writer.spec.by(ModbusWriter).modbus
+        if networks and not _meet(networks, modbus.spec.allow):
+            shown = ", ".join(map(network_text, networks[:3]))
             message = f"the access list of the listener shuts the writer `{writer.name}` ({shown}) out"
             related = (Related(modbus.at("allow"), "the access list is here"),)
-            hint = f"add {network_text(writer.spec.by(ModbusWriter).modbus[0])} to `allow`"
+            hint = f"add {network_text(networks[0])} to `allow`"
             yield rule.at(writer.at("modbus"), message, hint=hint, related=related)
 
 
@@ -101,12 +100,10 @@ def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     if modbus is None or not ip_address(modbus.spec.listen.host).is_loopback:
         return
     for writer in cell.document.writers.values():
-        if writer.spec.by(ModbusWriter).modbus and not any(
-            _meet(network, _LOOPBACK) for network in writer.spec.by(ModbusWriter).modbus
-        ):
-            shown = network_text(writer.spec.by(ModbusWriter).modbus[0])
+        networks = writer.spec.by(ModbusWriter).modbus
+        if networks and not _meet(networks, _LOOPBACK):
             message = (
-                f"the writer `{writer.name}` ({shown}) cannot reach {modbus.spec.listen}, "
+                f"the writer `{writer.name}` ({network_text(networks[0])}) cannot reach {modbus.spec.listen}, "
                 "which only this machine can"
             )
             related = (Related(modbus.at("listen"), f"the listener is {modbus.spec.listen}"),)
@@ -121,14 +118,17 @@ def _listeners(cells: Sequence[ExpandedCell]) -> Iterator[tuple[ExpandedCell, Pa
             yield cell, modbus
 
 
-def _clash(one: str, other: str) -> bool:
-    if one == other:
+def _clash(host: str, other: str) -> bool:
+    if host == other:
         return False
-    first, second = ip_address(one), ip_address(other)
+    first, second = ip_address(host), ip_address(other)
     # An IPv6 wildcard takes the port of IPv4 too.
     wide = [address for address in (first, second) if address.is_unspecified]
     return any(address.version == 6 for address in wide) or (bool(wide) and first.version == second.version)
 
 
-def _meet(network: Network, allowed: Sequence[Network]) -> bool:
-    return any(item.version == network.version and item.overlaps(network) for item in allowed)
+def _meet(networks: Sequence[Network], allowed: Sequence[Network]) -> bool:
+    """Whether any of them has an address that is allowed."""
+    return any(
+        item.version == network.version and item.overlaps(network) for network in networks for item in allowed
+    )

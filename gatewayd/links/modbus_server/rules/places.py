@@ -6,35 +6,29 @@ from collections.abc import Iterator
 from itertools import groupby
 
 from gatewayd.core.definition import Direction
+from gatewayd.core.status_layout import BASE
 from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProblem, placements_of
-from gatewayd.links.modbus_server.rules.wording import AREA_WORDS, first_of_each_line, where
+from gatewayd.links.modbus_server.rules.wording import AREA_WORDS, first_of_each_line, where, wrong
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.modbus.areas import Area
+from gatewayd.modbus.areas import AREA_NAMES, MAX_READ_REGISTERS, MAX_WRITE_REGISTERS, Area
 
-__all__ = ["FIRST_STATUS_REGISTER"]
-
-FIRST_STATUS_REGISTER = 60000
-"""First register of the status block, in holding and input registers alike."""
+__all__: list[str] = []
 
 _LAST_ADDRESS = 0xFFFF
-_READ_LIMIT = 125
-_WRITE_LIMIT = 123
 _TRADITIONAL = {
     Area.HOLDING: range(40001, 50000),
     Area.INPUT: range(30001, 40000),
     Area.DISCRETE: range(10001, 20000),
 }
 _READ_ONLY = (Area.INPUT, Area.DISCRETE)
-_KEYS = {Area.HOLDING: "holding", Area.INPUT: "input", Area.COIL: "coil", Area.DISCRETE: "discrete"}
 
 
 @cell_rule("GW202")
 def beyond_last_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A value that runs past address 65535."""
-    beyond = [item for item in placements_of(cell) if item.problem is PlacementProblem.BEYOND_END]
-    for placement in first_of_each_line(beyond):
+    for placement in wrong(cell, PlacementProblem.BEYOND_END):
         last = placement.address + placement.words - 1
         message = (
             f"`{placement.variable.name}` would lie at {AREA_WORDS[placement.area]} {placement.address} "
@@ -50,12 +44,12 @@ def status_block(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     inside = [
         item
         for item in placements_of(cell)
-        if not item.area.of_bits and item.problem is None and item.addresses[-1] >= FIRST_STATUS_REGISTER
+        if not item.area.of_bits and item.problem is None and item.addresses[-1] >= BASE
     ]
     for placement in first_of_each_line(inside):
         message = (
             f"`{placement.variable.name}` lies at {where(placement)}, "
-            f"but registers from {FIRST_STATUS_REGISTER} on are the status block"
+            f"but registers from {BASE} on are the status block"
         )
         yield rule.at(placement.position, message, hint="place it below 60000")
 
@@ -80,8 +74,7 @@ def traditional_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW209")
 def number_in_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A number in a place that holds a single bit."""
-    wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.NUMBER_IN_BIT]
-    for placement in first_of_each_line(wrong):
+    for placement in wrong(cell, PlacementProblem.NUMBER_IN_BIT):
         variable = placement.variable
         message = (
             f"`{variable.name}` is a number ({variable.field}, {variable.type}) "
@@ -112,18 +105,16 @@ def input_in_read_only_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnost
 @cell_rule("GW211")
 def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Type bit at a whole register."""
-    wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.BIT_WITHOUT_PLACE]
-    for placement in first_of_each_line(wrong):
+    for placement in wrong(cell, PlacementProblem.BIT_WITHOUT_PLACE):
         message = f"`{placement.variable.name}` has the type bit, but {where(placement)} is a whole register"
-        hint = f"write the bit, {_KEYS[placement.area]}: {placement.address}.0, or type: bool"
+        hint = f"write the bit, {AREA_NAMES[placement.area]}: {placement.address}.0, or type: bool"
         yield rule.at(placement.position, message, hint=hint)
 
 
 @cell_rule("GW222")
 def type_of_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A number type for a place that holds a single bit."""
-    wrong = [item for item in placements_of(cell) if item.problem is PlacementProblem.TYPE_IN_BIT]
-    for placement in first_of_each_line(wrong):
+    for placement in wrong(cell, PlacementProblem.TYPE_IN_BIT):
         message = f"`{placement.variable.name}` has the type {placement.spec.type} at {where(placement)}"
         yield rule.at(placement.position, message, hint="leave `type` out")
 
@@ -134,12 +125,12 @@ def split_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     reported: set[tuple[str, int]] = set()
     for area in (Area.HOLDING, Area.INPUT):
         placed = [item for item in placements_of(cell) if item.area is area and item.problem is None]
-        writable = [
-            item
-            for item in placed
-            if item.area is Area.HOLDING and item.variable.direction is Direction.INPUT
-        ]
-        for limit, verb, items in ((_READ_LIMIT, "reads", placed), (_WRITE_LIMIT, "writes", writable)):
+        inputs = [item for item in placed if item.variable.direction is Direction.INPUT]
+        writable = inputs if area is Area.HOLDING else []
+        for limit, verb, items in (
+            (MAX_READ_REGISTERS, "reads", placed),
+            (MAX_WRITE_REGISTERS, "writes", writable),
+        ):
             for placement, start, boundary in _cut(items, limit):
                 key = placement.variable.part.name, id(placement.spec)
                 if key in reported:
@@ -177,17 +168,15 @@ def mixed_directions(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if other.variable.direction is placement.variable.direction or lines in reported:
             continue
         reported.add(lines)
+        register = f"{AREA_WORDS[placement.area]} {placement.address}"
+        notation = placement.area.notation(placement.address)
         message = (
-            f"`{placement.variable.name}` ({placement.variable.direction.value}) shares {_register(placement)} "
+            f"`{placement.variable.name}` ({placement.variable.direction.value}) shares {register} ({notation}) "
             f"with `{other.variable.name}` ({other.variable.direction.value})"
         )
         related = (Related(other.position, f"`{other.variable.name}`, {where(other)}"),)
         hint = "use one register for inputs and another for outputs"
         yield rule.at(placement.position, message, hint=hint, related=related)
-
-
-def _register(placement: ExpandedPlacement) -> str:
-    return f"{AREA_WORDS[placement.area]} {placement.address} ({placement.area.notation(placement.address)})"
 
 
 @cell_rule("GW214")
@@ -198,11 +187,7 @@ def register_overlap(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         message = (
             f"`{later.variable.name}` lies at {where(later)}, where `{earlier.variable.name}` lies{more}"
         )
-        related = (
-            Related(earlier.position, f"`{earlier.variable.name}`, {where(earlier)}, first used here"),
-        )
-        hint = _room(cell, later)
-        yield rule.at(later.position, message, hint=hint, related=related)
+        yield _overlap(rule, cell, later, earlier, message)
 
 
 @cell_rule("GW215")
@@ -213,11 +198,14 @@ def bit_in_number(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             f"`{later.variable.name}` lies at {where(later)}, inside the same register as "
             f"`{earlier.variable.name}`: one is a bit, the other a number"
         )
-        related = (
-            Related(earlier.position, f"`{earlier.variable.name}`, {where(earlier)}, first used here"),
-        )
-        hint = _room(cell, later)
-        yield rule.at(later.position, message, hint=hint, related=related)
+        yield _overlap(rule, cell, later, earlier, message)
+
+
+def _overlap(
+    rule: Rule, cell: ExpandedCell, later: ExpandedPlacement, earlier: ExpandedPlacement, message: str
+) -> Diagnostic:
+    first = Related(earlier.position, f"`{earlier.variable.name}`, {where(earlier)}, first used here")
+    return rule.at(later.position, message, hint=_room(cell, later), related=(first,))
 
 
 def _overlaps(
@@ -233,7 +221,7 @@ def _overlaps(
         reach: ExpandedPlacement | None = None
         for placement in sorted(placed, key=_span):
             if reach is not None and _span(placement)[0] < _span(reach)[1]:
-                earlier, later = sorted((reach, placement), key=_order)
+                earlier, later = sorted((reach, placement), key=lambda item: item.position)
                 if ((earlier.bit is None) != (later.bit is None)) == mixed:
                     key = (*_line(later), *_line(earlier))
                     pairs.setdefault(key, []).append((later, earlier))
@@ -256,10 +244,6 @@ def _span(placement: ExpandedPlacement) -> tuple[int, int]:
     return start, start + placement.words * 16
 
 
-def _order(placement: ExpandedPlacement) -> tuple[int, int]:
-    return placement.position.line, placement.position.column
-
-
 def _room(cell: ExpandedCell, placement: ExpandedPlacement) -> str:
     """Remedy for an overlap: the next addresses of the area where the whole line fits."""
     area = placement.area
@@ -267,22 +251,18 @@ def _room(cell: ExpandedCell, placement: ExpandedPlacement) -> str:
     line = [item for item in here if _line(item) == _line(placement)]
     start = min(item.address for item in line)
     length = max(item.addresses[-1] for item in line) + 1 - start
-    end = _LAST_ADDRESS + 1 if area.of_bits else FIRST_STATUS_REGISTER
-    for taken in sorted((item.addresses for item in here if _line(item) != _line(placement)), key=_first):
-        if taken[0] < start + length:
-            start = max(start, taken[-1] + 1)
-        else:
+    end = _LAST_ADDRESS + 1 if area.of_bits else BASE
+    others = [item.addresses for item in here if _line(item) != _line(placement)]
+    for taken in sorted(others, key=lambda addresses: addresses.start):
+        if taken.start >= start + length:
             break
+        start = max(start, taken.stop)
     if start + length > end:
         return "shorten one of the two lines, or use another area"
     last = start + length - 1
     if length == 1:
         return f"the line fits at {start} ({area.notation(start)})"
     return f"the line fits at {start} to {last} ({area.notation(start)} to {area.notation(last)})"
-
-
-def _first(addresses: range) -> int:
-    return addresses[0]
 
 
 @cell_rule("GW220")
@@ -293,5 +273,4 @@ def no_modbus_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         return
     first = placements[0]
     message = f"`{first.variable.name}` has a Modbus address, but the file has no section `modbus`"
-    hint = "add `modbus: {listen: 127.0.0.1:1502}`"
-    yield rule.at(first.position, message, hint=hint)
+    yield rule.at(first.position, message, hint="add `modbus: {listen: 127.0.0.1:1502}`")

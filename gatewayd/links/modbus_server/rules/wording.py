@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from gatewayd.links.modbus_server.expand import ExpandedPlacement
+from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProblem, placements_of
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.modbus.areas import Area
 
-__all__ = ["AREA_WORDS", "first_of_each_line", "where"]
+__all__ = ["AREA_WORDS", "first_of_each_line", "where", "wrong"]
 
 AREA_WORDS = {
     Area.HOLDING: "holding register",
@@ -37,3 +38,8 @@ def first_of_each_line(placements: Iterable[ExpandedPlacement]) -> Iterator[Expa
         if key not in seen:
             seen.add(key)
             yield placement
+
+
+def wrong(cell: ExpandedCell, problem: PlacementProblem) -> Iterator[ExpandedPlacement]:
+    """The first of each line that cannot lie where the file puts it, for this reason."""
+    return first_of_each_line(item for item in placements_of(cell) if item.problem is problem)
