@@ -36,12 +36,12 @@ class CanType(Enum):
         """`struct` format character; empty for strings and domains."""
         self.bits = bits
         """Length in a PDO; 0 for strings and domains, which no PDO carries."""
-        self._struct = struct.Struct("<" + char) if char else None
+        self._struct = struct.Struct("<" + char)
 
     @property
     def size(self) -> int | None:
         """Bytes of an SDO transfer; None where any length goes."""
-        return self._struct.size if self._struct is not None else None
+        return self._struct.size if self.char else None
 
     @property
     def is_real(self) -> bool:
@@ -56,11 +56,9 @@ class CanType(Enum):
 
     def pack(self, value: Value) -> bytes:
         """Little-endian bytes of a number. OverflowError or struct.error if the type cannot hold it."""
-        assert self._struct is not None
         return self._struct.pack(value)
 
     def unpack(self, data: bytes) -> Value:
         """The number in little-endian bytes of exactly `size`."""
-        assert self._struct is not None
         value: Value = self._struct.unpack(data)[0]
         return value

@@ -93,8 +93,6 @@ class Emergency:
         self._history: deque[int] = deque(maxlen=HISTORY)
         self._waiting: deque[bytes] = deque(maxlen=CAPACITY)
         self._not_before = -math.inf
-        self.lost = 0
-        """Messages that found the queue full and pushed the oldest one out."""
         u32, default = CanType.UNSIGNED32, Function.EMCY + node
         self._cob_id = Entry.parameter(
             0, "COB-ID EMCY", u32, default, plus_node=True, check=self._check_cob_id
@@ -182,8 +180,6 @@ class Emergency:
         return self._not_before if self._waiting and self._allowed() else math.inf
 
     def _queue(self, code: int, data: bytes, now: float) -> None:
-        if len(self._waiting) == CAPACITY:
-            self.lost += 1
         message = code.to_bytes(2, "little") + bytes([self.register]) + data[:5].ljust(5, b"\0")
         self._waiting.append(message)
         self.tick(now)

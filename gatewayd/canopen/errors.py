@@ -1,4 +1,4 @@
-"""Error frames of SocketCAN: what a CAN controller tells about itself and the wire (linux/can/error.h)."""
+"""Error frames of SocketCAN: what a CAN controller reports of itself and the wire (linux/can/error.h)."""
 
 from __future__ import annotations
 
@@ -50,8 +50,6 @@ class Violation(IntFlag):
 
 _NO_CONTROLLER = ControllerFlags(0)
 _NO_VIOLATION = Violation(0)
-_ACKNOWLEDGE_SLOT = 0x19
-"""Byte 3 of a protocol error where nobody acknowledged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,23 +59,9 @@ class ErrorFrame:
     classes: ErrorClass
     controller: ControllerFlags = _NO_CONTROLLER
     violation: Violation = _NO_VIOLATION
-    location: int = 0
-    """Where in the frame the protocol was violated; 0: unknown."""
-    transceiver: int = 0
-    """Wiring fault as the transceiver reports it; 0: none."""
     tx_errors: int | None = None
-    """Transmit error counter, where the driver tells it."""
+    """Transmit error counter, where the driver reports it."""
     rx_errors: int | None = None
-
-    @property
-    def overrun(self) -> bool:
-        """Whether the controller lost received frames."""
-        return bool(self.controller & ControllerFlags.RX_OVERFLOW)
-
-    @property
-    def unacknowledged(self) -> bool:
-        """Whether nobody acknowledged a frame: this node is alone, or the others have another bit rate."""
-        return bool(self.classes & ErrorClass.NO_ACKNOWLEDGE) or self.location == _ACKNOWLEDGE_SLOT
 
     def __str__(self) -> str:
         words = [_spell(self.classes & ~ErrorClass.COUNTERS), _spell(self.controller), _spell(self.violation)]
@@ -101,8 +85,6 @@ def decode(can_id: int, data: bytes) -> ErrorFrame:
         classes,
         ControllerFlags(bytes_[1] & 0x7F) if about_controller else _NO_CONTROLLER,
         Violation(bytes_[2]) if classes & ErrorClass.PROTOCOL else _NO_VIOLATION,
-        bytes_[3] if classes & ErrorClass.PROTOCOL else 0,
-        bytes_[4] if classes & ErrorClass.TRANSCEIVER else 0,
         bytes_[6] if counted else None,
         bytes_[7] if counted else None,
     )

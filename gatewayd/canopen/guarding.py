@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 
-from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Entry, Object, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.gap import spared
-from gatewayd.canopen.nmt import NmtState
+from gatewayd.canopen.nmt import NmtSlave, NmtState
 
 __all__ = ["TOGGLE", "NodeGuarding"]
 
@@ -22,30 +21,25 @@ class NodeGuarding:
     """Answers remote frames on 700h + node-ID, and misses them if they stay away for the node life time.
 
     The life time is 100Ch milliseconds times 100Dh; supervision begins with the first request. `lost(now)` and
-    `back(now)` are told of the master. Nothing happens while `heartbeat()` says that this node produces a heartbeat.
+    `back(now)` are called for the master. Nothing happens while `heartbeat()` says that this node produces a heartbeat.
     """
 
     def __init__(
         self,
         send: Send,
-        node: Callable[[], int],
-        state: Callable[[], NmtState],
+        nmt: NmtSlave,
         heartbeat: Callable[[], bool],
         *,
         lost: Callable[[float], None],
         back: Callable[[float], None],
     ) -> None:
         self._send = send
-        self._node = node
-        self._state = state
+        self._nmt = nmt
         self._heartbeat = heartbeat
         self._lost = lost
         self._back = back
-        self._toggle = 0
-        self._due = math.inf
-        self._asked = -math.inf
-        self._is_lost = False
         self._spared = False
+        self.restart()
         self._time = Entry.parameter(0, "Guard time", CanType.UNSIGNED16, 0, changed=self._supervise)
         self._factor = Entry.parameter(0, "Life time factor", CanType.UNSIGNED8, 0, changed=self._supervise)
 
@@ -54,7 +48,7 @@ class NodeGuarding:
         yield variable(0x100C, self._time)
         yield variable(0x100D, self._factor)
 
-    def restart(self, now: float) -> None:
+    def restart(self) -> None:
         """Begin with toggle bit 0 and without supervision."""
         self._toggle = 0
         self._due = math.inf
@@ -72,11 +66,10 @@ class NodeGuarding:
 
         `late`: it waited while the process stood still. It is a sign of the master, who waits for no answer any more.
         """
-        if not frame.remote or self._heartbeat() or self._state() is NmtState.INITIALISING:
+        if not frame.remote or self._heartbeat() or self._nmt.state is NmtState.INITIALISING:
             return
         if not late:
-            answer = bytes([self._state() | self._toggle])
-            self._send(Frame(Function.ERROR_CONTROL + self._node(), answer), Priority.NEWEST)
+            self._send(self._nmt.report(self._toggle), Priority.NEWEST)
             self._toggle ^= TOGGLE
         self._asked = now
         self._spared = False

@@ -13,7 +13,7 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Entry, Object, array, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.gap import spared
-from gatewayd.canopen.nmt import NmtState
+from gatewayd.canopen.nmt import NmtSlave, NmtState
 
 __all__ = ["MIN_CONSUMERS", "WATCH", "Consumer", "HeartbeatConsumer", "HeartbeatProducer", "Seen", "Watch"]
 
@@ -38,18 +38,14 @@ class HeartbeatProducer:
     def __init__(
         self,
         send: Send,
-        node: Callable[[], int],
-        state: Callable[[], NmtState],
+        nmt: NmtSlave,
         alive: Callable[[float], bool],
         milliseconds: int,
     ) -> None:
         self._send = send
-        self._node = node
-        self._state = state
+        self._nmt = nmt
         self._alive = alive
         self._due = math.inf
-        self.withheld = 0
-        """Heartbeats that were due and not sent because the core did not live."""
         self._period = Entry.parameter(
             0, "Producer heartbeat time", CanType.UNSIGNED16, milliseconds, changed=self._changed
         )
@@ -80,14 +76,12 @@ class HeartbeatProducer:
         frame = self.frame(now)
         if frame is not None:
             self._send(frame, Priority.NEWEST)
-        elif self._state() is not NmtState.INITIALISING:
-            self.withheld += 1
 
     def frame(self, now: float) -> Frame | None:
         """The heartbeat as it would be sent now; None if there is none."""
-        if not self.enabled or self._state() is NmtState.INITIALISING or not self._alive(now):
+        if not self.enabled or self._nmt.state is NmtState.INITIALISING or not self._alive(now):
             return None
-        return Frame(Function.ERROR_CONTROL + self._node(), bytes([self._state()]))
+        return self._nmt.report()
 
     def next_deadline(self, now: float) -> float:
         """When `tick` has something to do."""
@@ -180,13 +174,11 @@ class HeartbeatConsumer:
 
     def state(self, node: int) -> Watch | None:
         """How far a node is known; None if it is not watched."""
-        watched = self._watched.get(node)
-        return watched.state if watched is not None else None
+        return self._watched[node].state if node in self._watched else None
 
     def time(self, node: int) -> float:
         """Seconds for which a node may be silent; infinity if it is not watched."""
-        watched = self._watched.get(node)
-        return watched.timeout if watched is not None else math.inf
+        return self._watched[node].timeout if node in self._watched else math.inf
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still and received nothing: each living node has its time again."""

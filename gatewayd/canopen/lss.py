@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import Enum, IntEnum
+from typing import ClassVar
 
 from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.frame import Frame, Priority, Send
@@ -60,11 +61,14 @@ class Command(IntEnum):
     INQUIRE_NODE = 0x5E
 
 
+Handler = Callable[["LssSlave", bytes, float], None]
+
+
 class LssSlave:
     """LSS of one node.
 
     `node` is the node-ID to begin with, 255 for none. `bit_rates`: what the link can switch to, the present rate
-    included. `configured(now)`: a node without node-ID has got one. `store(node, bit_rate)`: keep both and tell
+    included. `configured(now)`: a node without node-ID has got one. `store(node, bit_rate)`: keep both; returns
     whether that worked. `activate(bit_rate, delay, now)`: be silent for `delay` seconds, switch, be silent again.
     """
 
@@ -94,27 +98,6 @@ class LssSlave:
         self._select: dict[int, int] = {}
         self._identify: dict[int, int] = {}
         self._position = 0
-        self._always: dict[int, Callable[[bytes, float], None]] = {
-            Command.SWITCH_GLOBAL: self._switch_global,
-            Command.IDENTIFY_NON_CONFIGURED: self._identify_non_configured,
-            Command.FASTSCAN: self._fastscan,
-        }
-        self._always |= dict.fromkeys(
-            range(Command.SELECT_VENDOR, Command.SELECT_SERIAL + 1), self._switch_selective
-        )
-        self._always |= dict.fromkeys(
-            range(Command.IDENTIFY_VENDOR, Command.IDENTIFY_SERIAL_HIGH + 1), self._identify_remote
-        )
-        self._configuring: dict[int, Callable[[bytes, float], None]] = {
-            Command.CONFIGURE_NODE: self._configure_node,
-            Command.CONFIGURE_BIT_TIMING: self._configure_bit_timing,
-            Command.ACTIVATE_BIT_TIMING: self._activate_bit_timing,
-            Command.STORE: self._store_configuration,
-            Command.INQUIRE_NODE: self._inquire_node,
-        }
-        self._configuring |= dict.fromkeys(
-            range(Command.INQUIRE_VENDOR, Command.INQUIRE_SERIAL + 1), self._inquire_address
-        )
 
     def restart(self) -> None:
         """NMT reset: the pending node-ID is in force, and LSS waits."""
@@ -128,11 +111,11 @@ class LssSlave:
         """A frame with COB-ID 7E5h. Anything that is no request for this state is ignored, as CiA 305 demands."""
         if frame.remote or len(frame.data) != 8:
             return
-        handler = self._always.get(frame.data[0])
+        handler = self.IN_ANY_STATE.get(frame.data[0])
         if handler is None and self.state is LssState.CONFIGURATION:
-            handler = self._configuring.get(frame.data[0])
+            handler = self.CONFIGURING.get(frame.data[0])
         if handler is not None:
-            handler(frame.data, now)
+            handler(self, frame.data, now)
 
     def _switch_global(self, data: bytes, now: float) -> None:
         if data[1] == 0:
@@ -228,3 +211,20 @@ class LssSlave:
 
     def _answer(self, data: bytes) -> None:
         self._send(Frame(Function.LSS_RESPONSE, data.ljust(8, b"\0")), Priority.ORDERED)
+
+    IN_ANY_STATE: ClassVar[dict[int, Handler]] = {
+        Command.SWITCH_GLOBAL: _switch_global,
+        **dict.fromkeys(range(Command.SELECT_VENDOR, Command.SELECT_SERIAL + 1), _switch_selective),
+        **dict.fromkeys(range(Command.IDENTIFY_VENDOR, Command.IDENTIFY_SERIAL_HIGH + 1), _identify_remote),
+        Command.IDENTIFY_NON_CONFIGURED: _identify_non_configured,
+        Command.FASTSCAN: _fastscan,
+    }
+    CONFIGURING: ClassVar[dict[int, Handler]] = {
+        Command.CONFIGURE_NODE: _configure_node,
+        Command.CONFIGURE_BIT_TIMING: _configure_bit_timing,
+        Command.ACTIVATE_BIT_TIMING: _activate_bit_timing,
+        Command.STORE: _store_configuration,
+        **dict.fromkeys(range(Command.INQUIRE_VENDOR, Command.INQUIRE_SERIAL + 1), _inquire_address),
+        Command.INQUIRE_NODE: _inquire_node,
+    }
+    """What is served in the state CONFIGURATION alone."""

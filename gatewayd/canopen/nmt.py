@@ -74,7 +74,7 @@ ALLOWED: dict[NmtState, frozenset[Service]] = {
 class NmtSlave:
     """The state of one node.
 
-    `node` tells the present node-ID. `changed(old, new, now)` is called after each change of state, `reset(command,
+    `node` gives the present node-ID. `changed(old, new, now)` is called after each change of state, `reset(command,
     now)` while the node initialises, before its boot-up: it gives the parameters their power-on values.
     """
 
@@ -88,8 +88,6 @@ class NmtSlave:
         autostart: bool = False,
     ) -> None:
         self.state = NmtState.INITIALISING
-        self.commands = 0
-        """Commands carried out."""
         self._send = send
         self._node = node
         self._changed = changed
@@ -99,6 +97,10 @@ class NmtSlave:
     def allows(self, service: Service) -> bool:
         """Whether the service runs in the present state."""
         return service in ALLOWED[self.state]
+
+    def report(self, toggle: int = 0) -> Frame:
+        """The state as boot-up, heartbeat and guarding report it; guarding adds a toggle bit."""
+        return Frame(Function.ERROR_CONTROL + self._node(), bytes([self.state | toggle]))
 
     def receive(self, frame: Frame, now: float) -> None:
         """A frame with COB-ID 0. Wrong lengths, other nodes' commands and unknown commands are ignored."""
@@ -112,7 +114,6 @@ class NmtSlave:
         target = TRANSITIONS.get((self.state, command))
         if target is None:
             return
-        self.commands += 1
         self._enter(target, now)
         if target is NmtState.INITIALISING:
             self._reset(command, now)
@@ -125,7 +126,7 @@ class NmtSlave:
         """
         if self.state is not NmtState.INITIALISING or self._node() == UNCONFIGURED:
             return
-        self._send(Frame(Function.ERROR_CONTROL + self._node(), bytes([0])), Priority.EVENT)
+        self._send(self.report(), Priority.EVENT)
         self._enter(NmtState.PRE_OPERATIONAL, now)
         if self._autostart:
             self._enter(NmtState.OPERATIONAL, now)

@@ -31,7 +31,7 @@ __all__ = [
 ORDERED_CAPACITY = 256
 """ORDERED frames that may wait: a whole SDO block (127 segments) and what comes up meanwhile."""
 EVENT_CAPACITY = 64
-"""EVENT frames that may wait; of more of them the oldest are lost, because the last ones tell how things stand."""
+"""EVENT frames that may wait; of more of them the oldest are lost, because the last ones say how things stand."""
 NEWEST_CAPACITY = 513
 """COB-IDs of cyclic frames that may wait: as many as a node can have TPDOs, and its heartbeat."""
 PATIENCE = 8
@@ -46,12 +46,7 @@ Renew = Callable[[int], Frame | None]
 class TransmitQueue:
     """Frames that wait. Bounded: a frame that finds no room is dropped and counted."""
 
-    def __init__(
-        self,
-        ordered_capacity: int = ORDERED_CAPACITY,
-        newest_capacity: int = NEWEST_CAPACITY,
-        event_capacity: int = EVENT_CAPACITY,
-    ) -> None:
+    def __init__(self) -> None:
         self.overflow = 0
         """Frames that found no room."""
         self.replaced = 0
@@ -59,9 +54,6 @@ class TransmitQueue:
         self._ordered: deque[Frame] = deque()
         self._events: deque[Frame] = deque()
         self._newest: dict[int, Frame] = {}
-        self._ordered_capacity = ordered_capacity
-        self._newest_capacity = newest_capacity
-        self._event_capacity = event_capacity
         self._passed = 0
 
     def __len__(self) -> int:
@@ -74,7 +66,7 @@ class TransmitQueue:
         if priority is Priority.EVENT:
             self._put_event(frame)
             return True
-        if len(self._ordered) >= self._ordered_capacity:
+        if len(self._ordered) >= ORDERED_CAPACITY:
             self.overflow += 1
             return False
         self._ordered.append(frame)
@@ -121,7 +113,7 @@ class TransmitQueue:
     def _put_newest(self, frame: Frame) -> bool:
         if frame.can_id in self._newest:
             self.replaced += 1
-        elif len(self._newest) >= self._newest_capacity:
+        elif len(self._newest) >= NEWEST_CAPACITY:
             self.overflow += 1
             return False
         self._newest[frame.can_id] = frame
@@ -131,7 +123,7 @@ class TransmitQueue:
         # A heartbeat from before a boot-up message must not follow it.
         if self._newest.pop(frame.can_id, None) is not None:
             self.replaced += 1
-        if len(self._events) >= self._event_capacity:
+        if len(self._events) >= EVENT_CAPACITY:
             self.overflow += 1
             self._events.popleft()
         self._events.append(frame)
@@ -166,9 +158,8 @@ class Transmitter:
         now: Callable[[], float],
         punctual: Callable[[Frame], bool] | None = None,
         overdue: Callable[[], bool] = lambda: False,
-        queue: TransmitQueue | None = None,
     ) -> None:
-        self.queue = TransmitQueue() if queue is None else queue
+        self.queue = TransmitQueue()
         self.discarded = 0
         """Frames that were dropped because the bus was away, or because they may not wait."""
         self._offer = offer
@@ -198,7 +189,7 @@ class Transmitter:
         old = priority is Priority.NEWEST and self._overdue()
         if self._open and not self.queue and not old and self._offer(frame):
             return True
-        # Asked again: a bus that fails at the frame it is offered closes us, and will never tell of room for that one.
+        # Asked again: a bus that fails at the frame it is offered closes us, and will never report room for that one.
         if not self._open:
             self.discarded += 1
             return False

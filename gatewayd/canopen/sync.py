@@ -61,8 +61,6 @@ class SyncService:
         self._last = -math.inf
         self.count = 0
         """SYNC messages heard or sent."""
-        self.missed = 0
-        """SYNC messages that were due and that the bus did not take."""
         u8, u32, changed = CanType.UNSIGNED8, CanType.UNSIGNED32, self._configured
         cob_id = plan.cob_id | (PRODUCER if plan.producer else 0)
         self._cob_id = Entry.parameter(
@@ -136,11 +134,9 @@ class SyncService:
         overflow = self._overflow.number
         counter = self._counter % overflow + 1 if overflow else None
         frame = Frame(self.cob_id, b"" if counter is None else bytes([counter]))
-        if not self._send(frame, Priority.AT_ONCE):
-            self.missed += 1
-            return
-        self._counter = counter or 0
-        self._sync(counter, now)
+        if self._send(frame, Priority.AT_ONCE):
+            self._counter = counter or 0
+            self._sync(counter, now)
 
     def next_deadline(self, now: float) -> float:
         """When `tick` has something to do."""

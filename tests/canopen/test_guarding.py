@@ -5,7 +5,7 @@ import math
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.guarding import NodeGuarding
 from gatewayd.canopen.nmt import NmtState
-from tests.links.canopen_node.wire import Client, Wire
+from tests.links.canopen_node.wire import Client, Wire, slave
 
 ASK = Frame(0x705, remote=True, length=1)
 
@@ -15,13 +15,11 @@ class Guarded:
 
     def __init__(self) -> None:
         self.wire = Wire()
-        self.state = NmtState.OPERATIONAL
         self.heartbeat = False
         self.told: list[str] = []
         self.service = NodeGuarding(
             self.wire.send,
-            lambda: 5,
-            lambda: self.state,
+            slave(5, NmtState.OPERATIONAL),
             lambda: self.heartbeat,
             lost=lambda _now: self.told.append("lost"),
             back=lambda _now: self.told.append("back"),
@@ -36,7 +34,7 @@ class Guarded:
 def test_answers_with_a_toggle_bit_that_starts_with_0() -> None:
     guarded = Guarded()
     assert [guarded.ask()[0].data for _ in range(3)] == [b"\x05", b"\x85", b"\x05"]
-    guarded.service.restart(1.0)
+    guarded.service.restart()
     assert guarded.ask() == [Frame(0x705, b"\x05")]
 
 

@@ -10,7 +10,7 @@ from gatewayd.canopen.dictionary import AbortCode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.heartbeat import MIN_CONSUMERS, Consumer, HeartbeatConsumer, HeartbeatProducer, Watch
 from gatewayd.canopen.nmt import NmtState
-from tests.links.canopen_node.wire import Client, Wire
+from tests.links.canopen_node.wire import Client, Wire, slave
 
 
 class Producer:
@@ -18,11 +18,9 @@ class Producer:
 
     def __init__(self, milliseconds: int) -> None:
         self.wire = Wire()
-        self.state = NmtState.PRE_OPERATIONAL
+        self.nmt = slave(5, NmtState.PRE_OPERATIONAL)
         self.alive = True
-        self.service = HeartbeatProducer(
-            self.wire.send, lambda: 5, lambda: self.state, lambda _now: self.alive, milliseconds
-        )
+        self.service = HeartbeatProducer(self.wire.send, self.nmt, lambda _now: self.alive, milliseconds)
         self.client = Client(self.service.objects())
         self.service.restart(0.0)
 
@@ -45,7 +43,7 @@ def test_cct_heartbeat_01_first_one_period_after_boot_up() -> None:
 def test_cct_heartbeat_02_tells_the_nmt_state() -> None:
     producer = Producer(100)
     for state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED):
-        producer.state = state
+        producer.nmt.state = state
         producer.service.tick(producer.service.next_deadline(0.0))
     assert producer.wire.take() == [Frame(0x705, b"\x7f"), Frame(0x705, b"\x05"), Frame(0x705, b"\x04")]
 
@@ -63,7 +61,6 @@ def test_no_heartbeat_while_the_core_does_not_live() -> None:
     producer = Producer(100)
     producer.alive = False
     assert producer.run(0.0, 1.05) == []
-    assert producer.service.withheld == 10
     producer.alive = True
     assert len(producer.run(1.05, 1.25)) == 2
 

@@ -109,8 +109,10 @@ def test_a_heartbeat_that_waits_holds_up_no_pdo_behind_it() -> None:
     assert emptied(queue).index(Frame(0x181)) <= 1
 
 
-def test_full_queue_drops_the_new_frame_and_counts_it() -> None:
-    queue = TransmitQueue(ordered_capacity=2, newest_capacity=1)
+def test_full_queue_drops_the_new_frame_and_counts_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gatewayd.canopen.queue.ORDERED_CAPACITY", 2)
+    monkeypatch.setattr("gatewayd.canopen.queue.NEWEST_CAPACITY", 1)
+    queue = TransmitQueue()
     assert [queue.put(Frame(0x581, bytes([n])), Priority.ORDERED) for n in range(3)] == [True, True, False]
     assert [queue.put(Frame(0x181 + n), Priority.NEWEST) for n in range(2)] == [True, False]
     assert queue.overflow == 2

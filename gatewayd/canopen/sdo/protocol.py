@@ -47,35 +47,25 @@ class Request(Enum):
     UNKNOWN = auto()
 
 
-_SPECIFIERS = {
-    0: Request.DOWNLOAD_SEGMENT,
-    1: Request.DOWNLOAD,
-    2: Request.UPLOAD,
-    3: Request.UPLOAD_SEGMENT,
-    4: Request.ABORT,
-}
-"""Client command specifier, bits 7-5."""
 _BLOCK_UPLOAD = (
     Request.BLOCK_UPLOAD,
     Request.BLOCK_UPLOAD_END,
     Request.BLOCK_UPLOAD_ACKNOWLEDGE,
     Request.BLOCK_UPLOAD_START,
 )
-"""Specifier 5 by its subcommand, bits 1-0."""
-_BLOCK_DOWNLOAD = (Request.BLOCK_DOWNLOAD, Request.BLOCK_DOWNLOAD_END)
-"""Specifier 6 by its subcommand, bit 0."""
+_SPECIFIERS = (
+    (Request.DOWNLOAD_SEGMENT,),
+    (Request.DOWNLOAD,),
+    (Request.UPLOAD,),
+    (Request.UPLOAD_SEGMENT,),
+    (Request.ABORT,),
+    _BLOCK_UPLOAD,
+    (Request.BLOCK_DOWNLOAD, Request.BLOCK_DOWNLOAD_END),
+    (Request.UNKNOWN,),
+)
+"""By the client command specifier (bits 7-5), then by the subcommand in the lowest bits, where there is one."""
 
-
-def _request(command: int) -> Request:
-    specifier = command >> 5
-    if specifier == 5:
-        return _BLOCK_UPLOAD[command & 3]
-    if specifier == 6:
-        return _BLOCK_DOWNLOAD[command & 1]
-    return _SPECIFIERS.get(specifier, Request.UNKNOWN)
-
-
-REQUESTS = tuple(map(_request, range(256)))
+REQUESTS = tuple(kinds[low % len(kinds)] for kinds in _SPECIFIERS for low in range(32))
 """What a command byte means."""
 BLOCK_SEGMENTS = tuple(Request.ABORT if command == 0x80 else Request.BLOCK_SEGMENT for command in range(256))
 """What it means while the segments of a block download come: a sequence number, for all but an abort."""

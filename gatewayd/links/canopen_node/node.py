@@ -105,7 +105,9 @@ class Node:
             store=self._store_lss,
             activate=self._observer.switch_bit_rate,
         )
-        self.nmt = NmtSlave(self._send, self._node, self._nmt_changed, self._reset, autostart=plan.autostart)
+        self.nmt = NmtSlave(
+            self._send, lambda: self.lss.node, self._nmt_changed, self._reset, autostart=plan.autostart
+        )
         self.emergency = Emergency(self._send, node, self._emergencies_allowed)
         self.robot_errors = RobotErrors(
             cell, self.emergency, lambda: self._started and self.nmt.state is not NmtState.INITIALISING
@@ -119,7 +121,7 @@ class Node:
             lose_node=self._lose_node,
             lose_rpdo=partial(self._lose, plan.rpdo_writer),
         )
-        self.producer = HeartbeatProducer(self._send, self._node, self._state, alive, plan.heartbeat)
+        self.producer = HeartbeatProducer(self._send, self.nmt, alive, plan.heartbeat)
         self.consumer = HeartbeatConsumer(
             plan.consumers,
             lost=self.errors.heartbeat_lost,
@@ -136,8 +138,7 @@ class Node:
         self._peers = Peers(cell, self.promises, self.consumer, self._waiting)
         self.guarding = NodeGuarding(
             self._send,
-            self._node,
-            self._state,
+            self.nmt,
             lambda: self.producer.enabled,
             lost=self.errors.guarding_lost,
             back=self.errors.guarding_back,
@@ -396,7 +397,7 @@ class Node:
             )
         self.consumer.restart(now)
         self.promises.restart()
-        self.guarding.restart(now)
+        self.guarding.restart()
         self.sync.restart(now)
         self._route()
         self.errors.bus_seen(self.bus, now)
@@ -483,9 +484,3 @@ class Node:
 
     def _store_lss(self, node: int, bit_rate: int) -> bool:
         return self.parameters.save_lss(node, bit_rate if bit_rate != self.plan.bitrate else None)
-
-    def _node(self) -> int:
-        return self.lss.node
-
-    def _state(self) -> NmtState:
-        return self.nmt.state

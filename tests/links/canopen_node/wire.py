@@ -8,8 +8,9 @@ import pytest
 
 from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary, Object
 from gatewayd.canopen.frame import Frame, Priority
+from gatewayd.canopen.nmt import NmtSlave, NmtState
 
-__all__ = ["Client", "Wire"]
+__all__ = ["Client", "Wire", "slave"]
 
 
 class Wire:
@@ -31,6 +32,13 @@ class Wire:
     def take(self) -> list[Frame]:
         frames, self.frames = self.frames, []
         return frames
+
+
+def slave(node: int, state: NmtState) -> NmtSlave:
+    """An NMT slave in a state that the test may change; it sends nothing by itself."""
+    made = NmtSlave(lambda _frame, _priority: True, lambda: node, lambda *_: None, lambda *_: None)
+    made.state = state
+    return made
 
 
 class Client:
