@@ -1,1 +1,1 @@
-"""The cell as a CANopen node: CiA 301 slave services, pure and clockless, and one asyncio shell around them."""
+"""CANopen as a library: the services of a CiA 301 slave, pure and without a clock, and drivers for CAN buses."""

@@ -50,7 +50,7 @@ class CanType(Enum):
 
     @property
     def bounds(self) -> tuple[int, int]:
-        """Least and greatest number of an integer type."""
+        """Smallest and largest number of an integer type."""
         signed = self.char.islower()
         return -(1 << self.bits - 1) if signed else 0, (1 << self.bits - signed) - 1
 

@@ -1,8 +1,8 @@
-"""EMCY: the errors that are active, what was told of them, and how fast (CiA 301, 7.2.7 and 7.5.2.2, .4, .17, .18).
+"""EMCY: the errors that are active, what was sent of them, and how fast (CiA 301, 7.2.7 and 7.5.2.2, .4, .17, .18).
 
 An error is active from `raise_error` until `clear`; raising it again says nothing new. The first message of an error
-tells its code, the message 0000h tells that the last active error has gone. Messages wait while the NMT state forbids
-EMCY and while the inhibit time runs; if more wait than `CAPACITY`, the oldest are lost, because the last ones tell
+has its code, the message 0000h says that the last active error has gone. Messages wait while the NMT state forbids
+EMCY and while the inhibit time runs; if more wait than `CAPACITY`, the oldest are lost, because the last ones say
 how things stand.
 """
 
@@ -84,7 +84,7 @@ def register_of(code: int) -> Register:
 
 
 class Emergency:
-    """The errors of one node. `allowed()` tells whether the NMT state lets EMCY run."""
+    """The errors of one node. `allowed()` says whether the NMT state lets EMCY run."""
 
     def __init__(self, send: Send, node: int, allowed: Callable[[], bool]) -> None:
         self._send = send
@@ -130,7 +130,7 @@ class Emergency:
     def raise_error(self, code: int, now: float, data: bytes = b"", instance: int = 0) -> None:
         """An error has come. `data`: up to 5 bytes for the message, the first two of them also for 1003h.
 
-        `instance` tells errors of one code apart: a node-ID, a PDO's COB-ID.
+        `instance` distinguishes errors of one code: a node-ID, a PDO's COB-ID.
         """
         if (code, instance) in self._active:
             return
@@ -159,7 +159,7 @@ class Emergency:
             self._history.clear()
 
     def resume(self, former: Emergency) -> None:
-        """Take over the errors of another one: active, told and waiting to be told."""
+        """Take over the errors of another one: active, sent and waiting to be sent."""
         self._active = former._active
         self._history = former._history
         self._waiting = former._waiting

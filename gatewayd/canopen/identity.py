@@ -45,12 +45,12 @@ class Identity:
 
     @classmethod
     def of(cls, fingerprint: int) -> Identity:
-        """The identity of a cell: its mapping's fingerprint tells it from the other cells on the bus."""
+        """The identity of a cell: its mapping's fingerprint distinguishes it from the other cells on the bus."""
         return cls(VENDOR_ID, PRODUCT_CODE, revision(), fingerprint)
 
 
 def identity_objects(identity: Identity, status: Callable[[], int]) -> Iterable[Object]:
-    """1000h, 1002h, 1008h to 100Ah, 1018h. `status` tells the flags of the status block."""
+    """1000h, 1002h, 1008h to 100Ah, 1018h. `status` gives the flags of the status block."""
     yield variable(0x1000, Entry.constant(0, "Device type", 0))
     register = Entry.constant(0, "Manufacturer status register", 0)
     register.source = lambda: CanType.UNSIGNED32.pack(status())

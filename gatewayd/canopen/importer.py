@@ -21,22 +21,22 @@ class _Sheet(StringIO):
 
 
 def differences(text: str, objects: Iterable[Object], node: int) -> tuple[str, ...]:
-    """Where the importer, told the node-ID, understands another name, type, access, PDO flag or default than was meant.
+    """Where the importer, given the node-ID, reads another name, type, access, PDO flag or default than was meant.
 
     Empty for a good sheet. Raises what the importer raises on a text that is no EDS.
     """
     imported = canopen.import_od(_Sheet(text), node_id=node)
     return tuple(
-        f"{one.index:04X}h sub {entry.subindex}: {problem}"
-        for one in objects
-        for entry in one.entries
-        for problem in _differs(_found(imported, one, entry), entry)
+        f"{item.index:04X}h sub {entry.subindex}: {problem}"
+        for item in objects
+        for entry in item.entries
+        for problem in _differs(_found(imported, item, entry), entry)
     )
 
 
-def _found(imported: canopen.ObjectDictionary, one: Object, entry: Entry) -> ODVariable | None:
-    found = imported.get(one.index)
-    if found is None or isinstance(found, ODVariable) == (one.code is not ObjectCode.VAR):
+def _found(imported: canopen.ObjectDictionary, item: Object, entry: Entry) -> ODVariable | None:
+    found = imported.get(item.index)
+    if found is None or isinstance(found, ODVariable) == (item.code is not ObjectCode.VAR):
         return None
     if isinstance(found, ODVariable):
         return found

@@ -1,6 +1,6 @@
 """What the kernel knows of a network interface that is a CAN controller, asked over rtnetlink.
 
-Reading needs no privilege. A service that may not use AF_NETLINK cannot tell why its bus is silent, so its unit has to
+Reading needs no privilege. A service that may not use AF_NETLINK cannot know why its bus is silent, so its unit has to
 allow it (RestrictAddressFamilies=).
 """
 
@@ -32,7 +32,7 @@ class ControllerState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """One look at an interface. What its driver does not tell is None."""
+    """One look at an interface. What its driver does not report is None."""
 
     index: int
     """Another one after the adapter was unplugged and plugged in again."""
@@ -66,7 +66,7 @@ _MAX_REPLY = 32768
 
 
 def request(name: str, sequence: int) -> bytes:
-    """The question after one interface."""
+    """The request for one interface."""
     text = name.encode() + b"\0"
     attribute = _ATTRIBUTE.pack(_ATTRIBUTE.size + len(text), _IFLA_IFNAME) + text + bytes(-len(text) % 4)
     length = _HEADER.size + _LINK.size + len(attribute)
@@ -86,7 +86,7 @@ def parse(reply: bytes, sequence: int) -> Interface | None:
         number = -_ERROR.unpack_from(reply, _HEADER.size)[0]
         if number == errno.ENODEV:
             return None
-        raise OSError(number, "the kernel does not tell about the interface")
+        raise OSError(number, "the kernel does not describe the interface")
     _, hardware, index, flags, _ = _LINK.unpack_from(reply, _HEADER.size)
     found = dict(_attributes(reply[_HEADER.size + _LINK.size :]))
     details = dict(_attributes(dict(_attributes(found.get(_IFLA_LINKINFO, b""))).get(_IFLA_INFO_DATA, b"")))

@@ -27,7 +27,7 @@ CATCH_UP_FRAMES = 16_384
 RECEIVE_BUFFER = 2 << 20
 """Bytes asked for: some 2,700 frames, 0.3 s of a saturated bus of 1 Mbit/s. net.core.rmem_max may allow less."""
 SEND_BUFFER = 2304
-"""Bytes asked for: the least that the kernel gives, room for some six frames. What is in there goes out late when a
+"""Bytes asked for: the minimum that the kernel gives, room for some six frames. What is in there goes out late when a
 bus that stood still recovers, so that it must not be much; the interface's own queue takes more (txqueuelen, by
 default ten), so that the kernel reports when there is room."""
 
@@ -161,7 +161,7 @@ class SocketCanBus(SupervisedBus):
     def _readable(self) -> None:
         self._read(clock.judged_now(), DRAIN)
 
-    def _read(self, now: float, most: int) -> None:
+    def _read(self, now: float, limit: int) -> None:
         """Hand over at most so many frames that wait."""
         if self._socket is None:
             return
@@ -170,7 +170,7 @@ class SocketCanBus(SupervisedBus):
         failure: OSError | None = None
         receive, append = self._socket.recv, frames.append
         try:
-            for _ in range(most):
+            for _ in range(limit):
                 parts = can_id, length, data = _unpack(receive(_FRAME.size))
                 if can_id <= _BASIC:
                     append(_new_frame(Frame, (can_id, data[:length], False, 0)))

@@ -38,7 +38,7 @@ class SyncService:
 
     `on_sync(counter, now)` is called for every SYNC of the right length, our own ones included; the counter is None
     if SYNC carries none. `wrong_length(length, now)` is called for every other one, which does nothing else.
-    `allowed()` tells whether the NMT state lets SYNC run; `changed()` is called when the COB-ID changes.
+    `allowed()` says whether the NMT state lets SYNC run; `changed()` is called when the COB-ID changes.
     """
 
     def __init__(

@@ -16,9 +16,9 @@ class Clock:
     """A consumer with a notebook."""
 
     def __init__(self) -> None:
-        self.told: list[datetime] = []
+        self.heard: list[datetime] = []
         self.service = TimeConsumer(
-            on_time=lambda moment, _now: self.told.append(moment), changed=lambda: None
+            on_time=lambda moment, _now: self.heard.append(moment), changed=lambda: None
         )
         self.client = Client(self.service.objects())
 
@@ -38,13 +38,13 @@ def test_what_is_no_time_is_ignored(data: bytes) -> None:
     clock = Clock()
     clock.service.receive(Frame(0x100, data), 0.0)
     clock.service.receive(Frame(0x100, remote=True, length=6), 0.0)
-    assert clock.told == []
+    assert clock.heard == []
 
 
-def test_a_good_time_is_told() -> None:
+def test_a_good_time_is_handed_on() -> None:
     clock = Clock()
     clock.service.receive(Frame(0x100, bytes(6)), 0.0)
-    assert clock.told == [datetime(1984, 1, 1, tzinfo=UTC)]
+    assert clock.heard == [datetime(1984, 1, 1, tzinfo=UTC)]
 
 
 def test_cob_id_can_be_moved_and_switched_off() -> None:
@@ -65,4 +65,4 @@ def test_a_producer_and_restricted_cob_ids_are_refused(value: int) -> None:
 def test_hostile_frames_do_no_harm(data: bytes) -> None:
     clock = Clock()
     clock.service.receive(Frame(0x100, data), 0.0)
-    assert len(clock.told) <= 1
+    assert len(clock.heard) <= 1

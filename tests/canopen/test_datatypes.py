@@ -12,14 +12,14 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Value
 
 
-@pytest.mark.parametrize("one", CanType, ids=lambda one: one.name)
-def test_codes_are_those_of_the_standard(one: CanType) -> None:
+@pytest.mark.parametrize("kind", CanType, ids=lambda kind: kind.name)
+def test_codes_are_those_of_the_standard(kind: CanType) -> None:
     """An independent implementation has the same numbers."""
-    assert getattr(datatypes, one.name) == one.code
+    assert getattr(datatypes, kind.name) == kind.code
 
 
 @pytest.mark.parametrize(
-    "one,value,data",
+    "kind,value,data",
     [
         (CanType.BOOLEAN, True, "01"),
         (CanType.INTEGER8, -2, "fe"),
@@ -32,19 +32,19 @@ def test_codes_are_those_of_the_standard(one: CanType) -> None:
         (CanType.REAL64, 1.0, "000000000000f03f"),
     ],
 )
-def test_bytes_are_little_endian(one: CanType, value: Value, data: str) -> None:
-    assert one.pack(value) == bytes.fromhex(data)
-    assert one.unpack(bytes.fromhex(data)) == value
-    assert one.size == len(data) // 2
+def test_bytes_are_little_endian(kind: CanType, value: Value, data: str) -> None:
+    assert kind.pack(value) == bytes.fromhex(data)
+    assert kind.unpack(bytes.fromhex(data)) == value
+    assert kind.size == len(data) // 2
 
 
 def test_a_pdo_carries_a_boolean_in_one_bit() -> None:
     assert (CanType.BOOLEAN.bits, CanType.BOOLEAN.size) == (1, 1)
 
 
-@pytest.mark.parametrize("one", [CanType.VISIBLE_STRING, CanType.DOMAIN], ids=lambda one: one.name)
-def test_strings_have_no_length_of_their_own(one: CanType) -> None:
-    assert (one.size, one.bits) == (None, 0)
+@pytest.mark.parametrize("kind", [CanType.VISIBLE_STRING, CanType.DOMAIN], ids=lambda kind: kind.name)
+def test_strings_have_no_length_of_their_own(kind: CanType) -> None:
+    assert (kind.size, kind.bits) == (None, 0)
 
 
 def test_what_does_not_fit_is_no_number_of_the_type() -> None:

@@ -76,18 +76,18 @@ def test_highest_subindex_is_made_where_it_is_missing() -> None:
     assert objects.read(0x2001, 0) == b"\x00"
 
 
-def test_check_refuses_before_the_value_changes_and_changed_is_told_after() -> None:
-    told: list[bytes] = []
+def test_check_refuses_before_the_value_changes_and_changed_is_called_after() -> None:
+    stored: list[bytes] = []
 
     def check(data: bytes) -> None:
         if data == b"\x03":
             raise Abort(AbortCode.DEVICE_STATE)
 
     entry = Entry(1, "step", CanType.UNSIGNED8, Access.RW, b"\x02", check=check)
-    entry.changed = lambda: told.append(entry.value)
+    entry.changed = lambda: stored.append(entry.value)
     assert _code(entry.write, b"\x03") is AbortCode.DEVICE_STATE
     entry.write(b"\x04")
-    assert told == [b"\x04"]
+    assert stored == [b"\x04"]
 
 
 def test_source_and_sink_stand_in_for_the_value() -> None:
@@ -98,4 +98,4 @@ def test_source_and_sink_stand_in_for_the_value() -> None:
 
 
 def test_objects_come_in_the_order_of_their_index() -> None:
-    assert [one.index for one in dictionary(_step())] == [0x1000, 0x2000]
+    assert [item.index for item in dictionary(_step())] == [0x1000, 0x2000]

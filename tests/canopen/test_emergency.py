@@ -49,8 +49,8 @@ def test_cct_emergency_03_history_is_newest_first_and_bounded(errors: Errors) ->
     for code in range(0x8101, 0x8101 + HISTORY + 2):
         errors.service.raise_error(code, 0.0)
     assert errors.client.read(0x1003) == HISTORY
-    told = [errors.client.read(0x1003, number) & 0xFFFF for number in range(1, HISTORY + 1)]
-    assert told == list(range(0x8102 + HISTORY, 0x8102, -1))
+    codes = [errors.client.read(0x1003, number) & 0xFFFF for number in range(1, HISTORY + 1)]
+    assert codes == list(range(0x8102 + HISTORY, 0x8102, -1))
 
 
 def test_cct_emergency_04_only_0_clears_the_history(errors: Errors) -> None:

@@ -16,13 +16,13 @@ class Guarded:
     def __init__(self) -> None:
         self.wire = Wire()
         self.heartbeat = False
-        self.told: list[str] = []
+        self.calls: list[str] = []
         self.service = NodeGuarding(
             self.wire.send,
             slave(5, NmtState.OPERATIONAL),
             lambda: self.heartbeat,
-            lost=lambda _now: self.told.append("lost"),
-            back=lambda _now: self.told.append("back"),
+            lost=lambda _now: self.calls.append("lost"),
+            back=lambda _now: self.calls.append("back"),
         )
         self.client = Client(self.service.objects())
 
@@ -58,13 +58,13 @@ def test_life_guarding_starts_with_the_first_request() -> None:
     guarded.ask(10.0)
     assert guarded.service.next_deadline(10.0) == 10.3
     guarded.service.tick(10.29)
-    assert guarded.told == []
+    assert guarded.calls == []
     guarded.service.tick(10.3)
     guarded.service.tick(20.0)
-    assert guarded.told == ["lost"]
+    assert guarded.calls == ["lost"]
     guarded.ask(30.0)
     guarded.ask(30.1)
-    assert guarded.told == ["lost", "back"]
+    assert guarded.calls == ["lost", "back"]
 
 
 def test_without_a_factor_there_is_no_supervision() -> None:

@@ -40,7 +40,7 @@ def test_cct_heartbeat_01_first_one_period_after_boot_up() -> None:
     assert producer.run(0.0, 0.35) == pytest.approx([0.1, 0.2, 0.3])
 
 
-def test_cct_heartbeat_02_tells_the_nmt_state() -> None:
+def test_cct_heartbeat_02_carries_the_nmt_state() -> None:
     producer = Producer(100)
     for state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED):
         producer.nmt.state = state
@@ -77,12 +77,12 @@ class Watcher:
     """A consumer with a notebook."""
 
     def __init__(self, *consumers: Consumer) -> None:
-        self.told: list[tuple[str, int]] = []
+        self.calls: list[tuple[str, int]] = []
         self.announced = 0
         self.service = HeartbeatConsumer(
             consumers,
-            lost=lambda node, _now: self.told.append(("lost", node)),
-            back=lambda node, _now: self.told.append(("back", node)),
+            lost=lambda node, _now: self.calls.append(("lost", node)),
+            back=lambda node, _now: self.calls.append(("back", node)),
             changed=self._changed,
         )
         self.client = Client(self.service.objects())
@@ -100,28 +100,28 @@ MASTER = Consumer(1, 500, None)
 def test_cct_heartbeat_04_supervision_starts_with_the_first_heartbeat() -> None:
     watcher = Watcher(MASTER)
     watcher.service.tick(100.0)
-    assert (watcher.told, watcher.service.next_deadline(100.0)) == ([], math.inf)
+    assert (watcher.calls, watcher.service.next_deadline(100.0)) == ([], math.inf)
     watcher.hear(1, 100.0)
     assert watcher.service.next_deadline(100.0) == 100.5
 
 
-def test_cct_heartbeat_05_silence_is_told_once() -> None:
+def test_cct_heartbeat_05_silence_is_reported_once() -> None:
     watcher = Watcher(MASTER)
     watcher.hear(1, 0.0)
     watcher.service.tick(0.49)
-    assert watcher.told == []
+    assert watcher.calls == []
     watcher.service.tick(0.5)
     watcher.service.tick(9.0)
-    assert watcher.told == [("lost", 1)]
+    assert watcher.calls == [("lost", 1)]
 
 
-def test_cct_heartbeat_06_return_is_told_once() -> None:
+def test_cct_heartbeat_06_return_is_reported_once() -> None:
     watcher = Watcher(MASTER)
     watcher.hear(1, 0.0)
     watcher.service.tick(1.0)
     watcher.hear(1, 2.0)
     watcher.hear(1, 2.1)
-    assert watcher.told == [("lost", 1), ("back", 1)]
+    assert watcher.calls == [("lost", 1), ("back", 1)]
 
 
 def test_boot_up_of_a_watched_node_ends_its_supervision_until_it_is_heard() -> None:
@@ -129,7 +129,7 @@ def test_boot_up_of_a_watched_node_ends_its_supervision_until_it_is_heard() -> N
     watcher.hear(1, 0.0)
     watcher.hear(1, 0.1, state=0)
     watcher.service.tick(9.0)
-    assert watcher.told == []
+    assert watcher.calls == []
     assert watcher.service.state(1) is Watch.WAITING
 
 
@@ -138,9 +138,9 @@ def test_boot_up_of_a_lost_node_is_not_its_return() -> None:
     watcher.hear(1, 0.0)
     watcher.service.tick(1.0)
     watcher.hear(1, 2.0, state=0)
-    assert watcher.told == [("lost", 1)]
+    assert watcher.calls == [("lost", 1)]
     watcher.hear(1, 2.1)
-    assert watcher.told == [("lost", 1), ("back", 1)]
+    assert watcher.calls == [("lost", 1), ("back", 1)]
 
 
 def test_another_consumer_goes_on_with_what_is_lost() -> None:
@@ -157,17 +157,17 @@ def test_after_a_gap_of_our_own_a_node_has_its_whole_time_again() -> None:
     watcher.hear(1, 0.0)
     watcher.service.gap(0.1, 9.0)
     watcher.service.tick(9.49)
-    assert (watcher.told, watcher.service.state(2)) == ([], Watch.WAITING)
+    assert (watcher.calls, watcher.service.state(2)) == ([], Watch.WAITING)
     watcher.service.tick(9.5)
     watcher.service.gap(10.0, 20.0)
-    assert (watcher.told, watcher.service.state(1)) == ([("lost", 1)], Watch.LOST)
+    assert (watcher.calls, watcher.service.state(1)) == ([("lost", 1)], Watch.LOST)
 
 
 def test_a_process_that_stands_still_over_and_over_misses_a_silent_node_all_the_same() -> None:
     watcher = Watcher(MASTER)
     watcher.hear(1, 0.0)
     now = 0.0
-    while not watcher.told:
+    while not watcher.calls:
         watcher.service.gap(now, now + 0.1)
         now += 0.2
         watcher.service.tick(now)
@@ -208,7 +208,7 @@ def test_a_lost_node_that_is_no_longer_watched_is_no_error_any_more() -> None:
     watcher.service.tick(1.0)
     watcher.client.write(0x1016, 1, 0)
     watcher.service.tick(1.1)
-    assert watcher.told == [("lost", 1), ("back", 1)]
+    assert watcher.calls == [("lost", 1), ("back", 1)]
 
 
 @given(st.lists(st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8), st.booleans())))

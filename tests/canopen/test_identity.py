@@ -21,7 +21,7 @@ def dictionary() -> Dictionary:
     return Dictionary(identity_objects(Identity.of(0xCAFE_F00D), lambda: 0x55))
 
 
-def test_the_node_tells_who_it_is(dictionary: Dictionary) -> None:
+def test_the_node_says_who_it_is(dictionary: Dictionary) -> None:
     client = Client(dictionary)
     assert client.read(0x1000) == 0
     assert client.read(0x1002) == 0x55

@@ -38,7 +38,7 @@ def test_our_own_sheet_is_read_as_it_was_meant() -> None:
 
 
 @pytest.mark.parametrize(
-    "meant, spoilt, told",
+    "meant, spoilt, reported",
     [
         ("ParameterName=count", "ParameterName=amount", "2010h sub 1: name 'count' is read as 'amount'"),
         ("DataType=0x0004", "DataType=0x0007", "2010h sub 1: type 4 is read as 7"),
@@ -47,6 +47,6 @@ def test_our_own_sheet_is_read_as_it_was_meant() -> None:
         ("[2010sub1]", "[2010sub2]", "2010h sub 1: missing"),
     ],
 )
-def test_every_difference_is_told(meant: str, spoilt: str, told: str) -> None:
+def test_every_difference_is_reported(meant: str, spoilt: str, reported: str) -> None:
     assert TEXT.count(meant) == 1
-    assert told in differences(TEXT.replace(meant, spoilt), DICTIONARY, NODE)
+    assert reported in differences(TEXT.replace(meant, spoilt), DICTIONARY, NODE)

@@ -31,7 +31,7 @@ def controller(state: int, *, restart: int = 0) -> bytes:
     return attribute(18, attribute(1, b"slcan\0") + attribute(0x8002, b"".join(details)))
 
 
-def test_controller_with_everything_its_driver_tells() -> None:
+def test_controller_with_everything_its_driver_reports() -> None:
     found = parse(answer(attribute(33, b"\0"), controller(3, restart=100)), 7)
     assert found is not None
     assert found.is_can
@@ -41,7 +41,7 @@ def test_controller_with_everything_its_driver_tells() -> None:
     assert (found.bitrate, found.restart_ms, found.tx_errors, found.rx_errors) == (500_000, 100, 12, 34)
 
 
-def test_interface_that_is_no_controller_tells_little() -> None:
+def test_interface_that_is_no_controller_reports_little() -> None:
     found = parse(answer(attribute(33, b"\1"), attribute(18, attribute(1, b"vcan\0")), flags=0), 7)
     assert found is not None
     assert (found.up, found.carrier, found.controller, found.bitrate) == (False, True, None, None)
@@ -50,7 +50,7 @@ def test_interface_that_is_no_controller_tells_little() -> None:
 def test_missing_interface_is_an_answer_and_other_refusals_are_errors() -> None:
     refusal = struct.pack("=IHHIIi", 36, 2, 0, 7, 0, -errno.ENODEV)
     assert parse(refusal, 7) is None
-    with pytest.raises(OSError, match="does not tell"):
+    with pytest.raises(OSError, match="does not describe"):
         parse(struct.pack("=IHHIIi", 36, 2, 0, 7, 0, -errno.EPERM), 7)
 
 

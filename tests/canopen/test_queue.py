@@ -126,8 +126,8 @@ def test_emergencies_have_room_whatever_else_waits_and_the_last_ones_stay() -> N
     for number in range(EVENT_CAPACITY + 1):
         assert queue.put(Frame(0x81, bytes([number])), Priority.EVENT)
     assert queue.overflow == 2
-    told = [frame.data[0] for frame in emptied(queue) if frame.can_id == 0x81]
-    assert told == list(range(1, EVENT_CAPACITY + 1))
+    numbers = [frame.data[0] for frame in emptied(queue) if frame.can_id == 0x81]
+    assert numbers == list(range(1, EVENT_CAPACITY + 1))
 
 
 def test_a_frame_that_is_not_taken_stays() -> None:
@@ -245,7 +245,7 @@ def test_a_sync_goes_out_at_once_or_never(wire: Wire) -> None:
 
 
 def test_a_stuck_bus_that_recovers_gets_what_is_true_then(wire: Wire) -> None:
-    """Five seconds of a master's life: 500 SYNCs, 50 heartbeats, PDOs, and an EMCY that tells of it."""
+    """Five seconds of a master's life: 500 SYNCs, 50 heartbeats, PDOs, and an EMCY that reports it."""
     for cycle in range(500):
         wire.now += 0.01
         wire.send(Frame(0x80), Priority.AT_ONCE)

@@ -21,7 +21,7 @@ INDEX = 0x2005
 class Wire:
     """Takes the place of canopen's network: the server answers at once, at a time that stands still.
 
-    `lost` tells which frames of the client (True) or of the server (False) are lost on the way.
+    `lost` says which frames of the client (True) or of the server (False) are lost on the way.
     """
 
     def __init__(self, value: bytes = b"") -> None:

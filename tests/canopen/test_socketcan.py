@@ -77,7 +77,7 @@ def test_one_wake_up_reads_no_more_than_a_batch(wire: tuple[SocketCanBus, Record
 
 
 @pytest.mark.parametrize("place", [0, 1])
-def test_kinds_of_frames_are_told_apart_wherever_they_stand(
+def test_kinds_of_frames_are_separated_wherever_they_stand(
     wire: tuple[SocketCanBus, Recorder, socket.socket], place: int
 ) -> None:
     bus, recorder, theirs = wire
@@ -112,7 +112,7 @@ def test_nothing_is_handed_to_a_kernel_that_would_swallow_it(
     assert (bus.counters.sent, bus.counters.refused) == (1, 1)
 
 
-async def test_machine_without_can_is_told_what_to_do() -> None:
+async def test_machine_without_can_is_refused_with_advice() -> None:
     with contextlib.suppress(OSError):
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
         pytest.skip("this kernel has CAN")

@@ -20,7 +20,7 @@ from gatewayd.loop import clock
 from tests.links.canopen_node.recorder import Recorder, until
 
 BUS_OFF = 0x2000_0040
-NOBODY_TELLS = -1
+NOBODY_REPORTS = -1
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def full() -> Iterator[tuple[socket.socket, socket.socket]]:
         yield ours, theirs
 
 
-async def test_room_is_told_once_and_when_there_is_some(
+async def test_room_is_reported_once_and_when_there_is_some(
     bus: SupervisedBus, recorder: Recorder, full: tuple[socket.socket, socket.socket]
 ) -> None:
     ours, theirs = full
@@ -64,28 +64,28 @@ async def test_room_is_told_once_and_when_there_is_some(
     assert (bus._full, recorder.writable) == (False, 1)
 
 
-async def test_room_of_which_nobody_tells_is_tried_after_a_moment(
+async def test_room_that_nobody_reports_is_tried_after_a_moment(
     bus: SupervisedBus, recorder: Recorder
 ) -> None:
-    bus._wait_for_room(NOBODY_TELLS)
+    bus._wait_for_room(NOBODY_REPORTS)
     assert bus._full
     await until(lambda: recorder.writable)
     assert (bus._full, recorder.writable) == (False, 1)
 
 
-@pytest.mark.parametrize("kernel_tells", [True, False])
+@pytest.mark.parametrize("kernel_reports", [True, False])
 async def test_a_bus_that_carries_nothing_is_not_waited_for(
-    bus: SupervisedBus, recorder: Recorder, kernel_tells: bool
+    bus: SupervisedBus, recorder: Recorder, kernel_reports: bool
 ) -> None:
     ours, theirs = socket.socketpair()
     with contextlib.closing(ours), contextlib.closing(theirs):
-        bus._wait_for_room(ours.fileno() if kernel_tells else NOBODY_TELLS)
+        bus._wait_for_room(ours.fileno() if kernel_reports else NOBODY_REPORTS)
         bus._feed(BusSignal.OFF, 1.0, "off")
         await asyncio.sleep(5 * ROOM_RETRY)
     assert (bus._full, recorder.writable) == (False, 0)
 
 
-async def test_an_error_frame_is_counted_and_told_with_the_state_that_follows(
+async def test_an_error_frame_is_counted_and_reported_with_the_state_that_follows(
     bus: SupervisedBus, recorder: Recorder
 ) -> None:
     report = decode(BUS_OFF, bytes(8))
@@ -96,7 +96,7 @@ async def test_an_error_frame_is_counted_and_told_with_the_state_that_follows(
     assert (bus.counters.errors, bus.counters.bus_off) == (1, 1)
 
 
-async def test_a_state_is_told_when_it_changes(bus: SupervisedBus, recorder: Recorder) -> None:
+async def test_a_state_is_reported_when_it_changes(bus: SupervisedBus, recorder: Recorder) -> None:
     bus._feed(BusSignal.UP, 1.0, "still up")
     assert (recorder.states, recorder.reasons) == ([BusState.ACTIVE], ["up"])
 

@@ -55,7 +55,7 @@ def test_cct_synchronization_01_sync_is_heard_in_the_allowed_states_only(cycle: 
     assert (cycle.heard, cycle.service.count) == ([None], 1)
 
 
-def test_cct_synchronization_02_wrong_length_is_told_and_does_nothing(cycle: Cycle) -> None:
+def test_cct_synchronization_02_wrong_length_is_reported_and_does_nothing(cycle: Cycle) -> None:
     cycle.service.receive(Frame(0x80, b"\1"), 0.0)
     assert (cycle.heard, cycle.wrong) == ([], [1])
     cycle.client.write(0x1019, 0, 10)

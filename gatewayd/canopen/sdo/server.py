@@ -268,7 +268,7 @@ class SdoServer:
         Request.BLOCK_UPLOAD: _initiate_block_upload,
         Request.ABORT: _end,
     }
-    """What ends the present transfer, and may begin another. In a sub-block only an abort can be told from data."""
+    """What ends the present transfer, and may begin another. In a sub-block only an abort differs from data."""
     TRANSITIONS: ClassVar[dict[tuple[SdoState, Request], Act]] = {
         (SdoState.DOWNLOAD, Request.DOWNLOAD_SEGMENT): _take_segment,
         (SdoState.UPLOAD, Request.UPLOAD_SEGMENT): _give_segment,

@@ -105,7 +105,7 @@ class BlockDownload:
         return self._taken > 0 and (last or number == MAX_BLOCK_SEGMENTS)
 
     def acknowledge(self) -> bytes:
-        """The frame that tells how far the sub-block was taken; the next one begins."""
+        """The frame that says how far the sub-block was taken; the next one begins."""
         taken, self._taken = self._taken, 0
         self.pending = False
         return protocol.block_download_acknowledged(taken, MAX_BLOCK_SEGMENTS)

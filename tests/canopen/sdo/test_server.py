@@ -110,9 +110,9 @@ def test_expedited_download_without_a_size_takes_that_of_the_object(
     ],
 )
 def test_refused_request(server: SdoServer, request_: str, multiplexer: str, code: AbortCode) -> None:
-    before = {(one.index, e.subindex): e.value for one in server._dictionary for e in one.entries}
+    before = {(item.index, e.subindex): e.value for item in server._dictionary for e in item.entries}
     assert ask(server, request_) == abort(multiplexer, code)
-    assert {(one.index, e.subindex): e.value for one in server._dictionary for e in one.entries} == before
+    assert {(item.index, e.subindex): e.value for item in server._dictionary for e in item.entries} == before
     assert server.state is SdoState.IDLE
 
 
@@ -200,11 +200,11 @@ def test_sdo_19_block_download(server: SdoServer, dictionary: Dictionary) -> Non
     data = bytes(range(100)) * 10
     assert ask(server, "c6 05 20 00 e8 03") == "a40520007f000000"
     frames = segments(data)
-    assert [frame for one in frames for frame in server.receive(one, 0.0)] == [
+    assert [answer for frame in frames for answer in server.receive(frame, 0.0)] == [
         bytes((0xA2, 127, 127)) + bytes(5)
     ]
     frames = segments(data, 127)
-    assert [frame for one in frames for frame in server.receive(one, 0.0)] == [
+    assert [answer for frame in frames for answer in server.receive(frame, 0.0)] == [
         bytes((0xA2, 16, 127)) + bytes(5)
     ]
     assert dictionary.read(0x2005, 0) == b""
@@ -239,9 +239,11 @@ def test_sdo_22_segments_out_of_sequence_are_sent_again(server: SdoServer, dicti
     ask(server, "c6 05 20 00 46")
     frames = segments(data)
     sent = frames[:3] + frames[4:]
-    assert [frame for one in sent for frame in server.receive(one, 0.0)] == [bytes((0xA2, 3, 127)) + bytes(5)]
+    assert [answer for frame in sent for answer in server.receive(frame, 0.0)] == [
+        bytes((0xA2, 3, 127)) + bytes(5)
+    ]
     again = segments(data, 3)
-    assert [frame for one in again for frame in server.receive(one, 0.0)] == [
+    assert [answer for frame in again for answer in server.receive(frame, 0.0)] == [
         bytes((0xA2, 7, 127)) + bytes(5)
     ]
     assert server.receive(block_end(data), 0.0) == [b"\xa1" + bytes(7)]
@@ -270,7 +272,7 @@ def test_the_rest_of_an_acknowledged_sub_block_is_no_new_one(server: SdoServer) 
     assert server.tick(0.3) == [bytes((0xA2, 4, 127)) + bytes(5)]
     for frame in segments(data)[4:]:
         assert server.receive(frame, 0.4) == []
-    assert [f for one in segments(data, 4) for f in server.receive(one, 0.5)] == [
+    assert [answer for frame in segments(data, 4) for answer in server.receive(frame, 0.5)] == [
         bytes((0xA2, 6, 127)) + bytes(5)
     ]
     assert server.receive(block_end(data), 0.5) == [b"\xa1" + bytes(7)]
@@ -422,7 +424,7 @@ def test_the_clients_abort_ends_without_an_answer(
 
 @pytest.mark.parametrize("state", [state for state in TRANSFERS if state is not SdoState.BLOCK_DOWNLOAD])
 def test_a_new_transfer_ends_the_old_one(server: SdoServer, state: SdoState) -> None:
-    """Within a sub-block no frame can be told from a segment."""
+    """Within a sub-block no frame differs from a segment."""
     reach(server, state)
     assert ask(server, "40 06 20 00") == "4306200001020304"
     assert server.state is SdoState.IDLE
@@ -493,41 +495,41 @@ def download(server: SdoServer, index: int, subindex: int, data: bytes) -> int:
 def test_od_01_to_04_every_entry_is_read_with_its_default_and_its_length(
     server: SdoServer, dictionary: Dictionary
 ) -> None:
-    for one in dictionary:
-        for entry in one.entries:
+    for item in dictionary:
+        for entry in item.entries:
             expected = entry.default if entry.access.readable else AbortCode.WRITE_ONLY
-            assert upload(server, one.index, entry.subindex) == expected
+            assert upload(server, item.index, entry.subindex) == expected
             assert entry.type.size in (None, len(entry.default))
 
 
 def test_od_05_to_07_every_entry_takes_or_refuses_what_it_holds(
     server: SdoServer, dictionary: Dictionary
 ) -> None:
-    for one in dictionary:
-        for entry in one.entries:
+    for item in dictionary:
+        for entry in item.entries:
             data = entry.type.pack(entry.low or 0) if entry.low is not None else entry.default
-            code = download(server, one.index, entry.subindex, data)
+            code = download(server, item.index, entry.subindex, data)
             assert code == (0 if entry.access.writable else AbortCode.READ_ONLY)
             if entry.access.writable and entry.type.size is not None:
-                assert download(server, one.index, entry.subindex, data + b"\0") == AbortCode.TOO_LONG
-                assert download(server, one.index, entry.subindex, data[1:]) == AbortCode.TOO_SHORT
+                assert download(server, item.index, entry.subindex, data + b"\0") == AbortCode.TOO_LONG
+                assert download(server, item.index, entry.subindex, data[1:]) == AbortCode.TOO_SHORT
 
 
 def test_od_08_and_09_limits_are_the_last_values_that_are_taken(
     server: SdoServer, dictionary: Dictionary
 ) -> None:
     checked = 0
-    for one in dictionary:
-        for entry in one.entries:
+    for item in dictionary:
+        for entry in item.entries:
             for limit, step, code in (
                 (entry.low, -1, AbortCode.VALUE_TOO_LOW),
                 (entry.high, 1, AbortCode.VALUE_TOO_HIGH),
             ):
                 if limit is not None:
                     within, beyond = entry.type.pack(limit), entry.type.pack(limit + step)
-                    assert download(server, one.index, entry.subindex, within) == 0
-                    assert download(server, one.index, entry.subindex, beyond) == code
-                    assert upload(server, one.index, entry.subindex) == within
+                    assert download(server, item.index, entry.subindex, within) == 0
+                    assert download(server, item.index, entry.subindex, beyond) == code
+                    assert upload(server, item.index, entry.subindex) == within
                     checked += 1
     assert checked == 3
 
@@ -570,7 +572,7 @@ def test_no_frame_raises_and_nothing_incomplete_is_written(frames: list[tuple[by
         if len(written) > before:
             assert len(answers) == 1
             assert answers[0][0] in (0x60, 0x20, 0x30, 0xA1)
-        assert all(len(one) <= 100 for one in written)
+        assert all(len(data) <= 100 for data in written)
         assert server.state is not SdoState.IDLE or server.next_deadline(now) == math.inf
 
 
@@ -582,7 +584,7 @@ def test_cob_ids_follow_the_node_id_and_cannot_be_changed() -> None:
         (0x610).to_bytes(4, "little"),
         (0x590).to_bytes(4, "little"),
     ]
-    assert all(entry.plus_node for one in objects for entry in one.entries[1:])
+    assert all(entry.plus_node for item in objects for entry in item.entries[1:])
     with pytest.raises(Abort) as caught:
         objects.write(0x1200, 1, (0x620).to_bytes(4, "little"))
     assert caught.value.code is AbortCode.READ_ONLY
