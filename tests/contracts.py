@@ -12,7 +12,6 @@ import json
 import logging
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -44,11 +43,10 @@ from gatewayd.mapping.schema import mapping_schema
 from gatewayd.report.schema import documented
 from gatewayd.web.listener import StatusListener
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS
+from tests.sources import MODULES, PACKAGE, ROOT, every_node, nodes
 
 __all__ = ["CONTRACTS", "GOLDEN", "as_text", "texts"]
 
-ROOT = Path(__file__).parent.parent
-PACKAGE = ROOT / "gatewayd"
 GOLDEN = ROOT / "tests" / "golden" / "contracts"
 
 
@@ -346,24 +344,37 @@ def _parameter(parameter: click.Parameter) -> str:
 
 def environment() -> object:
     """Every environment variable that is looked at."""
-    return sorted({name for tree in _trees() for name in _variables(tree)})
+    return sorted({name for node in every_node() for name in _variables(node)})
 
 
 _OURS = re.compile(r"_?GATEWAYD_[A-Z_]+")
 
 
-def _variables(tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and _OURS.fullmatch(node.value):
-            yield node.value
-        asked: list[ast.expr] = []
-        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("environ.get", "environment.get")):
-            asked = node.args[:1]
-        elif isinstance(node, ast.Subscript) and ast.unparse(node.value).endswith(("environ", "environment")):
-            asked = [node.slice]
-        elif isinstance(node, ast.Compare) and ast.unparse(node.comparators[0]).endswith("environ"):
-            asked = [node.left]
-        yield from (str(name.value) for name in asked if isinstance(name, ast.Constant))
+def _variables(node: ast.AST) -> Iterator[str]:
+    asked: ast.expr | None = None
+    match node:
+        case ast.Constant(str(value)) if _OURS.fullmatch(value):
+            yield value
+        case ast.Call(ast.Attribute(where, "get"), [name, *_]) if _is_environment(where):
+            asked = name
+        case ast.Subscript(where, name) if _is_environment(where):
+            asked = name
+        case ast.Compare(name, _, [where, *_]) if _is_environment(where):
+            asked = name
+    if isinstance(asked, ast.Constant):
+        yield str(asked.value)
+
+
+def _is_environment(node: ast.expr) -> bool:
+    return _last_name(node).endswith(("environ", "environment"))
+
+
+def _last_name(node: ast.expr) -> str:
+    """Of `a.b.c` it is `c`."""
+    match node:
+        case ast.Attribute(_, name) | ast.Name(name):
+            return name
+    return ""
 
 
 # -- log --------------------------------------------------------------------------------------------------------------
@@ -374,28 +385,25 @@ _METHODS = {"debug", "info", "warning", "error", "exception", "critical"}
 def log_calls() -> dict[str, list[str]]:
     """What the log may say apart from events: text -> its levels and the names of its fields, by its call."""
     found: dict[str, set[str]] = {}
-    for tree in _trees():
-        for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
-            if _is_logging(call):
-                text = ast.literal_eval(call.args[0])
-                found.setdefault(text, set()).add(f"{_method(call)} {_fields(call, tree)}".strip())
+    for module in MODULES:
+        for call in filter(_is_logging, nodes(module)):
+            assert isinstance(call, ast.Call)
+            text = ast.literal_eval(call.args[0])
+            found.setdefault(text, set()).add(f"{_method(call)} {_fields(call, nodes(module))}".strip())
     return {text: sorted(calls) for text, calls in found.items()}
 
 
 def texts() -> set[str]:
     """Every text that stands in the code."""
-    nodes = (node for tree in _trees() for node in ast.walk(tree) if isinstance(node, ast.Constant))
-    return {node.value for node in nodes if isinstance(node.value, str)}
+    constants = (node.value for node in every_node() if isinstance(node, ast.Constant))
+    return {value for value in constants if isinstance(value, str)}
 
 
-def _is_logging(call: ast.Call) -> bool:
-    return (
-        isinstance(call.func, ast.Attribute)
-        and call.func.attr in _METHODS
-        and ast.unparse(call.func.value).rpartition(".")[2].lstrip("_") in ("log", "logger")
-        and bool(call.args)
-        and isinstance(call.args[0], ast.Constant)
-    )
+def _is_logging(node: ast.AST) -> bool:
+    match node:
+        case ast.Call(ast.Attribute(logger, method), [ast.Constant(), *_]):
+            return method in _METHODS and _last_name(logger).lstrip("_") in ("log", "logger")
+    return False
 
 
 def _method(call: ast.Call) -> str:
@@ -404,19 +412,19 @@ def _method(call: ast.Call) -> str:
     return "exception" if is_exception else call.func.attr
 
 
-def _fields(call: ast.Call, tree: ast.Module) -> str:
+def _fields(call: ast.Call, module: Sequence[ast.AST]) -> str:
     names: list[str] = []
     for keyword in call.keywords:
         if keyword.arg == "extra" and isinstance(keyword.value, ast.Call):
             for field in keyword.value.keywords:
-                names += [field.arg] if field.arg is not None else _returned(field.value, tree)
+                names += [field.arg] if field.arg is not None else _returned(field.value, module)
     return " ".join(sorted(names))
 
 
-def _returned(call: ast.expr, tree: ast.Module) -> list[str]:
+def _returned(call: ast.expr, module: Sequence[ast.AST]) -> list[str]:
     """The keys of what a function of the same module returns; `...` where they cannot be seen."""
     name = ast.unparse(call).removesuffix("()").rpartition(".")[2]
-    for node in ast.walk(tree):
+    for node in module:
         if isinstance(node, ast.FunctionDef) and node.name == name:
             for inner in ast.walk(node):
                 if isinstance(inner, ast.Return) and isinstance(inner.value, ast.Dict):
@@ -439,11 +447,6 @@ def log_lines() -> object:
         root.setLevel(level)
     lines = [json.loads(call.args[0]) for call in stream.write.call_args_list]
     return [{name: value for name, value in line.items() if name != "time"} for line in lines]
-
-
-@cache
-def _trees() -> Sequence[ast.Module]:
-    return [ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))]
 
 
 def as_text(contract: object) -> str:

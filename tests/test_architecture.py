@@ -15,8 +15,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
-PACKAGE = ROOT / "gatewayd"
+from tests.sources import MODULES, ROOT, nodes, tree
 
 LINK = {
     "core",
@@ -270,29 +269,6 @@ TESTED_TOGETHER = {
     "mapping.rules": "tests/mapping/test_rules.py",
 }
 """Package -> the one file that tests all its modules: rules are tested by their own bad and good examples."""
-
-
-def _modules() -> dict[str, Path]:
-    found = {}
-    for path in sorted(PACKAGE.rglob("*.py")):
-        parts = path.relative_to(PACKAGE).with_suffix("").parts
-        found[".".join(part for part in parts if part != "__init__") or "gatewayd"] = path
-    return found
-
-
-MODULES = _modules()
-
-
-@cache
-def tree(module: str) -> ast.Module:
-    """The parsed source."""
-    return ast.parse(MODULES[module].read_text())
-
-
-@cache
-def nodes(module: str) -> tuple[ast.AST, ...]:
-    """Everything in the source."""
-    return tuple(ast.walk(tree(module)))
 
 
 @cache

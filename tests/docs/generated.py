@@ -7,11 +7,13 @@ tests/docs/test_generated.py fails while one is not current.
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from textwrap import indent
@@ -168,23 +170,39 @@ def command_names() -> list[str]:
     return names
 
 
-def help_text(name: str) -> str:
-    """What `gatewayd NAME --help` prints; `gatewayd --help` for an empty name."""
-    # A process of its own: within one, click remembers the help option of whoever asked first.
-    arguments = [*name.split(), "--help"]
-    return subprocess.run(
-        [sys.executable, "-m", "gatewayd", *arguments],
+_PRINT_HELPS = """\
+import json, sys
+from contextlib import redirect_stdout
+from io import StringIO
+from gatewayd.cli import command
+helps = {}
+for name in sys.argv[1:]:
+    with redirect_stdout(StringIO()) as printed:
+        command.main([*name.split(), "--help"], prog_name="gatewayd", standalone_mode=False)
+    helps[name] = printed.getvalue()
+print(json.dumps(helps))
+"""
+
+
+@cache
+def help_texts() -> dict[str, str]:
+    """What `gatewayd NAME --help` prints, by name; `gatewayd --help` for the empty name."""
+    # In a process of its own: here, click may remember the help option of somebody who asked without `gatewayd`.
+    printed = subprocess.run(
+        [sys.executable, "-c", _PRINT_HELPS, *command_names()],
         check=True,
         capture_output=True,
         text=True,
+        cwd=ROOT,
         env=os.environ | {"COLUMNS": str(HELP_WIDTH + 2)},
-    ).stdout.rstrip()
+    ).stdout
+    return {name: text.rstrip() for name, text in json.loads(printed).items()}
 
 
 def command_line() -> str:
     """The help of every command."""
     parts = [
-        f"## gatewayd {name}".rstrip() + "\n\n" + indent(help_text(name), "    ") for name in command_names()
+        f"## gatewayd {name}".rstrip() + "\n\n" + indent(text, "    ") for name, text in help_texts().items()
     ]
     return "\n\n".join(parts)
 
@@ -192,11 +210,11 @@ def command_line() -> str:
 def exit_codes() -> str:
     """What each command says about its exit codes, in one table."""
     rows = []
-    for name in command_names():
-        told = help_text(name).partition("Exit codes:\n")[2]
+    for name, text in help_texts().items():
+        codes = text.partition("Exit codes:\n")[2]
         rows += [
             (f"`gatewayd {name}`" if name else "any command", found[1], found[2])
-            for found in re.finditer(r"^ +(\d+) +(.+)$", told, re.MULTILINE)
+            for found in re.finditer(r"^ +(\d+) +(.+)$", codes, re.MULTILINE)
         ]
     return table(("command", "code", "meaning"), rows)
 

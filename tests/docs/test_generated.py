@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from gatewayd.links.modbus_server.functions import _FUNCTIONS
-from tests.docs.generated import DOCS, PARTS, ROOT, pages, renewed
+from tests.docs.generated import DOCS, PARTS, pages, renewed
+from tests.sources import MODULES, nodes
 
 every_page = pytest.mark.parametrize("page", pages(), ids=lambda page: page.relative_to(DOCS).as_posix())
 
@@ -58,12 +59,12 @@ def test_every_text_of_the_log_is_listed() -> None:
     page = (DOCS / "reference" / "log.md").read_text()
     logged = [
         str(call.args[0].value)
-        for path in (ROOT / "gatewayd").rglob("*.py")
-        if not {"simulator", "demo"} & set(path.parts)
-        for call in ast.walk(ast.parse(path.read_text()))
+        for module in MODULES
+        if module.partition(".")[0] not in {"simulator", "demo"}
+        for call in nodes(module)
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute)
-        if ast.unparse(call.func.value) in ("log", "_log") and call.func.attr != "log"
         if call.args and isinstance(call.args[0], ast.Constant)
+        if ast.unparse(call.func.value) in ("log", "_log") and call.func.attr != "log"
     ]
     assert logged
     assert [text for text in logged if f"`{text}`" not in page] == []
