@@ -8,8 +8,9 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import Enum
+from functools import cache
 from ipaddress import IPv4Network, IPv6Network
 from typing import Any, Final
 
@@ -26,7 +27,7 @@ from gatewayd.core.definition import (
     Writer,
 )
 from gatewayd.links.registry import definer, languages
-from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock, ExpandedVariable
 from gatewayd.mapping.model import WriterSpec
 from gatewayd.mapping.plan import Plan
 from gatewayd.mapping.shown import Shown, shown_of
@@ -43,7 +44,7 @@ _CASTS: Final[dict[ValueKind, Callable[[Value], Value]]] = {
 def compile_plan(cell: ExpandedCell) -> Plan:
     """Compile a cell that passed all rules; ValueError for one with parts that could not be read or expanded."""
     document, sections, settings = cell.document, cell.document.sections, cell.settings
-    missing = [one.key for one in languages() if one.required and one.key not in sections]
+    missing = [kind.key for kind in languages() if kind.required and kind.key not in sections]
     if missing or not document.cell or not cell.is_complete:
         raise ValueError(f"{document.source.name} has errors and cannot be compiled")
     writers = {name: index for index, name in enumerate(document.writers)}
@@ -51,23 +52,13 @@ def compile_plan(cell: ExpandedCell) -> Plan:
         name=document.cell,
         fingerprint=0,
         variables=tuple(map(_variable, cell.variables, shown_of(cell))),
-        locks=tuple(
-            Lock(
-                lock.name,
-                lock.members,
-                tuple(writers[name] for name in lock.owners),
-                lock.takeover,
-                lock.lease,
-                lock.whole,
-            )
-            for lock in cell.locks
-        ),
+        locks=tuple(_lock(lock, writers) for lock in cell.locks),
         writers=tuple(_writer(name, part.spec) for name, part in document.writers.items()),
         stale_after=settings.stale_after,
         clear_on_connect=settings.clear_on_connect,
         adopt_for=settings.adopt_for,
     )
-    links = {one.key: one.compile(cell) for one in languages() if one.key in sections}
+    links = {kind.key: kind.compile(cell) for kind in languages() if kind.key in sections}
     plan = Plan(document.source.name, definition, links)
     return dataclasses.replace(plan, cell=dataclasses.replace(definition, fingerprint=fingerprint(plan)))
 
@@ -98,21 +89,25 @@ def _variable(variable: ExpandedVariable, shown: Shown) -> Variable:
     )
 
 
+def _lock(lock: ExpandedLock, writers: Mapping[str, int]) -> Lock:
+    owners = tuple(writers[name] for name in lock.owners)
+    return Lock(lock.name, lock.members, owners, lock.takeover, lock.lease, lock.whole)
+
+
 def _writer(name: str, spec: WriterSpec) -> Writer:
     return Writer(
         name,
         timeout=spec.timeout,
         grace=spec.grace or 0.0,
         counts_writes=spec.timeout_counts == "writes",
-        heartbeat=next((time for one in languages() if (time := one.silence(spec)) is not None), None),
+        heartbeat=next((time for kind in languages() if (time := kind.silence(spec)) is not None), None),
     )
 
 
 def _fallback(fallback: Fallback, kind: ValueKind) -> Fallback:
     if fallback.value is None:
         return fallback
-    value: Value = _CASTS[kind](fallback.value)
-    return Fallback(FallbackKind.VALUE, value)
+    return Fallback(FallbackKind.VALUE, _CASTS[kind](fallback.value))
 
 
 _FOR_PEOPLE: Final = frozenset({"comment", "source", "fingerprint"})
@@ -150,24 +145,21 @@ def _meaning(thing: Any) -> Any:
     meaning = getattr(thing, "meaning", None)
     if meaning is not None:
         return meaning
+    kind: type = type(thing)
     return {
         name: _meaning(value)
-        for name, default in _fields_of(type(thing))
+        for name, default in _fields_of(kind)
         if (value := getattr(thing, name)) is not default and value != default
     }
 
 
-_known_fields: dict[type, tuple[tuple[str, Any], ...]] = {}
-
-
+@cache
 def _fields_of(kind: type[Any]) -> tuple[tuple[str, Any], ...]:
     """Names and defaults of the fields that carry meaning."""
-    if kind not in _known_fields:
-        unwritten = definer().unwritten if kind is CellDefinition else {}
-        without = _FOR_PEOPLE | _DERIVED.get(kind, frozenset())
-        _known_fields[kind] = tuple(
-            (field.name, unwritten.get(field.name, field.default))
-            for field in dataclasses.fields(kind)
-            if field.name not in without
-        )
-    return _known_fields[kind]
+    unwritten = definer().unwritten if kind is CellDefinition else {}
+    without = _FOR_PEOPLE | _DERIVED.get(kind, frozenset())
+    return tuple(
+        (field.name, unwritten.get(field.name, field.default))
+        for field in dataclasses.fields(kind)
+        if field.name not in without
+    )

@@ -35,7 +35,7 @@ class CompiledFile:
     @property
     def errors(self) -> tuple[Diagnostic, ...]:
         """The findings for which there is no plan."""
-        return tuple(one for one in self.diagnostics if one.severity is Severity.ERROR)
+        return tuple(found for found in self.diagnostics if found.severity is Severity.ERROR)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,4 +48,4 @@ class Compiled:
     @property
     def plans(self) -> tuple[Plan, ...]:
         """What can be served."""
-        return tuple(one.plan for one in self.files if one.plan is not None)
+        return tuple(file.plan for file in self.files if file.plan is not None)

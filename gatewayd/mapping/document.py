@@ -67,11 +67,8 @@ class Document:
         """Return the keys that stand in a top-level table, the broken ones too."""
         root = self.source.root
         entry = root.entries.get(section) if root is not None else None
-        return (
-            frozenset(entry.value.entries)
-            if entry is not None and isinstance(entry.value, Table)
-            else frozenset()
-        )
+        found = entry.value if entry is not None else None
+        return frozenset(found.entries if isinstance(found, Table) else ())
 
     def has(self, section: str) -> bool:
         """Whether the file holds a top-level key, be it right or wrong."""
@@ -79,13 +76,15 @@ class Document:
 
     def at(self, *path: Step) -> Position:
         """Return the place of the value at `path` from the top of the file, or of the nearest thing around it."""
-        start = self.source.position()
-        return walk(self.source.root, path, start)[1] if self.source.root is not None else start
+        return self._places(path)[1]
 
     def key_at(self, *path: Step) -> Position:
         """Return the place of the key at `path` from the top of the file, or of the nearest key around it."""
+        return self._places(path)[0]
+
+    def _places(self, path: tuple[Step, ...]) -> tuple[Position, Position]:
         start = self.source.position()
-        return walk(self.source.root, path, start)[0] if self.source.root is not None else start
+        return walk(self.source.root, path, start) if self.source.root is not None else (start, start)
 
 
 def walk(node: Node, path: tuple[Step, ...], key: Position) -> tuple[Position, Position]:

@@ -22,7 +22,7 @@ from gatewayd.mapping.language import FILE, VARIABLE, WRITER
 from gatewayd.mapping.model import ANY, FORMAT_VERSION, Group, VariableSpec, WriterSpec
 from gatewayd.mapping.scalars import CellName, Name
 from gatewayd.mapping.section import Section
-from gatewayd.mapping.source import Items, MappingText, Node, Scalar, Table, TableEntry
+from gatewayd.mapping.source import Items, MappingText, Node, Scalar, Table, TableEntry, shown
 
 __all__ = ["read_document"]
 
@@ -112,7 +112,6 @@ class _Reader:
     def __init__(self, source: MappingText) -> None:
         self.source = source
         self.findings: list[Diagnostic] = []
-        self._named: dict[type[Section], dict[str, Part[Any]]] = {}
 
     def read(self, root: Table) -> Document:
         self._format_version(root)
@@ -162,9 +161,8 @@ class _Reader:
             return parts
         if not isinstance(entry.value, Table):
             message = f"`{entry.key.text}` is not a table of `name: ...` lines"
-            self._find(
-                syntax.WRONG_TYPE, message, entry.value.position, "write one name with its table per line"
-            )
+            hint = "write one name with its table per line"
+            self._find(syntax.WRONG_TYPE, message, entry.value.position, hint)
             return parts
         for name, inner in entry.value.entries.items():
             named = self._name(model, inner)
@@ -204,11 +202,9 @@ class _Reader:
             for details in error.errors(include_url=False):
                 self._translate(details, model, entry, ())
             return None
-        return (
-            Part(entry.key.text, spec, entry.key.position, entry.value)
-            if len(self.findings) == found
-            else None
-        )
+        if len(self.findings) > found:
+            return None
+        return Part(entry.key.text, spec, entry.key.position, entry.value)
 
     def _has_value(self, key: str, entry: TableEntry) -> bool:
         if isinstance(entry.value, Scalar) and entry.value.value is None:
@@ -244,9 +240,7 @@ class _Reader:
             self._find(rule, context["message"], place, context["hint"])
             return
         inner = _of(_NESTED, model, str(path[0])) or model if len(path) > 1 else model
-        name = str(
-            next((step for step in reversed((*prefix, *path)) if isinstance(step, str)), entry.key.text)
-        )
+        name = next((step for step in reversed((*prefix, *path)) if isinstance(step, str)), entry.key.text)
         text = _echo(_node_at(entry.value, path))
         if kind == "missing" and isinstance(path[-1], str):
             self._missing_key(inner, path, entry)
@@ -263,9 +257,8 @@ class _Reader:
             message = f"`{name}` is {text}, it must be {_BOUNDS[kind][0]} {context[_BOUNDS[kind][1]]}"
             self._find(syntax.OUT_OF_RANGE, message, value, _field_hint(inner, name))
         elif kind == "string_pattern_mismatch":
-            self._find(
-                syntax.BAD_NETWORK, f"{text} is not a host name or IP address", value, "write 192.168.1.10"
-            )
+            message = f"{text} is not a host name or IP address"
+            self._find(syntax.BAD_NETWORK, message, value, "write 192.168.1.10")
         else:
             message = f"`{name}` is {text}: {_SIZES.get(kind, 'wrong number of values')}"
             self._find(syntax.WRONG_TYPE, message, value, _field_hint(inner, name))
@@ -337,15 +330,11 @@ def _raw(node: Node) -> Any:
     return node.value if isinstance(node, Scalar) else {} if isinstance(node, Table) else []
 
 
-_SHOWN_LENGTH = 60
-
-
 def _echo(node: Node) -> str:
     """Return a value as a message echoes it."""
     match node:
         case Scalar():
-            text = node.text if len(node.text) <= _SHOWN_LENGTH else node.text[: _SHOWN_LENGTH - 3] + "..."
-            return f"`{text}`"
+            return f"`{shown(node.text)}`"
         case Items():
             return f"a list of {len(node.items)}"
         case Table():

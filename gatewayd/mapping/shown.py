@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, inf
-from typing import Final
 
 from gatewayd.core.definition import ValueKind
 from gatewayd.links.registry import languages
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.reach import Reach
 
-__all__ = ["EVERYTHING", "Shown", "shown_of"]
+__all__ = ["Shown", "shown_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +25,6 @@ class Shown:
     """Whether NaN and the infinities are shown as what they are."""
 
 
-EVERYTHING: Final = Shown()
-"""What a variable without a narrow place shows."""
-
-
 def shown_of(cell: ExpandedCell) -> list[Shown]:
     """What is shown of each variable of a cell, in the order of its variables."""
     reaches: list[list[Reach]] = [[] for _ in cell.variables]
@@ -37,7 +32,7 @@ def shown_of(cell: ExpandedCell) -> list[Shown]:
         for index, reach in language.reaches(cell):
             reaches[index].append(reach)
     return [
-        _together(variable, places) if places else EVERYTHING
+        _together(variable, places) if places else Shown()
         for variable, places in zip(cell.variables, reaches, strict=True)
     ]
 

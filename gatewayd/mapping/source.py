@@ -40,7 +40,7 @@ __all__ = [
     "TableEntry",
     "WholeNumber",
     "parse",
-    "plain",
+    "shown",
 ]
 
 MAX_BYTES: Final = 1 << 20
@@ -131,17 +131,6 @@ class MappingText:
     def position(self) -> Position:
         """Return the start of the file, for what is missing altogether."""
         return Position(self.name, 1, 1)
-
-
-def plain(node: Node) -> object:
-    """`node` as dict, list and scalar values; numbers remember their text (`WholeNumber`, `RealNumber`)."""
-    match node:
-        case Scalar():
-            return node.value
-        case Items():
-            return [plain(item) for item in node.items]
-        case Table():
-            return {key: plain(entry.value) for key, entry in node.entries.items()}
 
 
 def parse(data: bytes, name: str) -> MappingText:
@@ -285,7 +274,7 @@ class _Reader:
             self._find(syntax.ALIAS, message, key.position, "write the keys out")
         elif (first := table.entries.get(key.text)) is not None:
             related = (Related(first.key.position, "first given here"),)
-            message = f"the key `{_shown(key.text)}` is given twice in one table"
+            message = f"the key `{shown(key.text)}` is given twice in one table"
             self._find(syntax.DUPLICATE_KEY, message, key.position, "remove one of the two", related)
         else:
             table.entries[key.text] = TableEntry(key, value)
@@ -295,27 +284,27 @@ class _Reader:
             return
         if event.anchor is not None:
             self._anchors.setdefault(event.anchor, position)
-            message = f"anchors (`&{_shown(event.anchor)}`) are not used in mappings"
+            message = f"anchors (`&{shown(event.anchor)}`) are not used in mappings"
             self._find(syntax.ALIAS, message, position, "write the value out where it is needed")
         if event.ctag is not None:
-            message = f"tags (`{_shown(str(event.ctag))}`) are not used in mappings"
+            message = f"tags (`{shown(str(event.ctag))}`) are not used in mappings"
             hint = "types follow from the place of a value: remove the tag"
             self._find(syntax.TAG, message, position, hint)
 
     def _alias(self, event: Any, position: Position) -> Scalar:
         anchor = self._anchors.get(event.anchor)
         related = (Related(anchor, "the anchor is here"),) if anchor is not None else ()
-        message = f"aliases (`*{_shown(event.anchor)}`) are not used in mappings"
+        message = f"aliases (`*{shown(event.anchor)}`) are not used in mappings"
         self._find(syntax.ALIAS, message, position, "write the value out", related)
         return Scalar("*" + event.anchor, quoted=True, position=position)
 
     def _syntax(self, error: MarkedYAMLError) -> None:
         mark = error.problem_mark or error.context_mark
-        position = Position(self.name, mark.line + 1, mark.column + 1) if mark else Position(self.name, 1, 1)
+        position = self._position(mark) if mark else Position(self.name, 1, 1)
         related: tuple[Related, ...] = ()
         if error.context and error.context_mark and mark is not error.context_mark:
-            place = Position(self.name, error.context_mark.line + 1, error.context_mark.column + 1)
-            related = (Related(place, _CONTEXTS.get(_one_line(error.context), _one_line(error.context))),)
+            context = _one_line(error.context)
+            related = (Related(self._position(error.context_mark), _CONTEXTS.get(context, context)),)
         problem = _one_line(error.problem or error.context or "not YAML")
         problem = problem.replace("'<stream end>'", "the end of the file")
         if problem.startswith("expected <block end>"):
@@ -338,7 +327,10 @@ class _Reader:
         self.findings.append(rule.at(position, message, hint=hint or None, related=related))
 
     def _at(self, event: Any) -> Position:
-        return Position(self.name, event.start_mark.line + 1, event.start_mark.column + 1)
+        return self._position(event.start_mark)
+
+    def _position(self, mark: Any) -> Position:
+        return Position(self.name, mark.line + 1, mark.column + 1)
 
 
 _COMMENTS: Final = ("//", "(*", "/*", ";")
@@ -378,5 +370,6 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())[:200]
 
 
-def _shown(text: str) -> str:
+def shown(text: str) -> str:
+    """The text as a message echoes it: not all of a very long one."""
     return text if len(text) <= _SHOWN_LENGTH else text[: _SHOWN_LENGTH - 3] + "..."

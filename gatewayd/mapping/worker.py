@@ -26,7 +26,7 @@ def compile_files(names: Iterable[str]) -> Compiled:
             unreadable.append(Unreadable(name, getattr(error, "strerror", None) or str(error)))
     loaded = load_together(files)
     return Compiled(
-        tuple(CompiledFile(one.name, one.diagnostics, one.plan) for one in loaded), tuple(unreadable)
+        tuple(CompiledFile(file.name, file.diagnostics, file.plan) for file in loaded), tuple(unreadable)
     )
 
 

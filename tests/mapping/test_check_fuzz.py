@@ -17,10 +17,11 @@ from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
 from gatewayd.links.canopen_node.plan import canopen_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together
-from gatewayd.mapping.source import parse, plain
+from gatewayd.mapping.source import parse
 from gatewayd.report.findings import CheckOutcome, as_github, as_json, as_text
 from gatewayd.report.table import as_csv, as_markdown, rows
 from gatewayd.report.table import as_json as table_as_json
+from tests.mapping.values import plain
 
 ROOT = Path(__file__).parents[2]
 SEEDS = [

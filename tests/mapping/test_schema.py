@@ -9,7 +9,8 @@ import jsonschema
 import pytest
 
 from gatewayd.mapping.schema import mapping_schema, schema_text
-from gatewayd.mapping.source import parse, plain
+from gatewayd.mapping.source import parse
+from tests.mapping.values import plain
 
 MAPPINGS = Path(__file__).parents[2] / "mappings"
 VALIDATOR = jsonschema.Draft202012Validator(mapping_schema())

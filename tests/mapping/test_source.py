@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.mapping.diagnostics import Position
-from gatewayd.mapping.source import MAX_BYTES, Items, MappingText, RealNumber, Scalar, Table, parse, plain
+from gatewayd.mapping.source import MAX_BYTES, Items, MappingText, RealNumber, Scalar, Table, parse
+from tests.mapping.values import plain
 
 
 def read(text: str) -> MappingText:

@@ -7,9 +7,20 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from gatewayd.mapping.source import parse, plain
+from gatewayd.mapping.source import Items, Node, Scalar, Table, parse
 
-__all__ = ["read", "refused", "written"]
+__all__ = ["plain", "read", "refused", "written"]
+
+
+def plain(node: Node) -> object:
+    """`node` as dict, list and scalar values; numbers remember their text (`WholeNumber`, `RealNumber`)."""
+    match node:
+        case Scalar():
+            return node.value
+        case Items():
+            return [plain(item) for item in node.items]
+        case Table():
+            return {key: plain(entry.value) for key, entry in node.entries.items()}
 
 
 def written(text: str) -> object:

@@ -40,7 +40,7 @@ _REMEDIES = {
 
 
 class ListenError(OSError):
-    """The address cannot be listened on; `errno` tells why, the text also what to do."""
+    """The address cannot be listened on; `errno` says why, the text also what to do."""
 
 
 class ModbusListener:

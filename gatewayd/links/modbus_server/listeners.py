@@ -54,11 +54,11 @@ class Listeners(SharedPart):
 
     def progress(self) -> dict[str, int]:
         """Attempts, then sweeps, of each listener."""
-        return {f"listener {one.name}": one.progress + self._waits[one] for one in self.listeners}
+        return {f"listener {known.name}": known.progress + self._waits[known] for known in self.listeners}
 
     def troubles(self) -> list[str]:
         """Addresses that cannot be had."""
-        return [f"not listening on {one.name}" for one in self.listeners if not one.listening]
+        return [f"not listening on {known.name}" for known in self.listeners if not known.listening]
 
     def gap(self, since: float, now: float) -> None:
         """What is in the sockets may have waited."""
@@ -92,7 +92,7 @@ class Listeners(SharedPart):
         for unit in links:
             assert isinstance(unit, ModbusUnit)
             served.setdefault((unit.plan.host, unit.plan.port), []).append(unit)
-        for listener in [one for one in self.listeners if one.address not in served]:
+        for listener in [known for known in self.listeners if known.address not in served]:
             listener.serve((), successors)
             self.listeners.remove(listener)
             self._end(listener)

@@ -1,6 +1,6 @@
 """What may have waited in a socket while the gateway stood still.
 
-The kernel takes what peers send, and their connections, whether or not the process runs. Of one read nobody can tell
+The kernel takes what peers send, and their connections, whether or not the process runs. Of one read nobody knows
 when its bytes came; so after a gap everything counts as waiting until the socket was read empty, and so does what
 comes within `SETTLING` of it: that may have been in the queues of a network card or a hypervisor.
 

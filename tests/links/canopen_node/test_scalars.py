@@ -16,7 +16,8 @@ from gatewayd.links.canopen_node.scalars import (
     MillisecondTime,
     Transmission,
 )
-from gatewayd.mapping.source import parse, plain
+from gatewayd.mapping.source import parse
+from tests.mapping.values import plain
 
 
 def yaml(text: str) -> Any:

@@ -1,4 +1,4 @@
-"""Rules GW504 and GW505: the addresses by which writers are told apart."""
+"""Rules GW504 and GW505: the addresses by which writers are known."""
 
 from __future__ import annotations
 
