@@ -7,6 +7,7 @@ hints. The rows are in `gatewayd.rtde.fields`.
 from __future__ import annotations
 
 import difflib
+import re
 from typing import TYPE_CHECKING
 
 from gatewayd.rtde.fields import (
@@ -43,9 +44,12 @@ _WORDS = {
     "output": ("output_bit_registers0_to_31", "output_bit_registers32_to_63"),
 }
 _ALL_NAMES = tuple(dict.fromkeys((*INPUTS, *OUTPUTS)))
+_REGISTER = re.compile(r"input_(?:int|double)_register_([0-9]+)")
 _FIELDBUS_REGISTERS = 24
 _UR_RTDE_LOWER = range(18, 24)
 _UR_RTDE_UPPER = range(42, 48)
+_LOWER_RANGE = "ur_rtde using its lower range (registers 18-23, from 0 on newer controllers)"
+_NEW_RANGE = "ur_rtde (registers from 0 on PolyScope 5.23 / X 10.9 and newer)"
 
 
 def bit_word(side: str, number: int) -> tuple[str, int]:
@@ -77,7 +81,7 @@ def is_fieldbus_range(name: str) -> bool:
 def likely_holders(field: str) -> str:
     """Who probably controls an input field for which the controller answers IN_USE, in words for a log.
 
-    RTDE does not tell; these are the clients known to claim the field (issues of UR's drivers, ur_rtde's sources).
+    RTDE does not say; these are the clients known to claim the field (issues of UR's drivers, ur_rtde's sources).
     """
     number = _register_number(field)
     holders = []
@@ -87,7 +91,7 @@ def likely_holders(field: str) -> str:
         holders.append("the robot's PROFINET or EtherNet/IP adapter")
         holders.append("a MODBUS unit configured on the robot")
         if number is not None:
-            holders.append(_ur_rtde(number in _UR_RTDE_LOWER))
+            holders.append(_LOWER_RANGE if number in _UR_RTDE_LOWER else _NEW_RANGE)
     elif number is not None:
         holders.append("a URCap or driver using the upper registers")
         if number in _UR_RTDE_UPPER:
@@ -102,15 +106,7 @@ def likely_holders(field: str) -> str:
     return ", ".join(holders) + " or another RTDE client"
 
 
-def _ur_rtde(usual: bool) -> str:
-    if usual:
-        return "ur_rtde using its lower range (registers 18-23, from 0 on newer controllers)"
-    return "ur_rtde (registers from 0 on PolyScope 5.23 / X 10.9 and newer)"
-
-
 def _register_number(name: str) -> int | None:
     """Number of an integer or double input register."""
-    for prefix in ("input_int_register_", "input_double_register_"):
-        if name.startswith(prefix) and name.removeprefix(prefix).isdecimal():
-            return int(name.removeprefix(prefix))
-    return None
+    match = _REGISTER.fullmatch(name)
+    return int(match[1]) if match is not None else None

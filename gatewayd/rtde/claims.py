@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from types import MappingProxyType
 
+from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.rtde.messages import ERROR_WORDS, IN_USE, InputsSetup, SetupInputs
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
@@ -50,13 +51,7 @@ MAX_RECIPES = 255
 _IDS_FOR_RETRIES = 64
 """Recipe ids that joins leave over for inputs that become free later."""
 _RETRIED = frozenset({IN_USE, REFUSED})
-_FAMILIES = (
-    "speed_slider",
-    "standard_digital_output",
-    "configurable_digital_output",
-    "tool_digital_output",
-    "standard_analog_output",
-)
+_FAMILIES = tuple({needs.mask.removesuffix("_mask"): None for needs in COMPANIONS.values()})
 
 
 class HandshakeError(Exception):
@@ -159,7 +154,8 @@ class Claims:
         self._used = 0
         self._asked = False
         self._changed = False
-        self._exhausted = False
+        self.exhausted = False
+        """Whether a request was wanted after all recipe ids of the connection had been used."""
         self._limited = False
         self._enqueue(self._groups)
         if limited:
@@ -190,11 +186,6 @@ class Claims:
     def retriable(self) -> bool:
         """Whether asking again may help for some field."""
         return any(group.retriable() for group in self._groups)
-
-    @property
-    def exhausted(self) -> bool:
-        """Whether a request was wanted after all recipe ids of the connection had been used."""
-        return self._exhausted
 
     @property
     def busy(self) -> bool:
@@ -257,7 +248,7 @@ class Claims:
         if not self._queue:
             return None
         if self._used >= MAX_RECIPES:
-            self._exhausted = True
+            self.exhausted = True
             self._queue.clear()
             return None
         self._asked = True

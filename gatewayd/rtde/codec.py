@@ -49,18 +49,25 @@ class ProtocolError(Exception):
 
 
 _Received = TypeVar("_Received", ControllerMessage, ExecutableMessage)
+_Sent = TypeVar("_Sent", ControllerMessage, ExecutableMessage)
 
 
-class _Receiver(Generic[_Received]):
-    """Cuts a stream into packages and decodes them by the table of the version spoken."""
+class _Endpoint(Generic[_Received, _Sent]):
+    """One side: cuts a stream into packages and decodes them by the table of the version spoken, and encodes.
 
-    version: int
-    """Protocol version spoken: 1 until another one is accepted."""
+    `decoders` are the tables of versions 1 and 2, `ids_since` the version from which received data has a recipe id.
+    """
 
-    def __init__(self, decoders: Mapping[int, Callable[[bytes], _Received]], *, data_id: bool) -> None:
-        self.version = 1
-        self._decoders: Mapping[int, Callable[[bytes], _Received]] = decoders
-        self._data_id = data_id
+    def __init__(
+        self,
+        decoders: tuple[Mapping[int, Callable[[bytes], _Received]], ...],
+        encode: Callable[[_Sent, int], tuple[PackageType, bytes]],
+        ids_since: int,
+    ) -> None:
+        self._tables: tuple[Mapping[int, Callable[[bytes], _Received]], ...] = decoders
+        self._encode: Callable[[_Sent, int], tuple[PackageType, bytes]] = encode
+        self._ids_since = ids_since
+        self._speak(1)
         self._rest = bytearray()
         self._needed = _HEADER.size
         self._consumed = 0
@@ -112,15 +119,38 @@ class _Receiver(Generic[_Received]):
                     message = decoder(data[start + _HEADER.size : position])
                 except payloads.MalformedPayloadError as error:
                     self._reject(f"{PackageType(kind).name} with {error}", start, data[start:position])
-                self._observe(message)
+                self._note(message)
                 yield message
         finally:
             if self._error is None:
                 self._consumed += position
                 self._rest += data[position:]
 
-    def _observe(self, message: _Received) -> None:
-        """Take note of a message of the version negotiation before it is handed out."""
+    def send(self, message: _Sent) -> bytes:
+        """The package of `message` in the version spoken. ValueError for what does not fit into one."""
+        kind, payload = self._encode(message, self.version)
+        size = _HEADER.size + len(payload)
+        if size > MAX_PACKAGE:
+            msg = f"{kind.name} of {size} bytes is larger than a package can be ({MAX_PACKAGE})"
+            raise ValueError(msg)
+        if kind is not PackageType.DATA_PACKAGE:
+            self._note(message)
+        return _HEADER.pack(size, kind) + payload
+
+    def _note(self, message: ControllerMessage | ExecutableMessage) -> None:
+        """Switch the version where a message, sent or received, accepts the one that was requested first."""
+        if isinstance(message, RequestProtocolVersion):
+            self._requested.append(message.version)
+        elif isinstance(message, ProtocolVersionReply) and self._requested:
+            requested = self._requested.popleft()
+            if message.accepted:
+                self._speak(requested)
+
+    def _speak(self, version: int) -> None:
+        self.version = version
+        """Protocol version spoken: 1 until another one is accepted."""
+        self._decoders: Mapping[int, Callable[[bytes], _Received]] = self._tables[version > 1]
+        self._data_id = version >= self._ids_since
 
     def _reject_header(self, size: int, kind: int, data: bytes, position: int) -> NoReturn:
         if size < _HEADER.size:
@@ -134,61 +164,20 @@ class _Receiver(Generic[_Received]):
         raise self._error from None
 
 
-def _package(kind: PackageType, payload: bytes) -> bytes:
-    size = _HEADER.size + len(payload)
-    if size > MAX_PACKAGE:
-        msg = f"{kind.name} of {size} bytes is larger than a package can be ({MAX_PACKAGE})"
-        raise ValueError(msg)
-    return _HEADER.pack(size, kind) + payload
-
-
-class ClientProtocol(_Receiver[ControllerMessage]):
+class ClientProtocol(_Endpoint[ControllerMessage, ExecutableMessage]):
     """The client's side of one connection (EE). Switches version when an accepted request is answered."""
 
     def __init__(self) -> None:
-        super().__init__(payloads.FROM_CONTROLLER_V1, data_id=False)
-
-    def send(self, message: ExecutableMessage) -> bytes:
-        """The package of `message` in the version spoken. ValueError for what does not fit into one."""
-        data = _package(*payloads.encode_executable(message, self.version))
-        if isinstance(message, RequestProtocolVersion):
-            self._requested.append(message.version)
-        return data
-
-    def _observe(self, message: ControllerMessage) -> None:
-        if isinstance(message, ProtocolVersionReply) and self._requested:
-            requested = self._requested.popleft()
-            if message.accepted:
-                self._speak(requested)
-
-    def _speak(self, version: int) -> None:
-        self.version = version
-        self._data_id = version > 1
-        self._decoders = payloads.FROM_CONTROLLER if version > 1 else payloads.FROM_CONTROLLER_V1
+        tables = payloads.FROM_CONTROLLER_V1, payloads.FROM_CONTROLLER
+        super().__init__(tables, payloads.encode_executable, ids_since=2)
 
 
-class ControllerProtocol(_Receiver[ExecutableMessage]):
+class ControllerProtocol(_Endpoint[ExecutableMessage, ControllerMessage]):
     """The controller's side of one connection (CON). Switches version when it sends the acceptance of a request.
 
     Answer a RequestProtocolVersion while iterating over `receive`, before the next message is taken.
     """
 
     def __init__(self) -> None:
-        super().__init__(payloads.FROM_EXECUTABLE_V1, data_id=True)
-
-    def send(self, message: ControllerMessage) -> bytes:
-        """The package of `message` in the version spoken. ValueError for what does not fit into one."""
-        data = _package(*payloads.encode_controller(message, self.version))
-        if isinstance(message, ProtocolVersionReply) and self._requested:
-            requested = self._requested.popleft()
-            if message.accepted:
-                self._speak(requested)
-        return data
-
-    def _observe(self, message: ExecutableMessage) -> None:
-        if isinstance(message, RequestProtocolVersion):
-            self._requested.append(message.version)
-
-    def _speak(self, version: int) -> None:
-        self.version = version
-        self._decoders = payloads.FROM_EXECUTABLE if version > 1 else payloads.FROM_EXECUTABLE_V1
+        tables = payloads.FROM_EXECUTABLE_V1, payloads.FROM_EXECUTABLE
+        super().__init__(tables, payloads.encode_controller, ids_since=1)

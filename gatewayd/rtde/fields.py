@@ -6,6 +6,7 @@ guide lists (it covers e-Series and PolyScope X) counts as missing on CB3 unless
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
@@ -71,22 +72,19 @@ class SoftwareVersion(NamedTuple):
     @classmethod
     def parse(cls, text: str) -> SoftwareVersion:
         """Read "5.12", "5.12.0" or "5.12.0.1101" (the build is dropped); ValueError for anything else."""
-        parts = text.strip().split(".")
-        if not _MIN_PARTS <= len(parts) <= _MOST_PARTS or not all(
-            part.isascii() and part.isdigit() for part in parts
-        ):
+        match = _VERSION.fullmatch(text.strip())
+        if match is None:
             msg = f"{text!r} is not a software version like 5.12 or 5.12.0"
             raise ValueError(msg)
-        return cls(*(int(part) for part in parts[: _MOST_PARTS - 1]))
+        return cls(int(match[1]), int(match[2]), int(match[3] or 0))
 
 
-_MIN_PARTS = 2
-_MOST_PARTS = 4
+_VERSION = re.compile(r"([0-9]+)\.([0-9]+)(?:\.([0-9]+))?(?:\.[0-9]+)?")
 _NEVER = SoftwareVersion(1 << 30, 0)
 
 
 class Since(NamedTuple):
-    """First version with a field in each series; None: from the start."""
+    """First version with a field in each series, by its word; None: from the start."""
 
     cb3: SoftwareVersion | None = None
     e: SoftwareVersion | None = None
@@ -109,7 +107,8 @@ class Field:
 
     def first_version(self, series: Series) -> SoftwareVersion | None:
         """First software version of the series with the field; None: from the start. See `exists`."""
-        return self.since[_COLUMN[series]]
+        version: SoftwareVersion | None = getattr(self.since, series.word)
+        return version
 
     def exists(self, series: Series) -> bool:
         """Whether any known version of the series has the field."""
@@ -119,9 +118,6 @@ class Field:
         """Whether that controller should have the field; without a version: whether any of the series has it."""
         first = self.first_version(series)
         return first is None or (first != _NEVER and (version is None or version >= first))
-
-
-_COLUMN = {Series.CB3: 0, Series.E: 1, Series.X: 2}
 
 
 @dataclass(frozen=True, slots=True)

@@ -281,7 +281,7 @@ class Negotiation:
         if self._agreed is not None and (refused or tuple(types) != self._agreed.types):
             raise HandshakeError("the controller answered the same output recipe otherwise than before")
         if refused:
-            self._reading.refuse(refused)
+            self._reading.refused |= refused
             return self._ask_outputs()
         if reply.recipe == 0:
             raise HandshakeError("the controller refused the output recipe without naming a field")
@@ -335,7 +335,7 @@ class Negotiation:
     def _piece_answered(self, reply: messages.OutputsSetup) -> NextStep:
         types, refused = sort_types(self._asked, reply.types)
         if refused:
-            self._reading.refuse(refused)
+            self._reading.refused |= refused
             return self._advance()
         if reply.recipe == 0:
             raise HandshakeError(

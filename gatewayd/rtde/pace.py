@@ -38,23 +38,19 @@ class Pace:
     def __init__(self, period: float, statistics: Statistics, now: float) -> None:
         self._period = period
         self._statistics = statistics
-        self._timestamp: float | None = None
+        self.timestamp: float | None = None
+        """Controller time of the newest package."""
         self._arrival = now
         self._window_start = now
         self._window_packages = 0
         statistics.frequency = 0.0
-
-    @property
-    def timestamp(self) -> float | None:
-        """Controller time of the newest package."""
-        return self._timestamp
 
     def package(self, timestamp: float, now: float) -> bool:
         """Count a package; False if the controller's time went back or leapt, that is, if it has restarted."""
         self._window_packages += 1
         statistics = self._statistics
         statistics.packages += 1
-        last, self._timestamp = self._timestamp, timestamp
+        last, self.timestamp = self.timestamp, timestamp
         arrival, self._arrival = self._arrival, now
         if last is None:
             return True

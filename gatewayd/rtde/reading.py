@@ -8,7 +8,6 @@ before it is set up: nothing that was claimed is left unread because a list was 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from types import MappingProxyType
 
 from gatewayd.rtde.claims import OLD_LIST_LIMIT
 from gatewayd.rtde.codec import ProtocolError
@@ -39,20 +38,12 @@ class Reading:
         self._outputs = wishes.wanted_outputs()
         self._read_backs = wishes.read_backs()
         self._verifies = wishes.read_back
-        self._refused: dict[str, str] = {}
-        self._types: dict[str, DataType] = {}
-        self._held: dict[str, tuple[Scalar, ...]] = {}
-        self._piece: Recipe | None = None
-
-    @property
-    def held(self) -> Mapping[str, tuple[Scalar, ...]]:
-        """What was read in pieces."""
-        return MappingProxyType(dict(self._held))
-
-    @property
-    def refused(self) -> Mapping[str, str]:
+        self.refused: dict[str, str] = {}
         """Fields that cannot be read at all, with the controller's word for each."""
-        return MappingProxyType(self._refused)
+        self.held: dict[str, tuple[Scalar, ...]] = {}
+        """What was read in pieces."""
+        self._types: dict[str, DataType] = {}
+        self._piece: Recipe | None = None
 
     @property
     def left_out(self) -> Mapping[str, bool]:
@@ -63,18 +54,14 @@ class Reading:
         return {
             name: read_back
             for name, read_back in wanted.items()
-            if name not in chosen and name not in self._refused
+            if name not in chosen and name not in self.refused
         }
 
     def working(self) -> tuple[str, ...]:
         """The list of the working recipe."""
         wanted = (*self._outputs, *(self._read_backs if self._verifies else ()))
-        offered = [name for name in wanted if name not in self._refused]
+        offered = [name for name in wanted if name not in self.refused]
         return fitting(offered) if self.limited else tuple(offered)
-
-    def refuse(self, words: Mapping[str, str]) -> None:
-        """The controller does not offer these outputs."""
-        self._refused |= words
 
     def agree(self, recipe: Recipe) -> None:
         """The working recipe is set up: it reads what it has."""
@@ -87,7 +74,7 @@ class Reading:
             name
             for name in claimed
             if name.startswith("input_")
-            and not (name in working or name in self._held or name in self._refused)
+            and not (name in working or name in self.held or name in self.refused)
         )
 
     def expect(self, piece: Recipe) -> None:
@@ -103,7 +90,7 @@ class Reading:
         except ProtocolError:
             return False
         self._types |= zip(piece.names, piece.types, strict=True)
-        self._held |= {name: flat[slot] for name, slot in piece.slots.items()}
+        self.held |= {name: flat[slot] for name, slot in piece.slots.items()}
         return True
 
     def unread(self, claimed: Mapping[str, DataType]) -> frozenset[str]:

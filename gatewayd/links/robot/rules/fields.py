@@ -14,18 +14,14 @@ from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Se
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 from gatewayd.mapping.rules.writers import more_places
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, REGISTERS, Series, SoftwareVersion, suggest
+from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Series, SoftwareVersion, is_fieldbus_range, suggest
 from gatewayd.rtde.claims import OLD_LIST_LIMIT, list_size
 
 __all__: list[str] = []
 
 _LONG_LISTS_SINCE = SoftwareVersion(5, 17)
 _UPPER_INPUTS = frozenset(
-    f"{family.prefix}{register}"
-    for family in REGISTERS
-    if family.prefix.startswith("input_")
-    for register in family.numbers
-    if register not in family.fieldbus
+    name for name in INPUTS if name.startswith("input_") and not is_fieldbus_range(name)
 )
 
 
