@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from gatewayd.rtde.catalogue import Series, SoftwareVersion
+    from gatewayd.rtde.fields import Series, SoftwareVersion
     from gatewayd.simulator.controller import Controller
     from gatewayd.simulator.faults import DropAt
     from gatewayd.simulator.program import ProgramRule
@@ -285,7 +285,7 @@ def _fields(text: str | None) -> tuple[str, ...]:
 
 
 def _inputs(text: str | None) -> frozenset[str]:
-    from gatewayd.rtde.catalogue import INPUTS
+    from gatewayd.rtde.fields import INPUTS
 
     fields = frozenset(_fields(text))
     unknown = sorted(fields - INPUTS.keys())
@@ -307,7 +307,7 @@ def _drop_at(text: str | None) -> DropAt | None:
 
 
 def _generation(series: str | None, version: str | None) -> tuple[Series, SoftwareVersion | None]:
-    from gatewayd.rtde.catalogue import Series, SoftwareVersion
+    from gatewayd.rtde.fields import Series, SoftwareVersion
 
     if version is None:
         return Series.from_word(series or "e"), None

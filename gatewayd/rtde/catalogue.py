@@ -1,8 +1,4 @@
-"""What is known of each RTDE field before a controller is asked: type, meaning, unit, first version.
-
-The controller's own answer to a setup request stays the truth; the catalogue serves checks, tables, the simulator and
-hints. The rows are in `gatewayd.rtde.fields`.
-"""
+"""What follows from the names of RTDE fields: bits of words, similar names, and who may have claimed an input."""
 
 from __future__ import annotations
 
@@ -10,34 +6,12 @@ import difflib
 import re
 from typing import TYPE_CHECKING
 
-from gatewayd.rtde.fields import (
-    BITS_PER_WORD,
-    INPUTS,
-    OUTPUTS,
-    REGISTERS,
-    Field,
-    RegisterFamily,
-    Series,
-    SoftwareVersion,
-)
+from gatewayd.rtde.fields import BITS_PER_WORD, INPUTS, OUTPUTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-__all__ = [
-    "BITS_PER_WORD",
-    "INPUTS",
-    "OUTPUTS",
-    "REGISTERS",
-    "Field",
-    "RegisterFamily",
-    "Series",
-    "SoftwareVersion",
-    "bit_word",
-    "is_fieldbus_range",
-    "likely_holders",
-    "suggest",
-]
+__all__ = ["bit_word", "is_fieldbus_range", "likely_holders", "suggest"]
 
 _WORDS = {
     "input": ("input_bit_registers0_to_31", "input_bit_registers32_to_63"),

@@ -1,4 +1,7 @@
-"""The rows of the field catalogue: both RTDE guides, and what implementations know beyond them.
+"""The field catalogue: what is known of each RTDE field before a controller is asked.
+
+From both RTDE guides, and what implementations know beyond them. The controller's own answer to a setup request stays
+the truth; the catalogue serves checks, tables, the simulator and hints.
 
 Where the guides are silent about a version the field counts as there from the start; a field that only the newer
 guide lists (it covers e-Series and PolyScope X) counts as missing on CB3 unless a source says otherwise.

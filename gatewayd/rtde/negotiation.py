@@ -17,8 +17,8 @@ from enum import Enum, auto
 from typing import ClassVar, NamedTuple
 
 from gatewayd.rtde import messages
-from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.claims import Claims, HandshakeError, is_long, sort_types
+from gatewayd.rtde.fields import Series
 from gatewayd.rtde.reading import Reading
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.session import TOO_LONG, Session, Unavailable, Wishes, input_hint, output_hint

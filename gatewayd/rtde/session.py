@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gatewayd.report.format import address
-from gatewayd.rtde.catalogue import OUTPUTS, Series, likely_holders
+from gatewayd.rtde.catalogue import likely_holders
 from gatewayd.rtde.claims import InputRecipe
+from gatewayd.rtde.fields import OUTPUTS, Series
 from gatewayd.rtde.messages import IN_USE, NOT_FOUND, ControllerVersion
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.types import DEFAULT_PORT

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
 
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series, SoftwareVersion
 from gatewayd.rtde.enums import ProgramState
+from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field, Series, SoftwareVersion
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.arm import ControllerMoment
 from gatewayd.simulator.claims import ControllerClaims

@@ -11,7 +11,8 @@ from enum import Enum
 from random import Random
 from typing import NamedTuple
 
-from gatewayd.rtde.catalogue import INPUTS, is_fieldbus_range
+from gatewayd.rtde.catalogue import is_fieldbus_range
+from gatewayd.rtde.fields import INPUTS
 
 __all__ = [
     "ADAPTERS",

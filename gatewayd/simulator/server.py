@@ -15,14 +15,13 @@ from typing import Self, cast
 
 from gatewayd.rtde.codec import ProtocolError
 from gatewayd.rtde.messages import TextLevel
-from gatewayd.rtde.types import DEFAULT_PORT
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import DroppedError, Faults, Mangler
 from gatewayd.simulator.line import OutgoingLine
 from gatewayd.simulator.session import SimulatorSession
 from gatewayd.simulator.store import Scalar
 
-__all__ = ["DEFAULT_PORT", "MAKE_UP", "MAX_CONNECTIONS", "SimulatedController"]
+__all__ = ["MAKE_UP", "MAX_CONNECTIONS", "SimulatedController"]
 
 MAKE_UP = 25
 """Cycles of lateness that are made up for."""

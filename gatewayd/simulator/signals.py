@@ -93,11 +93,9 @@ def _actual_current_as_torque(moment: ControllerMoment) -> Vector:
     return tuple(a * k for a, k in zip(_actual_current(moment), _TORQUE_CONSTANT, strict=True))
 
 
+@lru_cache(2)
 def _pose(moment: ControllerMoment) -> Vector:
-    return _pose_at(moment.path)
-
-
-_pose_at = lru_cache(2)(pose)
+    return pose(moment.path)
 
 
 def _actual_pose(moment: ControllerMoment) -> Vector:
@@ -127,19 +125,11 @@ def _raw_wrench(moment: ControllerMoment) -> Vector:
     return (x, y, z - _PAYLOAD * _GRAVITY, *torque)
 
 
-def _force(moment: ControllerMoment) -> Vector:
-    return (math.hypot(*_wrench(moment)[:3]),)
-
-
 def _accelerometer(moment: ControllerMoment) -> Vector:
     """Acceleration plus gravity's reaction, turned into the flange's frame."""
     ax, ay, az, *_ = thrust(moment.path, moment.rate)
     az += _GRAVITY
     return tuple(ax * x + ay * y + az * z for x, y, z in frames(moment.path).rotation)
-
-
-def _momentum(moment: ControllerMoment) -> Vector:
-    return (0.4 * _ARM_MASS * math.hypot(*twist(moment.path, moment.rate, ELBOW)[:3]),)
 
 
 def _power(moment: ControllerMoment) -> float:
@@ -156,10 +146,6 @@ def _digital_inputs(moment: ControllerMoment) -> Vector:
     """A light running over the standard inputs, another over the configurable ones, tool input 0 blinking."""
     second = int(moment.path)
     return (1 << second % 8 | 1 << 8 + second // 2 % 8 | (second // 4 & 1) << 16,)
-
-
-def _configurable_inputs(moment: ControllerMoment) -> Vector:
-    return (int(_digital_inputs(moment)[0]) >> 8 & 0xFF,)
 
 
 def _base_wrench(moment: ControllerMoment) -> Vector:
@@ -205,14 +191,16 @@ SIGNALS: Mapping[str, Signal] = {
     "actual_TCP_force": _wrench,
     "ft_raw_wrench": _raw_wrench,
     "wrench_calc_from_currents": _wrench,
-    "tcp_force_scalar": _force,
+    "tcp_force_scalar": lambda moment: (math.hypot(*_wrench(moment)[:3]),),
     "actual_tool_accelerometer": _accelerometer,
     "elbow_position": lambda moment: frames(moment.path).origins[ELBOW],
     "elbow_velocity": lambda moment: twist(moment.path, moment.rate, ELBOW)[:3],
-    "actual_momentum": _momentum,
+    "actual_momentum": lambda moment: (
+        0.4 * _ARM_MASS * math.hypot(*twist(moment.path, moment.rate, ELBOW)[:3]),
+    ),
     "target_base_wrench": _base_wrench,
     "actual_digital_input_bits": _digital_inputs,
-    "actual_configurable_digital_input_bits": _configurable_inputs,
+    "actual_configurable_digital_input_bits": lambda moment: (int(_digital_inputs(moment)[0]) >> 8 & 0xFF,),
     "euromap67_input_bits": lambda moment: (1 << int(moment.path) % 16,),
     "joint_temperatures": _temperatures,
     "tool_temperature": lambda moment: (27 + 8 * (1 - math.exp(-moment.time / 2400)),),

@@ -10,8 +10,8 @@ import selectors
 import socket
 import time
 
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
 from gatewayd.rtde.codec import ControllerProtocol
+from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.messages import (
     ControllerMessage,
     ControllerVersion,

@@ -35,7 +35,7 @@ from gatewayd.logs.records import LEVELS as LEVEL_NAMES
 from gatewayd.mapping.schema import mapping_schema
 from gatewayd.modbus.areas import Area
 from gatewayd.report.schema import documented
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field, Series
+from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field, Series
 from gatewayd.web.histogram import BOUNDS
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS
 from tests.docs import canopen

@@ -13,7 +13,7 @@ from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.loader import Loaded, load, load_together, read_bytes
 from gatewayd.mapping.source import MAX_BYTES
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
+from gatewayd.rtde.fields import INPUTS, OUTPUTS
 
 MAPPINGS = Path(__file__).parents[2] / "mappings"
 GOOD = {path.name: path.read_bytes() for path in sorted(MAPPINGS.glob("*.yaml"))}

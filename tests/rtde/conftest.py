@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from gatewayd.rtde import client, messages
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
 from gatewayd.rtde.codec import ControllerProtocol
+from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.loss import Loss
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import ClientSettings, Session

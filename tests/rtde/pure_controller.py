@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from gatewayd.rtde import messages as m
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
+from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import Session

@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, bit_word, is_fieldbus_range, likely_holders, suggest
+from gatewayd.rtde.catalogue import bit_word, is_fieldbus_range, likely_holders, suggest
+from gatewayd.rtde.fields import INPUTS, OUTPUTS
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.rtde.catalogue import INPUTS
 from gatewayd.rtde.claims import (
     OLD_LIST_LIMIT,
     REFUSED,
@@ -15,6 +14,7 @@ from gatewayd.rtde.claims import (
     recipe_key,
     sort_types,
 )
+from gatewayd.rtde.fields import INPUTS
 from gatewayd.rtde.messages import IN_USE, NOT_FOUND, InputsSetup
 from gatewayd.rtde.types import DataType
 

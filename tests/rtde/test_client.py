@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from gatewayd.rtde import messages
-from gatewayd.rtde.catalogue import Series
+from gatewayd.rtde.fields import Series
 from gatewayd.rtde.loss import LossReason
 from tests.rtde.conftest import send
 

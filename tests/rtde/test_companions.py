@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.rtde.catalogue import INPUTS
 from gatewayd.rtde.claims import recipe_key
 from gatewayd.rtde.companions import COMPANIONS
+from gatewayd.rtde.fields import INPUTS
 
 
 def test_every_mask_and_type_of_the_catalogue_is_a_companion_and_shares_the_recipe() -> None:

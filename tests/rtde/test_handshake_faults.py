@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from gatewayd.rtde.catalogue import INPUTS
 from gatewayd.rtde.client import RtdeClient
+from gatewayd.rtde.fields import INPUTS
 from gatewayd.rtde.loss import LossReason
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.types import DataType

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gatewayd.rtde import messages as m
-from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.claims import HandshakeError
+from gatewayd.rtde.fields import Series
 from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice, State
 from gatewayd.rtde.session import Wishes
 from tests.rtde.pure_controller import PureController

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from gatewayd.rtde.catalogue import Series
+from gatewayd.rtde.fields import Series
 from gatewayd.rtde.loss import LossReason
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import Faults

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from gatewayd.rtde.catalogue import Series, SoftwareVersion
+from gatewayd.rtde.fields import Series, SoftwareVersion
 from gatewayd.simulator.controller import INTERNAL, Controller
 from gatewayd.simulator.faults import ADAPTER_FIELDS, Faults
 from gatewayd.simulator.program import parse

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from gatewayd.rtde.catalogue import INPUTS
+from gatewayd.rtde.fields import INPUTS
 from gatewayd.simulator.faults import ADAPTER_FIELDS, DropAt, Faults, FaultStep, Mangler
 
 PACKAGES = [bytes([n]) * 8 for n in range(200)]

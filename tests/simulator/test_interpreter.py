@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.rtde.catalogue import INPUTS
+from gatewayd.rtde.fields import INPUTS
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.interpreter import Interpreter
 from gatewayd.simulator.program import DEMO, ProgramError, parse

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Series
 from gatewayd.rtde.codec import ClientProtocol, ProtocolError
+from gatewayd.rtde.fields import INPUTS, OUTPUTS, Series
 from gatewayd.rtde.messages import (
     ControllerMessage,
     ControllerVersion,

@@ -7,7 +7,7 @@ import struct
 
 import pytest
 
-from gatewayd.rtde.catalogue import OUTPUTS
+from gatewayd.rtde.fields import OUTPUTS
 from gatewayd.simulator.arm import ControllerMoment
 from gatewayd.simulator.signals import INITIAL, SIGNALS
 

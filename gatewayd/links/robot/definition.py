@@ -10,7 +10,7 @@ from gatewayd.links.robot.sections import Robot, RobotPlace, RobotValidity
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import Defined, ExpandedVariable
 from gatewayd.mapping.model import VariableSpec
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Field
+from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field
 from gatewayd.rtde.types import INTEGER_RANGES, DataType
 
 __all__ = ["define", "field_of", "is_program_output"]

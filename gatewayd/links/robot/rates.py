@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from gatewayd.links.robot.sections import Robot
-from gatewayd.rtde.catalogue import Series
+from gatewayd.rtde.fields import Series
 
 __all__ = ["MIN_RATE", "package_period", "package_rate"]
 

@@ -10,7 +10,8 @@ from typing import Final
 
 from gatewayd.links.robot.scalars import Reference
 from gatewayd.mapping.expanded import UndefinedError
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, REGISTERS, Field, bit_word
+from gatewayd.rtde.catalogue import bit_word
+from gatewayd.rtde.fields import INPUTS, OUTPUTS, REGISTERS, Field
 from gatewayd.rtde.types import DataType
 
 __all__ = ["ReferenceProblem", "Target", "UnresolvedReference", "resolve"]

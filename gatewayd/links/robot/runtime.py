@@ -78,7 +78,7 @@ class RobotLink(SourceLink):
         self._slots: dict[str, slice] = {}
         self._has_timestamp = False
         self._program: int | None = None
-        """Where packages tell the state of the robot program."""
+        """Where packages have the state of the robot program."""
         self._inputs = ClaimedInputs()
         self._session: Session | None = None
         """What was agreed and is not adopted yet."""
@@ -115,7 +115,7 @@ class RobotLink(SourceLink):
         return self._client.statistics.progress
 
     async def run(self) -> None:
-        """Stay connected until cancelled. Raises what is a defect, after the cell was told that the robot is lost."""
+        """Stay connected until cancelled. Raises what is a defect, after the robot was reported lost."""
         try:
             await self._run()
         except Exception:
@@ -176,7 +176,7 @@ class RobotLink(SourceLink):
         ]
 
     def gap(self, since: float, now: float) -> None:
-        """The process stood still from `since` to `now`. The packages that waited tell their own time."""
+        """The process stood still from `since` to `now`. The packages that waited have their own time."""
         self._client.gap()
 
     def flush(self, now: float) -> None:
@@ -186,7 +186,7 @@ class RobotLink(SourceLink):
 
     @property
     def settled(self) -> bool:
-        """False between the claim of registers and the package that tells what they hold."""
+        """False between the claim of registers and the package that shows what they hold."""
         return self._session is None
 
     def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
@@ -208,7 +208,7 @@ class RobotLink(SourceLink):
         self._outputs = OutputTransfer(variables, self._slots, reasons)
         self._adopting = True
         held = self._inputs.rebind(variables, reasons)
-        self._tell_availability(reasons, now)
+        self._report_availability(reasons, now)
         self._adopting = False
         if cell.accepts_writes:
             quality = cell.image.quality
@@ -235,7 +235,7 @@ class RobotLink(SourceLink):
         self._cell.robot_connected(
             now, f"controller {session.controller}, RTDE protocol {session.protocol}, {rate}"
         )
-        self._tell_availability(reasons, now)
+        self._report_availability(reasons, now)
 
     def inputs_changed(self, session: Session) -> None:
         """Registers that were in use elsewhere are ours now, or others share a recipe.
@@ -312,7 +312,7 @@ class RobotLink(SourceLink):
         health.late = statistics.late
         health.frequency = statistics.frequency
 
-    def _tell_availability(self, reasons: Mapping[int, str], now: float) -> None:
+    def _report_availability(self, reasons: Mapping[int, str], now: float) -> None:
         for index, reason in reasons.items():
             self._cell.set_availability([index], False, reason, now)
         served = (index for index in range(len(self._cell.definition.variables)) if index not in reasons)
@@ -324,7 +324,7 @@ class RobotLink(SourceLink):
         reasons = unavailable(session, self._cell.definition.variables)
         self._adopting = True
         adopted = self._inputs.adopt(session, flat, now, reasons)
-        self._tell_availability(reasons, now)
+        self._report_availability(reasons, now)
         self._adopting = False
         self._cell.adopt(adopted, now)
 

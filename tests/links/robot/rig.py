@@ -16,7 +16,7 @@ from gatewayd.links.robot.plan import robot_of
 from gatewayd.links.robot.runtime import RobotLink
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
-from gatewayd.rtde.catalogue import SoftwareVersion
+from gatewayd.rtde.fields import SoftwareVersion
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import DEMO, parse
 from gatewayd.simulator.server import SimulatedController

@@ -8,8 +8,8 @@ from gatewayd.core.definition import Direction, Value, ValueKind, Variable
 from gatewayd.core.image import ProcessImage
 from gatewayd.links.robot.inputs import LIVED_ON, SEND_AGAIN, ClaimedInputs
 from gatewayd.links.robot.readback import VERIFY_AFTER, Finding, Package
-from gatewayd.rtde.catalogue import Series
 from gatewayd.rtde.claims import REGISTERS_KEY, WATCHDOG_KEY, InputRecipe
+from gatewayd.rtde.fields import Series
 from gatewayd.rtde.messages import ControllerVersion
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.session import Session

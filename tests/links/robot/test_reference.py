@@ -9,7 +9,7 @@ from pydantic import TypeAdapter
 
 from gatewayd.links.robot.reference import ReferenceProblem, UnresolvedReference, resolve
 from gatewayd.links.robot.scalars import Reference, RobotReference
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
+from gatewayd.rtde.fields import INPUTS, OUTPUTS
 
 READER: TypeAdapter[Reference] = TypeAdapter(RobotReference)
 

@@ -21,7 +21,7 @@ from gatewayd.core.succession import succeed
 from gatewayd.links.robot import readback as readback_module
 from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.plan import robot_of
-from gatewayd.rtde.catalogue import SoftwareVersion
+from gatewayd.rtde.fields import SoftwareVersion
 from gatewayd.simulator.server import SimulatedController
 from tests.links.robot.rig import HMI, PLC, Defect, Rig, Rigged, plan_for
 from tests.links.robot.rig import rigged as joined

@@ -10,7 +10,7 @@ from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.model import VariableSpec
-from gatewayd.rtde.catalogue import Series, SoftwareVersion
+from gatewayd.rtde.fields import Series, SoftwareVersion
 
 __all__ = ["controller", "unresolved", "watchdog_field"]
 

@@ -14,8 +14,9 @@ from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Se
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 from gatewayd.mapping.rules.writers import more_places
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS, Series, SoftwareVersion, is_fieldbus_range, suggest
+from gatewayd.rtde.catalogue import is_fieldbus_range, suggest
 from gatewayd.rtde.claims import OLD_LIST_LIMIT, list_size
+from gatewayd.rtde.fields import INPUTS, OUTPUTS, Series, SoftwareVersion
 
 __all__: list[str] = []
 

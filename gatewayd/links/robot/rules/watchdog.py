@@ -10,7 +10,7 @@ from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.writers import is_supervised
-from gatewayd.rtde.catalogue import INPUTS, OUTPUTS
+from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.types import DataType
 
 __all__: list[str] = []
