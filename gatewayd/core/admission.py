@@ -42,8 +42,6 @@ class Verdict:
 class Admission:
     """Judges requests against the definition, the owners and the image."""
 
-    __slots__ = ("_image", "_locks", "_ownership", "_sole", "_unlimited", "_variables", "_writers")
-
     def __init__(
         self,
         variables: Sequence[Variable],

@@ -8,7 +8,7 @@ adopts without an owner falls back at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from enum import Enum
 
 from gatewayd.core.definition import FallbackKind
@@ -30,8 +30,6 @@ class AdoptionStep(Enum):
 
 class Adoption:
     """The count of one cell; `adopt_for` in seconds, None: adopted values stay."""
-
-    __slots__ = ("adopt_for", "began", "over", "reachable")
 
     def __init__(self, adopt_for: float | None) -> None:
         self.adopt_for = adopt_for
@@ -67,17 +65,15 @@ class Adoption:
         self.reachable, self.began, self.over = former.reachable, former.began, former.over
 
 
-def would_fall_back(image: ProcessImage, inputs: Iterable[int], unread: Collection[int]) -> list[int]:
+def would_fall_back(image: ProcessImage, inputs: Iterable[int], unread: Collection[int]) -> Iterator[int]:
     """Those whose release fallback would change something, as far as it is known what the robot holds."""
-    return [index for index in inputs if _changes(image, index, is_unread=index in unread)]
-
-
-def _changes(image: ProcessImage, index: int, *, is_unread: bool) -> bool:
-    variable, value = image.variables[index], image.values[index]
-    fallback = variable.on_release
-    if fallback.kind is FallbackKind.HOLD:
-        return False
-    return is_unread or fallback.apply(value, variable.kind) != value
+    for index in inputs:
+        variable, value = image.variables[index], image.values[index]
+        fallback = variable.on_release
+        if fallback.kind is not FallbackKind.HOLD and (
+            index in unread or fallback.apply(value, variable.kind) != value
+        ):
+            yield index
 
 
 def named(image: ProcessImage, inputs: Sequence[int]) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from gatewayd.core.admission import Admission, Change
 from gatewayd.core.adoption import Adoption, AdoptionStep, adopted, named
@@ -55,36 +56,25 @@ class Cell:
         self.events = EventRing()
         self.health = Health()
         self.forcing = Forcing(self.image)
-        self.delivery = Delivery(self.image, self.health, self.events.append)
+        record = self.events.append
+        self.delivery = Delivery(self.image, self.health, record)
         self.adoption = Adoption(definition.adopt_for)
-        self._fallbacks = Fallbacks(definition, self.image, self.ownership, self.delivery, self.events.append)
+        fallbacks = Fallbacks(definition, self.image, self.ownership, self.delivery, record)
+        self._fallbacks = fallbacks
         self.listeners: list[Callable[[Direction], None]] = []
         self.write_listeners: list[Callable[[int, Written, float], None]] = []
-        """Told of every accepted write that changes something: writer, changes, time. They must not raise."""
+        """Called with every accepted write that changes something: writer, changes, time. They must not raise."""
         self.last_refusal: LastRefusal | None = None
         self._admission = Admission(definition.variables, definition.writers, self.ownership, self.image)
+        inputs_changed = partial(self._notify, Direction.INPUT)
         self._locking = Locking(
-            self.ownership,
-            self.writers,
-            self.events.append,
-            self._fallbacks.apply,
-            self._fallbacks.inherited,
-            lambda: self._notify(Direction.INPUT),
+            self.ownership, self.writers, record, fallbacks.apply, fallbacks.inherited, inputs_changed
         )
         self.operator = Operator(
-            definition,
-            self.image,
-            self.ownership,
-            self.forcing,
-            self._admission,
-            self._locking,
-            self._fallbacks,
-            self.delivery,
-            self.events.append,
-            self.refuse,
-            self._notify,
-        )
-        self._refusals = RefusalLog(self.events.append)
+            self.image, self.ownership, self.forcing, self._admission, self._locking, fallbacks, self.delivery,
+            record, self.refuse, self._notify,
+        )  # fmt: skip
+        self._refusals = RefusalLog(record)
         self._next_heartbeat: float | None = None
 
     @property
@@ -333,7 +323,7 @@ class Cell:
     def set_availability(self, variables: Iterable[int], available: bool, reason: str, now: float) -> None:
         """The controller gave or refused the register (or field) behind these variables.
 
-        What it gave is not good before `adopt` (inputs) or the next package (outputs) tells its value.
+        What it gave is not good before `adopt` (inputs) or the next package (outputs) brings its value.
         """
         changed = [
             index for index in dict.fromkeys(variables) if self.image.available[index] is not available
@@ -349,10 +339,6 @@ class Cell:
             self.events.append(Event(now, kind, variable=index, detail=reason))
         self._notify(Direction.INPUT)
         self._notify(Direction.OUTPUT)
-
-    def is_available(self, variable: int) -> bool:
-        """Whether the controller has the variable's field, and gave it to us if it is an input."""
-        return self.image.available[variable]
 
     # -- time ----------------------------------------------------------------------------------------------------
 
@@ -418,13 +404,16 @@ class Cell:
     def _count_adoption(self, now: float) -> None:
         """What nobody has claimed by the end of `adopt_for` falls back."""
         step, left = self.adoption.look(now, adopted=self.delivery.ready), self.adoption.left(now)
-        pending = self._fallbacks.of_nobody(self.image.inputs) if left or step is AdoptionStep.END else []
-        self.health.adoption = left if pending else 0.0
-        if step is AdoptionStep.BEGIN and pending:
-            detail = f"in {left:g} s, without an owner by then: {named(self.image, pending)}"
+        pending = self._fallbacks.of_nobody(self.image.inputs)
+        first = next(pending, None) if left or step is AdoptionStep.END else None
+        self.health.adoption = 0.0 if first is None else left
+        if first is None or step is AdoptionStep.NOTHING:
+            return
+        if step is AdoptionStep.BEGIN:
+            detail = f"in {left:g} s, without an owner by then: {named(self.image, [first, *pending])}"
             self.events.append(Event(now, EventKind.ADOPTION_ENDS, detail=detail))
-        elif step is AdoptionStep.END and self.delivery.ready:
-            self.fall_back(pending, now)
+        elif self.delivery.ready:
+            self.fall_back([first, *pending], now)
 
     def _set_inputs(self, values: Sequence[tuple[int, Value]], now: float) -> None:
         self.image.store_all(values, now)

@@ -22,21 +22,6 @@ __all__ = ["Delivery"]
 class Delivery:
     """The inputs of one cell by variable index. It brings the health figures about them up to date."""
 
-    __slots__ = (
-        "_health",
-        "_image",
-        "_new",
-        "_record",
-        "_reported",
-        "_seen",
-        "differing",
-        "given_at",
-        "owed",
-        "ready",
-        "under_way",
-        "unread",
-    )
-
     def __init__(self, image: ProcessImage, health: Health, record: Callable[[Event], None]) -> None:
         self._image = image
         self._health = health

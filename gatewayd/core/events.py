@@ -68,8 +68,6 @@ class Event:
 class EventRing:
     """The last `CAPACITY` events, oldest first when iterated."""
 
-    __slots__ = ("_events", "count", "listeners")
-
     def __init__(self, capacity: int = CAPACITY) -> None:
         self._events: deque[Event] = deque(maxlen=capacity)
         self.count = 0

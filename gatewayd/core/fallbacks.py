@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 
 from gatewayd.core.adoption import would_fall_back
 from gatewayd.core.definition import CellDefinition, FallbackKind
@@ -16,24 +17,15 @@ __all__ = ["Fallbacks"]
 _NOT_READABLE = "the robot does not say what it holds"
 
 
+@dataclass(slots=True, eq=False)
 class Fallbacks:
     """The fallbacks of one cell's inputs. Whoever calls it says afterwards that inputs have changed."""
 
-    __slots__ = ("_definition", "_delivery", "_image", "_ownership", "_record")
-
-    def __init__(
-        self,
-        definition: CellDefinition,
-        image: ProcessImage,
-        ownership: LockTable,
-        delivery: Delivery,
-        record: Callable[[Event], None],
-    ) -> None:
-        self._definition = definition
-        self._image = image
-        self._ownership = ownership
-        self._delivery = delivery
-        self._record = record
+    _definition: CellDefinition
+    _image: ProcessImage
+    _ownership: LockTable
+    _delivery: Delivery
+    _record: Callable[[Event], None]
 
     def apply(self, variables: Iterable[int], now: float) -> None:
         """Give these inputs their fallbacks; without the robot or the register they are owed."""
@@ -77,7 +69,7 @@ class Fallbacks:
             wanted.update(self.of_nobody(entered))
         return sorted(wanted)
 
-    def of_nobody(self, variables: Iterable[int]) -> list[int]:
+    def of_nobody(self, variables: Iterable[int]) -> Iterator[int]:
         """Those that nobody owns and for which a fallback would change something."""
         return would_fall_back(self._image, filter(self._is_ownerless, variables), self._delivery.unread)
 

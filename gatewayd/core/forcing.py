@@ -30,8 +30,6 @@ class Force:
 class Forcing:
     """The forces and the taken locks of one cell; variables and locks are indices."""
 
-    __slots__ = ("_image", "_truth", "forces", "holds", "next_due")
-
     def __init__(self, image: ProcessImage) -> None:
         self._image = image
         self._truth: dict[int, tuple[Value, Quality]] = {}

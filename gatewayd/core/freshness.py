@@ -68,8 +68,6 @@ class Freshness:
     `stale_after`: at the limit itself it would go to and fro with every package.
     """
 
-    __slots__ = ("last_arrival", "last_package", "last_progress", "stale_after", "state", "timestamp")
-
     def __init__(self, stale_after: float) -> None:
         self.stale_after = stale_after
         self.state = Source.LOST

@@ -50,28 +50,6 @@ class ProcessImage:
     shows its `on_stale`; one that is out of range shows its value as far as each place can.
     """
 
-    __slots__ = (
-        "_bounds",
-        "_covered",
-        "_exceptions",
-        "_held",
-        "_outputs_stored",
-        "_restricted",
-        "_running_only",
-        "_stopped",
-        "available",
-        "inputs",
-        "output_time",
-        "outputs",
-        "quality",
-        "running",
-        "running_time",
-        "times",
-        "unreadable",
-        "values",
-        "variables",
-    )
-
     def __init__(self, variables: Sequence[Variable]) -> None:
         self.variables = tuple(variables)
         self.inputs = _indices(variables, Direction.INPUT)

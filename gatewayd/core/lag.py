@@ -28,8 +28,6 @@ PROBE_INTERVAL = 1.0
 class Lag:
     """The lag of one controller's packages. It outlives sessions: a new connection does not make a line quick."""
 
-    __slots__ = ("_asked", "_baseline", "_level", "_raw", "_steady_since", "_timestamp", "limit", "seconds")
-
     def __init__(self, limit: float) -> None:
         self.limit = limit
         """Seconds from which on a package is late. Steps of the lag within half of it count as jitter."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from gatewayd.core.admission import Admission, Change
-from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, Value
+from gatewayd.core.definition import OPERATOR, Direction, Value
 from gatewayd.core.delivery import Delivery
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.fallbacks import Fallbacks
@@ -29,7 +29,6 @@ __all__ = ["Operator"]
 class Operator:
     """Carries out what the local operator of one cell asks for; `forcing` is what he holds and forces."""
 
-    _definition: CellDefinition
     _image: ProcessImage
     _ownership: LockTable
     forcing: Forcing
@@ -76,7 +75,8 @@ class Operator:
         Forcing it again changes value and `until`. Refused like any write: limits, robot, register.
         """
         self.release_expired(now)
-        declared = self._definition.variables[variable]
+        declared = self._image.variables[variable]
+        lock = declared.lock
         is_input = declared.direction is Direction.INPUT
         if is_input:
             verdict = self._admission.judge(
@@ -92,13 +92,10 @@ class Operator:
         old = self._image.values[variable]
         self.forcing.lift()
         self.forcing.put(variable, Force(allowed, now, until))
-        if declared.lock is not None:
-            self._hold(declared.lock, now, detail, forced=variable)
-        self._record(
-            Event(
-                now, EventKind.FORCED, variable, declared.lock, OPERATOR, old=old, new=allowed, detail=detail
-            )
-        )
+        if lock is not None:
+            self._hold(lock, now, detail, forced=variable)
+        event = Event(now, EventKind.FORCED, variable, lock, OPERATOR, old=old, new=allowed, detail=detail)
+        self._record(event)
         if is_input:
             self._give(variable, allowed, now)
             self._notify(Direction.INPUT)
@@ -133,10 +130,8 @@ class Operator:
     def give_forced(self, now: float) -> None:
         """The robot gets what is forced, whatever its inputs held when they were adopted."""
         for index, force in self.forcing.forces.items():
-            if (
-                self._definition.variables[index].direction is Direction.INPUT
-                and self._image.available[index]
-            ):
+            is_input = self._image.variables[index].direction is Direction.INPUT
+            if is_input and self._image.available[index]:
                 self._give(index, force.value, now)
 
     # -- inside --------------------------------------------------------------------------------------------------
@@ -150,15 +145,14 @@ class Operator:
 
         Its other members fall back if it was a writer's, else those that were only adopted. Whether any had to.
         """
-        until = self.forcing.until(lock, self._ownership.locks[lock].members)
+        members = self._ownership.locks[lock].members
+        until = self.forcing.until(lock, members)
         assert until is not None
         former = self._ownership.hold(lock, until)
-        if former != OPERATOR:
-            kind = EventKind.ACQUIRED if former is None else EventKind.TAKEN_OVER
-            self._record(Event(now, kind, lock=lock, writer=OPERATOR, other=former, detail=detail))
         if former == OPERATOR:
             return False
-        members = self._ownership.locks[lock].members
+        kind = EventKind.ACQUIRED if former is None else EventKind.TAKEN_OVER
+        self._record(Event(now, kind, lock=lock, writer=OPERATOR, other=former, detail=detail))
         dropped = self._fallbacks.inherited(lock, OPERATOR) if former is None else members
         self._fallbacks.apply([member for member in dropped if member != forced], now)
         return bool(dropped)
@@ -166,20 +160,11 @@ class Operator:
     def _end_forces(self, variables: Sequence[int], now: float, detail: str) -> None:
         self.forcing.lift()
         for index in variables:
-            force = self.forcing.forces.pop(index)
-            self._record(
-                Event(
-                    now, EventKind.UNFORCED, variable=index, writer=OPERATOR, old=force.value, detail=detail
-                )
-            )
-        self._fallbacks.apply(
-            [index for index in variables if self._definition.variables[index].lock is not None], now
-        )
-        self._settle(
-            {lock for index in variables if (lock := self._definition.variables[index].lock) is not None},
-            now,
-            detail,
-        )
+            old = self.forcing.forces.pop(index).value
+            self._record(Event(now, EventKind.UNFORCED, index, writer=OPERATOR, old=old, detail=detail))
+        locks = {index: self._image.variables[index].lock for index in variables}
+        self._fallbacks.apply([index for index, lock in locks.items() if lock is not None], now)
+        self._settle({lock for lock in locks.values() if lock is not None}, now, detail)
         self._image.find_unreadable()
         self._notify(Direction.INPUT)
         self._notify(Direction.OUTPUT)

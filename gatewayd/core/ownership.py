@@ -72,8 +72,6 @@ _OPERATORS = {None: Standing.FREE, OPERATOR: Standing.OWNER}
 class LockTable:
     """The owners of a cell's locks. Locks and writers are indices; times are monotonic seconds."""
 
-    __slots__ = ("_next_expiry", "_ranks", "connections", "expires", "locks", "orphans", "owners")
-
     def __init__(self, locks: Sequence[Lock]) -> None:
         self.locks = tuple(locks)
         self.owners: list[int | None] = [None] * len(locks)

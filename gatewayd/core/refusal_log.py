@@ -48,8 +48,6 @@ class _Reported:
 class RefusalLog:
     """Refusals are equal if writer, variable and reason are. Each reported event stands for `1 + repeats` refusals."""
 
-    __slots__ = ("_next", "_report", "_reported")
-
     def __init__(self, report: Callable[[Event], None]) -> None:
         self._report = report
         self._reported: dict[tuple[int | None, int | None, Reason | None], _Reported] = {}

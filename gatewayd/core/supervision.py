@@ -30,18 +30,6 @@ class WriterTable:
     address makes nobody alive.
     """
 
-    __slots__ = (
-        "_counts_writes",
-        "_excused",
-        "_next_end",
-        "_patience",
-        "alive",
-        "connections",
-        "ends",
-        "last_seen",
-        "writers",
-    )
-
     def __init__(self, writers: Sequence[Writer], locks: Sequence[Lock] = ()) -> None:
         self.writers = tuple(writers)
         self.alive = [False] * len(writers)

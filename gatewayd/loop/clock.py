@@ -44,8 +44,6 @@ _read = time.clock_gettime
 class _Suspension:
     """How long the machine was suspended since this module was imported; judged once in each turn of the loop."""
 
-    __slots__ = ("_offset", "total")
-
     def __init__(self) -> None:
         self.total = 0.0
         self._offset = _read(_CLOCK_BOOT) - _monotonic()
@@ -88,8 +86,6 @@ GapListener = Callable[[Gap], None]
 
 class _Watch:
     """When the loop was last seen at work, and who is notified when it was not. Only the loop's thread may look."""
-
-    __slots__ = ("listeners", "seen")
 
     def __init__(self) -> None:
         self.listeners: list[GapListener] = []

@@ -169,8 +169,6 @@ class _Series:
 class _Watch:
     """One cell's writes and events, on their way to the audit."""
 
-    __slots__ = ("_audit", "_next", "_series", "cell")
-
     def __init__(self, cell: Cell, audit: Audit) -> None:
         self.cell = cell
         self._audit = audit

@@ -171,7 +171,7 @@ def test_it_ends_while_the_robot_is_away(press: CellDefinition) -> None:
 def test_names_and_texts(press: CellDefinition) -> None:
     image = ProcessImage(press.variables)
     image.values[START] = True
-    assert would_fall_back(image, [START, LAMP, PART], unread={LAMP, PART}) == [START, LAMP]
+    assert list(would_fall_back(image, [START, LAMP, PART], unread={LAMP, PART})) == [START, LAMP]
     assert named(image, [START]) == "start"
     assert adopted(image, 3, ()) == "3 variables"
     assert adopted(image, 3, {PART, START, LAMP}) == "3 variables; not readable: start, lamp, part"

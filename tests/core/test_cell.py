@@ -979,7 +979,7 @@ def test_availability_before_the_first_session_is_remembered(press: CellDefiniti
     cell = Cell(press)
     cell.set_availability([PART, ALARM], False, "no such field", 0.0)
     connect(cell, 0.1)
-    assert not cell.is_available(PART)
+    assert not cell.image.available[PART]
     assert quality(cell, PART) is Quality.UNAVAILABLE
     assert cell.unreadable == {ALARM}
     cell.robot_lost("unplugged", 0.2)

@@ -379,8 +379,8 @@ async def test_an_analog_output_without_a_domain_is_not_there(until: Until) -> N
         ANALOG, prepare=lambda robot: robot.controller.hold(["standard_analog_output_type"])
     ) as rig:
         await until(lambda: rig.cell.accepts_writes)
-        assert not rig.cell.is_available(VALUE)
+        assert not rig.cell.image.available[VALUE]
         refusal = rig.cell.write(Requester(PLC), [Change(VALUE, 0.5)], time.monotonic())
         assert refusal is not None
         rig.robot.controller.free(["standard_analog_output_type"])
-        await until(lambda: rig.cell.is_available(VALUE))
+        await until(lambda: rig.cell.image.available[VALUE])

@@ -216,10 +216,10 @@ async def test_registers_freed_later_are_adopted_and_lose_no_write(rigged: Rigge
 
     async with rigged(prepare=prepare) as rig:
         await until(lambda: rig.cell.accepts_writes)
-        assert not rig.cell.is_available(REAL)
+        assert not rig.cell.image.available[REAL]
         rig.robot.controller.free(["input_double_register_0"])
         number = 0
-        while not rig.cell.is_available(REAL):
+        while not rig.cell.image.available[REAL]:
             number += 1
             rig.write((NUMBER, number))
             await asyncio.sleep(0)
@@ -437,10 +437,10 @@ async def test_a_reload_in_that_moment_swallows_nothing(rigged: Rigged, until: U
         for number in range(20):
             rig.write((NUMBER, number))
         assert rebound(rig, REGISTERS.replace("lamp:", "light:")) is not None
-        assert not rig.cell.is_available(REAL), "it was not read yet"
+        assert not rig.cell.image.available[REAL], "it was not read yet"
         await until(lambda: rig.get("input_int_register_0") == 19)
         rig.robot.faults.freeze = False
-        await until(lambda: rig.cell.is_available(REAL) and rig.link.settled)
+        await until(lambda: rig.cell.image.available[REAL] and rig.link.settled)
         rig.write((REAL, 3.5))
         await until(lambda: rig.get("input_double_register_0") == 3.5)
 
