@@ -78,7 +78,7 @@ def command(seconds: float | None, port: int | None) -> int:
         reason = error.strerror or str(error)
         click.echo(f"gatewayd: cannot listen on port {port}: {reason}; --port 0 takes a free one", err=True)
         return FAILED
-    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+    with asyncio.Runner(loop_factory=clock.ClockedLoop) as runner:
         return runner.run(_play(console, chosen, note, seconds or None, live=live))
 
 

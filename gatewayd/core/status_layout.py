@@ -58,14 +58,8 @@ class StatusField:
     meaning: str
 
 
-@dataclass(frozen=True, slots=True)
-class StatusTable:
+class StatusTable(StatusField):
     """A table with one entry for each variable or writer, `offset` words after `BASE`."""
-
-    offset: int
-    words: int
-    name: str
-    meaning: str
 
 
 FIELDS = (

@@ -21,23 +21,18 @@ CAPACITY = 10_000
 log = logging.getLogger("gatewayd.logs")
 
 
-class LogStream:
+class LogStream(LineThread):
     """A stream for `gatewayd.logs.records.configure` on a file descriptor. Writing never waits and never raises."""
 
     def __init__(self, descriptor: int, capacity: int = CAPACITY) -> None:
+        super().__init__("log", capacity, self._write_out, self._report_lost)
         self._reported = 0
         self._descriptor = descriptor
-        self._lines = LineThread("log", capacity, self._write, self._report_lost)
-        self._lines.start()
-
-    @property
-    def lost(self) -> int:
-        """Lines dropped since the start."""
-        return self._lines.dropped
+        self.start()
 
     def write(self, text: str) -> None:
         """Queue a line with its end."""
-        self._lines.put(text)
+        self.put(text)
 
     def flush(self) -> None:
         """Nothing: lines are on their way."""
@@ -46,13 +41,9 @@ class LogStream:
         """The descriptor that is written to."""
         return self._descriptor
 
-    def close(self, patience: float = 0.5) -> None:
-        """Write what waits, for `patience` seconds at most."""
-        self._lines.close(patience)
-
     # -- the thread ----------------------------------------------------------------------------------------------
 
-    def _write(self, lines: Sequence[str]) -> bool:
+    def _write_out(self, lines: Sequence[str]) -> bool:
         rest = memoryview("".join(lines).encode("utf-8", "backslashreplace"))
         try:
             # Not through sys.stderr: a thread that waits inside it would hold a lock that the interpreter's end needs.
@@ -64,7 +55,7 @@ class LogStream:
 
     def _report_lost(self) -> None:
         """There is room to report it."""
-        pending = self.lost - self._reported
+        pending = self.dropped - self._reported
         if pending:
             self._reported += pending
             log.warning("log lines lost", extra=fields(lines=pending))

@@ -25,7 +25,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["GAP", "ClockedLoop", "Gap", "judged_now", "new_event_loop", "now", "on_gap", "overdue", "raw"]
+__all__ = ["GAP", "ClockedLoop", "Gap", "judged_now", "now", "on_gap", "overdue", "raw"]
 
 GAP = 0.05
 """Seconds beyond what the loop wanted to sleep after which the process counts as having stood still."""
@@ -173,11 +173,6 @@ class ClockedLoop(asyncio.SelectorEventLoop):
         global _watch  # noqa: PLW0603 - as above
         _watch = None
         super().close()
-
-
-def new_event_loop() -> ClockedLoop:
-    """A loop for `asyncio.Runner(loop_factory=...)`."""
-    return ClockedLoop()
 
 
 def on_gap(listener: GapListener) -> None:

@@ -57,7 +57,7 @@ class LineThread:
         self._waiting.append(line)
         self._wake.set()
 
-    def close(self, patience: float) -> None:
+    def close(self, patience: float = 0.5) -> None:
         """Write what waits, for `patience` seconds at most."""
         self._closing.set()
         self._wake.set()

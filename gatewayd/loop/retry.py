@@ -14,10 +14,6 @@ __all__ = ["Failure", "keep_running", "reason_of", "until_done"]
 _Result = TypeVar("_Result")
 
 
-def _nothing() -> None:
-    pass
-
-
 def reason_of(error: Exception) -> str:
     """What an error says, without its number."""
     return getattr(error, "strerror", None) or str(error)
@@ -49,7 +45,7 @@ async def until_done(
     expected: type[Exception],
     report: Callable[[Exception], object],
     period: float,
-    progress: Callable[[], None] = _nothing,
+    progress: Callable[[], None] = lambda: None,
 ) -> _Result:
     """The result of the first attempt that does not end in an `expected` error; `period` seconds lie between two."""
     failure = Failure(report)
@@ -65,7 +61,7 @@ async def keep_running(
     work: Callable[[], Awaitable[None]],
     log: logging.Logger,
     period: float,
-    progress: Callable[[], None] = _nothing,
+    progress: Callable[[], None] = lambda: None,
     what: str = "internal error, starting again",
 ) -> None:
     """Do the work, and again whenever it ends in an error, which is a defect: nothing of it ends the process."""

@@ -33,7 +33,7 @@ log = logging.getLogger("gatewayd.run")
 def run(found: Startup, options: Options) -> None:
     """Serve until the end is asked for."""
     daemon = Daemon(found.plans, options.state or state_directory(os.environ))
-    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+    with asyncio.Runner(loop_factory=clock.ClockedLoop) as runner:
         runner.run(_serve(daemon, found, options))
 
 

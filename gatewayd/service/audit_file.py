@@ -35,10 +35,11 @@ _MODE = 0o640
 log = logging.getLogger("gatewayd.audit")
 
 
-class AuditFile:
-    """Appends lines to `path`. `write` never blocks and never raises; everything else happens in the thread."""
+class AuditFile(LineThread):
+    """Appends lines to `path`. `put` never blocks and never raises; everything else happens in the thread."""
 
     def __init__(self, path: Path, limit: int = MAX_SIZE, kept: int = KEPT, retry: float = RETRY) -> None:
+        super().__init__("audit file", QUEUE, self._append_lines, gather=_GATHER, retry=retry)
         self.path = path
         self._failure = Failure(self._report)
         self._limit = limit
@@ -48,36 +49,22 @@ class AuditFile:
         self._descriptor = -1
         self._size = 0
         # A directory that is missing is reported at the start, not at the first write of the week.
-        self._lines = LineThread("audit file", QUEUE, self._write, gather=_GATHER, retry=retry)
-        self._lines.start()
-
-    @property
-    def dropped(self) -> int:
-        """Lines lost since the start."""
-        return self._lines.dropped
+        self.start()
 
     @property
     def trouble(self) -> str:
         """Why the file cannot be written now; empty while it can."""
         return self._failure.reason
 
-    def write(self, line: str) -> None:
-        """Queue one line; the oldest ones are kept and this one is dropped if the queue is full."""
-        self._lines.put(line)
-
-    def close(self, patience: float = 0.5) -> None:
-        """Write what waits, for `patience` seconds at most."""
-        self._lines.close(patience)
-
     # -- the thread ----------------------------------------------------------------------------------------------
 
-    def _write(self, lines: Sequence[str]) -> bool:
+    def _append_lines(self, lines: Sequence[str]) -> bool:
         """Write these lines and how many are missing before them; whether that went well."""
         pending = self.dropped - self._counted
         if pending:
             lines = [*lines, json.dumps({"what": "records dropped", "times": pending})]
         data = "".join(line + "\n" for line in lines).encode()
-        if not data and (self._descriptor >= 0 or self._lines.closing):
+        if not data and (self._descriptor >= 0 or self.closing):
             return True
         try:
             self._open()

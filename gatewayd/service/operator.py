@@ -83,7 +83,7 @@ class OperatorAccess:
         self._daemon = daemon
         self._control = control
         self._file = AuditFile(audit_file) if audit_file is not None else None
-        self.audit = Audit(self._file.write if self._file is not None else None)
+        self.audit = Audit(self._file.put if self._file is not None else None)
         daemon.observe(self.audit.watch)
         self.api = Api(daemon, self.audit, lambda: (*notes(), *self._troubles()), stood_still)
 

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Protocol
 
 from gatewayd.core.cell import Cell
 from gatewayd.links.contract import PrepareError
@@ -23,17 +22,16 @@ from gatewayd.mapping.compiled import Compiled
 from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.diff import Changes, as_text, compare, objections
-from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.compilation import Compilation, CompilationError
-from gatewayd.service.shared_parts import AllPrepared
-from gatewayd.service.startup import mapping_files, tell_findings
+from gatewayd.service.daemon import Daemon
+from gatewayd.service.startup import log_findings, mapping_files
 
-__all__ = ["ReloadOutcome", "Reloader", "Result", "Swapping"]
+__all__ = ["ReloadOutcome", "Reloader", "Result"]
 
 SETTLING_TIME = 0.5
 """Seconds for which a swap waits for a link that is about to know more, a robot's that has just claimed registers."""
 _SHOWN = 3
-"""Reasons that the one-line summary tells."""
+"""Reasons that the one-line summary has."""
 
 log = logging.getLogger("gatewayd.reload")
 
@@ -67,7 +65,7 @@ class ReloadOutcome:
     swap: float = 0.0
     """Seconds that the swap itself took."""
     details: tuple[str, ...] = ()
-    """The changes one by one, as `gatewayd diff` tells them."""
+    """The changes one by one, as `gatewayd diff` shows them."""
 
     @property
     def text(self) -> str:
@@ -107,24 +105,6 @@ class ReloadOutcome:
         }
 
 
-class Swapping(Protocol):
-    """What a reload needs of the daemon."""
-
-    @property
-    def runtimes(self) -> Sequence[CellRuntime]:
-        """The cells that are served now."""
-
-    @property
-    def running(self) -> bool:
-        """Whether there is anything to swap."""
-
-    async def prepare(self, plans: Sequence[Plan]) -> AllPrepared:
-        """Have ready what these plans need besides what there is. Raises PrepareError."""
-
-    def swap(self, plans: Sequence[Plan], now: float, prepared: AllPrepared) -> list[str]:
-        """Serve these plans instead; returns inputs left as they were."""
-
-
 class Reloader:
     """Reloads the mapping files at `paths` (files or directories) into `daemon`, one reload after another.
 
@@ -133,7 +113,7 @@ class Reloader:
 
     def __init__(
         self,
-        daemon: Swapping,
+        daemon: Daemon,
         paths: Sequence[Path],
         began: Callable[[], None] = lambda: None,
         ended: Callable[[ReloadOutcome], None] = lambda _outcome: None,
@@ -185,7 +165,7 @@ class Reloader:
                 compiled = await asyncio.to_thread(compilation.result)
         except CompilationError as error:
             return ReloadOutcome(Result.FAILED, (str(error),))
-        tell_findings(compiled.files)
+        log_findings(compiled.files)
         reasons = tuple(_reasons(compiled))
         if reasons:
             return ReloadOutcome(Result.FAILED, reasons)
@@ -194,7 +174,7 @@ class Reloader:
         if not differences:
             return ReloadOutcome(Result.UNCHANGED)
         outcome = await self._swap(plans, differences, force=force)
-        summaries = (one if isinstance(one, str) else one.summary for one in differences)
+        summaries = (change if isinstance(change, str) else change.summary for change in differences)
         return replace(outcome, changes=tuple(summaries), details=tuple(_details(differences)))
 
     async def _swap(
@@ -241,7 +221,7 @@ class Reloader:
         for changes in differences:
             if isinstance(changes, Changes):
                 name = changes.old.cell.name
-                found += (f"{name}: {one}" for one in objections(changes, _owned(runtimes[name].cell)))
+                found += (f"{name}: {text}" for text in objections(changes, _owned(runtimes[name].cell)))
         gone = runtimes.keys() - {plan.cell.name for plan in plans}
         found += (f"{name}: the whole cell would be gone" for name in sorted(gone))
         return tuple(found)
@@ -250,7 +230,7 @@ class Reloader:
         """Wait for links that are about to know more, so that last fallbacks can still be sent."""
         end = clock.now() + SETTLING_TIME
         while clock.now() < end and not all(  # noqa: ASYNC110
-            link.settled for one in self._daemon.runtimes for link in one.links.values()
+            link.settled for runtime in self._daemon.runtimes for link in runtime.links.values()
         ):
             await asyncio.sleep(0.002)
 
@@ -265,15 +245,15 @@ def _details(differences: Sequence[Changes | str]) -> Iterator[str]:
 
 def _owned(cell: Cell) -> set[str]:
     owners, variables = cell.ownership.owners, cell.definition.variables
-    return {one.name for one in variables if one.lock is not None and owners[one.lock] is not None}
+    return {its.name for its in variables if its.lock is not None and owners[its.lock] is not None}
 
 
 def _reasons(compiled: Compiled) -> Iterator[str]:
     """Why not all of it can be served."""
     for unread in compiled.unreadable:
         yield f"{unread.name} cannot be read: {unread.reason}"
-    for one in compiled.files:
-        yield from map(_line, one.errors)
+    for file in compiled.files:
+        yield from map(_line, file.errors)
 
 
 def _line(finding: Diagnostic) -> str:

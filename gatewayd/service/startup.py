@@ -17,9 +17,9 @@ from gatewayd.service.compilation import Compilation
 __all__ = [
     "Startup",
     "load_plans",
+    "log_findings",
     "mapping_files",
     "state_directory",
-    "tell_findings",
 ]
 
 log = logging.getLogger("gatewayd.startup")
@@ -82,16 +82,17 @@ def load_plans(
         compiled = compilation.result(given_up)
     for unread in compiled.unreadable:
         log.error("cannot read the mapping file", extra=fields(file=unread.name, reason=unread.reason))
-    tell_findings(compiled.files)
-    broken = [one for one in compiled.files if one.plan is None]
-    for one in broken:
-        log.error("the cell is not served", extra=fields(file=one.name, remedy=f"gatewayd check {one.name}"))
+    log_findings(compiled.files)
+    broken = [file for file in compiled.files if file.plan is None]
+    for file in broken:
+        remedy = f"gatewayd check {file.name}"
+        log.error("the cell is not served", extra=fields(file=file.name, remedy=remedy))
     return Startup(compiled.plans, len(compiled.unreadable), len(broken))
 
 
-def tell_findings(files: Iterable[CompiledFile]) -> None:
+def log_findings(files: Iterable[CompiledFile]) -> None:
     """Log every finding with its place, rule and remedy."""
-    for finding in (finding for one in files for finding in one.diagnostics):
+    for finding in (finding for file in files for finding in file.diagnostics):
         level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
         rule = f"{finding.rule.id} {finding.rule.slug}"
         log.log(level, finding.message, extra=fields(at=str(finding.position), rule=rule, hint=finding.hint))

@@ -31,11 +31,6 @@ class Notifier:
         self.watchdog_after = _watchdog(environment, process) if self._address else None
         """Seconds without `watchdog` after which the manager ends us; None: it does not watch."""
 
-    @property
-    def present(self) -> bool:
-        """Whether there is a manager to speak to."""
-        return bool(self._address)
-
     def ready(self, status: str = "") -> bool:
         """Start-up or reload is complete."""
         return self._send("READY=1" + _status(status))

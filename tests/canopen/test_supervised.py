@@ -120,7 +120,7 @@ def test_what_was_read_while_the_process_was_stopped_is_no_news() -> None:
         bus._hand_over([Frame(0x201, bytes(8))], [], before)
         return before, handler.at
 
-    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+    with asyncio.Runner(loop_factory=clock.ClockedLoop) as runner:
         before, at = runner.run(read())
     assert order == ["gap", "frames"]
     assert at - before >= 2 * clock.GAP

@@ -61,7 +61,7 @@ def test_lines_come_whole_and_in_order(pipe: Pipe) -> None:
     stream.close(10)
     os.close(writing)
     assert everything(reading).splitlines() == [f"line {n}: grün \\udcff" for n in range(1000)]
-    assert stream.lost == 0
+    assert stream.dropped == 0
 
 
 def test_a_reader_that_stops_holds_up_nobody(pipe: Pipe) -> None:
@@ -73,9 +73,9 @@ def test_a_reader_that_stops_holds_up_nobody(pipe: Pipe) -> None:
         stream.write("a line\n")
     stream.close(0.1)
     assert time.monotonic() - begin < 2
-    assert 89 <= stream.lost <= 91
+    assert 89 <= stream.dropped <= 91
     os.read(reading, 1 << 20)
-    stream._lines._thread.join(10)
+    stream._thread.join(10)
 
 
 @pytest.mark.usefixtures("_root")
@@ -86,7 +86,7 @@ def test_what_was_lost_is_told_when_it_reads_again(pipe: Pipe) -> None:
     configure(Format.TEXT, stream=stream)
     for number in range(100):
         logging.getLogger("x").info("event %d", number)
-    lost = stream.lost
+    lost = stream.dropped
     found: list[str] = []
     reader = threading.Thread(target=lambda: found.append(everything(reading)))
     reader.start()
@@ -104,4 +104,4 @@ def test_a_reader_that_is_gone_costs_its_lines_alone(pipe: Pipe) -> None:
     stream = LogStream(writing)
     stream.write("to nobody\n")
     stream.close(10)
-    assert not stream._lines._thread.is_alive()
+    assert not stream._thread.is_alive()

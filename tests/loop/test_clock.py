@@ -33,7 +33,7 @@ def hold_up(theirs: socket.socket) -> None:
 
 
 def _run(main: object) -> None:
-    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+    with asyncio.Runner(loop_factory=clock.ClockedLoop) as runner:
         runner.run(main)  # type: ignore[arg-type]  # a coroutine
 
 
@@ -197,7 +197,7 @@ _WAITING = """
         loop.call_later(0.3, print, "timer")
         loop.call_later(0.4, loop.stop)
 
-    loop = clock.new_event_loop()
+    loop = clock.ClockedLoop()
     loop.run_until_complete(main())
     loop.run_forever()
 """
@@ -237,7 +237,7 @@ _CHILD = """
         while True:
             await asyncio.sleep(0.02)
 
-    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+    with asyncio.Runner(loop_factory=clock.ClockedLoop) as runner:
         runner.run(main())
 """
 

@@ -45,7 +45,7 @@ def test_lines_are_appended_to_what_is_there(opened: Opened, tmp_path: Path) -> 
     path = tmp_path / "audit.jsonl"
     path.write_text("before\n")
     one = opened(path)
-    one.write("now")
+    one.put("now")
     one.close()
     assert path.read_text() == "before\nnow\n"
     assert path.stat().st_mode & 0o777 == 0o644
@@ -53,7 +53,7 @@ def test_lines_are_appended_to_what_is_there(opened: Opened, tmp_path: Path) -> 
 
 def test_a_new_file_is_not_for_everybody(opened: Opened) -> None:
     one = opened()
-    one.write("x")
+    one.put("x")
     one.close()
     assert one.path.stat().st_mode & 0o007 == 0
 
@@ -61,7 +61,7 @@ def test_a_new_file_is_not_for_everybody(opened: Opened) -> None:
 def test_it_is_rotated_by_size_and_the_oldest_goes(opened: Opened, tmp_path: Path) -> None:
     one = opened()
     for number in range(5):
-        one.write(f"{number} " + "x" * 1200)
+        one.put(f"{number} " + "x" * 1200)
         until(lambda number=number: f"{number} x" in text(one.path))  # type: ignore[misc]
     one.close()
     found = {path.name: path.read_text()[0] for path in tmp_path.iterdir()}
@@ -79,13 +79,13 @@ def test_trouble_is_told_before_anybody_writes(opened: Opened, tmp_path: Path) -
 @pytest.mark.parametrize("by", ["delete", "move"])
 def test_a_file_that_vanished_is_begun_anew(opened: Opened, tmp_path: Path, by: str) -> None:
     one = opened()
-    one.write("first")
+    one.put("first")
     until(lambda: "first" in text(one.path))
     if by == "delete":
         one.path.unlink()
     else:
         one.path.rename(tmp_path / "moved")
-    one.write("second")
+    one.put("second")
     until(lambda: "second" in text(one.path))
     assert one.path.read_text() == "second\n"
 
@@ -94,11 +94,11 @@ def test_a_full_disk_is_told_once_and_costs_nothing(opened: Opened, caplog: pyte
     if not os.path.exists("/dev/full"):  # noqa: PTH110
         pytest.skip("no /dev/full")
     one = opened(Path("/dev/full"))
-    one.write("x")
+    one.put("x")
     until(lambda: bool(one.trouble))
     begun = time.perf_counter()
     for _ in range(1000):
-        one.write("y")
+        one.put("y")
     assert time.perf_counter() - begun < 1.0
     time.sleep(0.1)
     told = [record for record in caplog.records if record.levelno == logging.ERROR]
@@ -111,7 +111,7 @@ def test_it_goes_on_when_the_directory_comes_and_counts_what_was_lost(
     monkeypatch.setattr(auditfile, "QUEUE", 3)
     one = opened(tmp_path / "missing" / "audit.jsonl", limit=10**6)
     for number in range(10):
-        one.write(str(number))
+        one.put(str(number))
     until(lambda: bool(one.trouble))
     assert one.dropped == 7
     one.path.parent.mkdir()
@@ -127,7 +127,7 @@ def test_closing_takes_no_longer_than_its_patience(opened: Opened, tmp_path: Pat
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     one = opened(pipe)
-    one.write("x")
+    one.put("x")
     begun = time.monotonic()
     one.close(0.1)
     assert time.monotonic() - begun < 5.0

@@ -91,7 +91,6 @@ def test_a_status_is_cut_and_never_fails_to_encode(manager: Manager, notifier: N
 )
 def test_without_a_manager_nothing_happens(environment: dict[str, str]) -> None:
     notifier = Notifier({**environment, "WATCHDOG_USEC": "2000000"}, 1)
-    assert not notifier.present
     assert notifier.watchdog_after is None
     assert not any((notifier.ready(), notifier.status("x"), notifier.watchdog(), notifier.stopping()))
     assert notifier._socket is None

@@ -323,7 +323,7 @@ def test_a_pdo_that_a_gap_kept_from_being_sent_tells_what_is_so_after_it(station
             await until(lambda: b"\x03" + bytes(7) in station.frames(0x285))
         assert b"\x02" + bytes(7) not in station.frames(0x285)
 
-    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+    with asyncio.Runner(loop_factory=clock.ClockedLoop) as runner:
         runner.run(main())
 
 

@@ -353,7 +353,7 @@ def test_stopped_between_two_requests_of_one_turn_the_second_has_waited(
         await listener.close()
         return answers
 
-    with asyncio.Runner(loop_factory=clock.new_event_loop) as runner:
+    with asyncio.Runner(loop_factory=clock.ClockedLoop) as runner:
         answers = runner.run(main())
     assert sorted(answers) == sorted([WRITE.replace(" 000a 0005", " 00 0a 00 05"), BUSY[WRITE]])
     in_time, late = judge.waits
