@@ -106,8 +106,10 @@ class Cell:
             return refusal
         if requester.writer is not None:
             self._locking.move(requester, verdict.moves, now, verdict.values)
-            self._tell_written(requester.writer, verdict.values, now)
-        self._set_inputs(verdict.values, now)
+            self._report_written(requester.writer, verdict.values, now)
+        self.image.store_all(verdict.values, now)
+        self.delivery.give(verdict.values, now)
+        self._notify(Direction.INPUT)
         self.health.writes_accepted += 1
         return None
 
@@ -415,12 +417,7 @@ class Cell:
         elif self.delivery.ready:
             self.fall_back([first, *pending], now)
 
-    def _set_inputs(self, values: Sequence[tuple[int, Value]], now: float) -> None:
-        self.image.store_all(values, now)
-        self.delivery.give(values, now)
-        self._notify(Direction.INPUT)
-
-    def _tell_written(self, writer: int, values: Sequence[tuple[int, Value]], now: float) -> None:
+    def _report_written(self, writer: int, values: Sequence[tuple[int, Value]], now: float) -> None:
         if not self.write_listeners:
             return
         present = self.image.values

@@ -52,7 +52,7 @@ class Event:
     variable: int | None = None
     lock: int | None = None
     writer: int | None = None
-    """Who did it, or whom it befell."""
+    """Who did it, or to whom it happened."""
     other: int | None = None
     """The former owner of a lock taken over, or the holder in a refusal."""
     reason: Reason | None = None

@@ -41,4 +41,4 @@ class Health:
     writes_accepted: int = 0
     writes_refused: int = 0
     words: dict[str, int] = field(default_factory=dict)
-    """Numbers of the status block that links tell, by name (`LinkKind.status_fields`)."""
+    """Numbers of the status block that links report, by name (`LinkKind.status_fields`)."""

@@ -66,7 +66,7 @@ class RefusalLog:
         self._next = min(self._next, event.time + REFUSAL_INTERVAL)
 
     def tick(self, now: float) -> None:
-        """Tell what was only counted in an interval that has ended, and forget what was not refused again."""
+        """Report what was only counted in an interval that has ended, and forget what was not refused again."""
         if now < self._next:
             return
         for key, reported in list(self._reported.items()):

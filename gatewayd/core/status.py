@@ -167,7 +167,7 @@ class StatusBlock:
         quality = self._cell.image.quality
         for entry in entries:
             word = quality[16 * entry : 16 * entry + 16]
-            yield sum(1 << bit for bit, one in enumerate(word) if one is Quality.GOOD)
+            yield sum(1 << bit for bit, its in enumerate(word) if its is Quality.GOOD)
 
     def _writers_alive(self, entries: range, _now: float) -> Iterable[int]:
         return map(self._cell.writers.alive.__getitem__, entries)

@@ -62,7 +62,7 @@ class LinkMetric:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What tells its samples apart."""
+        """What its samples differ in."""
         first = self.shared[0] if self.shared is not None else "cell"
         return (first, self.label) if self.label else (first,)
 
@@ -120,7 +120,7 @@ class LinkKind:
     has_one_place: ClassVar[bool] = False
     """A variable has one place at most: the interface has that or null, not a list."""
     status_fields: ClassVar[tuple[StatusField, ...]] = ()
-    """Words of the status block that its links tell (`Cell.health.words`), at addresses that nobody else has."""
+    """Words of the status block that its links report (`Cell.health.words`), at addresses that nobody else has."""
     metrics: ClassVar[tuple[LinkMetric, ...]] = ()
     usual: ClassVar[bool] = False
     """Nearly every cell has one: its runtime is imported while the mapping files are read."""
@@ -225,7 +225,7 @@ class Link:
 
 
 class SourceLink(Link):
-    """The link that tells the values of a cell and takes what is written: every cell has exactly one.
+    """The link that brings the values of a cell and takes what is written: every cell has exactly one.
 
     Its losses are the cell's (`Cell.robot_lost`), and freshness is about it.
     """

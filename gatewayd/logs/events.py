@@ -1,4 +1,4 @@
-"""Tells the core's events to the log: names instead of indices, one line for each event.
+"""Brings the core's events into the log: names instead of indices, one line for each event.
 
 What happens to many variables alike at one moment, say all bits of a word that another client has claimed, is one line.
 """
@@ -55,7 +55,7 @@ class EventLog:
         self._log = logging.getLogger("gatewayd.cell")
         self._waiting: _Story | None = None
         self._names: list[str] = []
-        """Variables that the waiting event befell."""
+        """Variables that the waiting event is about."""
 
     def __call__(self, event: Event) -> None:
         """Log the event."""
@@ -84,8 +84,7 @@ class EventLog:
         (level, kind, found), names = self._waiting, self._names
         self._waiting, self._names = None, []
         subject = {"variable" if len(names) == 1 else "variables": _ranges(names)} if names else {}
-        found_all = {"cell": self._definition.name, **subject, **found}
-        self._log.log(level, kind.value, extra=fields(**found_all))
+        self._log.log(level, kind.value, extra=fields(cell=self._definition.name, **subject, **found))
 
     def _fields(self, event: Event) -> dict[str, object]:
         definition = self._definition

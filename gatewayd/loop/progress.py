@@ -1,4 +1,4 @@
-"""Long waits taken in short steps, so that a part that waits can be told from one that hangs."""
+"""Long waits taken in short steps, so that a part that waits does not look like one that hangs."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -104,17 +105,11 @@ class Audit:
         if id(cell) not in self._watches:
             self._watches[id(cell)] = _Watch(cell, self)
 
-    def unwatch(self, cell: Cell) -> None:
-        """Watch the cell no longer; what was merged and is not recorded yet is recorded."""
-        watch = self._watches.pop(id(cell), None)
-        if watch is not None:
-            watch.end()
-
     def follow(self, cells: Iterable[Cell]) -> None:
-        """Watch these cells and no others."""
+        """Watch these cells and no others; what was merged of those, and is not recorded yet, is recorded."""
         present = {id(cell): cell for cell in cells}
-        for cell in [watch.cell for watch in self._watches.values() if id(watch.cell) not in present]:
-            self.unwatch(cell)
+        for gone in [known for known in self._watches if known not in present]:
+            self._watches.pop(gone).end()
         for cell in present.values():
             self.watch(cell)
 
@@ -179,12 +174,9 @@ class _Watch:
 
     def end(self) -> None:
         """Follow the cell no longer."""
-        for listeners, mine in (
-            (self.cell.write_listeners, self.written),
-            (self.cell.events.listeners, self.happened),
-        ):
-            if mine in listeners:
-                listeners.remove(mine)  # type: ignore[arg-type]
+        with suppress(ValueError):  # a cell that has a successor has no listeners any more
+            self.cell.write_listeners.remove(self.written)
+            self.cell.events.listeners.remove(self.happened)
         self.tick(math.inf)
 
     def written(self, writer: int, changes: Written, now: float) -> None:

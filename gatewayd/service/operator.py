@@ -5,17 +5,18 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from gatewayd.control.api import Api, Gateway
+from gatewayd.control.api import Api
 from gatewayd.control.endpoint import Endpoint, Reload
 from gatewayd.core.cell import Cell
 from gatewayd.loop import clock
 from gatewayd.loop.retry import keep_running
 from gatewayd.service.audit import Audit
 from gatewayd.service.audit_file import AuditFile
+from gatewayd.service.watchdog import Watched
 
 __all__ = ["JUST_NOW", "RETRY_PERIOD", "Operated", "OperatorAccess", "Standstill"]
 
@@ -52,7 +53,7 @@ class Standstill:
         return self._until - self._since if awake <= JUST_NOW else 0.0
 
 
-class Operated(Gateway, Protocol):
+class Operated(Watched, Protocol):
     """What is needed of the daemon."""
 
     @property
@@ -61,9 +62,6 @@ class Operated(Gateway, Protocol):
 
     def observe(self, observer: Callable[[Cell], None]) -> None:
         """Have `observer` called with every cell before anybody writes to it."""
-
-    def progress(self) -> Mapping[str, int]:
-        """A counter for each part of the gateway; 0: it has not begun."""
 
 
 class OperatorAccess:

@@ -1,4 +1,4 @@
-"""The running gateway as a service: tells its manager when it is ready, how it is, that it lives, and when it ends.
+"""The running gateway as a service: its manager learns when it is ready, how it is, that it lives, and when it ends.
 
 Readiness means that every link was tried and the core ticks, not that a robot or a PLC is there: those come and go.
 """
@@ -12,10 +12,11 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Protocol
 
+from gatewayd.control.api import Gateway
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.report.summary import summary
-from gatewayd.report.verdict import ServedCell, verdict_of
+from gatewayd.report.verdict import verdict_of
 from gatewayd.service.liveness import Liveness, Progressed
 from gatewayd.service.systemd import Notifier
 
@@ -29,18 +30,11 @@ STATUS_PERIOD = 5.0
 log = logging.getLogger("gatewayd.service")
 
 
-class Watched(Protocol):
+class Watched(Gateway, Protocol):
     """What a service needs to know of the daemon."""
-
-    @property
-    def runtimes(self) -> Sequence[ServedCell]:
-        """The cells that are served now."""
 
     def progress(self) -> Mapping[str, int]:
         """A counter for each part that has to go on; 0: it has not begun."""
-
-    def troubles(self) -> Sequence[str]:
-        """What is wrong with the gateway as a whole, in a few words each."""
 
 
 class ManagerReporter:
@@ -90,11 +84,11 @@ class ManagerReporter:
         self._report(now)
 
     def reload_begins(self) -> None:
-        """Tell that a reload has begun; `reload_ended` has to follow."""
+        """Report that a reload has begun; `reload_ended` has to follow."""
         self._notifier.reloading(time.monotonic(), "reloading")
 
     def reload_ended(self, notes: Sequence[str] = ()) -> None:
-        """Tell that the reload is over; `notes` is what came of it and is to be seen until the next one."""
+        """Report that the reload is over; `notes` is what came of it and is to be seen until the next one."""
         self.notes = tuple(notes)
         self._reported = self._summary(clock.now())
         self._notifier.ready(self._reported)

@@ -155,8 +155,8 @@ def test_unwatching_tells_the_rest_and_ends_it(cell: Cell, audit: Audit) -> None
     audit.watch(cell)
     for value in (1, 2):
         assert cell.write(Requester(PLC), [Change(NUMBER, value)], 1.0) is None
-    audit.unwatch(cell)
-    audit.unwatch(cell)
+    audit.follow(())
+    audit.follow(())
     assert written(audit) == [("plc", 0, 1, 1), ("plc", 1, 2, 1)]
     assert cell.write(Requester(PLC), [Change(NUMBER, 9)], 9.0) is None
     audit.tick(99.0)
