@@ -12,6 +12,7 @@ __all__ = [
     "BUFFER_SIZE",
     "HEADER_SIZE",
     "MAX_FRAME",
+    "MAX_PDU",
     "FrameBuffer",
     "FramingError",
     "ModbusFrame",

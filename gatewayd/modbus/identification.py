@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from enum import IntEnum
 
 from gatewayd import __version__
+from gatewayd.modbus.frames import MAX_PDU
 
 __all__ = ["FUNCTION", "MEI_TYPE", "Identification", "ObjectId", "ReadCode"]
 
@@ -14,8 +14,7 @@ MEI_TYPE = 14
 
 _HEAD_SIZE = 7
 _OBJECT_HEAD_SIZE = 2
-_MAX_PDU = 253
-_MAX_OBJECT = _MAX_PDU - _HEAD_SIZE - _OBJECT_HEAD_SIZE
+_MAX_OBJECT = MAX_PDU - _HEAD_SIZE - _OBJECT_HEAD_SIZE
 _REQUEST_SIZE = 4
 _MORE_FOLLOWS = 0xFF
 _CONFORMITY = 0x83
@@ -44,7 +43,7 @@ class ObjectId(IntEnum):
     FINGERPRINT = 0x80
 
 
-_LAST_OF = {ReadCode.BASIC: 0x02, ReadCode.REGULAR: 0x7F, ReadCode.EXTENDED: 0xFF}
+_LAST_OF: dict[int, int] = {ReadCode.BASIC: 0x02, ReadCode.REGULAR: 0x7F, ReadCode.EXTENDED: 0xFF}
 
 
 class Identification:
@@ -52,7 +51,7 @@ class Identification:
 
     def __init__(self, cell: str, fingerprint: int, application: str = "") -> None:
         """`cell` is the model name; `fingerprint`, in hexadecimal, says which mapping is loaded."""
-        texts = {
+        texts: dict[int, str] = {
             ObjectId.VENDOR_NAME: "gatewayd",
             ObjectId.PRODUCT_CODE: "gatewayd",
             ObjectId.REVISION: __version__,
@@ -62,7 +61,7 @@ class Identification:
             ObjectId.APPLICATION_NAME: application or cell,
             ObjectId.FINGERPRINT: f"{fingerprint:08x}",
         }
-        self._objects = _encoded(texts)
+        self._objects = {key: text.encode("ascii", "replace")[:_MAX_OBJECT] for key, text in texts.items()}
 
     def answer(self, pdu: bytes) -> bytes | int:
         """The answer to a request that begins with 43, 14; or the exception code."""
@@ -72,7 +71,7 @@ class Identification:
         if code == ReadCode.INDIVIDUAL:
             content = self._objects.get(first)
             return 0x02 if content is None else self._stream(code, [(first, content)])
-        last = _LAST_OF.get(ReadCode(code)) if code in _LAST_OF else None
+        last = _LAST_OF.get(code)
         if last is None:
             return 0x03
         if first > last or first not in self._objects:
@@ -85,13 +84,9 @@ class Identification:
         body = bytearray()
         count = more = following = 0
         for key, content in objects:
-            if _HEAD_SIZE + len(body) + _OBJECT_HEAD_SIZE + len(content) > _MAX_PDU:
+            if _HEAD_SIZE + len(body) + _OBJECT_HEAD_SIZE + len(content) > MAX_PDU:
                 more, following = _MORE_FOLLOWS, key
                 break
             body += bytes((key, len(content))) + content
             count += 1
         return bytes((FUNCTION, MEI_TYPE, code, _CONFORMITY, more, following, count)) + body
-
-
-def _encoded(texts: Mapping[ObjectId, str]) -> dict[int, bytes]:
-    return {int(key): text.encode("ascii", "replace")[:_MAX_OBJECT] for key, text in sorted(texts.items())}

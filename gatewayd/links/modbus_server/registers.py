@@ -115,26 +115,33 @@ class _Bits:
         ]
 
 
-class RegisterTable:
-    """Holding registers or input registers."""
+class _Table:
+    """What may be read of a table."""
 
-    def __init__(self, placements: Sequence[Placement], cell: Cell, *, fill_gaps: bool) -> None:
-        self.image = bytearray(2 * _ADDRESSES)
-        """Big-endian words by address."""
-        covered = {
-            placement.address + word: placement.variable
-            for placement in placements
-            for word in range(placement.words)
-        }
-        self.readable = Readable(_filled(covered) if fill_gaps else covered, MAX_READ_REGISTERS)
-        self._addresses_of = _addresses_by_variable(placements)
-        self._items: dict[int, _Number | _Bits] = {
-            item.address + word: item for item in _items(placements, cell) for word in range(item.words)
-        }
+    def __init__(self, placements: Sequence[Placement], longest: int, *, fill_gaps: bool) -> None:
+        self._addresses_of: dict[int, set[int]] = {}
+        for placement in placements:
+            self._addresses_of.setdefault(placement.variable, set()).update(placement.addresses)
+        mapped = set().union(*self._addresses_of.values())
+        gapless = range(min(mapped), max(mapped) + 1) if fill_gaps and mapped else mapped
+        self.readable = Readable(gapless, longest)
 
     def hold_back(self, variables: frozenset[int]) -> None:
         """Let reads that touch one of `variables` fail."""
-        self.readable.hold_back(_addresses(self._addresses_of, variables))
+        held = (self._addresses_of[variable] for variable in variables if variable in self._addresses_of)
+        self.readable.hold_back(frozenset[int]().union(*held))
+
+
+class RegisterTable(_Table):
+    """Holding registers or input registers."""
+
+    def __init__(self, placements: Sequence[Placement], cell: Cell, *, fill_gaps: bool) -> None:
+        super().__init__(placements, MAX_READ_REGISTERS, fill_gaps=fill_gaps)
+        self.image = bytearray(2 * _ADDRESSES)
+        """Big-endian words by address."""
+        self._items: dict[int, _Number | _Bits] = {
+            item.address + word: item for item in _items(placements, cell) for word in range(item.words)
+        }
 
     def changes(self, address: int, data: bytes) -> list[Change] | Refusal:
         """What writing the big-endian words `data` from `address` on means for the cell.
@@ -186,20 +193,14 @@ class RegisterTable:
         return read_only
 
 
-class BitTable:
+class BitTable(_Table):
     """Coils or discrete inputs."""
 
-    def __init__(self, placements: Sequence[Placement], cell: Cell, *, fill_gaps: bool) -> None:
+    def __init__(self, placements: Sequence[Placement], *, fill_gaps: bool) -> None:
+        super().__init__(placements, MAX_READ_BITS, fill_gaps=fill_gaps)
         self.image = bytearray(_ADDRESSES // 8)
         """Bits by address, the first one in the least significant bit of the first byte."""
-        self._cell = cell
         self._variables = {placement.address: placement.variable for placement in placements}
-        self.readable = Readable(_filled(self._variables) if fill_gaps else self._variables, MAX_READ_BITS)
-        self._addresses_of = _addresses_by_variable(placements)
-
-    def hold_back(self, variables: frozenset[int]) -> None:
-        """Let reads that touch one of `variables` fail."""
-        self.readable.hold_back(_addresses(self._addresses_of, variables))
 
     def read(self, address: int, count: int) -> bytes:
         """`count` bits from `address` on, packed as the protocol sends them, padded with zeros."""
@@ -226,7 +227,7 @@ class RegisterImage:
             return RegisterTable(_of(plan.placements, area), cell, fill_gaps=plan.fill_gaps)
 
         def bits(area: Area) -> BitTable:
-            return BitTable(_of(plan.placements, area), cell, fill_gaps=plan.fill_gaps)
+            return BitTable(_of(plan.placements, area), fill_gaps=plan.fill_gaps)
 
         self.holding = table(Area.HOLDING)
         self.input = table(Area.INPUT)
@@ -234,9 +235,7 @@ class RegisterImage:
         self.discrete = bits(Area.DISCRETE)
         self._cell = cell
         self._held_back: frozenset[int] = frozenset()
-        self._runs = {
-            direction: tuple(self._compile(plan.placements, direction, cell)) for direction in Direction
-        }
+        self._runs = {direction: tuple(self._compile(plan.placements, direction)) for direction in Direction}
         for direction in Direction:
             self.refresh(direction)
         cell.listeners.append(self.refresh)
@@ -256,8 +255,8 @@ class RegisterImage:
             for table in (self.holding, self.input, self.coils, self.discrete):
                 table.hold_back(self._held_back)
 
-    def _compile(self, placements: Sequence[Placement], direction: Direction, cell: Cell) -> Iterator[Run]:
-        variables = cell.definition.variables
+    def _compile(self, placements: Sequence[Placement], direction: Direction) -> Iterator[Run]:
+        variables = self._cell.definition.variables
         flowing = [
             placement for placement in placements if variables[placement.variable].direction is direction
         ]
@@ -274,24 +273,6 @@ class RegisterImage:
 
 def _of(placements: Iterable[Placement], area: Area) -> list[Placement]:
     return [placement for placement in placements if placement.area is area]
-
-
-def _filled(addresses: Iterable[int]) -> range:
-    """All addresses from the first to the last one."""
-    mapped = sorted(addresses)
-    return range(mapped[0], mapped[-1] + 1) if mapped else range(0)
-
-
-def _addresses_by_variable(placements: Iterable[Placement]) -> dict[int, frozenset[int]]:
-    addresses: dict[int, frozenset[int]] = {}
-    for placement in placements:
-        covered = range(placement.address, placement.address + placement.words)
-        addresses[placement.variable] = addresses.get(placement.variable, frozenset()).union(covered)
-    return addresses
-
-
-def _addresses(of: dict[int, frozenset[int]], variables: frozenset[int]) -> frozenset[int]:
-    return frozenset[int]().union(*(of[variable] for variable in variables if variable in of))
 
 
 def _items(placements: Sequence[Placement], cell: Cell) -> Iterator[_Number | _Bits]:
