@@ -14,7 +14,7 @@ __all__ = ["COMMANDS", "command"]
 COMMANDS = {
     "demo": "Simulator, gateway, a PLC and a CANopen master in one terminal.",
     "check": "Find every mistake of mapping files, without a robot.",
-    "diff": "Tell what a new mapping file changes of an old one.",
+    "diff": "Print what a new mapping file changes of an old one.",
     "show": "Print the register table of a mapping file.",
     "export": "Write the EDS, the DCF or robot program lines of a mapping file.",
     "simulate": "Be a robot controller to connect to.",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
-from gatewayd.cli.files import name_of, read_file, reason_of
+from gatewayd.cli.files import format_option, name_of, read_file, reason_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,12 +62,10 @@ Exit codes:
 """,
 )
 @click.argument("files", nargs=-1, type=click.Path(allow_dash=True))
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["text", "json", "github"]),
-    default="text",
-    show_default=True,
+@format_option(
+    "text",
+    "json",
+    "github",
     help="How findings are written: for people, for programs, for GitHub's annotations.",
 )
 @click.option("--strict", is_flag=True, help="Let warnings fail the check too.")
@@ -122,7 +120,7 @@ def _check(files: tuple[str, ...], *, separately: bool) -> CheckOutcome:
         else:
             unreadable.append(content)
     loaded = tuple(load(data, name) for name, data in readable) if separately else load_together(readable)
-    findings = tuple(finding for one in loaded for finding in one.diagnostics)
+    findings = tuple(finding for mapping in loaded for finding in mapping.diagnostics)
     return CheckOutcome(tuple(name for name, _ in readable), findings, tuple(unreadable))
 
 

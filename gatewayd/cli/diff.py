@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from gatewayd.cli.files import load_file
+from gatewayd.cli.files import format_option, load_file
 
 __all__ = ["command"]
 
@@ -30,17 +30,10 @@ Exit codes:
 )
 @click.argument("old", type=click.Path(allow_dash=True))
 @click.argument("new", type=click.Path(allow_dash=True))
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="For people or for programs.",
-)
+@format_option("text", "json", help="For people or for programs.")
 @click.pass_context
 def command(context: click.Context, old: str, new: str, form: str) -> None:
-    """Tell what the mapping NEW changes of the mapping OLD: variables, owners, addresses, settings of the links.
+    """Print what the mapping NEW changes of the mapping OLD: variables, owners, addresses, settings of the links.
 
     Compared is what the files mean: order of keys, spelling and formatting do not count. `-` reads standard input.
     """

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gatewayd.cli.files import load_file, reason_of
+from gatewayd.cli.files import load_plan, reason_of
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
     from gatewayd.links.exports import Export
-    from gatewayd.mapping.plan import Plan
 
 __all__ = ["command"]
 
@@ -91,19 +90,10 @@ def _made(context: click.Context, export: Export, file: str) -> str:
     from gatewayd.links.exports import ExportError
 
     try:
-        return export.make(_plan(context, file))
+        return export.make(load_plan(context, file)[1])
     except ExportError as error:
         click.echo(printable(str(error)), err=True)
         context.exit(BROKEN)
-
-
-def _plan(context: click.Context, file: str) -> Plan:
-    loaded = load_file(file)
-    if loaded is None:
-        context.exit(UNREADABLE)
-    if loaded.plan is None:
-        context.exit(BROKEN)
-    return loaded.plan
 
 
 def _write(context: click.Context, output: str, text: str) -> None:

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
-    from gatewayd.mapping.loader import Loaded
+    from collections.abc import Callable
 
-__all__ = ["STDIN", "load_file", "name_of", "read_file", "reason_of"]
+    from gatewayd.mapping.loader import Loaded
+    from gatewayd.mapping.plan import Plan
+
+__all__ = ["STDIN", "format_option", "load_file", "load_plan", "name_of", "read_file", "reason_of"]
 
 STDIN = "-"
 """The file name that stands for standard input."""
+_BROKEN, _UNREADABLE = 1, 2
+"""Exit codes."""
+
+
+def format_option(*formats: str, help: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:  # noqa: A002
+    """`--format`, as `form`; the first is the default."""
+    choice = click.Choice(formats)
+    return click.option("--format", "form", type=choice, default=formats[0], show_default=True, help=help)
 
 
 def name_of(file: str) -> str:
@@ -52,3 +63,13 @@ def load_file(file: str) -> Loaded | None:
     if loaded.plan is None:
         click.echo(as_text(CheckOutcome((name,), loaded.diagnostics)), nl=False, err=True)
     return loaded
+
+
+def load_plan(context: click.Context, file: str) -> tuple[Loaded, Plan]:
+    """The file and its plan; ends the command, with the reason printed, where there is none."""
+    loaded = load_file(file)
+    if loaded is None:
+        context.exit(_UNREADABLE)
+    if loaded.plan is None:
+        context.exit(_BROKEN)
+    return loaded, loaded.plan

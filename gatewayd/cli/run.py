@@ -45,7 +45,7 @@ Exit codes:
     type=click.Choice(["debug", "info", "warning", "error"]),
     default="info",
     show_default=True,
-    help="Least severity told; debug also tells every lock taken and released.",
+    help="Least severity logged; debug also logs every lock taken and released.",
 )
 @click.option(
     "--state",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from gatewayd.cli.files import load_file
+from gatewayd.cli.files import format_option, load_plan
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-BROKEN, UNREADABLE = 1, 2
-"""Exit codes."""
 PIPE_WIDTH = 120
 """Columns of the table where neither a terminal nor COLUMNS says how wide it is."""
 
@@ -45,12 +43,11 @@ Exit codes:
 """,
 )
 @click.argument("file", type=click.Path(allow_dash=True))
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["table", "csv", "json", "markdown"]),
-    default="table",
-    show_default=True,
+@format_option(
+    "table",
+    "csv",
+    "json",
+    "markdown",
     help="The table for the screen, or all rows for programs and documents.",
 )
 @click.option(
@@ -61,24 +58,18 @@ def command(context: click.Context, file: str, form: str, *, every: bool) -> Non
     """Print what lies where in the mapping FILE: addresses from 0 and in 4xxxxx form, types, scales, limits, who may
     write for how long, and what is seen when a side is lost. `-` reads standard input.
     """
-    loaded = load_file(file)
-    if loaded is None:
-        context.exit(UNREADABLE)
-    plan = loaded.plan
-    if plan is None:
-        context.exit(BROKEN)
+    loaded, plan = load_plan(context, file)
     if form == "table":
         _print_table(loaded, plan, every=every)
         return
     from gatewayd.report.table import as_csv, as_json, as_markdown, rows
 
     table = rows(loaded.cell)
-    written = {
-        "csv": lambda: as_csv(table),
-        "json": lambda: as_json(plan, loaded.cell, table),
-        "markdown": lambda: as_markdown(plan, loaded.cell, table),
-    }
-    click.echo(written[form](), nl=False)
+    if form == "csv":
+        click.echo(as_csv(table), nl=False)
+    else:
+        write = as_json if form == "json" else as_markdown
+        click.echo(write(plan, loaded.cell, table), nl=False)
 
 
 def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:

@@ -213,8 +213,8 @@ def command(
 ) -> int:
     """Be a Universal Robots controller: its RTDE interface with moving values, claims and a small robot program.
 
-    Serves any number of RTDE clients as a real controller does and prints one line when it listens. What it is told
-    to do wrong can be declared here and, in part, switched while it runs.
+    Serves any number of RTDE clients as a real controller does and prints one line when it listens. Its faults
+    are declared here and, in part, switched while it runs.
     """
     import asyncio
 

@@ -10,8 +10,11 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
+from gatewayd.core.health import Health
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
+from gatewayd.demo.master import Master
+from gatewayd.demo.plc import Plc
 from gatewayd.demo.scene import Scene
 from gatewayd.report.event_text import BAD, UNDECLARED_PEER, EventRecord
 from gatewayd.report.format import age, value
@@ -99,35 +102,20 @@ class ShownEvent:
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Everything at one moment."""
+    """Everything at one moment. What the parties count themselves is read from them when it is drawn."""
 
     elapsed: float
     robot: str
     """State of the robot in a few words."""
     fresh: bool
-    frequency: float
-    packages: int
-    skipped: int
-    plc: str
-    """What the PLC program does."""
-    plc_connected: bool
-    handshakes: int
-    verified: int
-    wrong: int
+    health: Health
+    plc: Plc
+    master: Master
     node: str
     """NMT state of the node as the CANopen master hears it."""
     operational: bool
-    heartbeats: int
     pdo_rate: int
     """PDOs per second from the node."""
-    rpdos: int
-    """PDOs to the node since the start."""
-    emergencies: int
-    line_verified: int
-    """Values that the master has compared."""
-    line_wrong: int
-    accepted: int
-    refused: int
     lines: tuple[Line, ...]
     events: tuple[ShownEvent, ...]
     """The latest last."""
@@ -135,8 +123,7 @@ class Snapshot:
 
 def snapshot(scene: Scene, now: float) -> Snapshot:
     """All that is shown, at monotonic time `now`."""
-    cell, plc, master = scene.cell, scene.plc, scene.master
-    health, program = cell.health, plc.program
+    cell, master = scene.cell, scene.master
     latest = [event for event in cell.events if event.kind not in _LEFT_OUT][-EVENTS_KEPT:]
     started_at = time.time() - now
     events = [
@@ -150,24 +137,12 @@ def snapshot(scene: Scene, now: float) -> Snapshot:
         elapsed=now - scene.started,
         robot=SOURCES[cell.freshness.state],
         fresh=cell.freshness.state is Source.FRESH,
-        frequency=health.frequency,
-        packages=health.packages,
-        skipped=health.skipped,
-        plc=program.phase.value,
-        plc_connected=plc.connected,
-        handshakes=program.handshakes,
-        verified=program.verified,
-        wrong=len(program.wrong),
+        health=cell.health,
+        plc=scene.plc,
+        master=master,
         node=_STATES.get(master.state, "unknown") if master.state is None or master.lives(now) else "lost",
         operational=master.operational(now),
-        heartbeats=master.heartbeats,
         pdo_rate=master.rate(now),
-        rpdos=master.sent,
-        emergencies=master.emergencies,
-        line_verified=master.feeder.verified,
-        line_wrong=len(master.feeder.wrong),
-        accepted=health.writes_accepted,
-        refused=health.writes_refused,
         lines=tuple(_line(cell, row, scene.can_writer, now) for row in scene.rows),
         events=tuple(events),
     )

@@ -65,12 +65,14 @@ def screen(shot: Snapshot, before: Snapshot | None, pokes: Sequence[Poke], width
 
 def plain(shot: Snapshot) -> str:
     """One block of lines."""
+    health, program, master = shot.health, shot.plc.program, shot.master
     links = (
-        f"{shot.elapsed:6.1f} s  robot {shot.robot}, {shot.frequency:.1f} Hz, {shot.packages} packages, "
-        f"{shot.skipped} skipped | plc {shot.plc}, {shot.handshakes} handshakes, {shot.verified} values verified | "
-        f"writes {shot.accepted} accepted, {shot.refused} refused\n"
-        f"          node {shot.node}, {shot.heartbeats} heartbeats, {shot.pdo_rate} PDOs/s | "
-        f"line {shot.rpdos} RPDOs, {shot.line_verified} values verified, {shot.emergencies} EMCY"
+        f"{shot.elapsed:6.1f} s  robot {shot.robot}, {health.frequency:.1f} Hz, {health.packages} packages, "
+        f"{health.skipped} skipped | plc {program.phase.value}, {program.handshakes} handshakes, "
+        f"{program.verified} values verified | "
+        f"writes {health.writes_accepted} accepted, {health.writes_refused} refused\n"
+        f"          node {shot.node}, {master.heartbeats} heartbeats, {shot.pdo_rate} PDOs/s | "
+        f"line {master.sent} RPDOs, {master.feeder.verified} values verified, {master.emergencies} EMCY"
     )
     lines = [
         f"  {'->' if line.row.direction == 'input' else '<-'} {line.row.name:<12} {line.row['robot']:<25} "
@@ -83,27 +85,32 @@ def plain(shot: Snapshot) -> str:
 
 
 def _links(shot: Snapshot, *, wide: bool) -> Text:
-    text = Text(no_wrap=True, overflow="ellipsis")
-    text.append(" ● ", "green" if shot.fresh else "red").append("robot ", "bold")
-    text.append(f"{shot.frequency:.1f} Hz" if shot.fresh and shot.frequency else shot.robot)
-    text.append(f", {shot.packages} packages, {shot.skipped} skipped")
-    text.append("   ● ", "green" if shot.plc_connected else "red").append("PLC ", "bold")
-    text.append(f"{shot.handshakes} handshakes, {shot.verified} values right")
-    if shot.wrong:
-        text.append(f", {shot.wrong} wrong", "bold red")
-    text.append(f"   {shot.accepted} writes, " if wide else "   ")
-    return text.append(f"{shot.refused} refused", "bold red" if shot.refused else "")
+    health, program = shot.health, shot.plc.program
+    rate = f"{health.frequency:.1f} Hz" if shot.fresh and health.frequency else shot.robot
+    text = _party(
+        " ● ", "robot", f"{rate}, {health.packages} packages, {health.skipped} skipped", good=shot.fresh
+    )
+    right = f"{program.handshakes} handshakes, {program.verified} values right"
+    text += _party("   ● ", "PLC", right, len(program.wrong), good=shot.plc.connected)
+    text.append(f"   {health.writes_accepted} writes, " if wide else "   ")
+    return text.append(f"{health.writes_refused} refused", "bold red" if health.writes_refused else "")
 
 
 def _canopen(shot: Snapshot) -> Text:
-    text = Text(no_wrap=True, overflow="ellipsis")
-    text.append(" ● ", "green" if shot.operational else "red").append("CANopen ", "bold")
-    text.append(f"{shot.node}, {shot.heartbeats} heartbeats, {shot.pdo_rate} PDOs/s")
-    text.append("   ● ", "green" if shot.operational and not shot.line_wrong else "red")
-    text.append("line ", "bold").append(f"{shot.rpdos} RPDOs, {shot.line_verified} values right")
-    if shot.line_wrong:
-        text.append(f", {shot.line_wrong} wrong", "bold red")
-    return text.append("   ").append(f"{shot.emergencies} EMCY", "bold red" if shot.emergencies else "")
+    master, good, wrong = shot.master, shot.operational, len(shot.master.feeder.wrong)
+    text = _party(
+        " ● ", "CANopen", f"{shot.node}, {master.heartbeats} heartbeats, {shot.pdo_rate} PDOs/s", good=good
+    )
+    right = f"{master.sent} RPDOs, {master.feeder.verified} values right"
+    text += _party("   ● ", "line", right, wrong, good=good and not wrong)
+    return text.append("   ").append(f"{master.emergencies} EMCY", "bold red" if master.emergencies else "")
+
+
+def _party(dot: str, name: str, words: str, wrong: int = 0, *, good: bool) -> Text:
+    """A party to the demonstration, with a dot that says how it is."""
+    text = Text(no_wrap=True, overflow="ellipsis").append(dot, "green" if good else "red")
+    text.append(f"{name} ", "bold").append(words)
+    return text.append(f", {wrong} wrong", "bold red") if wrong else text
 
 
 def _table(lines: Sequence[Line], old: dict[int, str], *, wide: bool, spacious: bool) -> Table:

@@ -23,7 +23,7 @@ async def test_everything_shown_is_what_the_gateway_knows(scene: Scene, until) -
     shot = snapshot(scene, time.monotonic())
     client.close()
     lines = {line.row.name: line for line in shot.lines}
-    assert shot.plc_connected
+    assert shot.plc.connected
     assert lines["start"].owner == "plc"
     assert (lines["start"].address, lines["start"].row["notation"]) == ("0.0", "400001.0")
     assert lines["part_number"].lease.endswith(" s")
