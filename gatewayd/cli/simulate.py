@@ -6,6 +6,8 @@ import errno
 import logging
 import math
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +16,6 @@ import click
 if TYPE_CHECKING:
     from gatewayd.rtde.fields import Series, SoftwareVersion
     from gatewayd.simulator.controller import Controller
-    from gatewayd.simulator.faults import DropAt
     from gatewayd.simulator.program import ProgramRule
 
 __all__ = ["command"]
@@ -255,20 +256,25 @@ def _controller(
     **switches: Any,
 ) -> Controller:
     from gatewayd.simulator.controller import Controller
-    from gatewayd.simulator.faults import Faults, LongLists
+    from gatewayd.simulator.faults import DropAt, Faults, LongLists
     from gatewayd.simulator.program import ProgramError
 
+    with _blamed("--drop-at"):
+        step = DropAt.parse(drop_at) if drop_at is not None else None
+    with _blamed("--unreadable"):
+        inputs = _inputs(unreadable)
+    with _blamed("--version"):
+        generation, software = _generation(series, version)
     faults = Faults(
         hold=_fields(hold),
-        unreadable=_inputs(unreadable),
+        unreadable=inputs,
         long_lists=LongLists(strict_lists or "take"),
-        drop_at=_drop_at(drop_at),
+        drop_at=step,
         drop_times=drop_times or math.inf,
         linger=linger / 1000,
         overflow_close=None if overflow_close == math.inf else overflow_close,
         **switches,
     )
-    generation, software = _generation(series, version)
     try:
         rules = _rules(programs, program_files)
         return Controller(
@@ -278,6 +284,15 @@ def _controller(
         raise _ProgramMistakeError(str(error)) from error
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--hold") from error
+
+
+@contextmanager
+def _blamed(option: str) -> Iterator[None]:
+    """Turn a ValueError into one about this option."""
+    try:
+        yield
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint=option) from error
 
 
 def _fields(text: str | None) -> tuple[str, ...]:
@@ -291,19 +306,8 @@ def _inputs(text: str | None) -> frozenset[str]:
     unknown = sorted(fields - INPUTS.keys())
     if unknown:
         message = f"no such input: {', '.join(unknown)}"
-        raise click.BadParameter(message, param_hint="--unreadable")
+        raise ValueError(message)
     return fields
-
-
-def _drop_at(text: str | None) -> DropAt | None:
-    from gatewayd.simulator.faults import DropAt
-
-    if text is None:
-        return None
-    try:
-        return DropAt.parse(text)
-    except ValueError as error:
-        raise click.BadParameter(str(error), param_hint="--drop-at") from error
 
 
 def _generation(series: str | None, version: str | None) -> tuple[Series, SoftwareVersion | None]:
@@ -311,17 +315,14 @@ def _generation(series: str | None, version: str | None) -> tuple[Series, Softwa
 
     if version is None:
         return Series.from_word(series or "e"), None
-    try:
-        software = SoftwareVersion.parse(version)
-    except ValueError as error:
-        raise click.BadParameter(str(error), param_hint="--version") from error
+    software = SoftwareVersion.parse(version)
     own = Series.from_major(software.major)
     if own is None:
         message = f"{version}: software versions begin with 3 (cb3), 5 (e) or 10 (x)"
-        raise click.BadParameter(message, param_hint="--version")
+        raise ValueError(message)
     if series is not None and own.word != series:
         message = f"{version} is software of series {own.word}, not of {series}"
-        raise click.BadParameter(message, param_hint="--version")
+        raise ValueError(message)
     return own, software
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import select
 import signal
 import sys
@@ -37,6 +38,7 @@ _SEQUENCES = {
     "\x1b": "esc", "\r": "enter", "\n": "enter", "\x7f": "backspace", "\x08": "backspace",
 }  # fmt: skip
 """What terminals send for keys that are no characters."""
+_KEY = re.compile("|".join(map(re.escape, sorted(_SEQUENCES, key=len, reverse=True))) + "|.", re.DOTALL)
 
 
 @click.command(
@@ -145,14 +147,8 @@ def keys(descriptor: int, patience: float) -> Iterator[str]:
         # The terminal is gone.
         yield "\x03"
         return
-    text = data.decode(errors="ignore")
-    while text:
-        known = next(
-            (sequence for sequence in sorted(_SEQUENCES, key=len, reverse=True) if text.startswith(sequence)),
-            text[0],
-        )
-        text = text[len(known) :]
-        yield _SEQUENCES.get(known, known)
+    for key in _KEY.findall(data.decode(errors="ignore")):
+        yield _SEQUENCES.get(key, key)
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any, Protocol
@@ -82,7 +82,7 @@ class Cursor:
 
 
 class Api:
-    """The interface to one gateway. `notes` are standing troubles that no link tells.
+    """The interface to one gateway. `notes` are standing troubles that no link reports.
 
     `stood_still` is for how many seconds the process stood still until just now; 0.0: it did not.
     """
@@ -152,12 +152,8 @@ class Api:
         runtimes = self._runtimes(query.get("cell"))
         if after and len(runtimes) > 1:
             raise ApiError(400, "bad_query", "`after` counts the events of one cell: say which with `cell`")
-        found = [numbered for runtime in runtimes for numbered in _events(runtime, after, moment)]
-        found.sort(key=lambda numbered: (numbered[0], numbered[1]["seq"]))
-        return {
-            "time": utc(moment.wall),
-            "events": [event for _time, event in found[max(0, len(found) - limit) :]],
-        }
+        found = _in_order(numbered for runtime in runtimes for numbered in _events(runtime, after, moment))
+        return {"time": utc(moment.wall), "events": found[max(0, len(found) - limit) :]}
 
     def new_events(self, cursor: Cursor, query: Mapping[str, str], moment: Moment) -> list[EventMessage]:
         """What happened since the cursor was used last, and move it. A fresh cursor begins now.
@@ -171,8 +167,7 @@ class Api:
             if read != ring.count:
                 found += _events(runtime, read if read < ring.count else 0, moment)
             cursor.read[name] = ring.count
-        found.sort(key=lambda numbered: (numbered[0], numbered[1]["seq"]))
-        return [event for _time, event in found]
+        return _in_order(found)
 
     def audit(self, query: Mapping[str, str], moment: Moment) -> Json:
         """The last records, oldest first; `cell`, `variable`, `writer` and `limit` (100) choose some."""
@@ -299,6 +294,10 @@ def _events(runtime: ServedCell, after: int, moment: Moment) -> Iterator[tuple[f
     for seq, event in enumerate(ring, ring.count - len(ring) + 1):
         if seq > after:
             yield event.time, event_view(cell, seq, event, moment.now, moment.wall)
+
+
+def _in_order(found: Iterable[tuple[float, EventMessage]]) -> list[EventMessage]:
+    return [event for _, event in sorted(found, key=lambda timed: (timed[0], timed[1]["seq"]))]
 
 
 def _is_wanted(record: Record, query: Mapping[str, str]) -> bool:

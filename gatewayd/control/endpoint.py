@@ -90,7 +90,7 @@ class Endpoint:
         log.info("listening for control", extra=fields(socket=str(self.path)))
         try:
             async with server.serving(listening, self._api, self._reload):
-                while inode is not None and _inode(self.path) == inode:  # noqa: ASYNC110 - nobody tells
+                while inode is not None and _inode(self.path) == inode:  # noqa: ASYNC110 - nobody signals it
                     await asyncio.sleep(RETRY_PERIOD)
         finally:
             listening.close()

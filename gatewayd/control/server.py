@@ -64,9 +64,14 @@ def application(api: Api, reload: Reload | None) -> web.Application:
     """The routes."""
     routes = _Routes(api, reload)
     found = web.Application(client_max_size=MAX_BODY, middlewares=[routes.guard])
-    found.router.add_get("/v1/version", routes.version)
-    found.router.add_get("/v1/status", routes.status)
-    for name, question in (("variables", api.variables), ("locks", api.locks), ("audit", api.audit)):
+    questions: dict[str, _Question] = {
+        "version": lambda _query, _moment: api.version(),
+        "status": lambda _query, moment: api.status(moment),
+        "variables": api.variables,
+        "locks": api.locks,
+        "audit": api.audit,
+    }
+    for name, question in questions.items():
         found.router.add_get(f"/v1/{name}", routes.answer(question))
     found.router.add_get("/v1/events", routes.events)
     acts: dict[str, _Act] = {
@@ -107,12 +112,6 @@ class _Routes:
             return _error(ApiError(500, "internal", "internal error, see the log"))
         finally:
             self._under_way -= 1
-
-    async def version(self, _request: web.Request) -> web.StreamResponse:
-        return _json(self._api.version())
-
-    async def status(self, _request: web.Request) -> web.StreamResponse:
-        return _json(self._api.status(_moment()))
 
     def answer(self, question: _Question) -> _Handler:
         async def handle(request: web.Request) -> web.StreamResponse:

@@ -1,8 +1,8 @@
 """A small CANopen master: it knows nothing of gatewayd but its node-ID, its COB-IDs and what they carry.
 
 The master is that of a line around the robot cell. It starts the node by NMT, sends SYNC and its own heartbeat, sets
-the feed of the line by RPDO, and compares what the TPDOs tell with what it has asked for. `Feeder` is the logic alone;
-`Master` is the traffic on a bus of python-can.
+the feed of the line by RPDO, and compares what the TPDOs report with what it has asked for. `Feeder` is the logic
+alone; `Master` is the traffic on a bus of python-can.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class Feeder:
         return self.wanted
 
     def emergency(self, code: int, now: float) -> None:
-        """The node tells an error, or with 0 that there is none any more."""
+        """The node reports an error, or with 0 that there is none any more."""
         if code == _HELD:
             self.held, self._came_back = True, False
             self.refusals += 1
@@ -151,7 +151,7 @@ class Master:
     def __init__(self, channel: str) -> None:
         self.feeder = Feeder()
         self.state: int | None = None
-        """The node's NMT state as its heartbeat tells it; None before the first one."""
+        """The node's NMT state by its heartbeat; None before the first one."""
         self.heartbeats = 0
         self.received = 0
         """PDOs from the node."""

@@ -66,7 +66,7 @@ class Phase(Enum):
 
 
 class Signal(Enum):
-    """What a scan tells the handshake."""
+    """What a scan means for the handshake."""
 
     LOST = "robot values are not fresh, or the robot cannot be written"
     READY = "neither busy nor done"
@@ -231,6 +231,6 @@ class Plc:
         return Answers(True, bool(bits & 1), bool(bits & 2), part_done, cycles, force)
 
     async def _registers(self, address: int, count: int) -> Sequence[int]:
-        """Holding registers; none if the gateway refuses to tell them."""
+        """Holding registers; none if the gateway refuses."""
         reply = await self._client.read_holding_registers(address, count=count)
         return () if reply.isError() else reply.registers

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from enum import Enum
+from itertools import groupby
 
+from gatewayd.core.definition import Lock
 from gatewayd.links.contract import Names
 from gatewayd.links.registry import kind_of
 from gatewayd.mapping.plan import Plan
@@ -19,6 +21,7 @@ from gatewayd.report import facts
 from gatewayd.report.facts import Facts
 from gatewayd.report.printable import json_text, printable
 from gatewayd.report.weakening import weakened
+from gatewayd.report.wording import family, names_and_more
 
 __all__ = [
     "MAX_GONE",
@@ -218,7 +221,7 @@ def _cuts_owners_off(changes: Changes, owned: Collection[str]) -> Iterator[str]:
     """Changes of a link or writer by which the present owners would lose their connection, or find another robot."""
     if not owned:
         return
-    whose = _shortened(sorted(owned))
+    whose = _are(sorted(owned))
     for link in changes.links:
         moved = [detail for what in _moved(changes, link.name) if (detail := link.detail(what)) is not None]
         if moved:
@@ -229,7 +232,7 @@ def _cuts_owners_off(changes: Changes, owned: Collection[str]) -> Iterator[str]:
         held = sorted(_may_own(changes.old, writer.name).intersection(owned))
         if held:
             change = _changed(writer.details)
-            yield f"writer `{writer.name}` would change while {_shortened(held)} owned: {change}"
+            yield f"writer `{writer.name}` would change while {_are(held)} owned: {change}"
 
 
 def _moved(changes: Changes, link: str) -> Iterable[str]:
@@ -248,30 +251,23 @@ def _disturbed(changes: Changes) -> Iterator[str]:
             yield from kind_of(link.kind).disturbs(link, successor, old.cell, new.cell)
 
 
+def _guarded(plan: Plan, locks: Iterable[Lock]) -> set[str]:
+    return {plan.cell.variables[index].name for lock in locks for index in lock.members}
+
+
 def _members(plan: Plan, group: str) -> set[str]:
-    return {
-        plan.cell.variables[index].name
-        for lock in plan.cell.locks
-        if lock.name == group
-        for index in lock.members
-    }
+    return _guarded(plan, (lock for lock in plan.cell.locks if lock.name == group))
 
 
 def _may_own(plan: Plan, writer: str) -> set[str]:
-    return {
-        plan.cell.variables[index].name
-        for lock in plan.cell.locks
-        if writer in (plan.cell.writers[owner].name for owner in lock.owners)
-        for index in lock.members
-    }
+    writers = [known.name for known in plan.cell.writers]
+    index = writers.index(writer)
+    return _guarded(plan, (lock for lock in plan.cell.locks if index in lock.owners))
 
 
-def _shortened(names: list[str]) -> str:
+def _are(names: Sequence[str]) -> str:
     """`a` is; `a`, `b` and 3 more are."""
-    if len(names) == 1:
-        return f"`{names[0]}` is"
-    more = f" and {len(names) - 2} more" if len(names) > 2 else ""
-    return f"{f'`{names[0]}`, `{names[1]}`' if more else f'`{names[0]}` and `{names[1]}`'}{more} are"
+    return f"{names_and_more(names)} {'is' if len(names) == 1 else 'are'}"
 
 
 # -- for people and programs -------------------------------------------------------------------
@@ -315,16 +311,13 @@ def as_json(changes: Changes) -> str:
             name: list(map(_as_object, getattr(changes, name)))
             for name in ("links", "writers", "groups", "variables")
         },
-        "renumbered": [
-            {"name": moved.name, "old": moved.old, "new": moved.new} for moved in changes.renumbered
-        ],
+        "renumbered": list(map(asdict, changes.renumbered)),
     }
     return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
 
 def _as_object(difference: Difference) -> dict[str, object]:
-    details = [{"what": detail.what, "old": detail.old, "new": detail.new} for detail in difference.details]
-    return {"kind": difference.kind.name.lower(), "name": difference.name, "details": details}
+    return asdict(difference) | {"kind": difference.kind.name.lower()}
 
 
 def _line(noun: str, difference: Difference) -> str:
@@ -353,40 +346,27 @@ _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 
 def _folded(differences: Iterable[Difference]) -> Iterator[Difference]:
     """Elements that follow each other and differ in the same facts become one difference, `recipe[0..23]`."""
-    run: list[Difference] = []
-    for difference in differences:
-        if run and not _follows(run[-1], difference):
-            yield _merged(run)
-            run = []
-        run.append(difference)
-    if run:
-        yield _merged(run)
+    for _, run in groupby(enumerate(differences), _run):
+        elements = [difference for _, difference in run]
+        yield elements[0] if len(elements) == 1 else _merged(elements[0], elements[-1])
 
 
-def _follows(former: Difference, other: Difference) -> bool:
-    first, second = _ELEMENT.fullmatch(former.name), _ELEMENT.fullmatch(other.name)
-    return (
-        first is not None
-        and second is not None
-        and first[1] == second[1]
-        and int(second[2]) == int(first[2]) + 1
-        and former.kind is other.kind
-        and [detail.what for detail in former.details] == [detail.what for detail in other.details]
-    )
+def _run(numbered: tuple[int, Difference]) -> object:
+    """What the elements of one run, and nothing else, have in common."""
+    number, difference = numbered
+    element = _ELEMENT.fullmatch(difference.name)
+    if element is None:
+        return number
+    facts = [detail.what for detail in difference.details]
+    return element[1], int(element[2]) - number, difference.kind, facts
 
 
-def _merged(run: list[Difference]) -> Difference:
-    first, last = run[0], run[-1]
-    if first is last:
-        return first
-    begin, end = _ELEMENT.fullmatch(first.name), _ELEMENT.fullmatch(last.name)
-    assert begin is not None
-    assert end is not None
+def _merged(first: Difference, last: Difference) -> Difference:
     details = tuple(
         Detail(detail.what, _span(detail.old, other.old), _span(detail.new, other.new))
         for detail, other in zip(first.details, last.details, strict=True)
     )
-    return Difference(first.kind, f"{begin[1]}[{begin[2]}..{end[2]}]", details)
+    return Difference(first.kind, family(first.name, last.name), details)
 
 
 def _span(first: str, last: str) -> str:

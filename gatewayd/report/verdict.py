@@ -156,7 +156,7 @@ def _unserved(cell: Cell, source: LinkHealth, now: float) -> Iterator[_Finding]:
 
 
 def _held_by_robot(cell: Cell) -> Iterator[_Finding]:
-    """What it does not tell, or has not as it was given."""
+    """What it does not report, or has not as it was given."""
     unread = [cell.definition.variables[index].name for index in sorted(cell.delivery.unread)]
     if unread:
         text = f"what the robot holds is not known for {counted(len(unread), 'input')}: {listed(unread, _LISTED)}"

@@ -49,7 +49,7 @@ def names_and_more(names: Sequence[str]) -> str:
 def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
     """A hint that names the nearest known name, in whatever case it was written, or else says `otherwise`."""
     names = list(known)
-    same = [one for one in names if one.casefold() == name.casefold()]
+    same = [known_name for known_name in names if known_name.casefold() == name.casefold()]
     close = same or difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"did you mean `{close[0]}`?" if close else otherwise
 

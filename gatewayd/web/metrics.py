@@ -192,7 +192,7 @@ PROCESS_METRICS = {
     "process_start_time_seconds": "when it started, seconds since 1970",
     "process_virtual_memory_bytes": "address space it has",
 }
-"""What prometheus-client tells of the process itself."""
+"""What prometheus-client reports of the process itself."""
 
 LINK_LABEL = "link"
 """Behind all others, the name of a link that is not called as its kind: a cell may have several of that."""

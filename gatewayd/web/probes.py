@@ -95,7 +95,7 @@ class CellProbe:
 
 
 class Probes:
-    """Measures `daemon` while `run` runs. `notes` tells standing troubles that no link does, in a few words each."""
+    """Measures `daemon` while `run` runs. `notes` are standing troubles that no link reports."""
 
     def __init__(self, daemon: Daemon, notes: Callable[[], Iterable[str]] = lambda: ()) -> None:
         self.daemon = daemon

@@ -27,7 +27,7 @@ from gatewayd.web.probes import Probes
 __all__ = ["EVENTS", "as_json", "layout", "overview", "state"]
 
 EVENTS = 100
-"""Events in one answer at most; those of one deed, as many variables as it may concern, count as one."""
+"""Events in one answer at most; those of one act, as many variables as it may concern, count as one."""
 
 _IN_RUNS = frozenset(
     {
@@ -178,17 +178,17 @@ def _events(cell: Cell, since: int, now: float) -> list[dict[str, object]]:
     new = min(ring.count - since if 0 <= since <= ring.count else ring.count, len(ring))
     wall = time.time() - now
     latest = islice(enumerate(ring, ring.count - len(ring) + 1), len(ring) - new, None)
-    runs = [list(run) for _, run in groupby(latest, _deed)]
+    runs = [list(run) for _, run in groupby(latest, _act)]
     return [
         _event(run[0][1], cell, run[-1][0], wall + run[0][1].time, len(run) - 1) for run in runs[-EVENTS:]
     ]
 
 
-def _deed(numbered: tuple[int, Event]) -> tuple[object, ...]:
-    """What events that are one deed have in common: a lost PLC must not vanish below its hundred fallbacks."""
+def _act(numbered: tuple[int, Event]) -> tuple[object, ...]:
+    """What events of one act have in common: a lost PLC must not vanish below its hundred fallbacks."""
     number, event = numbered
-    one = number if event.kind not in _IN_RUNS else None
-    return event.kind, event.time, event.writer, event.other, event.detail, one
+    alone = number if event.kind not in _IN_RUNS else None
+    return event.kind, event.time, event.writer, event.other, event.detail, alone
 
 
 def _event(event: Event, cell: Cell, number: int, at: float, more: int) -> dict[str, object]:
