@@ -6,7 +6,8 @@ import http.client
 import json
 import os
 import socket
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import closing, contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -79,50 +80,48 @@ class Client:
 
     def get(self, path: str, **query: str | int | None) -> dict[str, Any]:
         """Ask: `get("/v1/variables", name="tcp*")`. Raises NoDaemon, ControlError."""
-        return self._end(*self._begin("GET", _with_query(path, query), None, self._patience))
+        with self._answer("GET", _with_query(path, query)) as response:
+            return self._read(response)
 
     def post(
         self, path: str, body: Mapping[str, Any] | None = None, *, patience: float | None = None
     ) -> dict[str, Any]:
         """Do: `post("/v1/locks/start/take", {"for": 60})`. Raises NoDaemon, ControlError."""
-        return self._end(*self._begin("POST", path, body or {}, patience or self._patience))
+        with self._answer("POST", path, body or {}, patience) as response:
+            return self._read(response)
 
     def follow(self, path: str, **query: str | int | None) -> Generator[dict[str, Any], None, None]:
         """Every object that comes, until the daemon ends. Raises NoDaemon, ControlError."""
         patience = max(self._patience, _FOLLOW_PATIENCE)
-        connection, response = self._begin("GET", _with_query(path, query), None, patience)
-        try:
+        with self._answer("GET", _with_query(path, query), patience=patience) as response:
             if response.status != http.client.OK:
-                self._end(connection, response)
-            while line := response.readline():
-                if line.strip():
-                    yield json.loads(line)
-        except (OSError, http.client.HTTPException, ValueError):
-            return
-        finally:
-            connection.close()
+                self._read(response)
+            try:
+                while line := response.readline():
+                    if line.strip():
+                        yield json.loads(line)
+            except (OSError, http.client.HTTPException, ValueError):
+                return
 
-    def _begin(
-        self, method: str, path: str, body: Mapping[str, Any] | None, patience: float
-    ) -> tuple[http.client.HTTPConnection, http.client.HTTPResponse]:
-        connection = _UnixConnection(self.path, patience)
-        try:
-            text = None if body is None else json.dumps(body)
-            connection.request(method, path, text, {"Content-Type": "application/json"} if text else {})
-            return connection, connection.getresponse()
-        except (OSError, http.client.HTTPException) as error:
-            connection.close()
-            raise NoDaemon(_explain(self.path, error)) from error
+    @contextmanager
+    def _answer(
+        self, method: str, path: str, body: Mapping[str, Any] | None = None, patience: float | None = None
+    ) -> Iterator[http.client.HTTPResponse]:
+        connection = _UnixConnection(self.path, patience or self._patience)
+        text = None if body is None else json.dumps(body)
+        with closing(connection):
+            try:
+                connection.request(method, path, text, {"Content-Type": "application/json"} if text else {})
+                response = connection.getresponse()
+            except (OSError, http.client.HTTPException) as error:
+                raise NoDaemon(_explain(self.path, error)) from error
+            yield response
 
-    def _end(
-        self, connection: http.client.HTTPConnection, response: http.client.HTTPResponse
-    ) -> dict[str, Any]:
+    def _read(self, response: http.client.HTTPResponse) -> dict[str, Any]:
         try:
             found = json.loads(response.read())
         except (OSError, http.client.HTTPException, ValueError) as error:
             raise NoDaemon(f"what answers at {self.path} is no gatewayd") from error
-        finally:
-            connection.close()
         if response.status >= http.client.BAD_REQUEST:
             failure = found.get("error") or {}
             code, message = failure.get("code", "http"), failure.get("message", f"HTTP {response.status}")

@@ -15,8 +15,9 @@ from gatewayd.core.definition import Direction, Fallback
 from gatewayd.links.registry import languages, tables
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.plan import Plan
-from gatewayd.report.layout import Column, Row, arranged
+from gatewayd.report.layout import Column, Row, arranged, plain
 from gatewayd.report.printable import json_text, printable
+from gatewayd.report.wording import number
 
 __all__ = [
     "as_csv",
@@ -62,12 +63,12 @@ def rows(cell: ExpandedCell) -> tuple[Row, ...]:
 
 def _places(links: Sequence[Sequence[Mapping[str, object]]]) -> Iterator[Mapping[str, object]]:
     """The places of one variable side by side, as many as the link with the most has."""
-    for number in range(max(1, *map(len, links))):
+    for place in range(max(1, *map(len, links))):
         yield {
             name: value
             for places in links
             if places
-            for name, value in places[min(number, len(places) - 1)].items()
+            for name, value in places[min(place, len(places) - 1)].items()
         }
 
 
@@ -115,7 +116,7 @@ def _row(cell: ExpandedCell, variable: ExpandedVariable, places: Mapping[str, ob
 def _fallback(fallback: Fallback) -> str:
     if fallback.value is None:
         return fallback.kind.value
-    return str(fallback.value).lower() if isinstance(fallback.value, bool) else f"{fallback.value:.10g}"
+    return plain(fallback.value) if isinstance(fallback.value, bool) else number(fallback.value)
 
 
 def as_csv(table: Sequence[Row]) -> str:
@@ -124,7 +125,7 @@ def as_csv(table: Sequence[Row]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     head = columns()
     writer.writerow(head)
-    writer.writerows([_plain(row[column]) for column in head] for row in table)
+    writer.writerows([printable(plain(row[column])) for column in head] for row in table)
     return text.getvalue()
 
 
@@ -218,14 +219,6 @@ def policy(row: Row) -> str:
 def lost(row: Row) -> str:
     """What is seen when a side is lost: `clear`; `clear, running` where that is so without a running program too."""
     return (row.on_release or row.on_stale) + (f", {row.valid}" if row.valid else "")
-
-
-def _plain(value: object) -> object:
-    if value is None:
-        return ""
-    if isinstance(value, str):
-        return printable(value)
-    return str(value).lower() if isinstance(value, bool) else value
 
 
 def _cell(text: str) -> str:
