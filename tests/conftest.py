@@ -81,7 +81,17 @@ def _place(item: pytest.Item) -> int:
 @pytest.fixture
 def plant(tmp_path: Path) -> Iterator[Plant]:
     """Its processes end with the test."""
-    built = Plant(tmp_path)
+    yield from _plant(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def lasting_plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
+    """For what the tests of a module share; whatever they do to it, the next test has to find it well."""
+    yield from _plant(tmp_path_factory.mktemp("plant"))
+
+
+def _plant(directory: Path) -> Iterator[Plant]:
+    built = Plant(directory)
     try:
         yield built
     finally:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
-import sys
 from collections.abc import Iterator
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner, Result
 
+from gatewayd.cli import command
 from tests.docs.generated import DOCS
 
 PAGES = sorted([*DOCS.glob("tutorial/*.md"), *DOCS.glob("howto/*.md")])
@@ -46,26 +47,26 @@ ELSEWHERE = {
 """Command (the whole line) -> what else tests it."""
 
 RUN = re.compile(r"gatewayd (check|show|export) (?!/etc/).*")
-"""What test_command_works runs."""
+"""What test_commands_work runs."""
 
 
 def commands(page: Path) -> Iterator[str]:
     """The lines of the page's shell blocks, without comments."""
     for block in BLOCK.findall(page.read_text()):
         for line in block.splitlines():
-            command = re.sub(r"\s+#.*", "", line).strip()
-            if command:
-                yield command
+            typed = re.sub(r"\s+#.*", "", line).strip()
+            if typed:
+                yield typed
 
 
-ALL = [(page, command) for page in PAGES for command in commands(page)]
+ALL = [(page, line) for page in PAGES for line in commands(page)]
 
 
 def test_every_command_is_known() -> None:
     unknown = [
-        f"{page.name}: {command}"
-        for page, command in ALL
-        if not RUN.fullmatch(command) and not any(re.fullmatch(known, command) for known in ELSEWHERE)
+        f"{page.name}: {line}"
+        for page, line in ALL
+        if not RUN.fullmatch(line) and not any(re.fullmatch(known, line) for known in ELSEWHERE)
     ]
     assert not unknown
 
@@ -79,25 +80,18 @@ def files(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def gatewayd(arguments: str, directory: Path) -> subprocess.CompletedProcess[str]:
+def gatewayd(arguments: str, directory: Path) -> Result:
     """Run `gatewayd ARGUMENTS` there."""
-    return subprocess.run(
-        [sys.executable, "-m", "gatewayd", *shlex.split(arguments)],
-        cwd=directory,
-        env={"PYTHONPATH": str(DOCS.parent), "COLUMNS": "110"},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    with chdir(directory):
+        return CliRunner(env={"COLUMNS": "110"}).invoke(command, shlex.split(arguments), prog_name="gatewayd")
 
 
 def test_commands_work(files: Path) -> None:
-    runnable = {command for _, command in ALL if RUN.fullmatch(command)}
+    runnable = {line for _, line in ALL if RUN.fullmatch(line)}
     assert runnable
-    for command in sorted(runnable):
-        done = gatewayd(command.removeprefix("gatewayd ").partition(" > ")[0], files)
-        assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
+    for line in sorted(runnable):
+        done = gatewayd(line.removeprefix("gatewayd ").partition(" > ")[0], files)
+        assert done.exit_code == 0, f"{line}: {done.output}"
 
 
 def test_files_of_the_pages_have_no_findings(files: Path) -> None:
@@ -115,7 +109,7 @@ def test_mistakes_of_the_tutorial_are_found_as_it_says(files: Path) -> None:
     )
     (files / "my-cell.yaml").write_text(broken)
     done = gatewayd("check my-cell.yaml", files)
-    assert done.returncode == 1
+    assert done.exit_code == 1
     for line in done.stdout.splitlines():
         if (
             re.search(r"\berror\b|first used", line)
@@ -142,6 +136,6 @@ OPTIONS = {
 
 
 def test_simulator_takes_the_options_of_the_guides() -> None:
-    told = gatewayd("simulate --help", DOCS.parent).stdout
+    text = gatewayd("simulate --help", DOCS.parent).stdout
     assert OPTIONS
-    assert {option for option in OPTIONS if option not in told} == set()
+    assert {option for option in OPTIONS if option not in text} == set()

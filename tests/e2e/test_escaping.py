@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import urllib.request
+from http import HTTPStatus
 from pathlib import Path
+from urllib.error import HTTPError
 
 import pytest
+from click.testing import CliRunner
 
+from gatewayd.cli import command
 from tests.e2e.plant import Plant
 from tests.e2e.plc import PLC
 from tests.e2e.processes import HOST, Daemon, free_port, wait_for
@@ -41,6 +43,7 @@ def assert_clean(text: str) -> None:
 
 class Cell:
     def __init__(self, plant: Plant) -> None:
+        self.plant = plant
         controller = plant.start("talking_controller", HOST, ascii_escaped(WORD), ascii_escaped(TEXT))
         self.mapping = plant.mapping(CELL, int(controller.answer()))
         self.socket = plant.directory / "control.sock"
@@ -56,9 +59,9 @@ class Cell:
         self.daemon.wait_for_line("register unavailable")
 
 
-@pytest.fixture
-def cell(plant: Plant) -> Cell:
-    return Cell(plant)
+@pytest.fixture(scope="module")
+def cell(lasting_plant: Plant) -> Cell:
+    return Cell(lasting_plant)
 
 
 def test_the_text_log_keeps_every_event_on_one_line(cell: Cell) -> None:
@@ -71,11 +74,11 @@ def test_the_text_log_keeps_every_event_on_one_line(cell: Cell) -> None:
     assert not [line for line in text.splitlines() if line.startswith("2026-01-01")]
 
 
-@pytest.mark.parametrize("command", ["status", "events", "watch --once", "locks", "events --audit"])
-def test_commands_print_nothing_that_steers_the_terminal(cell: Cell, command: str) -> None:
-    done = gatewayd(cell.socket, *command.split())
+@pytest.mark.parametrize("line", ["status", "events", "watch --once", "locks", "events --audit"])
+def test_commands_print_nothing_that_steers_the_terminal(cell: Cell, line: str) -> None:
+    done = gatewayd(cell.socket, *line.split())
     assert_clean(done.stdout + done.stderr)
-    if command == "events":
+    if line == "events":
         assert r"\x1b[31mINT\x07" in done.stdout
 
 
@@ -110,24 +113,33 @@ def test_show_diff_and_check_print_free_texts_escaped(cell: Cell, tmp_path: Path
 
 
 def gatewayd_plain(*arguments: str | Path) -> str:
-    command = [sys.executable, "-m", "gatewayd", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=30)
-    return done.stdout + done.stderr
+    return CliRunner().invoke(command, list(map(str, arguments))).output
 
 
-def test_audit_and_metrics(cell: Cell, plant: Plant) -> None:
-    plc = plant.ready_plc(PLC)
+def test_audit_and_metrics(cell: Cell) -> None:
+    plc = cell.plant.ready_plc(PLC)
     assert plc.write_integers(0, 4) == 0
     wait_for(lambda: cell.audit.exists() and "write accepted" in cell.audit.read_text(), "the audit")
     assert_clean(cell.audit.read_text("utf-8"))
     for path in ("metrics", "readyz", "page/cells/cell", "page/cells/cell/state"):
-        with urllib.request.urlopen(cell.url + path, timeout=10) as answer:  # noqa: S310 - our own listener
-            assert_clean(answer.read().decode("utf-8"))
+        assert_clean(answer_of(cell.url + path))
+
+
+def answer_of(url: str) -> str:
+    """Also where it says that something is wrong: on a busy machine the packages may come too late."""
+    try:
+        answer = urllib.request.urlopen(url, timeout=10)  # noqa: S310 - our own listener
+    except HTTPError as problem:
+        if problem.code != HTTPStatus.SERVICE_UNAVAILABLE:
+            raise
+        answer = problem
+    with answer:
+        return str(answer.read().decode("utf-8"))
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed (Debian package chromium)")
-async def test_the_page_shows_escapes(cell: Cell, plant: Plant) -> None:
-    async with browsing(plant.directory) as page:
+async def test_the_page_shows_escapes(cell: Cell, tmp_path: Path) -> None:
+    async with browsing(tmp_path) as page:
         await page.open(cell.url, 1280, 800)
         await page.wait("document.body.dataset.contact === 'live'")
         await page.wait("document.body.textContent.includes('INT')")

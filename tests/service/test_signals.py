@@ -58,10 +58,15 @@ def children(pid: int) -> list[int]:
     return [int(text) for text in found if b"\0-I\0" in Path(f"/proc/{text}/cmdline").read_bytes()]
 
 
+@pytest.fixture(scope="module")
+def simulator(lasting_plant: Plant) -> Simulator:
+    """One for all daemons, which it outlives."""
+    return lasting_plant.simulator()
+
+
 @pytest.fixture
-def served(plant: Plant) -> tuple[Simulator, Daemon]:
+def served(plant: Plant, simulator: Simulator) -> tuple[Simulator, Daemon]:
     """A robot that has 42 from the PLC."""
-    simulator = plant.simulator()
     daemon = plant.daemon(plant.mapping(CELL, simulator.port))
     plc = plant.ready_plc()
     assert plc.write_integers(0, 42) == 0
@@ -101,9 +106,8 @@ def test_what_ends_it_sends_the_fallbacks(served: tuple[Simulator, Daemon], numb
     assert "Traceback" not in daemon.text()
 
 
-def test_while_it_ends_nothing_else_counts(plant: Plant) -> None:
+def test_while_it_ends_nothing_else_counts(plant: Plant, simulator: Simulator) -> None:
     """A robot that does not read keeps the end waiting; SIGHUP and the others do nothing, SIGTERM forces."""
-    simulator = plant.simulator()
     daemon = plant.daemon(plant.mapping(CELL, simulator.port))
     plant.ready_plc()
     daemon.signal(signal.SIGSTOP)
@@ -156,8 +160,7 @@ def test_what_ends_it_while_the_files_are_read(reading: Process, number: signal.
     assert "Traceback" not in reading.text()
 
 
-def test_nothing_else_ends_it_while_the_files_are_read(plant: Plant) -> None:
-    simulator = plant.simulator()
+def test_nothing_else_ends_it_while_the_files_are_read(plant: Plant, simulator: Simulator) -> None:
     daemon = plant.run(plant.mapping(CELL, simulator.port))
     wait_for(lambda: bool(children(daemon.pid)), "the process that reads the files")
     (child,) = children(daemon.pid)
@@ -194,9 +197,10 @@ def _is_alive(pid: int) -> bool:
 
 
 @pytest.mark.parametrize("number", [*ENDING, signal.SIGHUP, signal.SIGUSR1, signal.SIGALRM], ids=name_of)
-def test_signals_from_the_first_line_of_ours(plant: Plant, number: signal.Signals) -> None:
+def test_signals_from_the_first_line_of_ours(
+    plant: Plant, simulator: Simulator, number: signal.Signals
+) -> None:
     """As soon as the kernel blocks them. What comes while Python itself starts is not ours to decide."""
-    simulator = plant.simulator()
     daemon = plant.run(plant.mapping(CELL, simulator.port))
     bit = 1 << (number - 1)
     wait_for(lambda: bool(dispositions(daemon.pid)["SigBlk"] & bit), "the first line of ours")
@@ -209,9 +213,8 @@ def test_signals_from_the_first_line_of_ours(plant: Plant, number: signal.Signal
 
 
 @pytest.mark.parametrize("step", range(24))
-def test_sigterm_at_any_moment_of_the_start(plant: Plant, step: int) -> None:
+def test_sigterm_at_any_moment_of_the_start(plant: Plant, simulator: Simulator, step: int) -> None:
     """A robot that had a value when the links were up gets the fallback; none of the moments leaves a traceback."""
-    simulator = plant.simulator()
     daemon = plant.run(plant.mapping(CELL, simulator.port))
     bit = 1 << (signal.SIGTERM - 1)
     wait_for(lambda: bool(dispositions(daemon.pid)["SigBlk"] & bit), "the first line of ours")
@@ -224,9 +227,11 @@ def test_sigterm_at_any_moment_of_the_start(plant: Plant, step: int) -> None:
     assert "stopp" in text, "before it serves, or in order"
 
 
-def test_what_was_ignored_or_blocked_by_who_started_it_works_all_the_same(plant: Plant) -> None:
+def test_what_was_ignored_or_blocked_by_who_started_it_works_all_the_same(
+    plant: Plant, simulator: Simulator
+) -> None:
     """A shell without job control ignores SIGINT for `gatewayd run &`; nohup ignores SIGHUP."""
-    mapping = plant.mapping(CELL, plant.simulator().port)
+    mapping = plant.mapping(CELL, simulator.port)
     program = (
         "import os, signal, sys; signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM});"
         "[signal.signal(one, signal.SIG_IGN) for one in (signal.SIGINT, signal.SIGHUP)];"
@@ -247,9 +252,8 @@ def test_what_was_ignored_or_blocked_by_who_started_it_works_all_the_same(plant:
 
 
 @pytest.fixture
-def in_terminal(plant: Plant) -> tuple[int, int, Path, Simulator]:
+def in_terminal(plant: Plant, simulator: Simulator) -> tuple[int, int, Path, Simulator]:
     """In the foreground of a terminal of its own, serving; its log goes to a file."""
-    simulator = plant.simulator()
     log = plant.directory / "terminal.log"
     log.touch()
     command = [sys.executable, "-m", "gatewayd", "run", str(plant.mapping(CELL, simulator.port))]
