@@ -247,7 +247,6 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "links.modbus_server.declaration": "tests/links/test_registry.py",
     "links.modbus_server.plan": "records; tests/mapping/test_compile.py pins their content",
     "links.modbus_server.tables": "tests/cli/test_show.py, tests/report/test_table.py",
-    "links.robot.declaration": "tests/links/test_registry.py",
     "links.robot.plan": "records; tests/mapping/test_compile.py pins their content",
     "links.robot.sections": "tests/mapping/test_model.py",
     "links.robot.tables": "tests/cli/test_show.py, tests/report/test_table.py",

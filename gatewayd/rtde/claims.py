@@ -169,11 +169,8 @@ class Claims:
     @property
     def types(self) -> Mapping[str, DataType]:
         """Every field that is claimed, with its type."""
-        return {
-            name: kind
-            for accepted in self.recipes.values()
-            for name, kind in zip(accepted.recipe.names, accepted.recipe.types, strict=True)
-        }
+        held = (accepted.recipe for accepted in self.recipes.values())
+        return {name: kind for recipe in held for name, kind in recipe.kinds.items()}
 
     @property
     def refused(self) -> Mapping[str, str]:

@@ -65,7 +65,7 @@ class RtdeClient:
             self._connection.join(fields)
 
     def probe(self) -> bool:
-        """Ask the controller something whose answer queues behind the packages: `ClientHandler.probed` tells when.
+        """Ask the controller something whose answer queues behind the packages: `ClientHandler.probed` reports when.
 
         False if nothing was asked: without a session, and while the last question is open.
         """

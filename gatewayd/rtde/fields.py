@@ -181,15 +181,9 @@ _TOOL_MODES = "0 disabled, 1 sinking, 2 sourcing, 3 push/pull"
 
 
 def _words(side: str, note: str = "") -> tuple[Field, ...]:
-    return tuple(
-        Field(
-            f"{side}_bit_registers{bits}",
-            _UINT32,
-            f"general purpose {side} bits{note}, {_RESERVED}",
-            since=_LOWER,
-        )
-        for bits in ("0_to_31", "32_to_63")
-    )
+    comment = f"general purpose {side} bits{note}, {_RESERVED}"
+    names = (f"{side}_bit_registers{bits}" for bits in ("0_to_31", "32_to_63"))
+    return tuple(Field(name, _UINT32, comment, since=_LOWER) for name in names)
 
 
 def _registers(side: str, note: str = "") -> Iterator[Field]:

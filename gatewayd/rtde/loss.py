@@ -80,11 +80,7 @@ def connect_failure(error: OSError, address: str) -> Loss:
     """What a failed connection attempt to `address` (for reading) means."""
     if isinstance(error, socket.gaierror):
         return Loss(LossReason.UNRESOLVED, f"{address}: host name not known: {error.strerror}")
-    if isinstance(error, TimeoutError):
-        reason, text = _BY_ERRNO[errno.ETIMEDOUT]
-    else:
-        reason, text = _by_errno(error)
-    return Loss(reason, f"{address}: {text}")
+    return _by_errno(error, errno.ETIMEDOUT if isinstance(error, TimeoutError) else error.errno, address)
 
 
 def connection_failure(error: OSError | None, address: str) -> Loss:
@@ -93,11 +89,10 @@ def connection_failure(error: OSError | None, address: str) -> Loss:
         return Loss(LossReason.CLOSED, f"{address}: connection closed by the controller")
     if isinstance(error, TimeoutError):
         return Loss(LossReason.SILENT, f"{address}: the controller no longer answers: cable or power lost")
-    reason, text = _by_errno(error)
+    return _by_errno(error, error.errno, address)
+
+
+def _by_errno(error: OSError, number: int | None, address: str) -> Loss:
+    unknown = LossReason.FAILED, f"connection failed: {error.strerror or error}"
+    reason, text = _BY_ERRNO.get(number or 0, unknown)
     return Loss(reason, f"{address}: {text}")
-
-
-def _by_errno(error: OSError) -> tuple[LossReason, str]:
-    return _BY_ERRNO.get(
-        error.errno or 0, (LossReason.FAILED, f"connection failed: {error.strerror or error}")
-    )

@@ -3,7 +3,7 @@
 Pure: messages in, messages out. The order is version 2 (else 1), controller version, claims, readings, working recipe,
 start. Where the working recipe reads every input back it is agreed before the claims, as nothing needs to be read
 apart then: its first package after the claims is the reading. Whether a controller takes so long a list of outputs
-only its answer tells; a refusal that blames no field leads to readings in pieces on the same connection. A reading is
+only its answer shows; a refusal that blames no field leads to readings in pieces on the same connection. A reading is
 an output recipe for one package: set up, started, paused. Inputs that are claimed later are read in the same way.
 
 Text messages are the caller's; data packages are handed to the negotiation only while it waits for a start, which

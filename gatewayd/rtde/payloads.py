@@ -1,6 +1,6 @@
 """The payload of each package type, both directions, protocol versions 1 and 2 (guide, section "Protocol").
 
-Tables of decoders and encoders by package and by message type. The type of a package does not tell its direction, and
+Tables of decoders and encoders by package and by message type. The type of a package does not show its direction, and
 its layout depends on the version spoken, so there is a table for each. Where guide and controllers differ the
 controllers are followed, as UR's own client libraries do: version 1 outputs carry no recipe id, a version 1 text
 from the controller has neither lengths nor source.

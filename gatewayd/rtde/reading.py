@@ -65,7 +65,7 @@ class Reading:
 
     def agree(self, recipe: Recipe) -> None:
         """The working recipe is set up: it reads what it has."""
-        self._types |= zip(recipe.names, recipe.types, strict=True)
+        self._types |= recipe.kinds
 
     def piece(self, claimed: Mapping[str, DataType]) -> tuple[str, ...]:
         """The next list to read of the claimed fields; empty when there is nothing left to read."""
@@ -89,12 +89,12 @@ class Reading:
             flat = piece.unpack(payload)
         except ProtocolError:
             return False
-        self._types |= zip(piece.names, piece.types, strict=True)
+        self._types |= piece.kinds
         self.held |= {name: flat[slot] for name, slot in piece.slots.items()}
         return True
 
     def unread(self, claimed: Mapping[str, DataType]) -> frozenset[str]:
-        """Those of the claimed fields, with their types, of which nothing tells what they hold.
+        """Those of the claimed fields, with their types, of which nothing shows what they hold.
 
         What reads as another type than it is written counts among them.
         """

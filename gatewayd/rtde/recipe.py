@@ -24,7 +24,7 @@ class Recipe:
     Values travel as one flat tuple in which a vector takes as many places as it has elements.
     """
 
-    __slots__ = ("_struct", "count", "names", "size", "slots", "types")
+    __slots__ = ("_struct", "count", "kinds", "names", "size", "slots", "types")
 
     def __init__(self, names: Sequence[str], types: Sequence[DataType]) -> None:
         if len(names) != len(types):
@@ -32,6 +32,8 @@ class Recipe:
             raise ValueError(msg)
         self.names = tuple(names)
         self.types = tuple(types)
+        self.kinds = dict(zip(names, types, strict=True))
+        """The type of each field."""
         self._struct = struct.Struct(">" + "".join(data_type.format for data_type in types))
         self.size = self._struct.size
         """Bytes of a payload, without the recipe id."""
@@ -45,7 +47,7 @@ class Recipe:
         """Places of the flat tuple."""
 
     def __repr__(self) -> str:
-        fields = ", ".join(f"{name}: {kind.word}" for name, kind in zip(self.names, self.types, strict=True))
+        fields = ", ".join(f"{name}: {kind.word}" for name, kind in self.kinds.items())
         return f"Recipe({fields})"
 
     def unpack(self, payload: bytes) -> tuple[Scalar, ...]:
@@ -66,7 +68,7 @@ class Recipe:
     def _complaint(self, values: Sequence[Scalar]) -> str:
         if len(values) != self.count:
             return f"{len(values)} values for a recipe of {self.count}"
-        for name, kind in zip(self.names, self.types, strict=True):
+        for name, kind in self.kinds.items():
             for value in values[self.slots[name]]:
                 try:
                     struct.pack(">" + kind.code, value)

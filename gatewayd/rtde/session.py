@@ -142,7 +142,7 @@ class Session:
     A register among them has a recipe of its own, until `RtdeClient.join` was called for it.
     """
     round_trip: float = 0.0
-    """Greatest time from a request to its answer so far, in seconds."""
+    """Longest time from a request to its answer so far, in seconds."""
 
 
 def output_hint(word: str, *, read_back: bool) -> str:

@@ -17,7 +17,7 @@ INTEGER_RANGES: Mapping[str, tuple[int, int]] = {
     "Q": (0, 0xFFFF_FFFF_FFFF_FFFF),
     "i": (-0x8000_0000, 0x7FFF_FFFF),
 }
-"""Least and greatest element of the integer types, by `DataType.code`."""
+"""Smallest and largest element of the integer types, by `DataType.code`."""
 
 
 class DataType(Enum):
@@ -62,7 +62,4 @@ class DataType(Enum):
     @classmethod
     def from_word(cls, word: str) -> DataType:
         """The type spelled `word`; KeyError for anything else, the error words included."""
-        return _BY_WORD[word]
-
-
-_BY_WORD = {member.word: member for member in DataType}
+        return cls[word]

@@ -26,7 +26,7 @@ DEFAULT_VERSIONS = {
     Series.E: SoftwareVersion(5, 12, 0),
     Series.X: SoftwareVersion(10, 12, 0),
 }
-"""Software that each series runs unless told otherwise."""
+"""Software that each series runs by default."""
 
 DEFAULT_UPTIME = 100.0
 """Seconds since power-up at the start: beyond the boot window that clients wait out."""

@@ -110,8 +110,8 @@ class Interpreter:
         happened = self._rising(self._reader(rule.input)) if rule.input else self._interval(rule.every)
         if rule.operation is RuleOperation.TOGGLE:
             return lambda: not own() if happened() else own()
-        greatest = 0x7FFF_FFFF
-        return lambda: ((own() + 1) if own() < greatest else 0) if happened() else own()
+        largest = 0x7FFF_FFFF
+        return lambda: ((own() + 1) if own() < largest else 0) if happened() else own()
 
     def _interval(self, seconds: float) -> Callable[[], bool]:
         cycles = due = self._cycles(seconds)

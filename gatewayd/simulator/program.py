@@ -27,6 +27,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from gatewayd.rtde.catalogue import bit_word
+from gatewayd.rtde.fields import BITS_PER_WORD
+
 __all__ = ["DEMO", "FieldReference", "ProgramError", "ProgramRule", "RuleOperation", "parse"]
 
 DEMO = """\
@@ -172,8 +175,7 @@ class _Statement:
         column = self._column()
         inputs = self._references("a source")
         if len(inputs) != count:
-            message = f"{count} targets, but {len(inputs)} sources"
-            raise ProgramError(self._source, self._line, column, message)
+            raise self._error(f"{count} targets, but {len(inputs)} sources", column)
         return inputs
 
     def _references(self, wanted: str) -> list[FieldReference]:
@@ -194,14 +196,11 @@ class _Statement:
 
     def _reference(self, name: str, element: str | None, bit: str | None, column: int) -> FieldReference:
         reserved = _RESERVED_BIT.fullmatch(name)
-        if reserved and int(reserved[2]) < 64 and bit is None and element is None:
-            word, number = divmod(int(reserved[2]), 32)
-            name = f"{reserved[1]}_bit_registers{32 * word}_to_{32 * word + 31}"
-            return FieldReference(name, number, True, self._source, self._line, column)
         part = element if bit is None else bit
-        return FieldReference(
-            name, None if part is None else int(part), bit is not None, self._source, self._line, column
-        )
+        number, of_bit = None if part is None else int(part), bit is not None
+        if reserved and int(reserved[2]) < 2 * BITS_PER_WORD and part is None:
+            (name, number), of_bit = bit_word(reserved[1], int(reserved[2])), True
+        return FieldReference(name, number, of_bit, self._source, self._line, column)
 
     def _signed(self) -> float:
         negative = self._sign("-")
@@ -245,8 +244,9 @@ class _Statement:
         token = self._tokens[self._at]
         return self._offset + token.end() - len(self._text()) + 1
 
-    def _error(self, message: str) -> ProgramError:
-        return ProgramError(self._source, self._line, self._column(), message)
+    def _error(self, message: str, column: int | None = None) -> ProgramError:
+        """`message` about the present token, or about `column`."""
+        return ProgramError(self._source, self._line, self._column() if column is None else column, message)
 
     def _tokenize(self, text: str, start: int) -> Iterator[re.Match[str]]:
         self._offset, at, end = start, 0, len(text.rstrip())
@@ -254,6 +254,6 @@ class _Statement:
             token = _TOKEN.match(text, at)
             if token is None:
                 at += len(text[at:]) - len(text[at:].lstrip())
-                raise ProgramError(self._source, self._line, start + at + 1, f"unexpected {text[at]!r}")
+                raise self._error(f"unexpected {text[at]!r}", start + at + 1)
             yield token
             at = token.end()

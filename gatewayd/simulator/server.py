@@ -26,7 +26,7 @@ __all__ = ["MAKE_UP", "MAX_CONNECTIONS", "SimulatedController"]
 MAKE_UP = 25
 """Cycles of lateness that are made up for."""
 MAX_CONNECTIONS = 16
-"""Clients served at a time unless told otherwise."""
+"""Clients served at a time by default."""
 
 _SHORTEST_CYCLE = 0.75  # of a period, before the timer's error
 _TIMER_ERROR = 0.0005  # epoll rounds up to 1 ms: aiming this much early spreads the error evenly

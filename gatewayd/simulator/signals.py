@@ -1,5 +1,5 @@
 """What the outputs of an undisturbed robot show: one pure function of the moment for every field that moves by itself,
-and the first value of those that only change when told to.
+and the first value of those that change only when they are set.
 
 The values are consistent rather than exact: speeds are the derivatives of positions, forces and currents follow the
 load, temperatures and voltages drift within what a real arm shows.
@@ -254,4 +254,4 @@ INITIAL: Mapping[str, float | Vector] = {
     "tool_digital_output0_mode": 1,
     "tool_digital_output1_mode": 1,
 }
-"""First values of fields that change only when told to; every other field starts at 0."""
+"""First values of fields that change only when they are set; every other field starts at 0."""

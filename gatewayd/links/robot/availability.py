@@ -19,9 +19,11 @@ __all__ = ["unavailable"]
 
 def unavailable(session: Session, variables: Sequence[Variable]) -> dict[int, str]:
     """Reason by variable index, in the controller's word and with its likely cause."""
-    refused = {(one.field, one.output): f"{one.word}: {one.hint}" for one in session.unavailable}
+    refused = {
+        (missing.field, missing.output): f"{missing.word}: {missing.hint}" for missing in session.unavailable
+    }
     recipes = [session.outputs, *(claimed.recipe for claimed in session.inputs.values())]
-    types = {name: kind for recipe in recipes for name, kind in zip(recipe.names, recipe.types, strict=True)}
+    types = {name: kind for recipe in recipes for name, kind in recipe.kinds.items()}
     reasons: dict[int, str] = {}
     for index, variable in enumerate(variables):
         reason = (

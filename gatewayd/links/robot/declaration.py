@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
-from gatewayd.links.contract import Description, LinkKind
+from gatewayd.links.contract import Description, LinkKind, Names
 from gatewayd.links.robot.companions import all_inputs, all_outputs
-from gatewayd.links.robot.description import description
-from gatewayd.links.robot.plan import RobotPlan
+from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
 from gatewayd.mapping.plan import LinkPlan
+from gatewayd.report.format import address, exact, seconds
 
 __all__ = ["KIND"]
 
@@ -51,13 +51,36 @@ class RobotKind(LinkKind):
         )
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
-        """The session with the controller."""
+        """Settings and address. Places have none: what a variable is in the robot, the definition of the cell says."""
         assert isinstance(plan, RobotPlan)
-        return description(plan, cell)
+        where = address(plan.host, plan.port)
+        return Description(
+            settings={
+                "host": plan.host,
+                "port": str(plan.port),
+                "frequency": f"{exact(plan.frequency)} Hz" if plan.frequency else "the controller's own",
+                "stale_after": seconds(cell.stale_after),
+                "on_connect": "fallback" if cell.clear_on_connect else "adopt",
+                "adopt_for": seconds(cell.adopt_for) or "none",
+                "verify": str(plan.verify).lower(),
+                "watchdog": _watchdog(plan.watchdog, cell),
+                "subscribed": Names(" ".join(sorted(plan.outputs))),
+                "claimed": Names(" ".join(sorted(plan.inputs))),
+            },
+            address=where,
+            fields={"address": where},
+        )
 
     def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
         """Another address is another robot."""
         return ("host", "port")
+
+
+def _watchdog(watchdog: WatchdogPlan | None, cell: CellDefinition) -> str:
+    if watchdog is None:
+        return ""
+    required = "".join(f", requires {cell.writers[writer].name}" for writer in watchdog.requires)
+    return f"{watchdog.field} at {exact(watchdog.frequency)} Hz{required}"
 
 
 def _session_of(plan: RobotPlan) -> tuple[object, ...]:

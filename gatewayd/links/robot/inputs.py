@@ -172,7 +172,9 @@ class ClaimedInputs:
 
     def _echo(self, names: Sequence[str]) -> slice | None:
         slots = [self._slots[name] for name in names if name in self._slots]
-        if len(slots) < len(names) or any(one.stop != other.start for one, other in pairwise(slots)):
+        if len(slots) < len(names) or any(
+            slot.stop != following.start for slot, following in pairwise(slots)
+        ):
             return None
         return slice(slots[0].start, slots[-1].stop)
 

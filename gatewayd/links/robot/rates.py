@@ -28,7 +28,7 @@ def package_period(robot: Robot) -> float:
 
 
 def package_rate(robot: Robot) -> float:
-    """The greatest number of packages per second that the controller may send; 500 where nothing is known."""
+    """The largest number of packages per second that the controller may send; 500 where nothing is known."""
     base = max(series.base_rate for series in Series)
     if robot.series is not None:
         base = Series.from_word(robot.series).base_rate

@@ -70,7 +70,7 @@ class ReadBack:
 
     def __init__(self, slots: Slots, round_trip: float) -> None:
         self.round_trip = round_trip
-        """Seconds from a send to its read-back, as measured; the greatest of late."""
+        """Seconds from a send to its read-back, as measured; the longest of late."""
         self._slots = slots
         self._history: dict[str, deque[_Sent]] = {}
         self._shown: dict[str, Sequence[Value] | None] = {}

@@ -17,7 +17,7 @@ _MARGIN = 2
 def watchdog_script(plan: Plan) -> str:
     """The call that stops the program when the gateway no longer feeds the watchdog; empty without a watchdog.
 
-    `rtde_set_watchdog` wants the least frequency of updates: half of the feeding, so that one late feed stops nothing.
+    `rtde_set_watchdog` wants the lowest frequency of updates: half of the feeding, so that one late feed stops nothing.
     """
     watchdog = robot_of(plan).watchdog
     if watchdog is None:

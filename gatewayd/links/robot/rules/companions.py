@@ -17,7 +17,7 @@ __all__: list[str] = []
 @cell_rule("GW310")
 def missing_mask(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A speed slider or robot output without the mask that makes it act."""
-    for variable, mask, _ in _without(cell, _mask):
+    for variable, mask, _ in _without(cell, lambda needs: needs.mask):
         if mask not in _mapped(cell):
             message = f"`{variable.name}` ({variable.target}) has no effect without `{mask}`"
             yield rule.at(variable.at("robot"), message, hint=f"map `{mask}` as a variable too")
@@ -26,7 +26,7 @@ def missing_mask(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW316", Severity.WARNING)
 def missing_mask_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A robot output whose own bit of the mask is not mapped."""
-    for variable, mask, bit in _without(cell, _mask):
+    for variable, mask, bit in _without(cell, lambda needs: needs.mask):
         if mask in _mapped(cell):
             message = f"`{variable.name}` ({variable.target}) has no effect without bit {bit} of `{mask}`"
             yield rule.at(variable.at("robot"), message, hint=f"map `{mask}.{bit}` as a variable too")
@@ -35,17 +35,9 @@ def missing_mask_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW315", Severity.WARNING)
 def missing_domain(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """An analog output without what says whether it is a current or a voltage."""
-    for variable, domain, bit in _without(cell, _domain):
+    for variable, domain, bit in _without(cell, lambda needs: needs.type):
         message = f"`{variable.name}` ({variable.target}) acts as a current or a voltage without saying which"
         yield rule.at(variable.at("robot"), message, hint=f"map `{domain}.{bit}` as a variable too")
-
-
-def _mask(needs: Companions) -> str | None:
-    return needs.mask
-
-
-def _domain(needs: Companions) -> str | None:
-    return needs.type
 
 
 def _without(

@@ -1,4 +1,4 @@
-"""A session with the controller in words."""
+"""The plan of a session with the controller in words."""
 
 from __future__ import annotations
 
