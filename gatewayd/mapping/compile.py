@@ -111,10 +111,7 @@ def _fallback(fallback: Fallback, kind: ValueKind) -> Fallback:
 
 
 _FOR_PEOPLE: Final = frozenset({"comment", "source", "fingerprint"})
-_DERIVED: Final = {
-    Variable: frozenset({"shown", "shows_nan"}),
-    Writer: frozenset({"heartbeat"}),
-}
+_DERIVED: Final = {Variable: frozenset({"shown", "shows_nan"}), Writer: frozenset({"heartbeat"})}
 """Fields that follow from others, which count: places, and the consumers of CANopen."""
 
 

@@ -97,12 +97,7 @@ class Rule:
         return files(self.home).joinpath(self.folder, "why.md").read_text("utf-8").strip()
 
     def at(
-        self,
-        position: Position,
-        message: str,
-        *,
-        hint: str | None = None,
-        related: tuple[Related, ...] = (),
+        self, position: Position, message: str, *, hint: str | None = None, related: tuple[Related, ...] = ()
     ) -> Diagnostic:
         """Make a finding of this rule."""
         return Diagnostic(self, message, position, related, hint)

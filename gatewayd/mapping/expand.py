@@ -49,7 +49,8 @@ class _Builder:
         self.variables: list[ExpandedVariable] = []
         self.unresolved: list[Unresolved] = []
         self._members: list[list[int]] = []
-        self._group_locks: dict[str, int] = {}
+        self._locks: dict[str | int, int] = {}
+        """Which lock a group has, or a variable without a group."""
 
     def add(self, part: Part[VariableSpec]) -> None:
         try:
@@ -58,19 +59,16 @@ class _Builder:
             self.unresolved.append(Unresolved(part, error))
             return
         for member, value in enumerate(values):
-            self._add(part, value, member if family else None)
-
-    def _add(self, part: Part[VariableSpec], value: Defined, member: int | None) -> None:
-        index = len(self.variables)
-        variable = ExpandedVariable(
-            **{name: getattr(value, name) for name in _DEFINED},
-            index=index,
-            name=part.name if member is None else f"{part.name}[{member}]",
-            part=part,
-            member=member,
-            lock=self._lock_index(part, index) if value.direction is Direction.INPUT else None,
-        )
-        self.variables.append(variable)
+            index = len(self.variables)
+            variable = ExpandedVariable(
+                **{name: getattr(value, name) for name in _DEFINED},
+                index=index,
+                name=f"{part.name}[{member}]" if family else part.name,
+                part=part,
+                member=member if family else None,
+                lock=self._lock_index(part, index) if value.direction is Direction.INPUT else None,
+            )
+            self.variables.append(variable)
 
     def finished(self) -> ExpandedCell:
         links = {language.key: language.expand(self.document, self.variables) for language in languages()}
@@ -85,15 +83,11 @@ class _Builder:
 
     def _lock_index(self, part: Part[VariableSpec], index: int) -> int | None:
         group = part.spec.group
-        if group is None:
-            self._members.append([index])
-            return len(self._members) - 1
-        if group not in self.document.groups:
+        if group is not None and group not in self.document.groups:
             return None
-        if group not in self._group_locks:
-            self._group_locks[group] = len(self._members)
+        lock = self._locks.setdefault(index if group is None else group, len(self._members))
+        if lock == len(self._members):
             self._members.append([])
-        lock = self._group_locks[group]
         self._members[lock].append(index)
         return lock
 

@@ -37,8 +37,7 @@ class WriterSpec(Section):
         description="what feeds `timeout`: every request, or only writes and lock requests",
     )
     grace: OptionalDuration = Field(
-        default=None,
-        description="how long what it owns outlives a connection that ended; default: none",
+        default=None, description="how long what it owns outlives a connection that ended; default: none"
     )
 
 

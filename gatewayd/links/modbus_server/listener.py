@@ -32,6 +32,7 @@ __all__ = ["ListenError", "ModbusListener"]
 _SWEEP = 0.25
 """Seconds between two looks for connections that are idle or stalled."""
 
+_NOBODY: Mapping[Cell, Cell] = MappingProxyType({})
 _REMEDIES = {
     errno.EADDRINUSE: "another program listens there; stop it or choose another port under modbus: listen:",
     errno.EACCES: "ports below 1024 need the capability CAP_NET_BIND_SERVICE; grant it or choose a port from 1024 on",
@@ -50,11 +51,7 @@ class ModbusListener:
     """
 
     def __init__(
-        self,
-        host: str,
-        port: int,
-        *,
-        observe: Callable[[PeerEvent], None] = lambda _event: None,
+        self, host: str, port: int, *, observe: Callable[[PeerEvent], None] = lambda _event: None
     ) -> None:
         self._host = host
         self._port = port
@@ -141,7 +138,7 @@ class ModbusListener:
             server.close()
 
     def serve(
-        self, units: Iterable[tuple[ModbusPlan, Cell]], successors: Mapping[Cell, Cell] = MappingProxyType({})
+        self, units: Iterable[tuple[ModbusPlan, Cell]], successors: Mapping[Cell, Cell] = _NOBODY
     ) -> None:
         """Answer for these units, and for no others, from the next request on; connections stay.
 
@@ -224,7 +221,7 @@ class ModbusListener:
         connection: PeerConnection,
         now: float,
         reason: str,
-        successors: Mapping[Cell, Cell] = MappingProxyType({}),
+        successors: Mapping[Cell, Cell] = _NOBODY,
     ) -> bool:
         """Give the connection the units its address may reach; returns whether there is any.
 

@@ -165,9 +165,6 @@ async def _close(listener: ModbusListener, opening: asyncio.Task[None] | None) -
     await listener.close("no longer configured")
 
 
-_PEER_LEVELS = {PeerEventKind.DENIED: logging.WARNING, PeerEventKind.FULL: logging.WARNING}
-
-
 def _log_peer(event: PeerEvent) -> None:
     found: dict[str, object] = {
         "peer": event.peer,
@@ -175,7 +172,6 @@ def _log_peer(event: PeerEvent) -> None:
         "reason": event.reason,
         "repeats": event.repeats,
     }
-    level = _PEER_LEVELS.get(event.kind, logging.INFO)
-    log.log(
-        level, "Modbus client %s", event.kind.value, extra=fields(**{k: v for k, v in found.items() if v})
-    )
+    refused = event.kind in (PeerEventKind.DENIED, PeerEventKind.FULL)
+    said = fields(**{key: value for key, value in found.items() if value})
+    log.log(logging.WARNING if refused else logging.INFO, "Modbus client %s", event.kind.value, extra=said)

@@ -8,17 +8,9 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from gatewayd.links.modbus_server.scalars import BAD_ADDRESS, Address
 from gatewayd.mapping import syntax
-from gatewayd.mapping.scalars import (
-    Listen,
-    ListenAddress,
-    Networks,
-    OptionalDuration,
-    Real,
-    Whole,
-    refuse,
-)
+from gatewayd.mapping.scalars import Listen, ListenAddress, Networks, OptionalDuration, Real, Whole, refuse
 from gatewayd.mapping.section import Section
-from gatewayd.modbus.areas import Area
+from gatewayd.modbus.areas import AREA_NAMES, Area
 
 __all__ = ["Modbus", "ModbusPlaces", "ModbusWriter", "NumberType", "PlacementSpec", "WordOrder"]
 
@@ -68,8 +60,7 @@ class PlacementSpec(Section):
     discrete: Address | None = Field(default=None, description="discrete input (1xxxxx), one bit, read only")
     type: NumberType | None = Field(default=None, description="number type; default: from the robot's type")
     order: WordOrder | None = Field(
-        default=None,
-        description="ABCD: big-endian; CDAB: words swapped; BADC: bytes swapped; DCBA: both",
+        default=None, description="ABCD: big-endian; CDAB: words swapped; BADC: bytes swapped; DCBA: both"
     )
     scale: Real | None = Field(default=None, description="robot value = raw value * scale + offset")
     offset: Real | None = Field(default=None, description="robot value = raw value * scale + offset")
@@ -80,11 +71,7 @@ class PlacementSpec(Section):
         if len(given) != 1:
             found = "none" if not given else " and ".join(given)
             message = f"a placement names exactly one of holding, input, coil and discrete; found {found}"
-            refuse(
-                BAD_ADDRESS,
-                message,
-                "write for example {holding: 100}; several placements make a list",
-            )
+            refuse(BAD_ADDRESS, message, "write for example {holding: 100}; several placements make a list")
         if self.area.of_bits and self.bit is not None:
             message = f"a {given[0]} address has no bits"
             refuse(BAD_ADDRESS, message, f"write {{{given[0]}: N}} with a whole number")
@@ -93,7 +80,7 @@ class PlacementSpec(Section):
     @property
     def area(self) -> Area:
         """The Modbus table."""
-        return next(area for key, area in _AREAS.items() if getattr(self, key) is not None)
+        return _AREAS[self.area_key]
 
     @property
     def area_key(self) -> str:
@@ -103,19 +90,16 @@ class PlacementSpec(Section):
     @property
     def address(self) -> int:
         """Protocol address from 0."""
-        return self._place()[0]
+        return int(getattr(self, self.area_key)[0])
 
     @property
     def bit(self) -> int | None:
         """Bit of the register, or None."""
-        return self._place()[1]
-
-    def _place(self) -> tuple[int, int | None]:
-        place: tuple[int, int | None] = getattr(self, self.area_key)
-        return place
+        bit: int | None = getattr(self, self.area_key)[1]
+        return bit
 
 
-_AREAS = {"holding": Area.HOLDING, "input": Area.INPUT, "coil": Area.COIL, "discrete": Area.DISCRETE}
+_AREAS = {AREA_NAMES[area]: area for area in (Area.HOLDING, Area.INPUT, Area.COIL, Area.DISCRETE)}
 
 
 def _places(value: Any) -> Any:
@@ -142,8 +126,7 @@ class ModbusPlaces(Section):
     modbus: Annotated[
         tuple[PlacementSpec, ...],
         BeforeValidator(
-            _places,
-            json_schema_input_type=float | str | PlacementSpec | list[float | str | PlacementSpec],
+            _places, json_schema_input_type=float | str | PlacementSpec | list[float | str | PlacementSpec]
         ),
         Field(strict=False),
     ] = Field(
