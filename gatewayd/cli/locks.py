@@ -112,9 +112,9 @@ def _print(locks: list[dict[str, Any]]) -> None:
         may = (" > " if lock["takeover"] else ", ").join(lock["owners"])
         members = "" if lock["members"] == [lock["name"]] else _members(lock)
         rows.append((name, lock["owner"] or "free", left, may, members))
-    widths = [max(len(row[column]) for row in rows) for column in range(4)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for place, row in enumerate(rows):
-        line = "  ".join(f"{text:<{width}}" for text, width in zip(row, widths, strict=False)) + f"  {row[4]}"
+        line = "  ".join(map(str.ljust, row, widths))
         colour = {"operator": "magenta", "free": None}.get(row[1], "green") if place else None
         click.echo(click.style(line.rstrip(), bold=not place, fg=colour))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -124,8 +125,6 @@ def readable(answer: Any) -> Any:
 
 def echo_json(answer: Any, *, indent: int | None = 2) -> None:
     """Print the answer as JSON with its exact content."""
-    import json
-
     click.echo(json_text(json.dumps(answer, indent=indent, ensure_ascii=False)))
 
 

@@ -100,7 +100,7 @@ def _heading(plan: Plan) -> str:
     from gatewayd.links.registry import tables
 
     count = len(plan.cell.variables)
-    parts = [f"{plan.cell.name}: {count} variable" + ("" if count == 1 else "s")]
+    parts = [f"{plan.cell.name}: {count} variable{'' if count == 1 else 's'}"]
     here = (link.headline(plan) for link in tables() if link.key in plan.links)
     parts += [headline for headline in here if headline]
     parts.append(f"fingerprint {plan.cell.fingerprint:08X}")
@@ -133,25 +133,17 @@ def _notes(loaded: Loaded, plan: Plan, *, shortened: bool) -> list[str]:
 
 
 def _table(entries: Sequence[tuple[Row, Row]], *, wide: bool) -> Table:
-    from rich import box
-    from rich.table import Table
     from rich.text import Text
 
     from gatewayd.links.registry import tables
     from gatewayd.report.layout import Column, arranged
 
-    own = [
-        Column("no."),
-        Column("name", whole=False),
-        Column("value", whole=False),
-        Column("owner", whole=False),
-        Column("lost"),
-    ]
+    own = [Column(name, whole=name in ("no.", "lost")) for name in ("no.", "name", "value", "owner", "lost")]
     further = (
         column for link in tables() for column in (link.columns if link.screen is None else link.screen)
     )
     columns = arranged(own, further)
-    table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False)
+    table = _empty_table()
     for column in columns:
         justify: Literal["left", "right"] = "right" if column.name == "no." else "left"
         least = min(_NAME_WIDTH, max((len(last.name) for _, last in entries), default=0))
@@ -200,12 +192,17 @@ def _texts(first: Row, last: Row) -> dict[str, str]:
     return texts
 
 
-def _further_table(content: ReportTable) -> Table:
+def _empty_table() -> Table:
     from rich import box
     from rich.table import Table
+
+    return Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False)
+
+
+def _further_table(content: ReportTable) -> Table:
     from rich.text import Text
 
-    table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False)
+    table = _empty_table()
     for title in content.head:
         table.add_column(title, overflow="fold")
     for row in content.rows:

@@ -253,11 +253,9 @@ class Api:
         found = []
         for runtime in self._runtimes(_text(body, "cell")):
             definition = runtime.cell.definition
-            named = next((index for index, lock in enumerate(definition.locks) if lock.name == name), None)
-            guarding = next(
-                (variable.lock for variable in definition.variables if variable.name == name), None
-            )
-            lock = named if named is not None else guarding
+            guarding = {variable.name: variable.lock for variable in definition.variables}
+            named = {lock.name: index for index, lock in enumerate(definition.locks)}
+            lock = named.get(name, guarding.get(name))
             if lock is not None:
                 found.append((runtime, lock))
         return _only(found, "lock", name)
@@ -271,11 +269,10 @@ _CODES = {
 
 
 def _why(refusal: Refusal, runtime: ServedCell) -> str:
-    limits = (
-        runtime.cell.definition.variables[refusal.variable].limits if refusal.variable is not None else None
-    )
-    if refusal.reason is Reason.OUT_OF_LIMITS and limits is not None:
-        return f"{refusal.reason.text}, {limits.low:g}..{limits.high:g}"
+    if refusal.reason is Reason.OUT_OF_LIMITS and refusal.variable is not None:
+        limits = runtime.cell.definition.variables[refusal.variable].limits
+        if limits is not None:
+            return f"{refusal.reason.text}, {limits.low:g}..{limits.high:g}"
     return refusal.reason.text
 
 

@@ -77,10 +77,6 @@ class Line:
 
     row: Row
     address: str
-    object: str
-    """CANopen object; empty where the variable is on Modbus alone."""
-    cob_id: str
-    """COB-ID of the PDO that carries it; empty where none does."""
     value: str
     quality: Quality
     age: str
@@ -181,8 +177,6 @@ def _line(cell: Cell, row: Row, can_writer: int | None, now: float) -> Line:
     return Line(
         row=row,
         address=f"{row['address']}" if row["bit"] is None else f"{row['address']}.{row['bit']}",
-        object=row["object"],
-        cob_id=row["cob_id"],
         value=value(cell.image.values[index], row.unit),
         quality=cell.image.quality[index],
         age=age(cell.image.age(index, now)),

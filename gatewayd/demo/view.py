@@ -76,7 +76,7 @@ def plain(shot: Snapshot) -> str:
     )
     lines = [
         f"  {'->' if line.row.direction == 'input' else '<-'} {line.row.name:<12} {line.row['robot']:<25} "
-        f"{line.address:>6} {line.row['notation']:<9} {line.object:<8} {line.cob_id:<5}"
+        f"{line.address:>6} {line.row['notation']:<9} {line.row['object']:<8} {line.row['cob_id']:<5}"
         f"{line.value:>9}  {line.quality.name.lower():<12}"
         f"{line.age:>7}  {_owner(line)}".rstrip()
         for line in shot.lines
@@ -146,8 +146,8 @@ def _cells(line: Line, *, changed: bool, wide: bool, spacious: bool) -> Iterator
     if spacious:
         yield Text(line.row["notation"], "dim")
     if wide:
-        yield Text(line.object)
-        yield Text(line.cob_id or ("SDO" if line.object else ""), "dim")
+        yield Text(line.row["object"])
+        yield Text(line.row["cob_id"] or ("SDO" if line.row["object"] else ""), "dim")
     yield Text(line.value, "bold yellow" if changed and line.row.name != "tool_height" else "bold")
     yield Text(line.quality.name.lower(), QUALITY_COLOURS[line.quality])
     yield Text(line.age, "dim")

@@ -6,7 +6,6 @@ the same place in the robot (`gatewayd.core.succession`).
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -19,7 +18,7 @@ from gatewayd.links.registry import kind_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.report import facts
 from gatewayd.report.facts import Facts
-from gatewayd.report.printable import json_text, printable
+from gatewayd.report.printable import json_document, printable
 from gatewayd.report.weakening import weakened
 from gatewayd.report.wording import family, names_and_more
 
@@ -313,7 +312,7 @@ def as_json(changes: Changes) -> str:
         },
         "renumbered": list(map(asdict, changes.renumbered)),
     }
-    return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
+    return json_document(document)
 
 
 def _as_object(difference: Difference) -> dict[str, object]:

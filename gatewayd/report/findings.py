@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 
 from gatewayd.mapping.compiled import Unreadable
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Severity
-from gatewayd.report.printable import json_text, printable
+from gatewayd.report.printable import json_document, printable
 
 __all__ = ["CheckOutcome", "as_github", "as_json", "as_text"]
 
@@ -62,7 +61,7 @@ def as_json(outcome: CheckOutcome) -> str:
         "findings": [_as_object(finding) for finding in outcome.findings],
         "unreadable": [{"file": item.name, "reason": item.reason} for item in outcome.unreadable],
     }
-    return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
+    return json_document(document)
 
 
 def as_github(outcome: CheckOutcome) -> str:

@@ -9,10 +9,11 @@ is safe as well.
 
 from __future__ import annotations
 
+import json
 import re
 from typing import Any
 
-__all__ = ["MAX_LENGTH", "json_text", "printable", "printable_answer"]
+__all__ = ["MAX_LENGTH", "json_document", "json_text", "printable", "printable_answer"]
 
 MAX_LENGTH = 4000
 """Characters of one text; what is longer is cut and says so. All variables of a full image in a line are shorter."""
@@ -57,6 +58,11 @@ def json_text(text: str) -> str:
         _json_escaped(character) if character != "\n" and _is_hidden(character) else character
         for character in text
     )
+
+
+def json_document(document: object) -> str:
+    """A whole document, for programs and for people's eyes."""
+    return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
 
 
 def _is_clean(text: str) -> bool:

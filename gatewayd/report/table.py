@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
@@ -16,7 +15,7 @@ from gatewayd.links.registry import languages, tables
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.layout import Column, Row, arranged, plain
-from gatewayd.report.printable import json_text, printable
+from gatewayd.report.printable import json_document, printable
 from gatewayd.report.wording import number
 
 __all__ = [
@@ -149,7 +148,7 @@ def as_json(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
         },
         "variables": [{column: row[column] for column in columns()} for row in table],
     }
-    return json_text(json.dumps(document, indent=2, ensure_ascii=False)) + "\n"
+    return json_document(document)
 
 
 def as_markdown(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:

@@ -112,13 +112,7 @@ def _variable(cell: Cell, declared: Declared, index: int) -> dict[str, object]:
     return {
         **{name: found[name] for name in _DECLARED},
         "places": [
-            {
-                "link": name,
-                "area": place.area,
-                "address": place.address,
-                "notation": place.notation,
-                "type": place.type,
-            }
+            {"link": name, **{key: getattr(place, key) for key in ("area", "address", "notation", "type")}}
             for name, link in declared.links.items()
             for place in link.places.get(index, ())
         ],

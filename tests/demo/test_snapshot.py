@@ -29,8 +29,8 @@ async def test_everything_shown_is_what_the_gateway_knows(scene: Scene, until) -
     assert lines["part_number"].lease.endswith(" s")
     assert lines["part_number"].refused == "you refused: 06"
     assert lines["busy"].owner == "robot"
-    assert (lines["busy"].object, lines["busy"].cob_id) == ("2400h:01", "0x290")
-    assert (lines["start"].object, lines["start"].cob_id) == ("", "")
+    assert (lines["busy"].row["object"], lines["busy"].row["cob_id"]) == ("2400h:01", "0x290")
+    assert (lines["start"].row["object"], lines["start"].row["cob_id"]) == ("", "")
     assert "wrote part_number = 7: refused with exception 06, held by plc" in shot.events[-1].text
     assert shot.events[-1].bad
 

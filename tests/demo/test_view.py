@@ -49,8 +49,8 @@ async def test_plain_lines_tell_the_same(shot: Snapshot) -> None:
         assert f"{line.row.name} " in text
         assert line.row["robot"] in text
         assert line.row["notation"] in text
-        assert line.object in text
-        assert line.cob_id in text
+        assert line.row["object"] in text
+        assert line.row["cob_id"] in text
     assert "node operational" in text
 
 
