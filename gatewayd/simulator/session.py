@@ -152,10 +152,7 @@ class SimulatorSession:
             return
         kinds = [self._controller.output_type(name) for name in message.names]
         types = tuple(kind.word if kind else messages.NOT_FOUND for kind in kinds)
-        valid = bool(types) and messages.NOT_FOUND not in types and not self._is_too_long(message.names)
-        if valid and not self._fits([kind for kind in kinds if kind]):
-            self._complain("the output recipe is larger than a data package")
-            valid = False
+        valid = self._recipe("output", message.names, types, kinds) is not None
         self._view = self._controller.store.view(message.names) if valid else None
         self._period = self._controller.period(message.frequency)
         self._reply(messages.OutputsSetup(_OUTPUT_RECIPE if valid else 0, types))
@@ -178,20 +175,29 @@ class SimulatorSession:
         self, names: tuple[str, ...], types: Sequence[str], kinds: Sequence[DataType | None]
     ) -> int:
         """The id of the new recipe, its fields claimed; 0 and nothing claimed if it cannot be."""
-        known = [kind for kind in kinds if kind is not None]
-        if not messages.ERROR_WORDS.isdisjoint(types) or self._is_too_long(names):
+        recipe = self._recipe("input", names, types, kinds)
+        if recipe is None:
             return 0
         if len(self._inputs) >= MAX_RECIPES:
             self._complain(f"a connection has {MAX_RECIPES} input recipes at most")
             return 0
-        if not self._fits(known):
-            self._complain("the input recipe is larger than a data package")
-            return 0
         self._controller.claims.claim(self, names)
         store = self._controller.store
         cells = [cell for name in names for cell in range(store.place(name).start, store.place(name).stop)]
-        self._inputs.append(_InputRecipe(Recipe(names, known), tuple(cells), effects(names)))
+        self._inputs.append(_InputRecipe(recipe, tuple(cells), effects(names)))
         return len(self._inputs)
+
+    def _recipe(
+        self, side: str, names: tuple[str, ...], types: Sequence[str], kinds: Sequence[DataType | None]
+    ) -> Recipe | None:
+        """The recipe of a setup request; None if it is refused."""
+        if not types or not messages.ERROR_WORDS.isdisjoint(types) or self._is_too_long(names):
+            return None
+        recipe = Recipe(names, [kind for kind in kinds if kind is not None])
+        if recipe.size + _DATA_HEAD <= MAX_PACKAGE:
+            return recipe
+        self._complain(f"the {side} recipe is larger than a data package")
+        return None
 
     def _data(self, message: messages.DataPackage) -> None:
         number = message.recipe or 0
@@ -224,7 +230,3 @@ class SimulatorSession:
             self._answer(message)
         except ValueError:
             self._complain("the list of types is larger than a package")
-
-    @staticmethod
-    def _fits(kinds: Sequence[DataType]) -> bool:
-        return Recipe([""] * len(kinds), kinds).size + _DATA_HEAD <= MAX_PACKAGE

@@ -19,12 +19,10 @@ def package_period(robot: Robot) -> float:
 
     Where the series is not known the slowest that may answer counts: CB3 with 125 Hz for its own rate.
     """
+    base = (Series.from_word(robot.series) if robot.series is not None else Series.CB3).base_rate
     if robot.frequency == 0:
-        return 1 / (Series.from_word(robot.series) if robot.series is not None else Series.CB3).base_rate
-    if robot.series is None:
-        return 1 / robot.frequency
-    base = Series.from_word(robot.series).base_rate
-    return max(int(base / robot.frequency), 1) / base
+        return 1 / base
+    return 1 / robot.frequency if robot.series is None else max(int(base / robot.frequency), 1) / base
 
 
 def package_rate(robot: Robot) -> float:
