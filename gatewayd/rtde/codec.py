@@ -53,7 +53,7 @@ _Sent = TypeVar("_Sent", ControllerMessage, ExecutableMessage)
 
 
 class _Endpoint(Generic[_Received, _Sent]):
-    """One side: cuts a stream into packages and decodes them by the table of the version spoken, and encodes.
+    """One side of a connection: what comes is cut into packages and decoded, by the table of the version spoken.
 
     `decoders` are the tables of versions 1 and 2, `ids_since` the version from which received data has a recipe id.
     """

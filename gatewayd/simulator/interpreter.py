@@ -225,14 +225,11 @@ def _join(pending: list[_Copy], copy: _Copy) -> None:
     target, source = copy
     if pending:
         last_target, last_source = pending[-1]
-        joined_target = slice(last_target.start, target.stop)
-        joined_source = slice(last_source.start, source.stop)
+        to, of = slice(last_target.start, target.stop), slice(last_source.start, source.stop)
         follows = last_target.stop == target.start and last_source.stop == source.start
         # A copy that would read what it writes itself must stay a sequence of single ones.
-        if follows and (
-            joined_source.stop <= joined_target.start or joined_target.stop <= joined_source.start
-        ):
-            pending[-1] = (joined_target, joined_source)
+        if follows and (of.stop <= to.start or to.stop <= of.start):
+            pending[-1] = (to, of)
             return
     pending.append(copy)
 

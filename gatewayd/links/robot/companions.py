@@ -210,20 +210,19 @@ def _lines(variables: Sequence[Variable], transfer: InputTransfer) -> Iterator[_
     for name, needs in COMPANIONS.items():
         if name not in transfer.slots or needs.mask not in transfer.slots:
             continue
-        single = [(bit, bit) for bit in range(_DIGITAL_LINES.get(name, 0))]
-        for bit, mask_bit in single if needs.bit is None else [(None, needs.bit)]:
-            kind = needs.type
-            value = carrier(name, bit)
+        bits: list[tuple[int | None, int]] = [(bit, bit) for bit in range(_DIGITAL_LINES.get(name, 0))]
+        for bit, mask_bit in bits if needs.bit is None else [(None, needs.bit)]:
+            kind, value = needs.type, carrier(name, bit)
             yield _Line(
-                (name, bit),
-                place(name, bit),
-                place(needs.mask, mask_bit),
-                place(kind, mask_bit) if kind in transfer.slots else None,
-                mask_bit,
-                value,
-                value is not None and bit is not None and variables[value].bit is None,
-                carrier(needs.mask, mask_bit) is not None,
-                carrier(kind, mask_bit) if kind is not None else None,
+                key=(name, bit),
+                place=place(name, bit),
+                mask=place(needs.mask, mask_bit),
+                type=place(kind, mask_bit) if kind in transfer.slots else None,
+                bit=mask_bit,
+                value_by=value,
+                is_part=value is not None and bit is not None and variables[value].bit is None,
+                is_masked=carrier(needs.mask, mask_bit) is not None,
+                type_by=carrier(kind, mask_bit) if kind is not None else None,
             )
 
 
