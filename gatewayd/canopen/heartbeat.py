@@ -35,13 +35,7 @@ class Consumer:
 class HeartbeatProducer:
     """Sends the NMT state every 1017h milliseconds, but only while `alive(now)` says that the core lives."""
 
-    def __init__(
-        self,
-        send: Send,
-        nmt: NmtSlave,
-        alive: Callable[[float], bool],
-        milliseconds: int,
-    ) -> None:
+    def __init__(self, send: Send, nmt: NmtSlave, alive: Callable[[float], bool], milliseconds: int) -> None:
         self._send = send
         self._nmt = nmt
         self._alive = alive

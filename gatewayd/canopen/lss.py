@@ -84,9 +84,6 @@ class LssSlave:
         store: Callable[[int, int], bool],
         activate: Callable[[int, float, float], None],
     ) -> None:
-        self.state = LssState.WAITING
-        self.node = node
-        """Node-ID in force."""
         self.pending_node = node
         self.pending_bit_rate = bit_rate
         self._send = send
@@ -95,16 +92,15 @@ class LssSlave:
         self._configured = configured
         self._store = store
         self._activate = activate
-        self._select: dict[int, int] = {}
-        self._identify: dict[int, int] = {}
-        self._position = 0
+        self.restart()
 
     def restart(self) -> None:
         """NMT reset: the pending node-ID is in force, and LSS waits."""
         self.node = self.pending_node
+        """Node-ID in force."""
         self.state = LssState.WAITING
-        self._select.clear()
-        self._identify.clear()
+        self._select: dict[int, int] = {}
+        self._identify: dict[int, int] = {}
         self._position = 0
 
     def receive(self, frame: Frame, now: float) -> None:

@@ -62,9 +62,8 @@ _CONTROLLER = {
 
 def pack(frame: Frame) -> bytes:
     """A frame as struct can_frame."""
-    if frame.remote:
-        return _FRAME.pack(frame.can_id | _REMOTE, frame.length, b"")
-    return _FRAME.pack(frame.can_id, len(frame.data), frame.data)
+    can_id, data, remote, length = frame
+    return _FRAME.pack(can_id | _REMOTE, length, b"") if remote else _FRAME.pack(can_id, len(data), data)
 
 
 def filters(can_ids: Iterable[int], remote_ids: Iterable[int]) -> bytes:
@@ -76,15 +75,21 @@ def filters(can_ids: Iterable[int], remote_ids: Iterable[int]) -> bytes:
     return b"".join(wanted)
 
 
-def seen(interface: Interface | None) -> BusSignal:
-    """What a look at the interface means."""
+def seen(name: str, interface: Interface | None) -> tuple[BusSignal, str]:
+    """What a look at the interface means, as a signal and in words."""
     if interface is None:
-        return BusSignal.GONE
+        return BusSignal.GONE, f"there is no interface {name}"
     if not interface.up:
-        return BusSignal.DOWN
+        return BusSignal.DOWN, f"{name} is down; `ip link set {name} up` brings it up"
     if not interface.carrier:
-        return BusSignal.OFF
-    return BusSignal.UP if interface.controller is None else _CONTROLLER[interface.controller]
+        restart = f"it stays off until {name} is taken down and up (restart-ms is not set)"
+        if interface.restart_ms:
+            restart = f"the kernel restarts it after {interface.restart_ms} ms"
+        return BusSignal.OFF, f"{name} is off the bus; {restart}"
+    signal = BusSignal.UP if interface.controller is None else _CONTROLLER[interface.controller]
+    if interface.rx_errors is None:
+        return signal, f"{name} is up"
+    return signal, f"{name} is up ({interface.tx_errors} transmit, {interface.rx_errors} receive errors)"
 
 
 class SocketCanBus(SupervisedBus):
@@ -223,22 +228,8 @@ class SocketCanBus(SupervisedBus):
                 return
             assert self._socket is not None
             self._count_lost(self._socket, now)
-        self._feed(seen(found), now, self._explain(found))
-
-    def _explain(self, found: Interface | None) -> str:
-        name = self._channel
-        if found is None:
-            return f"there is no interface {name}"
-        if not found.up:
-            return f"{name} is down; `ip link set {name} up` brings it up"
-        if not found.carrier:
-            restart = f"it stays off until {name} is taken down and up (restart-ms is not set)"
-            if found.restart_ms:
-                restart = f"the kernel restarts it after {found.restart_ms} ms"
-            return f"{name} is off the bus; {restart}"
-        if found.rx_errors is None:
-            return f"{name} is up"
-        return f"{name} is up ({found.tx_errors} transmit, {found.rx_errors} receive errors)"
+        signal, words = seen(self._channel, found)
+        self._feed(signal, now, words)
 
     # The socket
 

@@ -113,7 +113,7 @@ class SupervisedBus(ABC):
         self._handler.on_state(state, reason, now)
 
     def _hand_over(self, frames: list[Frame], errors: list[ErrorFrame], now: float) -> None:
-        """Give the handler what was read, data frames first.
+        """Give the handler what was read: data frames, then each error frame and the state that follows from it.
 
         If the process was stopped while it read, the frames have waited since the time was judged last: whoever has to
         know of the gap is called before.
@@ -123,18 +123,14 @@ class SupervisedBus(ABC):
                 now = clock.judged_now()
             self.counters.received += len(frames)
             self._handler.on_frames(frames, now)
-        for report in errors:
-            self._take_error(report, now)
-
-    def _take_error(self, report: ErrorFrame, now: float) -> None:
-        """Report an error frame, then the state that follows from it."""
-        self.counters.errors += 1
-        if report.tx_errors is not None and report.rx_errors is not None:
-            self.counters.tx_errors, self.counters.rx_errors = report.tx_errors, report.rx_errors
-        self._handler.on_error(report, now)
-        signal = signal_of_error(report)
-        if signal is not None:
-            self._feed(signal, now, f"the controller reports: {report}")
+        for error in errors:
+            self.counters.errors += 1
+            if error.tx_errors is not None and error.rx_errors is not None:
+                self.counters.tx_errors, self.counters.rx_errors = error.tx_errors, error.rx_errors
+            self._handler.on_error(error, now)
+            signal = signal_of_error(error)
+            if signal is not None:
+                self._feed(signal, now, f"the controller reports: {error}")
 
     def _wait_for_room(self, descriptor: int) -> None:
         """Report when `descriptor` can be written; with -1, after `ROOM_RETRY`."""

@@ -49,7 +49,7 @@ def test_more_filters_than_the_kernel_takes_become_one() -> None:
     ],
 )
 def test_what_a_look_means(interface: Interface | None, event: BusSignal) -> None:
-    assert seen(interface) is event
+    assert seen("can0", interface)[0] is event
 
 
 @pytest.fixture

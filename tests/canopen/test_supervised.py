@@ -89,7 +89,7 @@ async def test_an_error_frame_is_counted_and_reported_with_the_state_that_follow
     bus: SupervisedBus, recorder: Recorder
 ) -> None:
     report = decode(BUS_OFF, bytes(8))
-    bus._take_error(report, 1.0)
+    bus._hand_over([], [report], 1.0)
     assert recorder.errors == [report]
     assert bus.state is BusState.BUS_OFF
     assert recorder.states == [BusState.ACTIVE, BusState.BUS_OFF]

@@ -8,13 +8,13 @@ from enum import Enum, auto
 from gatewayd.canopen.dictionary import AbortCode
 
 __all__ = [
+    "BLOCK_DOWNLOAD_ENDED",
     "BLOCK_SEGMENTS",
     "REQUESTS",
     "SEGMENT",
     "Request",
     "abort",
     "block_download_acknowledged",
-    "block_download_ended",
     "block_download_initiated",
     "block_upload_ended",
     "block_upload_initiated",
@@ -74,6 +74,9 @@ _PADDING = tuple(bytes(count) for count in range(8))
 _SIZE = struct.Struct("<I")
 _CRC = struct.Struct("<BH5x")
 
+BLOCK_DOWNLOAD_ENDED = b"\xa1" + _PADDING[7]
+"""The data was taken whole."""
+
 
 def abort(multiplexer: bytes, code: AbortCode) -> bytes:
     """The transfer of an object (the three bytes of its index and sub-index) has ended with `code`."""
@@ -117,11 +120,6 @@ def block_download_initiated(multiplexer: bytes, segments: int, *, checked: bool
 def block_download_acknowledged(taken: int, segments: int) -> bytes:
     """So many segments of the sub-block were taken; the next sub-block may have `segments`."""
     return bytes((0xA2, taken, segments)) + _PADDING[5]
-
-
-def block_download_ended() -> bytes:
-    """The data was taken whole."""
-    return b"\xa1" + _PADDING[7]
 
 
 def block_upload_initiated(multiplexer: bytes, size: int, *, checked: bool) -> bytes:

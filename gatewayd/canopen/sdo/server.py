@@ -234,7 +234,7 @@ class SdoServer:
 
     def _end_block_download(self, data: bytes) -> list[bytes]:
         self._write(self._block_download.whole(data[0] >> 2 & 7, *_CRC.unpack(data)))
-        return [protocol.block_download_ended()]
+        return [protocol.BLOCK_DOWNLOAD_ENDED]
 
     # -- block upload --------------------------------------------------------------------------------------------
 

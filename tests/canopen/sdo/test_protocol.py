@@ -56,7 +56,7 @@ def test_in_a_sub_block_all_but_the_abort_are_segments() -> None:
         (protocol.block_download_initiated(OBJECT, 127, checked=True), "a40020017f000000"),
         (protocol.block_download_initiated(OBJECT, 127, checked=False), "a00020017f000000"),
         (protocol.block_download_acknowledged(3, 127), "a2037f0000000000"),
-        (protocol.block_download_ended(), "a100000000000000"),
+        (protocol.BLOCK_DOWNLOAD_ENDED, "a100000000000000"),
         (protocol.block_upload_initiated(OBJECT, 300, checked=True), "c60020012c010000"),
         (protocol.block_upload_initiated(OBJECT, 300, checked=False), "c20020012c010000"),
         (protocol.block_upload_ended(2, 0x1234), "c934120000000000"),
