@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
 from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.frame import Frame
 
-__all__ = ["DRAIN", "BusCounters", "BusError", "BusHandler", "BusState"]
+__all__ = ["DRAIN", "BusError", "BusHandler", "BusState"]
 
 DRAIN = 64
 """Most frames that a driver reads before the loop has its turn."""
@@ -38,32 +37,6 @@ class BusState(IntEnum):
     def carries(self) -> bool:
         """Whether frames go through."""
         return self >= BusState.PASSIVE
-
-
-@dataclass(slots=True)
-class BusCounters:
-    """Since the driver was made."""
-
-    received: int = 0
-    """Data and remote frames that were handed on."""
-    sent: int = 0
-    """Frames that the driver took."""
-    refused: int = 0
-    """Frames that it did not take: no room, or the bus carries nothing."""
-    errors: int = 0
-    """Error frames."""
-    lost: int = 0
-    """Received frames that found no room in the receive buffer."""
-    opened: int = 0
-    """Times that the interface was opened."""
-    bus_off: int = 0
-    """Times that the controller went off the bus."""
-    receive_buffer: int = 0
-    """Bytes that were granted for received frames; 0: not known."""
-    tx_errors: int = 0
-    """The controller's transmit error counter, as last reported."""
-    rx_errors: int = 0
-    """Its receive error counter."""
 
 
 class BusHandler(Protocol):

@@ -152,11 +152,10 @@ class PythonCanBus(SupervisedBus):
     def _look_for_frames(self) -> None:
         """There is no descriptor: ask, the more often the more comes."""
         clock.judged_now()
-        before = self.counters.received
         if self._bus is None:
             return
+        self._ask = min(2 * self._ask, ASK_LIMIT)
         exhausted = self._read(self._bus)
-        self._ask = ASK if self.counters.received != before else min(2 * self._ask, ASK_LIMIT)
         self._reading = self._loop.call_later(self._ask if exhausted else 0, self._look_for_frames)
 
     def _read(self, bus: can.BusABC) -> bool:
@@ -176,6 +175,8 @@ class PythonCanBus(SupervisedBus):
                     break
         except Exception as error:  # noqa: BLE001 - drivers let through whatever the nonsense of an adapter made of them
             failure = error
+        if frames:
+            self._ask = ASK
         self._hand_over(frames, errors, now)
         if failure is not None:
             self._lose(failure)
@@ -241,7 +242,6 @@ class PythonCanBus(SupervisedBus):
             return
         self._bus = bus
         self._supervisor.opened()
-        self.counters.opened += 1
         self._filter_in_adapter(bus)
         with contextlib.suppress(NotImplementedError, can.CanError, OSError):
             self._descriptor = bus.fileno()

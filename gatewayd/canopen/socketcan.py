@@ -198,7 +198,6 @@ class SocketCanBus(SupervisedBus):
         lost = (total - self._lost) & 0xFFFF_FFFF
         if lost:
             self._lost = total
-            self.counters.lost += lost
             self._handler.on_lost(lost, now)
 
     # State
@@ -222,8 +221,6 @@ class SocketCanBus(SupervisedBus):
         if found is None or found.index != self._index:
             self._release()
         if found is not None:
-            if found.tx_errors is not None and found.rx_errors is not None:
-                self.counters.tx_errors, self.counters.rx_errors = found.tx_errors, found.rx_errors
             if self._socket is None and not self._acquire(found, now):
                 return
             assert self._socket is not None
@@ -246,7 +243,6 @@ class SocketCanBus(SupervisedBus):
         self._supervisor.opened()
         self._index = found.index
         self._lost = 0
-        self.counters.opened += 1
         self._loop.add_reader(self._socket, self._readable)
         return True
 
@@ -258,7 +254,6 @@ class SocketCanBus(SupervisedBus):
             raw.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, _EVERY_ERROR)
             raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
             raw.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
-            self.counters.receive_buffer = raw.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
             raw.bind((self._channel,))
         except OSError:
             raw.close()

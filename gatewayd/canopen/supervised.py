@@ -1,4 +1,4 @@
-"""A CAN bus as the node sees it, and what all drivers do alike: keep its state, count, report, wait for room."""
+"""A CAN bus as the node sees it, and what all drivers do alike: keep its state, report, wait for room."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import asyncio
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 
-from gatewayd.canopen.bus import BusCounters, BusHandler, BusState
+from gatewayd.canopen.bus import BusHandler, BusState
 from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.supervision import BusSignal, Supervisor, signal_of_error
@@ -30,7 +30,6 @@ class SupervisedBus(ABC):
     """Set when the driver is opened."""
 
     def __init__(self, handler: BusHandler) -> None:
-        self.counters = BusCounters()
         self._handler = handler
         self._supervisor = Supervisor()
         self._looking: asyncio.TimerHandle | None = None
@@ -78,9 +77,7 @@ class SupervisedBus(ABC):
     def send(self, frame: Frame) -> bool:
         """Hand over a frame, without waiting. False: not now; `on_writable` or `on_state` is called when it can be."""
         if self._full or self._supervisor.state < _PASSIVE or not self._give(frame):
-            self.counters.refused += 1
             return False
-        self.counters.sent += 1
         self._handed_over = clock.now()
         return True
 
@@ -106,8 +103,6 @@ class SupervisedBus(ABC):
         if not self._supervisor.feed(signal):
             return
         state = self._supervisor.state
-        if state is BusState.BUS_OFF:
-            self.counters.bus_off += 1
         if not state.carries:
             self._forget_waiting()
         self._handler.on_state(state, reason, now)
@@ -121,12 +116,8 @@ class SupervisedBus(ABC):
         if frames:
             if clock.overdue():
                 now = clock.judged_now()
-            self.counters.received += len(frames)
             self._handler.on_frames(frames, now)
         for error in errors:
-            self.counters.errors += 1
-            if error.tx_errors is not None and error.rx_errors is not None:
-                self.counters.tx_errors, self.counters.rx_errors = error.tx_errors, error.rx_errors
             self._handler.on_error(error, now)
             signal = signal_of_error(error)
             if signal is not None:

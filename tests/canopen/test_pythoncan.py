@@ -101,7 +101,6 @@ async def test_frames_go_both_ways(virtual: tuple[PythonCanBus, Recorder, can.Bu
     assert second is not None
     assert (first.arbitration_id, bytes(first.data), first.is_extended_id) == (0x185, bytes(range(8)), False)
     assert (second.arbitration_id, second.is_remote_frame, second.dlc) == (0x285, True, 3)
-    assert (bus.counters.received, bus.counters.sent) == (2, 2)
 
 
 async def test_only_what_is_wanted_comes_in(virtual: tuple[PythonCanBus, Recorder, can.BusABC]) -> None:
@@ -132,12 +131,12 @@ async def test_burst_leaves_the_loop_its_turns(virtual: tuple[PythonCanBus, Reco
 async def test_reports_of_the_controller_change_the_state(
     virtual: tuple[PythonCanBus, Recorder, can.BusABC],
 ) -> None:
-    bus, recorder, peer = virtual
+    _bus, recorder, peer = virtual
     for can_id, data in ((0x204, [0, 0x20, 0, 0, 0, 0, 130, 7]), (0x040, [0] * 8), (0x100, [0] * 8)):
         peer.send(can.Message(arbitration_id=can_id, data=data, is_error_frame=True, is_extended_id=False))
     await until(lambda: len(recorder.errors) == 3)
     assert recorder.states == [BusState.ACTIVE, BusState.PASSIVE, BusState.BUS_OFF, BusState.ACTIVE]
-    assert (bus.counters.errors, bus.counters.bus_off, bus.counters.tx_errors) == (3, 1, 130)
+    assert recorder.errors[0].tx_errors == 130
 
 
 async def test_no_thread_is_started(virtual: tuple[PythonCanBus, Recorder, can.BusABC]) -> None:
@@ -183,7 +182,6 @@ async def test_adapter_unplugged_and_plugged_in_again(
     adapter.say("t2051FF")
     await until(lambda: recorder.frames)
     assert recorder.states == [BusState.ACTIVE, BusState.ABSENT, BusState.ACTIVE]
-    assert bus.counters.opened == 2
 
 
 @pytest.mark.parametrize("nonsense", ["t", "t205", "t2058zz", "tXYZ8", "T0000"])
@@ -230,7 +228,6 @@ async def test_adapter_that_takes_nothing_does_not_stop_the_loop(
             sent += 1
             if sent % 512 == 0:
                 await asyncio.sleep(0)
-    assert bus.counters.refused == 1
     assert not bus.send(Frame(0x185))
     assert recorder.writable == 0
     adapter.reading.set()

@@ -73,7 +73,6 @@ def test_one_wake_up_reads_no_more_than_a_batch(wire: tuple[SocketCanBus, Record
     bus._readable()
     assert recorder.batches == [DRAIN, 5]
     assert recorder.frames == [Frame(0x205, bytes([number])) for number in range(DRAIN + 5)]
-    assert bus.counters.received == DRAIN + 5
 
 
 @pytest.mark.parametrize("place", [0, 1])
@@ -96,7 +95,6 @@ def test_kinds_of_frames_are_separated_wherever_they_stand(
     ]
     assert [error.classes for error in recorder.errors] == [ErrorClass.BUS_OFF]
     assert recorder.states == [BusState.BUS_OFF]
-    assert bus.counters.bus_off == 1
 
 
 def test_nothing_is_handed_to_a_kernel_that_would_swallow_it(
@@ -109,7 +107,8 @@ def test_nothing_is_handed_to_a_kernel_that_would_swallow_it(
     bus._readable()
     assert not bus.send(Frame(0x185, b"\2"))
     assert theirs.recv(99) == pack(Frame(0x185, b"\1"))
-    assert (bus.counters.sent, bus.counters.refused) == (1, 1)
+    with pytest.raises(BlockingIOError):
+        theirs.recv(99, socket.MSG_DONTWAIT)
 
 
 async def test_machine_without_can_is_refused_with_advice() -> None:
