@@ -48,20 +48,16 @@ class Violation(IntFlag):
     WHILE_SENDING = 0x80
 
 
-_NO_CONTROLLER = ControllerFlags(0)
-_NO_VIOLATION = Violation(0)
-
-
 @dataclass(frozen=True, slots=True)
 class ErrorFrame:
     """One error frame, decoded."""
 
     classes: ErrorClass
-    controller: ControllerFlags = _NO_CONTROLLER
-    violation: Violation = _NO_VIOLATION
-    tx_errors: int | None = None
+    controller: ControllerFlags
+    violation: Violation
+    tx_errors: int | None
     """Transmit error counter, where the driver reports it."""
-    rx_errors: int | None = None
+    rx_errors: int | None
 
     def __str__(self) -> str:
         words = [_spell(self.classes & ~ErrorClass.COUNTERS), _spell(self.controller), _spell(self.violation)]
@@ -78,13 +74,9 @@ def decode(can_id: int, data: bytes) -> ErrorFrame:
     """An error frame by its identifier (the error flag may be set) and its up to eight bytes."""
     bytes_ = data.ljust(8, b"\0")
     classes = ErrorClass(can_id & 0x3FF)
-    about_controller = bool(classes & ErrorClass.CONTROLLER)
+    controller = bytes_[1] & 0x7F if classes & ErrorClass.CONTROLLER else 0
+    violation = bytes_[2] if classes & ErrorClass.PROTOCOL else 0
     # Kernels before 5.19 fill in the counters of controller frames without announcing them.
-    counted = bool(classes & ErrorClass.COUNTERS) or (about_controller and any(bytes_[6:8]))
-    return ErrorFrame(
-        classes,
-        ControllerFlags(bytes_[1] & 0x7F) if about_controller else _NO_CONTROLLER,
-        Violation(bytes_[2]) if classes & ErrorClass.PROTOCOL else _NO_VIOLATION,
-        bytes_[6] if counted else None,
-        bytes_[7] if counted else None,
-    )
+    counted = classes & ErrorClass.COUNTERS or (classes & ErrorClass.CONTROLLER and any(bytes_[6:8]))
+    tx_errors, rx_errors = bytes_[6:8] if counted else (None, None)
+    return ErrorFrame(classes, ControllerFlags(controller), Violation(violation), tx_errors, rx_errors)

@@ -24,7 +24,7 @@ import can
 
 from gatewayd.canopen.bus import DRAIN, BusError, BusHandler
 from gatewayd.canopen.cob_ids import BASIC_FRAME
-from gatewayd.canopen.errors import ErrorClass, ErrorFrame, decode
+from gatewayd.canopen.errors import ErrorFrame, decode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.supervised import SupervisedBus
 from gatewayd.canopen.supervision import LOOK, BusSignal
@@ -186,7 +186,7 @@ class PythonCanBus(SupervisedBus):
         can_id = message.arbitration_id
         if message.is_error_frame:
             known = self._interface in _LIKE_SOCKETCAN
-            errors.append(decode(can_id, bytes(message.data)) if known else ErrorFrame(ErrorClass(0)))
+            errors.append(decode(can_id, bytes(message.data)) if known else decode(0, b""))
         elif message.is_extended_id or message.is_fd or can_id > BASIC_FRAME:
             return
         elif message.is_remote_frame:
@@ -251,7 +251,7 @@ class PythonCanBus(SupervisedBus):
             self._room.register(self._descriptor, select.POLLOUT)
             self._loop.add_reader(self._descriptor, self._readable)
         self._ask = ASK
-        read = self._readable if self._descriptor >= 0 else self._look_for_frames
+        read = self._read_on if self._descriptor >= 0 else self._look_for_frames
         self._reading = self._loop.call_soon(read)
         self._feed(BusSignal.UP, clock.now(), f"{self._name} is open")
 

@@ -220,9 +220,9 @@ async def test_controller_tells_its_bit_rate_and_counters(adapter: SerialAdapter
     async with opened(adapter.name, 0x123) as station:
         assert station.bus.bitrate == 500_000
         adapter.say("sw100090")
-        await until(lambda: station.bus.interface and station.bus.interface.rx_errors == 100)
-        assert station.bus.interface is not None
-        assert station.bus.interface.tx_errors == 90
+        await until(lambda: station.recorder.errors)
+        report = station.recorder.errors[-1]
+        assert (report.rx_errors, report.tx_errors) == (100, 90)
 
 
 async def test_controller_gets_worse_and_better(adapter: SerialAdapter) -> None:
