@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -39,7 +39,6 @@ REFUSED, UNREACHABLE = 1, 2
 """Exit codes."""
 _COMPLETION_PATIENCE = 0.5
 
-_Command = TypeVar("_Command", bound=Callable[..., Any])
 _Complete = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 
@@ -177,18 +176,12 @@ complete_locks = _completing("locks", "/v1/locks", lambda lock: lock["owner"] or
 _complete_cells = _completing("cells", "/v1/status", lambda _cell: "")
 
 
-def cell_option(command: _Command) -> _Command:
-    """`--cell`."""
-    return click.option(
-        "--cell",
-        metavar="NAME",
-        shell_complete=_complete_cells,
-        help="Only this cell, of several in one gateway.",
-    )(command)
-
-
-def json_option(command: _Command) -> _Command:
-    """`--json`."""
-    return click.option(
-        "--json", "as_json", is_flag=True, help="Print what the gateway answers, for programs."
-    )(command)
+cell_option = click.option(
+    "--cell",
+    metavar="NAME",
+    shell_complete=_complete_cells,
+    help="Only this cell, of several in one gateway.",
+)
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print what the gateway answers, for programs."
+)

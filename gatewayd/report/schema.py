@@ -98,7 +98,7 @@ class Status(VersionInfo):
     """Everything at a glance."""
 
     time: Annotated[str, "when this was answered, UTC"]
-    uptime: Annotated[float, "seconds since the cores began to turn"]
+    uptime: Annotated[float, "seconds since the first cell was served"]
     healthy: Annotated[bool, "no cell has a problem, and the gateway as a whole has none"]
     problems: Annotated[
         list[str], "list of texts: everything that makes it unhealthy, with the name of the cell in front"

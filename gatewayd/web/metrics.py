@@ -114,7 +114,7 @@ _OF_CELLS = (
         lambda at: {state.name.lower(): state is at.cell.freshness.state for state in Source}, "state"),
     _OfCell("gatewayd_robot_package_rate_hertz", "packages per second, measured",
         lambda at: at.health.frequency),
-    _OfCell("gatewayd_robot_age_seconds", "seconds since the robot last told anything new; +Inf: never",
+    _OfCell("gatewayd_robot_age_seconds", "seconds since the robot last reported anything new; +Inf: never",
         lambda at: at.now - at.cell.freshness.last_progress),
     _OfCell("gatewayd_robot_packages_total", "packages received", lambda at: at.health.packages),
     _OfCell("gatewayd_robot_packages_skipped_total", "packages the controller left out",
@@ -158,8 +158,8 @@ _OF_CELLS = (
 )  # fmt: skip
 METRICS = (
     _info("gatewayd_info", "1, with the version of the gateway", "version"),
-    _info("gatewayd_ready", "1 while every cell is served, as /readyz tells it"),
-    _info("gatewayd_parts_hanging", "parts of the gateway that do not turn; /healthz names them"),
+    _info("gatewayd_ready", "1 while every cell is served, as /readyz reports it"),
+    _info("gatewayd_parts_hanging", "parts of the gateway that make no progress; /healthz names them"),
     _info(
         "gatewayd_troubles",
         "what is wrong with no cell in particular, say a mapping not served or a reload refused; /readyz names it",
