@@ -27,6 +27,7 @@ class CompiledFile:
     """A file that could be read."""
 
     name: str
+    """Path as given."""
     diagnostics: tuple[Diagnostic, ...]
     """All findings, from top to bottom."""
     plan: Plan | None

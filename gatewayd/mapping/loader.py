@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gatewayd.mapping.compile import compile_plan
+from gatewayd.mapping.compiled import CompiledFile
 from gatewayd.mapping.diagnostics import Diagnostic, Severity
 from gatewayd.mapping.expand import expand
 from gatewayd.mapping.expanded import ExpandedCell
-from gatewayd.mapping.plan import Plan
 from gatewayd.mapping.reader import read_document
 from gatewayd.mapping.rules.run import check_cell, check_plant
 from gatewayd.mapping.source import MAX_BYTES, parse
@@ -22,17 +22,11 @@ __all__ = ["Loaded", "load", "load_together", "read_bytes"]
 
 
 @dataclass(frozen=True, slots=True)
-class Loaded:
-    """One mapping file, looked at in full."""
+class Loaded(CompiledFile):
+    """One mapping file with what its findings and its plan were made from."""
 
-    name: str
-    """Path as given."""
     cell: ExpandedCell
-    """What could be read of it; empty where nothing could."""
-    diagnostics: tuple[Diagnostic, ...]
-    """All findings, from top to bottom."""
-    plan: Plan | None
-    """None when a finding is an error."""
+    """What could be read of the file; empty where nothing could."""
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -71,4 +65,4 @@ def load_together(files: Sequence[tuple[str, bytes]]) -> tuple[Loaded, ...]:
 def _finished(name: str, cell: ExpandedCell, findings: Iterable[Diagnostic]) -> Loaded:
     diagnostics = tuple(sorted(findings, key=lambda finding: (finding.position, finding.rule.id)))
     failed = any(finding.severity is Severity.ERROR for finding in diagnostics)
-    return Loaded(name, cell, diagnostics, None if failed else compile_plan(cell))
+    return Loaded(name, diagnostics, None if failed else compile_plan(cell), cell)

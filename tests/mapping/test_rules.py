@@ -655,8 +655,8 @@ SUPERVISED = {
     "a lease": ("{modbus: 192.168.1.20}", "owner: plc, lease: 2s", []),
     "an RPDO master without a heartbeat": ("{canopen: any}", "owner: plc, canopen: auto", ["GW521"]),
     "a heartbeat": ("{canopen: any, node: 1, heartbeat: 1s}", "owner: plc, canopen: auto", []),
-    "told by the rule about motion": ("{modbus: 192.168.1.20}", "owner: plc, name: go", ["GW604"]),
-    "told by the rule about shared locks": ("{modbus: 192.168.1.20}", "owner: [plc, hmi], lease: none", ["GW514"]),
+    "reported by the rule about motion": ("{modbus: 192.168.1.20}", "owner: plc, name: go", ["GW604"]),
+    "reported by the rule about shared locks": ("{modbus: 192.168.1.20}", "owner: [plc, hmi], lease: none", ["GW514"]),
 }  # fmt: skip
 
 

@@ -73,7 +73,7 @@ OFFSETS = st.sampled_from([0.0, 1.0, -273.15, 100.0])
 
 @given(every_codec, st.data())
 def test_registers_survive_a_round_trip_of_plain_numbers(made: tuple[str, str], data: st.DataObject) -> None:
-    """bytes -> value -> bytes is the identity for every type and order, NaN aside."""
+    """bytes -> value -> bytes is the identity for every type and order, but for NaN."""
     name, order = made
     number = TYPES[name]
     codec = make_codec(name, order, kind=FLOAT if number.is_real else INT)
