@@ -108,9 +108,13 @@ class Controller:
     def advance(self, cycles: int = 1) -> None:
         """Run one control cycle, `cycles` after the last: more than 1 where some could not be run in time."""
         self.cycle += cycles
-        self._overwrite()
+        for field, values in self._overwritten.items():
+            if self.get(field) != values:
+                self.store.write(field, values)
+        if self.faults.creep:
+            moment = self.store.moment
+            self.store.moment = moment._replace(time=moment.time + _CREEP)
         if self.faults.freeze or self.faults.creep:
-            self._creep()
             return
         running = self._running()
         fraction = self._fraction() if running else 0.0
@@ -173,16 +177,6 @@ class Controller:
             return
         self.set(field, values)
         self._overwritten[field] = self.get(field)
-
-    def _overwrite(self) -> None:
-        for field, values in self._overwritten.items():
-            if self.get(field) != values:
-                self.store.write(field, values)
-
-    def _creep(self) -> None:
-        if self.faults.creep:
-            moment = self.store.moment
-            self.store.moment = moment._replace(time=moment.time + _CREEP)
 
     def _type(self, field: Field | None) -> DataType | None:
         return field.type if field is not None and field.available(self.series, self.version) else None

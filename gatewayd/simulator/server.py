@@ -14,7 +14,6 @@ from types import TracebackType
 from typing import Self, cast
 
 from gatewayd.rtde.codec import ProtocolError
-from gatewayd.rtde.messages import TextLevel
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import DroppedError, Faults, Mangler
 from gatewayd.simulator.line import OutgoingLine
@@ -141,10 +140,10 @@ class SimulatedController:
             connection.abort("dropped on request")
         return len(connections)
 
-    def say(self, message: str, level: TextLevel = TextLevel.WARNING) -> None:
-        """Send a text message to every client."""
+    def say(self, message: str) -> None:
+        """Send a text message (a warning) to every client."""
         for connection in self._connections.values():
-            connection.say(message, level)
+            connection.say(message)
 
     def get(self, field: str) -> tuple[Scalar, ...] | Scalar:
         """A field's value now: a number, or a tuple for a vector. KeyError if there is no such field."""
@@ -271,9 +270,9 @@ class _Connection(asyncio.Protocol):
         _log.warning("%s: %s; connection closed", self._session, reason)
         self._transport.abort()
 
-    def say(self, message: str, level: TextLevel) -> None:
+    def say(self, message: str) -> None:
         """Send a text message."""
-        self._write(self._session.text(message, level))
+        self._write(self._session.text(message))
 
     def read(self, *, on: bool) -> None:
         """Take in what the client sends, or leave it in the socket."""

@@ -78,11 +78,11 @@ class SimulatorSession:
     def greeting(self) -> bytes:
         """What is sent before anything was asked."""
         text = self._controller.faults.text_on_connect
-        return b"" if text is None else self.text(text, messages.TextLevel.WARNING)
+        return b"" if text is None else self.text(text)
 
-    def text(self, message: str, level: messages.TextLevel) -> bytes:
-        """A text message to the client, in the layout of the version it speaks."""
-        return self._protocol.send(messages.TextMessage(message, SOURCE, level))
+    def text(self, message: str) -> bytes:
+        """A warning to the client, in the layout of the version it speaks."""
+        return self._protocol.send(messages.TextMessage(message, SOURCE, messages.TextLevel.WARNING))
 
     def receive(self, data: bytes) -> bytes:
         """The answers to `data`, in order. Raises ProtocolError for bytes that are not RTDE, DroppedError for a fault.
