@@ -28,11 +28,11 @@ from gatewayd.core.operator import Operator
 from gatewayd.core.ownership import Act, LockTable, Move
 from gatewayd.core.program import is_running
 from gatewayd.core.refusal import Reason, Refusal
-from gatewayd.core.refusal_log import REFUSAL_INTERVAL, LastRefusal, RefusalLog
+from gatewayd.core.refusal_log import LastRefusal, RefusalLog
 from gatewayd.core.requester import Requester
 from gatewayd.core.supervision import WriterTable
 
-__all__ = ["HEARTBEAT_PERIOD", "REFUSAL_INTERVAL", "Cell", "Change", "Written"]
+__all__ = ["HEARTBEAT_PERIOD", "Cell", "Change", "Written"]
 
 HEARTBEAT_PERIOD = 0.1
 """Seconds between two counts of the heartbeat."""
@@ -114,7 +114,7 @@ class Cell:
         return None
 
     def refuse(self, requester: Requester, refusal: Refusal, now: float, value: Value | None = None) -> None:
-        """Count and record a refusal; equal ones are reported once per `REFUSAL_INTERVAL`."""
+        """Count and record a refusal; equal ones are reported once in a while (`RefusalLog`)."""
         self.health.writes_refused += 1
         peer = requester.peer if requester.writer is None else ""
         self.last_refusal = LastRefusal(refusal, requester.writer, now, peer)
@@ -390,18 +390,17 @@ class Cell:
         self.operator.release_expired(now)
         lock = self.definition.variables[variable].lock
         judged = self._admission.judge_lock(requester, variable, act)
-        if not isinstance(judged, Refusal):
+        if not (isinstance(judged, Refusal) and judged.reason is Reason.WAITED):
             self.writer_seen(requester, now, wrote=True)
-            assert lock is not None
-            if judged is Move.RELEASE:
-                self._locking.free([lock], now, "released by its owner")
-            elif judged is not Move.NOTHING:
-                self._locking.take(requester, lock, judged, now)
-            return None
-        if judged.reason is not Reason.WAITED:
-            self.writer_seen(requester, now, wrote=True)
-        self.refuse(requester, judged, now)
-        return judged
+        if isinstance(judged, Refusal):
+            self.refuse(requester, judged, now)
+            return judged
+        assert lock is not None
+        if judged is Move.RELEASE:
+            self._locking.free([lock], now, "released by its owner")
+        elif judged is not Move.NOTHING:
+            self._locking.take(requester, lock, judged, now)
+        return None
 
     def _count_adoption(self, now: float) -> None:
         """What nobody has claimed by the end of `adopt_for` falls back."""

@@ -38,6 +38,7 @@ class Quality(IntEnum):
 
 _REPORTED = (Quality.GOOD, Quality.STALE, Quality.DIFFERS, Quality.OUT_OF_RANGE, Quality.NOT_RUNNING)
 """Qualities of values that came from their source at some time."""
+_EVERY_NUMBER = (-sys.float_info.max, sys.float_info.max)
 _SHOWN = (Quality.GOOD, Quality.OUT_OF_RANGE)
 """Qualities of outputs that show what the robot reports."""
 
@@ -67,7 +68,9 @@ class ProcessImage:
         self.running_time = -math.inf
         """`output_time` of the last package that was shown while the program ran."""
         self._bounds = {
-            index: _bounds(variable) for index, variable in enumerate(variables) if _is_restricted(variable)
+            index: (*(variable.shown or _EVERY_NUMBER), variable.shows_nan)
+            for index, variable in enumerate(variables)
+            if variable.shown is not None or not variable.shows_nan
         }
         """Range, and whether NaN and infinities are shown, of variables of which a place cannot show every value."""
         self._restricted = tuple(
@@ -180,12 +183,11 @@ class ProcessImage:
             self.values[target] = former.values[source]
             self.times[target] = former.times[source]
             self.available[target] = former.available[source]
+            is_output = variable.direction is Direction.OUTPUT
             if quality in _SHOWN:
-                stopped = (
-                    variable.direction is Direction.OUTPUT and variable.valid_running and not self.running
-                )
+                stopped = is_output and variable.valid_running and not self.running
                 quality = Quality.NOT_RUNNING if stopped else self.judged(target)
-            if variable.direction is Direction.OUTPUT and quality not in _SHOWN:
+            if is_output and quality not in _SHOWN:
                 self.values[target] = variable.on_stale.apply(self.values[target], variable.kind)
             self.quality[target] = quality
         self._hold_shown()
@@ -252,15 +254,6 @@ class ProcessImage:
         variable = self.variables[index]
         held = self._held.get(index, self.values[index])
         self.values[index] = variable.on_stale.apply(held, variable.kind)
-
-
-def _is_restricted(variable: Variable) -> bool:
-    return variable.shown is not None or not variable.shows_nan
-
-
-def _bounds(variable: Variable) -> tuple[float, float, bool]:
-    low, high = variable.shown or (-sys.float_info.max, sys.float_info.max)
-    return low, high, variable.shows_nan
 
 
 def _judged(value: Value, low: float, high: float, nan: bool) -> Quality:

@@ -91,13 +91,9 @@ class Locking:
 
     def drop(self, requester: Requester, locks: Iterable[int], now: float, detail: str) -> None:
         """Release those of these locks that the requester's writer owns."""
-        owners = self._ownership.owners
-        mine = [
-            lock
-            for lock in sorted(set(locks))
-            if owners[lock] is not None and owners[lock] == requester.writer
-        ]
-        self.free(mine, now, detail)
+        if requester.writer is not None:
+            mine = set(locks).intersection(self._ownership.held_by(requester.writer))
+            self.free(sorted(mine), now, detail)
 
     def disconnected(self, requester: Requester, now: float, reason: str, *, at_once: bool) -> None:
         """A connection of the requester's writer has ended, and with it what follows it, after the writer's grace."""

@@ -78,13 +78,7 @@ class StatusBlock:
                 block[2 * (low - first) : 2 * (high - first)] = encoded
         return bytes(block)
 
-    def write(
-        self,
-        requester: Requester,
-        first: int,
-        words: Sequence[int],
-        now: float,
-    ) -> Refusal | None:
+    def write(self, requester: Requester, first: int, words: Sequence[int], now: float) -> Refusal | None:
         """A writer takes or gives back a lock; any other word of the block is never writable.
 
         A request that fills both words is refused, because it could succeed by half.

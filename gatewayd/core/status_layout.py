@@ -134,12 +134,7 @@ TABLES = (
         1216, MAX_VARIABLES, "lease", "one word for each variable: milliseconds of its owner's lease left"
     ),
     StatusTable(2240, MAX_VARIABLES, "age", "one word for each variable: age of its value in milliseconds"),
-    StatusTable(
-        3264,
-        MAX_VARIABLES,
-        "quality",
-        f"one word for each variable: {_numbered(Quality)}",
-    ),
+    StatusTable(3264, MAX_VARIABLES, "quality", f"one word for each variable: {_numbered(Quality)}"),
 )
 LENGTH = 4288
 """Words of the whole block."""

@@ -38,6 +38,7 @@ class WriterTable:
         """Time of the last sign of life."""
         self.ends = [math.inf] * len(writers)
         """When the grace after the last connection has passed; infinity while there is one."""
+        self._timeouts = [math.inf if writer.timeout is None else writer.timeout for writer in writers]
         self._counts_writes = [writer.counts_writes and writer.timeout is not None for writer in writers]
         self._excused = [-math.inf] * len(writers)
         """Silence counts from here on at the earliest: before it was the gateway that did not hear."""
@@ -94,10 +95,8 @@ class WriterTable:
         """The living writers whose time-out has passed without a sign of life."""
         return [
             index
-            for index, (writer, alive, seen, excused) in enumerate(
-                zip(self.writers, self.alive, self.last_seen, self._excused, strict=True)
-            )
-            if alive and writer.timeout is not None and now - max(seen, excused) > writer.timeout
+            for index, (limit, excused) in enumerate(zip(self._timeouts, self._excused, strict=True))
+            if self.alive[index] and now - max(self.last_seen[index], excused) > limit
         ]
 
     def gap(self, since: float, now: float) -> None:

@@ -41,10 +41,7 @@ async def _serve(daemon: Daemon, found: Startup, options: Options) -> None:
     stop = asyncio.Event()
     reporter = ManagerReporter(Notifier(os.environ, os.getpid()), daemon, found.notes)
     reloader = Reloader(
-        daemon,
-        options.files,
-        reporter.reload_begins,
-        lambda outcome: reporter.reload_ended(outcome.notes),
+        daemon, options.files, reporter.reload_begins, lambda outcome: reporter.reload_ended(outcome.notes)
     )
     control = control_socket(options.control)
     SIGNALS.follow(asyncio.get_running_loop(), SignalActions(stop, reloader.ask))

@@ -117,13 +117,19 @@ class Daemon:
         release fallback, as `cell: name`.
         """
         former = {runtime.plan.cell.name: runtime for runtime in self.runtimes}
-        successors: dict[Cell, Cell] = {}
+        cells = {runtime: runtime.cell for runtime in self.runtimes}
         stranded: list[str] = []
         if prepared is not None:
             prepared.commit()
         # Whatever happens on the way, afterwards the shared parts serve the cells that there are.
         try:
-            runtimes = [self._runtime_for(plan, former, now, successors, stranded) for plan in plans]
+            runtimes = [
+                former.pop(plan.cell.name) if plan.cell.name in former else self._add(plan, now)
+                for plan in plans
+            ]
+            for runtime, plan in zip(runtimes, plans, strict=True):
+                if runtime.plan != plan:
+                    stranded += [f"{plan.cell.name}: {name}" for name in self._replace(runtime, plan, now)]
             for runtime in former.values():
                 stranded += [f"{runtime.plan.cell.name}: {name}" for name in runtime.retire(now)]
                 for part in (runtime, *runtime.links.values()):
@@ -131,40 +137,26 @@ class Daemon:
             self.runtimes = runtimes
         finally:
             self._begin_shared()
+            successors = {cell: runtime.cell for runtime, cell in cells.items() if runtime.cell is not cell}
             self.shared.serve(self.runtimes, successors)
         return stranded
 
-    def _runtime_for(
-        self,
-        plan: Plan,
-        former: dict[str, CellRuntime],
-        now: float,
-        successors: dict[Cell, Cell],
-        stranded: list[str],
-    ) -> CellRuntime:
-        runtime = former.pop(plan.cell.name, None)
-        if runtime is None:
-            runtime = self._make(plan, now)
-            self._show(runtime.cell)
-            self._begin_cell(runtime)
-        elif runtime.plan != plan:
-            stranded += self._replace(runtime, plan, now, successors)
+    def _add(self, plan: Plan, now: float) -> CellRuntime:
+        runtime = self._make(plan, now)
+        self._show(runtime.cell)
+        self._begin_cell(runtime)
         return runtime
 
-    def _replace(
-        self, runtime: CellRuntime, plan: Plan, now: float, successors: dict[Cell, Cell]
-    ) -> list[str]:
-        cell, former = runtime.cell, runtime.links
+    def _replace(self, runtime: CellRuntime, plan: Plan, now: float) -> tuple[str, ...]:
+        former = runtime.links
         stranded = runtime.succeed(plan, now)
         self._show(runtime.cell)
-        successors[cell] = runtime.cell
-        ended = {
-            name: self._end(link) for name, link in former.items() if runtime.links.get(name) is not link
-        }
+        gone = [name for name, link in former.items() if runtime.links.get(name) is not link]
+        ended = {name: self._end(former[name]) for name in gone}
         for name, link in runtime.links.items():
             if link is not former.get(name):
                 self._begin(link, link.run, ended.get(name))
-        return [f"{plan.cell.name}: {name}" for name in stranded]
+        return stranded
 
     def _show(self, cell: Cell) -> None:
         for observer in self._observers:
