@@ -9,6 +9,7 @@ import asyncio
 import logging
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import OPERATOR, Variable
@@ -68,15 +69,10 @@ class EventLog:
             self._waiting = story
         if event.variable is not None:
             self._names.append(self._definition.variables[event.variable].name)
-        if event.variable is None or not self._flush_soon():
-            self._flush()
-
-    def _flush_soon(self) -> bool:
-        try:
-            asyncio.get_running_loop().call_soon(self._flush)
-        except RuntimeError:
-            return False
-        return True
+            with suppress(RuntimeError):  # no loop runs
+                asyncio.get_running_loop().call_soon(self._flush)
+                return
+        self._flush()
 
     def _flush(self) -> None:
         if self._waiting is None:

@@ -93,8 +93,6 @@ class Audit:
         capacity: int = CAPACITY,
         wall_clock: Callable[[], float] = time.time,
     ) -> None:
-        self.count = 0
-        """Records since the start, the forgotten ones included."""
         self._records: deque[Record] = deque(maxlen=capacity)
         self._sink = sink
         self._wall_clock = wall_clock
@@ -131,7 +129,6 @@ class Audit:
     def append(self, record: Record) -> None:
         """Keep the record, and give it to the sink."""
         self._records.append(record)
-        self.count += 1
         if self._sink is not None:
             text = json.dumps(record.as_json(), ensure_ascii=False, separators=(",", ":"))
             self._sink(json_text(text))
@@ -142,9 +139,6 @@ class Audit:
 
     def __iter__(self) -> Iterator[Record]:
         return iter(self._records)
-
-    def __len__(self) -> int:
-        return len(self._records)
 
 
 @dataclass(slots=True)

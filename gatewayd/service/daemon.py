@@ -106,12 +106,8 @@ class Daemon:
         """Whether there is anything to swap: false before `run` and once it stops."""
         return self._group is not None
 
-    async def prepare(self, plans: Sequence[Plan]) -> AllPrepared:
-        """Have ready what these plans need besides what there is. Raises PrepareError, and nothing has changed."""
-        return await self.shared.prepare(plans)
-
     def swap(self, plans: Sequence[Plan], now: float, prepared: AllPrepared | None = None) -> list[str]:
-        """Serve these plans instead, between two packages; cells are known by their names.
+        """Serve these plans instead, between two packages; cells are known by their names. `prepared`: by `shared`.
 
         Links whose settings did not change stay up. Returns the inputs that are gone and could not be given their
         release fallback, as `cell: name`.

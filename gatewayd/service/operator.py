@@ -16,12 +16,10 @@ from gatewayd.loop import clock
 from gatewayd.loop.retry import keep_running
 from gatewayd.service.audit import Audit
 from gatewayd.service.audit_file import AuditFile
+from gatewayd.service.daemon import RETRY_PERIOD
 from gatewayd.service.watchdog import Watched
 
-__all__ = ["JUST_NOW", "RETRY_PERIOD", "Operated", "OperatorAccess", "Standstill"]
-
-RETRY_PERIOD = 2.0
-"""Seconds before what ended in a defect is started again."""
+__all__ = ["JUST_NOW", "Operated", "OperatorAccess", "Standstill"]
 
 JUST_NOW = 0.1
 """Seconds after the process stood still in which what waited meanwhile is served."""

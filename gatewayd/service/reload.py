@@ -184,7 +184,7 @@ class Reloader:
         if objected:
             return ReloadOutcome(Result.REFUSED, objected)
         try:
-            prepared = await self._daemon.prepare(plans)
+            prepared = await self._daemon.shared.prepare(plans)
         except PrepareError as error:
             return ReloadOutcome(Result.FAILED, (reason_of(error),))
         await self._settle()

@@ -76,7 +76,7 @@ def test_a_change_is_recorded_at_once(cell: Cell, audit: Audit, lines: list[str]
         "old": 0,
         "new": 7,
     }
-    assert audit.count == len(audit) == len(lines) == 2
+    assert len(list(audit)) == len(lines) == 2
     assert [one.what for one in happened(audit)] == ["lock acquired", "write accepted"]
 
 
@@ -160,7 +160,7 @@ def test_unwatching_tells_the_rest_and_ends_it(cell: Cell, audit: Audit) -> None
     assert written(audit) == [("plc", 0, 1, 1), ("plc", 1, 2, 1)]
     assert cell.write(Requester(PLC), [Change(NUMBER, 9)], 9.0) is None
     audit.tick(99.0)
-    assert audit.count == 3
+    assert len(list(audit)) == 3
     assert not cell.write_listeners
 
 
@@ -169,7 +169,7 @@ def test_the_ring_is_bounded(cell: Cell) -> None:
     audit.watch(cell)
     for value in range(10):
         assert cell.write(Requester(PLC), [Change(NUMBER, value + 1)], value * 10.0) is None
-    assert (len(audit), audit.count) == (3, 11)
+    assert [record.event.new for record in audit] == [8, 9, 10]
 
 
 @pytest.mark.parametrize("value, plain", [(math.nan, "nan"), (-math.inf, "-inf"), (1.5, 1.5), (True, True)])

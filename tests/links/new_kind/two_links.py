@@ -52,7 +52,7 @@ async def main(file: str, directory: Path, listen: int, to: int) -> dict[str, ob
     await asyncio.sleep(3 * right.period)
     before = looks(daemon)
     changes = compare(old, new)
-    daemon.swap([new], clock.now(), await daemon.prepare([new]))
+    daemon.swap([new], clock.now(), await daemon.shared.prepare([new]))
     after = looks(daemon)
     stop.set()
     await running
