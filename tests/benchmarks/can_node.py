@@ -26,7 +26,7 @@ from gatewayd.links.canopen_node import runtime as link_module
 from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.runtime import CanLink
-from gatewayd.links.canopen_node.storage import MemoryStore
+from gatewayd.links.canopen_node.storage import Store
 from gatewayd.mapping.loader import load
 
 __all__ = ["NODE"]
@@ -82,7 +82,7 @@ class Gateway:
         plan = _plan()
         self.cell = Cell(plan.cell)
         setattr(link_module, "make_bus", lambda *_: PairBus(pair, self.link))  # noqa: B010 - mypy refuses the other way
-        self.link = CanLink(plan.the(CanopenPlan), self.cell, MemoryStore())
+        self.link = CanLink(plan.the(CanopenPlan), self.cell, Store())
         self.names = {one.name: index for index, one in enumerate(plan.cell.variables)}
 
     async def run(self) -> None:

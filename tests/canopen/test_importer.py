@@ -30,7 +30,7 @@ DICTIONARY = Dictionary(
         ),
     ]
 )
-TEXT = eds_text(DICTIONARY, Sheet("cell.eds", "cell", 1, NODE))
+TEXT = eds_text(DICTIONARY, Sheet("cell", 1, NODE, 500_000))
 
 
 def test_our_own_sheet_is_read_as_it_was_meant() -> None:

@@ -1,7 +1,7 @@
 """CAN interfaces to test with: a peer on any of them, and a serial adapter whose controller does what a test says.
 
 The adapter is a pseudo-terminal under the kernel's slcan line discipline: the kernel believes in a CAN controller
-that tells its state and error counters, goes off the bus, and is unplugged.
+that reports its state and error counters, goes off the bus, and is unplugged.
 """
 
 from __future__ import annotations
@@ -143,6 +143,6 @@ class SerialAdapter:
     async def _ip(self, *words: str) -> None:
         """Run ip while the loop goes on: the kernel talks to the adapter meanwhile, and waits for it to read."""
         process = subprocess.Popen(["ip", "link", "set", self.name, *words])  # noqa: ASYNC220 - starting it is quick
-        while process.poll() is None:  # noqa: ASYNC110 - without a thread nobody tells
+        while process.poll() is None:  # noqa: ASYNC110 - without a thread nobody reports it
             await asyncio.sleep(0.005)
         assert process.returncode == 0

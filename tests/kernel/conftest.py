@@ -80,7 +80,7 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
-    """Instead of running a test, tell how it went inside."""
+    """Instead of running a test, report how it went inside."""
     boot = item.config.stash.get(BOOT, None)
     if boot is None or HERE not in item.path.parents:
         return None  # pytest asks for every test of the run

@@ -140,13 +140,13 @@ async def test_node_on_a_controller_that_fails(adapter: SerialAdapter, plant: Pl
     await until(lambda: BOOT_UP in adapter.lines and daemon.lines("listening for Modbus"), PATIENCE)
     plc = plant.plc()
     await until(lambda: plc.writable, PATIENCE)
-    (told,) = daemon.lines("CAN bit rate is not that of the mapping")
-    assert "bitrate=500000 mapping=250000" in told
+    (reported,) = daemon.lines("CAN bit rate is not that of the mapping")
+    assert "bitrate=500000 mapping=250000" in reported
     adapter.say("t21044E000000")
     await until(lambda: plc.integers(0) == [78], PATIENCE)
     assert (plc.owner(1), plc.status(NMT_STATE)) == (THE_MASTER, OPERATIONAL)
 
-    # Error-passive: told, and everything goes on.
+    # Error-passive: reported, and everything goes on.
     adapter.say("sp130140")
     await until(lambda: plc.status(CAN_BUS) == PASSIVE, PATIENCE)
     await until(lambda: f"{EMERGENCY}2081110000000000" in adapter.lines, PATIENCE)

@@ -31,7 +31,7 @@ FRAME_IN_KERNEL = 768
 
 
 class Station:
-    """A driver on an interface, with what it told."""
+    """A driver on an interface, with what it reported."""
 
     def __init__(self, name: str) -> None:
         self.recorder = Recorder()
@@ -260,7 +260,7 @@ async def test_bus_off_takes_no_frame_and_is_left_by_down_and_up(adapter: Serial
 
 
 async def test_bus_off_is_seen_when_the_daemon_starts(adapter: SerialAdapter) -> None:
-    """No error frame tells of what was before."""
+    """No error frame says anything of what was before."""
     adapter.say("sb000256")
     await asyncio.sleep(0.1)
     async with opened(adapter.name) as station:
@@ -287,7 +287,7 @@ async def test_adapter_unplugged_and_plugged_in_again(adapter: SerialAdapter) ->
 
 @pytest.mark.parametrize("queue", [10, 1])
 async def test_full_queue_of_the_kernel_loses_nothing(adapter: SerialAdapter, queue: int) -> None:
-    """With the usual queue the kernel tells when there is room (EAGAIN), with a short one nobody does (ENOBUFS)."""
+    """With the usual queue the kernel reports when there is room (EAGAIN), with a short one nobody does (ENOBUFS)."""
     await adapter.down()
     await adapter.set_queue_length(queue)
     await adapter.up()

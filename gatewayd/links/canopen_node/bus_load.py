@@ -17,8 +17,9 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Final
 
+from gatewayd.canopen import lss
 from gatewayd.core.definition import Direction
-from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo
+from gatewayd.links.canopen_node.expand import ExpandedPdo, the_node
 from gatewayd.links.canopen_node.sections import CanopenWriter
 from gatewayd.mapping.expanded import ExpandedCell
 
@@ -28,17 +29,15 @@ __all__ = [
     "FIRST_EVENT_TYPE",
     "WARNING_ABOVE",
     "Share",
-    "Station",
     "bus_shares",
     "frame_bits",
     "load",
     "pdo_bits",
     "pdo_rate",
-    "station_of",
 ]
 
-BIT_RATES: Final = (10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
-"""Bit-rates of CiA 301, 5.2, in bit/s."""
+BIT_RATES: Final = tuple(sorted(rate for rate in lss.BIT_RATES if rate is not None))
+"""Bit-rates of CiA 301, 5.2, in bit/s, from the slowest on."""
 WARNING_ABOVE: Final = 0.4
 """Share of the bus above which SDO and other nodes become slow."""
 ERROR_ABOVE: Final = 0.7
@@ -73,22 +72,6 @@ class Share:
         return self.bits * self.rate
 
 
-@dataclass(frozen=True, slots=True)
-class Station:
-    """One cell on the bus, as far as the load goes."""
-
-    node: CanopenCell
-    rate: float
-    """Packages of the robot per second at most."""
-    writers: tuple[CanopenWriter, ...]
-
-
-def station_of(cell: ExpandedCell, node: CanopenCell) -> Station:
-    """What a cell means for the bus that its node is on."""
-    writers = tuple(part.spec.by(CanopenWriter) for part in cell.document.writers.values())
-    return Station(node, cell.settings.rate, writers)
-
-
 def pdo_bits(pdo: ExpandedPdo) -> int:
     """Greatest length of its frame, in bits."""
     return frame_bits(ceil(min(pdo.bits, 64) / 8))
@@ -107,19 +90,20 @@ def pdo_rate(pdo: ExpandedPdo, rate: float, sync_period: float | None) -> float:
     return greatest if pdo.inhibit is None else min(greatest, 1 / pdo.inhibit)
 
 
-def bus_shares(stations: Sequence[Station]) -> tuple[Share, ...]:
+def bus_shares(cells: Sequence[ExpandedCell]) -> tuple[Share, ...]:
     """What the cells on one bus send, and what is sent to them; SYNC and watched heartbeats once for all."""
-    periods = _sync_periods(stations)
+    periods = _sync_periods(cells)
     found: list[Share] = []
-    for station in stations:
-        spec = station.node.part.spec
-        for pdo in station.node.pdos:
-            rate = pdo_rate(pdo, station.rate, periods.get(spec.sync.cob_id))
+    for cell in cells:
+        node = the_node(cell)
+        spec = node.part.spec
+        for pdo in node.pdos:
+            rate = pdo_rate(pdo, cell.settings.rate, periods.get(spec.sync.cob_id))
             found.append(Share(f"node {spec.node}: {pdo.label}", pdo_bits(pdo), rate))
         if spec.heartbeat is not None:
             found.append(Share(f"node {spec.node}: heartbeat", frame_bits(1), 1 / spec.heartbeat))
-    found.extend(_syncs(stations, periods))
-    found.extend(_watched(stations))
+    found.extend(_syncs(cells, periods))
+    found.extend(_watched(cells))
     return tuple(found)
 
 
@@ -128,30 +112,28 @@ def load(shares: Iterable[Share], bit_rate: int) -> float:
     return sum(share.bits_per_second for share in shares) / bit_rate
 
 
-def _sync_periods(stations: Sequence[Station]) -> dict[int, float]:
+def _sync_periods(cells: Sequence[ExpandedCell]) -> dict[int, float]:
     """The shortest period that is stated for a COB-ID of SYNC."""
     periods: dict[int, float] = {}
-    for station in stations:
-        sync = station.node.part.spec.sync
+    for cell in cells:
+        sync = the_node(cell).part.spec.sync
         if sync.period is not None:
             periods[sync.cob_id] = min(sync.period, periods.get(sync.cob_id, sync.period))
     return periods
 
 
-def _syncs(stations: Sequence[Station], periods: Mapping[int, float]) -> Iterable[Share]:
+def _syncs(cells: Sequence[ExpandedCell], periods: Mapping[int, float]) -> Iterable[Share]:
+    counted = {sync.cob_id for sync in (the_node(cell).part.spec.sync for cell in cells) if sync.counter}
     for cob_id, period in sorted(periods.items()):
-        counted = any(
-            sync.counter and sync.cob_id == cob_id
-            for sync in (station.node.part.spec.sync for station in stations)
-        )
-        yield Share("SYNC", frame_bits(1 if counted else 0), 1 / period)
+        yield Share("SYNC", frame_bits(1 if cob_id in counted else 0), 1 / period)
 
 
-def _watched(stations: Sequence[Station]) -> Iterable[Share]:
+def _watched(cells: Sequence[ExpandedCell]) -> Iterable[Share]:
     """Heartbeats of nodes that are no cells."""
-    own = {station.node.part.spec.node for station in stations}
+    own = {the_node(cell).part.spec.node for cell in cells}
     shortest: dict[int, float] = {}
-    for writer in (writer for station in stations for writer in station.writers):
+    for part in (part for cell in cells for part in cell.document.writers.values()):
+        writer = part.spec.by(CanopenWriter)
         if writer.node is not None and writer.heartbeat is not None and writer.node not in own:
             shortest[writer.node] = min(writer.heartbeat, shortest.get(writer.node, writer.heartbeat))
     for node, timeout in sorted(shortest.items()):

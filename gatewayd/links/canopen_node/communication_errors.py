@@ -1,14 +1,14 @@
 """What is wrong with the communication of a node, as errors (EMCY), and how the node reacts (1029h).
 
-What befalls the node, and what follows:
+What happens to the node, and what follows:
 
 | event | writers of the cell | NMT (1029h = 0 / 1 / 2) | EMCY |
 |---|---|---|---|
 | RPDO in OPERATIONAL, SDO request | the writer is alive | | |
-| heartbeat of a node of 1016h ends | its writer is lost, and refused till it is back \
-| PRE-OPERATIONAL / as it is / STOPPED | 8130h till it is back |
+| heartbeat of a node of 1016h ends | its writer is lost, and refused until it is back \
+| PRE-OPERATIONAL / as it is / STOPPED | 8130h until it is back |
 | heartbeat that the mapping promises ends, or does not come after the first write or lock request \
-| its writer is lost, and refused till it is back | as it is | |
+| its writer is lost, and refused until it is back | as it is | |
 | node whose heartbeat is promised boots | its writer is lost | as it is | |
 | guarding stays away | | PRE-OPERATIONAL / as it is / STOPPED | 8130h until it is back |
 | RPDO deadline passes | the RPDO writer is lost | as it is | 8250h until it is received |
@@ -83,17 +83,9 @@ class CommunicationErrors:
         self._emergency.raise_error(ErrorCode.HEARTBEAT, now)
         self._communication_error(now)
 
-    def guarding_back(self, now: float) -> None:
-        """It is heard again."""
-        self._emergency.clear(ErrorCode.HEARTBEAT, now)
-
     def sync_length(self, length: int, now: float) -> None:
         """A SYNC came with a wrong number of bytes."""
         self._emergency.raise_error(ErrorCode.SYNC_LENGTH, now, bytes([length]))
-
-    def sync_right(self, now: float) -> None:
-        """A SYNC came as it should."""
-        self._emergency.clear(ErrorCode.SYNC_LENGTH, now)
 
     def fault_raised(self, fault: Fault, number: int, now: float) -> None:
         """Something is wrong with an RPDO."""

@@ -31,7 +31,7 @@ def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
             for index, writer in enumerate(writers)
             if writer.node is not None and writer.heartbeat is not None
         ),
-        objects=tuple(one.plan for one in node.objects),
+        objects=tuple(placed.plan for placed in node.objects),
         pdos=tuple(_pdo(pdo) for pdo in node.pdos),
         rpdo_writer=next((index for index, writer in enumerate(writers) if writer.by_rpdo), None),
         sdo_writer=next((index for index, writer in enumerate(writers) if writer.by_sdo), None),
@@ -54,8 +54,8 @@ def _pdo(pdo: ExpandedPdo) -> PdoPlan:
                 for word in pdo.status
             ),
             *(
-                PdoEntry(one.variable, one.plan.index, one.plan.subindex, one.plan.type.bits)
-                for one in pdo.entries
+                PdoEntry(placed.variable, placed.plan.index, placed.plan.subindex, placed.plan.type.bits)
+                for placed in pdo.entries
             ),
         ),
         sync_start=pdo.sync_start,

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.status_layout import StatusField
-from gatewayd.links.canopen_node.description import description
-from gatewayd.links.canopen_node.plan import CanopenPlan, by_name
+from gatewayd.links.canopen_node.description import by_name, description
+from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.contract import Description, LinkKind, LinkMetric
 from gatewayd.mapping.plan import LinkPlan
 

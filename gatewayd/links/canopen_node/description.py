@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from gatewayd.canopen.heartbeat import Consumer
-from gatewayd.canopen.sync import SyncPlan
-from gatewayd.core.definition import CellDefinition
-from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, PdoPlan
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from gatewayd.core.definition import CellDefinition, Direction
+from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan
 from gatewayd.links.contract import Description, Place
 
-__all__ = ["description"]
+__all__ = ["by_name", "description"]
 
 
 def description(plan: CanopenPlan, cell: CellDefinition) -> Description:
@@ -18,24 +19,17 @@ def description(plan: CanopenPlan, cell: CellDefinition) -> Description:
     for placed in plan.objects:
         places.setdefault(placed.variable, []).append(_place(placed, cob_ids.get(placed.variable)))
     channel = f"{plan.interface}:{plan.channel}"
-    return Description(
-        settings={
-            "interface": plan.interface,
-            "channel": plan.channel,
-            "bitrate": str(plan.bitrate),
-            "node": str(plan.node),
-            "autostart": _flag(plan.autostart),
-            "heartbeat": str(plan.heartbeat),
-            "sync": _sync(plan.sync),
-            "consumers": "; ".join(_consumer(consumer, cell) for consumer in plan.consumers),
-            "pdos": "; ".join(_pdo(pdo, cell) for pdo in plan.pdos),
-            "rpdo_writer": _writer(plan.rpdo_writer, cell),
-            "sdo_writer": _writer(plan.sdo_writer, cell),
-        },
-        places=places,
-        address=channel,
-        fields={"channel": channel, "node": plan.node},
-    )
+    settings = by_name(plan, cell)
+    del settings["objects"]  # `places` has them
+    return Description(settings, places, address=channel, fields={"channel": channel, "node": plan.node})
+
+
+def by_name(part: Any, cell: CellDefinition) -> dict[str, str]:
+    """Each field of a plan, or of a part of one, as text, with names in place of the numbers of variables and writers.
+
+    Two nodes whose texts are equal are the same one for the bus, whatever else their mappings say.
+    """
+    return {field.name: _text(field.name, getattr(part, field.name), cell) for field in fields(part)}
 
 
 def _place(placed: ObjectPlan, cob_id: int | None) -> Place:
@@ -50,56 +44,22 @@ def _place(placed: ObjectPlan, cob_id: int | None) -> Place:
     )
 
 
-def _sync(sync: SyncPlan) -> str:
-    return _parts(
-        ("cob_id", str(sync.cob_id)),
-        ("producer", _flag(sync.producer)),
-        ("period", str(sync.period)),
-        ("counter", str(sync.counter)),
-    )
+def _text(key: str, value: Any, cell: CellDefinition) -> str:
+    if value is None:
+        return "" if key == "quality_of" else "none"
+    if key in ("variable", "quality_of"):
+        return str(cell.variables[value].name)
+    if key in ("writer", "rpdo_writer", "sdo_writer"):
+        return str(cell.writers[value].name)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Direction):
+        return value.value
+    if isinstance(value, tuple):
+        return "; ".join(_parts(item, cell) for item in value)
+    return _parts(value, cell) if is_dataclass(value) else str(value)
 
 
-def _consumer(consumer: Consumer, cell: CellDefinition) -> str:
-    return _parts(
-        ("node", str(consumer.node)),
-        ("timeout", str(consumer.timeout)),
-        ("writer", _writer(consumer.writer, cell)),
-    )
-
-
-def _pdo(pdo: PdoPlan, cell: CellDefinition) -> str:
-    return _parts(
-        ("number", str(pdo.number)),
-        ("direction", pdo.direction.value),
-        ("cob_id", str(pdo.cob_id)),
-        ("predefined", _flag(pdo.predefined)),
-        ("transmission", str(pdo.transmission)),
-        ("inhibit", str(pdo.inhibit)),
-        ("event", str(pdo.event)),
-        ("entries", "; ".join(_entry(entry, cell) for entry in pdo.entries)),
-        ("sync_start", str(pdo.sync_start)),
-        ("name", pdo.name),
-    )
-
-
-def _entry(entry: PdoEntry, cell: CellDefinition) -> str:
-    return _parts(
-        ("variable", "none" if entry.variable is None else cell.variables[entry.variable].name),
-        ("index", str(entry.index)),
-        ("subindex", str(entry.subindex)),
-        ("bits", str(entry.bits)),
-        ("quality_of", "" if entry.quality_of is None else cell.variables[entry.quality_of].name),
-    )
-
-
-def _parts(*parts: tuple[str, str]) -> str:
+def _parts(part: Any, cell: CellDefinition) -> str:
     """`number=1 direction=input`, without what is empty."""
-    return " ".join(f"{name}={text}" for name, text in parts if text)
-
-
-def _writer(writer: int | None, cell: CellDefinition) -> str:
-    return "none" if writer is None else cell.writers[writer].name
-
-
-def _flag(flag: bool) -> str:
-    return str(flag).lower()
+    return " ".join(f"{name}={text}" for name, text in by_name(part, cell).items() if text)

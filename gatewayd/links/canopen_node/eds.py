@@ -14,18 +14,17 @@ from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Dictionary, Entry, Object, ObjectCode, Pdo
-from gatewayd.canopen.frame import Frame, Priority
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition
+from gatewayd.links.canopen_node.bus_load import BIT_RATES
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.plan import CanopenPlan
-from gatewayd.links.canopen_node.storage import MemoryStore
+from gatewayd.links.canopen_node.storage import Store
 
-__all__ = ["Commissioning", "Sheet", "dcf_text", "eds_text", "objects_of", "sheet_of"]
+__all__ = ["Sheet", "dcf_text", "eds_text", "objects_of", "sheet_of"]
 
 _DATE: Final = "01-01-2026"
 _TIME: Final = "12:00AM"
-_BIT_RATES: Final = (10, 20, 50, 125, 250, 500, 800, 1000)
 _MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 _MANUFACTURER: Final = range(0x2000, 0x6000)
 _RPDOS: Final = range(0x1400, 0x1600)
@@ -40,51 +39,34 @@ _DOMAIN_OBJECT: Final = 2
 class Sheet:
     """What the head of the file says."""
 
-    file_name: str
     cell: str
+    """Its name; the file is named after it."""
     fingerprint: int
     node: int
     """The node-ID that the defaults of the objects were made with."""
-
-
-@dataclass(frozen=True, slots=True)
-class Commissioning:
-    """What makes a configuration file of a data sheet."""
-
-    node: int
     bit_rate: int
     """bit/s."""
-    name: str
-    """Node name."""
 
 
 def objects_of(plan: CanopenPlan, definition: CellDefinition) -> Dictionary:
     """The object dictionary of the node of a cell, as it is after its first power-on."""
-    return Node(plan, Cell(definition), _send_nowhere, MemoryStore(), _lives).dictionary
+    node = Node(plan, Cell(definition), lambda _frame, _priority: False, Store(), lambda _now: True)
+    return node.dictionary
 
 
-def _send_nowhere(_frame: Frame, _priority: Priority) -> bool:
-    """Nobody is on the bus."""
-    return False
-
-
-def _lives(_now: float) -> bool:
-    return True
-
-
-def sheet_of(plan: CanopenPlan, definition: CellDefinition, suffix: str = "eds") -> Sheet:
-    """The head for a cell; the file is named after it."""
-    return Sheet(f"{definition.name}.{suffix}", definition.name, definition.fingerprint, plan.node)
+def sheet_of(plan: CanopenPlan, definition: CellDefinition) -> Sheet:
+    """The head for a cell."""
+    return Sheet(definition.name, definition.fingerprint, plan.node, plan.bitrate)
 
 
 def eds_text(objects: Iterable[Object], sheet: Sheet) -> str:
     """The data sheet of a node: every object with type, access, default, limits and whether a PDO may carry it."""
-    return _text(_sections(tuple(objects), sheet, None))
+    return _text(_sections(tuple(objects), sheet, valued=False))
 
 
-def dcf_text(objects: Iterable[Object], sheet: Sheet, commissioning: Commissioning) -> str:
+def dcf_text(objects: Iterable[Object], sheet: Sheet) -> str:
     """The data sheet with node-ID, bit-rate, and the values of all parameters that a node stores."""
-    return _text(_sections(tuple(objects), sheet, commissioning))
+    return _text(_sections(tuple(objects), sheet, valued=True))
 
 
 _Section = tuple[str, list[tuple[str, str]]]
@@ -97,33 +79,27 @@ def _text(sections: Iterable[_Section]) -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-def _sections(
-    objects: tuple[Object, ...], sheet: Sheet, commissioning: Commissioning | None
-) -> Iterator[_Section]:
-    yield "FileInfo", _file_info(sheet, commissioning)
+def _sections(objects: tuple[Object, ...], sheet: Sheet, *, valued: bool) -> Iterator[_Section]:
+    yield "FileInfo", _file_info(sheet, valued=valued)
     yield "DeviceInfo", _device_info(objects)
-    if commissioning is not None:
-        yield "DeviceComissioning", _commissioning(commissioning)
-    yield (
-        "DummyUsage",
-        [(f"Dummy{number:04d}", "0" if number in _UNSUPPORTED_DUMMIES else "1") for number in _DUMMIES],
-    )
+    if valued:
+        yield "DeviceComissioning", _commissioning(sheet)
+    dummies = [(f"Dummy{number:04d}", "0" if number in _UNSUPPORTED_DUMMIES else "1") for number in _DUMMIES]
+    yield "DummyUsage", dummies
     yield "Comments", [("Lines", "1"), ("Line1", "made by gatewayd from the mapping of the cell")]
-    indices = [one.index for one in objects]
-    manufacturer = [index for index in indices if index in _MANUFACTURER]
-    mandatory = [index for index in indices if index in _MANDATORY]
-    optional = [index for index in indices if index not in {*manufacturer, *mandatory}]
-    named = (("Mandatory", mandatory), ("Optional", optional), ("Manufacturer", manufacturer))
-    by_index = {one.index: one for one in objects}
-    for name, group in named:
-        yield f"{name}Objects", _listed(group)
-        for index in group:
-            yield from _object(by_index[index], sheet.node, commissioning is not None)
+    groups: dict[str, list[Object]] = {"Mandatory": [], "Optional": [], "Manufacturer": []}
+    for item in objects:
+        optional = "Manufacturer" if item.index in _MANUFACTURER else "Optional"
+        groups["Mandatory" if item.index in _MANDATORY else optional].append(item)
+    for name, group in groups.items():
+        yield f"{name}Objects", _listed([item.index for item in group])
+        for item in group:
+            yield from _object(item, sheet.node, valued=valued)
 
 
-def _file_info(sheet: Sheet, commissioning: Commissioning | None) -> list[tuple[str, str]]:
+def _file_info(sheet: Sheet, *, valued: bool) -> list[tuple[str, str]]:
     pairs = [
-        ("FileName", sheet.file_name),
+        ("FileName", f"{sheet.cell}.{'dcf' if valued else 'eds'}"),
         ("FileVersion", "1"),
         ("FileRevision", "0"),
         ("EDSVersion", "4.0"),
@@ -135,12 +111,12 @@ def _file_info(sheet: Sheet, commissioning: Commissioning | None) -> list[tuple[
         ("ModificationDate", _DATE),
         ("ModifiedBy", "gatewayd"),
     ]
-    return pairs if commissioning is None else [*pairs, ("LastEDS", f"{sheet.cell}.eds")]
+    return [*pairs, ("LastEDS", f"{sheet.cell}.eds")] if valued else pairs
 
 
 def _device_info(objects: tuple[Object, ...]) -> list[tuple[str, str]]:
     identity = {
-        entry.subindex: entry.number for one in objects if one.index == _IDENTITY for entry in one.entries
+        entry.subindex: entry.number for item in objects if item.index == _IDENTITY for entry in item.entries
     }
     return [
         ("VendorName", "gatewayd"),
@@ -149,24 +125,24 @@ def _device_info(objects: tuple[Object, ...]) -> list[tuple[str, str]]:
         ("ProductNumber", f"0x{identity.get(2, 0):X}"),
         ("RevisionNumber", f"0x{identity.get(3, 0):X}"),
         ("OrderCode", "gatewayd"),
-        *((f"BaudRate_{rate}", "1") for rate in _BIT_RATES),
+        *((f"BaudRate_{rate // 1000}", "1") for rate in BIT_RATES),
         ("SimpleBootUpMaster", "0"),
         ("SimpleBootUpSlave", "1"),
         ("Granularity", "1"),
         ("DynamicChannelsSupported", "0"),
         ("GroupMessaging", "0"),
-        ("NrOfRXPDO", str(sum(one.index in _RPDOS for one in objects))),
-        ("NrOfTXPDO", str(sum(one.index in _TPDOS for one in objects))),
+        ("NrOfRXPDO", str(sum(item.index in _RPDOS for item in objects))),
+        ("NrOfTXPDO", str(sum(item.index in _TPDOS for item in objects))),
         ("LSS_Supported", "1"),
         ("CompactPDO", "0"),
     ]
 
 
-def _commissioning(commissioning: Commissioning) -> list[tuple[str, str]]:
+def _commissioning(sheet: Sheet) -> list[tuple[str, str]]:
     return [
-        ("NodeID", f"0x{commissioning.node:X}"),
-        ("NodeName", commissioning.name),
-        ("Baudrate", str(commissioning.bit_rate // 1000)),
+        ("NodeID", f"0x{sheet.node:X}"),
+        ("NodeName", sheet.cell),
+        ("Baudrate", str(sheet.bit_rate // 1000)),
         ("NetNumber", "0"),
         ("NetworkName", ""),
         ("CANopenManager", "0"),
@@ -180,20 +156,20 @@ def _listed(indices: list[int]) -> list[tuple[str, str]]:
     ]
 
 
-def _object(one: Object, node: int, valued: bool) -> Iterator[_Section]:
-    section = f"{one.index:04X}"
-    if one.code is ObjectCode.VAR:
-        yield section, _entry(one.entries[0], one.name, node, valued=valued)
+def _object(item: Object, node: int, *, valued: bool) -> Iterator[_Section]:
+    section = f"{item.index:04X}"
+    if item.code is ObjectCode.VAR:
+        yield section, _entry(item.entries[0], item.name, node, valued=valued)
         return
     yield (
         section,
         [
-            ("ParameterName", one.name),
-            ("ObjectType", f"0x{one.code:X}"),
-            ("SubNumber", f"0x{len(one.entries):X}"),
+            ("ParameterName", item.name),
+            ("ObjectType", f"0x{item.code:X}"),
+            ("SubNumber", f"0x{len(item.entries):X}"),
         ],
     )
-    for entry in one.entries:
+    for entry in item.entries:
         yield f"{section}sub{entry.subindex:X}", _entry(entry, entry.name, node, valued=valued)
 
 
@@ -229,20 +205,17 @@ def _number(can_type: CanType, data: bytes) -> str:
         return str(int(value))
     if can_type.is_real:
         return f"{value:.17g}"
-    return str(value) if _is_signed(can_type) else f"0x{value:X}"
+    return _integer(can_type, int(value))
 
 
 def _limits(entry: Entry) -> Iterator[tuple[str, str]]:
     if entry.type.is_real or entry.type.size is None or entry.type is CanType.BOOLEAN:
         return
-    signed = _is_signed(entry.type)
-    for key, limit in (
-        ("LowLimit", None if entry.low is None else ceil(entry.low)),
-        ("HighLimit", None if entry.high is None else floor(entry.high)),
-    ):
-        if limit is not None:
-            yield key, str(limit) if signed else f"0x{limit:X}"
+    if entry.low is not None:
+        yield "LowLimit", _integer(entry.type, ceil(entry.low))
+    if entry.high is not None:
+        yield "HighLimit", _integer(entry.type, floor(entry.high))
 
 
-def _is_signed(can_type: CanType) -> bool:
-    return can_type.name.startswith("INTEGER")
+def _integer(can_type: CanType, value: int) -> str:
+    return str(value) if can_type.name.startswith("INTEGER") else f"0x{value:X}"

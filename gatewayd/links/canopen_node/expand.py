@@ -5,9 +5,10 @@ What cannot be laid out is kept for the rules to find (`CanopenCell.is_complete`
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
+from itertools import chain
 from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
@@ -45,6 +46,7 @@ __all__ = [
     "expand_canopen",
     "node_of",
     "place_of",
+    "the_node",
 ]
 
 _INTEGERS: Final = (
@@ -104,6 +106,16 @@ class ExpandedPdo:
         """What people call it: `TPDO 3`, or with its name `TPDO 3 (force)`."""
         kind = "TPDO" if self.direction is Direction.OUTPUT else "RPDO"
         return f"{kind} {self.slot.number}" + (f" ({self.name})" if self.name else "")
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it has a number and a COB-ID, and all of it goes into one frame and one direction."""
+        return (
+            self.slot.cob_id is not None
+            and self.slot.number <= PDO_NUMBERS
+            and self.bits <= PDO_BITS
+            and all(entry.direction is self.direction for entry in self.entries)
+        )
 
     @property
     def bits(self) -> int:
@@ -181,18 +193,9 @@ class CanopenCell(ExpandedLink):
         return (
             not self.empty
             and not self.misnamed
-            and all(one.fits for one in self.objects)
-            and all(_is_whole(pdo) for pdo in self.pdos)
+            and all(placed.fits for placed in self.objects)
+            and all(pdo.is_whole for pdo in self.pdos)
         )
-
-
-def _is_whole(pdo: ExpandedPdo) -> bool:
-    return (
-        pdo.slot.cob_id is not None
-        and pdo.slot.number <= PDO_NUMBERS
-        and pdo.bits <= PDO_BITS
-        and all(entry.direction is pdo.direction for entry in pdo.entries)
-    )
 
 
 def node_of(cell: ExpandedCell) -> CanopenCell | None:
@@ -200,12 +203,19 @@ def node_of(cell: ExpandedCell) -> CanopenCell | None:
     return cell.link(CanopenCell)
 
 
+def the_node(cell: ExpandedCell) -> CanopenCell:
+    """The node of a cell that has one."""
+    node = node_of(cell)
+    assert node is not None
+    return node
+
+
 def default_type(variable: ExpandedVariable, real: str) -> CanType:
     """The type of a variable that names none; `real` is the type of reals."""
     if variable.low is None or variable.high is None:
         return CanType.BOOLEAN if variable.kind is ValueKind.BOOL else CanType[real]
     low, high = variable.low, variable.high
-    return next(one for one in _INTEGERS if one.bounds[0] <= low and high <= one.bounds[1])
+    return next(integer for integer in _INTEGERS if integer.bounds[0] <= low and high <= integer.bounds[1])
 
 
 def place_of(variable: ExpandedVariable) -> CanopenPlace | None:
@@ -215,10 +225,7 @@ def place_of(variable: ExpandedVariable) -> CanopenPlace | None:
 
 def expand_canopen(part: Part[Canopen], variables: Sequence[ExpandedVariable]) -> CanopenCell:
     """Lay the node out. Never raises."""
-    layout = _Layout(part, variables)
-    layout.name_members()
-    layout.place()
-    return layout.finished()
+    return _Layout(part, variables).finished()
 
 
 class _Layout:
@@ -233,9 +240,10 @@ class _Layout:
         """Variable -> the PDO that it is in."""
         self._members: dict[str, list[int]] = {name: [] for name in part.spec.pdos}
         self._status: dict[str, list[StatusWord]] = {name: [] for name in part.spec.pdos}
-        self._objects: dict[int, MappedObject] = {}
+        self._name_members()
+        self._objects = self._placed()
 
-    def name_members(self) -> None:
+    def _name_members(self) -> None:
         """Collect the variables of the PDOs of the file: those they list, then those that ask for them."""
         for name, pdo in self.part.spec.pdos.items():
             self._name_status(name, pdo)
@@ -265,7 +273,7 @@ class _Layout:
                 position = self.part.at("pdos", name, "status", number)
                 self._misnamed.append(Misnamed(name, member.variables.text, MemberProblem.UNKNOWN, position))
             else:
-                self._status[name] += (quality_word(one.index, one.name) for one in found)
+                self._status[name] += (quality_word(variable.index, variable.name) for variable in found)
 
     def _find(self, name: str, members: range | None) -> list[ExpandedVariable] | None:
         family = self._lines.get(name)
@@ -288,8 +296,8 @@ class _Layout:
             self._of[index] = pdo
             self._members[pdo].append(index)
 
-    def place(self) -> None:
-        """Give every variable that is on CANopen its object."""
+    def _placed(self) -> dict[int, MappedObject]:
+        """The object of every variable that is on CANopen."""
         real = self.part.spec.pdo.real
         chosen: list[tuple[ExpandedVariable, CanType, bool]] = []
         for variable in self.variables:
@@ -301,9 +309,13 @@ class _Layout:
             can_type = CanType[named] if named is not None else plain
             fits = _fits(variable.kind, can_type)
             chosen.append((variable, can_type if fits else plain, fits))
-        placed = place_objects((one.index, one.direction, can_type) for one, can_type, _ in chosen)
-        for (variable, _, fits), plan in zip(chosen, placed, strict=True):
-            self._objects[variable.index] = MappedObject(plan, variable.direction, fits)
+        plans = place_objects(
+            (variable.index, variable.direction, can_type) for variable, can_type, _ in chosen
+        )
+        return {
+            variable.index: MappedObject(plan, variable.direction, fits)
+            for (variable, _, fits), plan in zip(chosen, plans, strict=True)
+        }
 
     def finished(self) -> CanopenCell:
         """The whole node."""
@@ -317,36 +329,27 @@ class _Layout:
         )
 
     def _direction(self, direction: Direction) -> list[ExpandedPdo]:
-        named = [
-            (name, tuple(self._objects[index] for index in self._members[name]))
-            for name in self._members
-            if self._direction_of(name) is direction
-        ]
+        named = [name for name in self._members if self._direction_of(name) is direction]
         automatic = [
-            self._objects[one.index].plan
-            for one in self.variables
-            if one.direction is direction and one.index not in self._of
-            if (place := place_of(one)) is not None and place.pdo == AUTO
+            self._objects[variable.index].plan
+            for variable in self.variables
+            if variable.direction is direction and variable.index not in self._of
+            if (place := place_of(variable)) is not None and place.pdo == AUTO
         ]
-        contents: list[tuple[str, tuple[MappedObject, ...]]] = [
-            *named,
-            *(
-                ("", tuple(self._objects[plan.variable] for plan in pdo))
-                for pdo in split_into_pdos(automatic)
-            ),
-        ]
+        contents = [(name, self._members[name]) for name in named]
+        contents += [("", [plan.variable for plan in pdo]) for pdo in split_into_pdos(automatic)]
         specs = self.part.spec.pdos
         pool = self.part.spec.cob_ids
         transmit = direction is Direction.OUTPUT
         slots = assign(
             [specs[name].cob_id if name else None for name, _ in contents],
             self.part.spec.node,
-            _flat(pool.tpdo if transmit else pool.rpdo),
+            chain.from_iterable(pool.tpdo if transmit else pool.rpdo),
             transmit=transmit,
         )
         made = [
-            self._pdo(name, direction, slot, entries)
-            for (name, entries), slot in zip(contents, slots, strict=True)
+            self._pdo(name, direction, slot, tuple(self._objects[index] for index in members))
+            for (name, members), slot in zip(contents, slots, strict=True)
         ]
         return sorted(made, key=lambda pdo: pdo.slot.number)
 
@@ -382,10 +385,6 @@ def _given(spec: PdoSpec | PdoDefaults, defaults: PdoDefaults, key: str) -> floa
     """A time of a PDO where it is written (`none` counts), else the default of all."""
     value: float | None = getattr(spec if key in spec.model_fields_set else defaults, key)
     return value
-
-
-def _flat(ranges: Iterable[range]) -> Iterator[int]:
-    return (cob_id for one in ranges for cob_id in one)
 
 
 def _fits(kind: ValueKind, can_type: CanType) -> bool:

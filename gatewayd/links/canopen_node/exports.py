@@ -2,48 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Final
 
-from gatewayd.canopen.dictionary import Dictionary
-from gatewayd.links.canopen_node.eds import Commissioning, dcf_text, eds_text, objects_of, sheet_of
-from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
+from gatewayd.canopen.dictionary import Object
+from gatewayd.links.canopen_node.eds import Sheet, dcf_text, eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.plan import canopen_of
 from gatewayd.links.exports import Export, ExportError
 from gatewayd.mapping.plan import Plan
 
 __all__ = ["EXPORTS"]
 
 
-def _eds(plan: Plan) -> str:
-    node = _node(plan)
-    dictionary = objects_of(node, plan.cell)
-    return _read_back(eds_text(dictionary, sheet_of(node, plan.cell, "eds")), dictionary, node)
+def _exported(text: Callable[[Iterable[Object], Sheet], str], plan: Plan) -> str:
+    """A sheet that no other implementation understands otherwise."""
+    from gatewayd.canopen.importer import differences  # python-canopen takes a fifth of a second to import
 
-
-def _dcf(plan: Plan) -> str:
-    node = _node(plan)
-    commissioning = Commissioning(node.node, node.bitrate, plan.cell.name)
-    dictionary = objects_of(node, plan.cell)
-    return _read_back(dcf_text(dictionary, sheet_of(node, plan.cell, "dcf"), commissioning), dictionary, node)
-
-
-def _node(plan: Plan) -> CanopenPlan:
     node = canopen_of(plan)
     if node is None:
         raise ExportError(
             f"{plan.source}: the cell is on no CAN bus: "
             "add `canopen: {channel: can0, bitrate: 500000, node: 16}`"
         )
-    return node
-
-
-def _read_back(text: str, dictionary: Dictionary, node: CanopenPlan) -> str:
-    """Let no sheet out that another implementation understands otherwise."""
-    from gatewayd.canopen.importer import differences  # python-canopen takes a fifth of a second to import
-
-    found = differences(text, dictionary, node.node)
+    dictionary = objects_of(node, plan.cell)
+    made = text(dictionary, sheet_of(node, plan.cell))
+    found = differences(made, dictionary, node.node)
     if found:
         raise ExportError(f"not written, because python-canopen reads it otherwise: {'; '.join(found[:3])}")
-    return text
+    return made
 
 
 EXPORTS: Final = (
@@ -57,7 +44,7 @@ EXPORTS: Final = (
         are those of the mapping.
         """,
         "gatewayd export eds my-cell.yaml -o my-cell.eds",
-        _eds,
+        partial(_exported, eds_text),
     ),
     Export(
         "dcf",
@@ -66,6 +53,6 @@ EXPORTS: Final = (
         bit-rate and the value of every parameter as the mapping has them.
         """,
         "gatewayd export dcf my-cell.yaml -o my-cell.dcf",
-        _dcf,
+        partial(_exported, dcf_text),
     ),
 )

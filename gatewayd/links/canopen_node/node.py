@@ -60,7 +60,7 @@ class _Timed(Protocol):
 class Node:
     """One cell as one node.
 
-    `alive(now)` tells whether the core lives: without it the heartbeat is withheld. `bit_rates` are those that the
+    `alive(now)` says whether the core lives: without it the heartbeat is withheld. `bit_rates` are those that the
     link can switch to for an LSS master.
     """
 
@@ -141,7 +141,7 @@ class Node:
             self.nmt,
             lambda: self.producer.enabled,
             lost=self.errors.guarding_lost,
-            back=self.errors.guarding_back,
+            back=partial(self.emergency.clear, ErrorCode.HEARTBEAT),
         )
         self.sync = SyncService(
             self._send,
@@ -151,7 +151,7 @@ class Node:
             wrong_length=self.errors.sync_length,
             changed=self._route,
         )
-        self.time = TimeConsumer(on_time=self._observer.time_told, changed=self._route)
+        self.time = TimeConsumer(on_time=self._observer.time_received, changed=self._route)
         self.receive_pdos = ReceiveEngine(
             cell,
             partial(self._peers.requester, plan.rpdo_writer),
@@ -159,10 +159,7 @@ class Node:
             self.errors.fault_cleared,
         )
         self.pdos = PdoTable(
-            replace(plan, node=node),
-            cell.definition.variables,
-            self._find,
-            self._pdo_changed,
+            replace(plan, node=node), cell.definition.variables, self._find, self._pdo_changed
         )
         self.dictionary = Dictionary(self._objects(identity), self._waiting.permit)
         self.parameters.bind(self.dictionary)
@@ -261,7 +258,7 @@ class Node:
         self.robot_errors.tick(now)
 
     def bus_changed(self, state: BusState, now: float) -> None:
-        """The bus is in another state, or told for the first time."""
+        """The bus is in another state, or reports its first one."""
         self._now = now
         old, self.bus = self.bus, state
         if old.carries and not state.carries:
@@ -401,7 +398,7 @@ class Node:
         self.sync.restart(now)
         self._route()
         self.errors.bus_seen(self.bus, now)
-        self._judge_store(now)
+        self.emergency.judge(ErrorCode.STORED_PARAMETERS, self._store_damaged, now)
 
     def _configured(self, now: float) -> None:
         """LSS has given a node-ID to a node that had none."""
@@ -432,10 +429,7 @@ class Node:
     def _store_failed(self, damaged: bool) -> None:
         self._store_damaged = damaged
         if self._started:
-            self._judge_store(self._now)
-
-    def _judge_store(self, now: float) -> None:
-        self.emergency.judge(ErrorCode.STORED_PARAMETERS, self._store_damaged, now)
+            self.emergency.judge(ErrorCode.STORED_PARAMETERS, damaged, self._now)
 
     # -- assembly ------------------------------------------------------------------------------------------------
 
@@ -478,7 +472,7 @@ class Node:
             self._route()
 
     def _on_sync(self, counter: int | None, now: float) -> None:
-        self.errors.sync_right(now)
+        self.emergency.clear(ErrorCode.SYNC_LENGTH, now)
         self.transmit.on_sync(counter, now, late=self._waiting.seconds > 0)
         self.receive_pdos.on_sync(now)
 

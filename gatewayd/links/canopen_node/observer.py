@@ -1,4 +1,4 @@
-"""What a node counts, and whom it tells of what is not for the bus."""
+"""What a node counts, and who learns of what is not for the bus."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["NodeCounters", "Observer"]
 
 
 class Observer:
-    """Whom a node tells what is not for the bus; does nothing by itself."""
+    """Gets what a node has to report that is not for the bus; does nothing by itself."""
 
     def cob_ids_changed(self) -> None:
         """`Node.cob_ids` or `Node.remote_ids` is another one now."""
@@ -22,7 +22,7 @@ class Observer:
     def report(self, text: str) -> None:
         """Something for the log."""
 
-    def time_told(self, moment: datetime, now: float) -> None:
+    def time_received(self, moment: datetime, now: float) -> None:
         """The network's wall clock (TIME)."""
 
     def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:

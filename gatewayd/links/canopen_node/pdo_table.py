@@ -1,8 +1,9 @@
-"""The PDO table of a cell, as a master's programmer needs it, and the load of the bus for each bit-rate."""
+"""The PDO table of a cell with a node, as a master's programmer needs it, and the load of the bus for each bit-rate."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from gatewayd.core.definition import Direction
@@ -12,15 +13,14 @@ from gatewayd.links.canopen_node.bus_load import (
     bus_shares,
     load,
     pdo_rate,
-    station_of,
 )
-from gatewayd.links.canopen_node.expand import ExpandedPdo, MappedObject, node_of
-from gatewayd.links.canopen_node.status_words import StatusWord
+from gatewayd.links.canopen_node.expand import ExpandedPdo, MappedObject, the_node
 from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.report.wording import cob
 
 __all__ = [
+    "PdoItem",
     "PdoRow",
-    "PdoRun",
     "as_document",
     "by_sdo_only",
     "load_by_bit_rate",
@@ -31,16 +31,16 @@ __all__ = [
 
 
 @dataclass(frozen=True, slots=True)
-class PdoRun:
-    """Neighbouring variables of one line in a PDO, or a word of the status block."""
+class PdoItem:
+    """A variable in a PDO, neighbouring variables of one line, or a word of the status block."""
 
-    names: str
-    """`start`, or `recipe[0..1]`; `status: flags`."""
+    name: str
+    """`start`, or `recipe[0..1]`; `flags`."""
     bit: int
     """Where the first begins, 0 the least significant bit of the first byte."""
     bits: int
     """Bits of all."""
-    objects: str
+    object: str
     """`2020h:01`, or `2020h:01-02`."""
     type: str
 
@@ -55,24 +55,28 @@ class PdoRow:
     cob_id: str
     """`0x190`."""
     predefined: bool
-    transmission: str
-    """`event (254)`, `sync (1)`, `every 4th SYNC`."""
+    transmission: int
     inhibit: float | None
     """Seconds; None for synchronous PDOs too, which have none."""
     event: float | None
     """Seconds: event timer, or deadline."""
     rate: float
     """Frames per second in the worst case."""
-    runs: tuple[PdoRun, ...]
+    variables: tuple[PdoItem, ...]
+    """Each by itself."""
+    status: tuple[PdoItem, ...]
+    """Words of the status block, which come before the variables."""
+    runs: tuple[PdoItem, ...]
+    """The same with neighbours of one line together."""
 
 
-def object_place(one: MappedObject) -> str:
+def object_place(index: int, subindex: int) -> str:
     """Index and sub-index, both hexadecimal as in a manual: `2000h:01`."""
-    return f"{one.plan.index:04X}h:{one.plan.subindex:02X}"
+    return f"{index:04X}h:{subindex:02X}"
 
 
 def transmission_words(transmission: int) -> str:
-    """A transmission type in words and as a number."""
+    """A transmission type in words and as a number: `event (254)`, `sync (1)`, `every 4 SYNCs (4)`."""
     if transmission >= FIRST_EVENT_TYPE:
         return f"event ({transmission})"
     if transmission == 0:
@@ -81,117 +85,75 @@ def transmission_words(transmission: int) -> str:
 
 
 def pdo_rows(cell: ExpandedCell) -> tuple[PdoRow, ...]:
-    """The PDOs of a cell without errors: those towards the robot, then those from it; none without a node."""
-    node = node_of(cell)
-    if node is None:
-        return ()
-    station = station_of(cell, node)
-    found = []
-    for pdo in node.pdos:
-        assert pdo.slot.cob_id is not None
-        event_driven = pdo.transmission >= FIRST_EVENT_TYPE
-        found.append(
-            PdoRow(
-                pdo.label,
-                pdo.direction,
-                f"0x{pdo.slot.cob_id:03X}",
-                pdo.slot.predefined,
-                transmission_words(pdo.transmission),
-                pdo.inhibit if event_driven else None,
-                pdo.event if event_driven or pdo.direction is Direction.INPUT else None,
-                pdo_rate(pdo, station.rate, node.part.spec.sync.period),
-                _runs(cell, pdo),
-            )
-        )
-    return tuple(found)
+    """The PDOs of a cell without errors: those towards the robot, then those from it."""
+    node = the_node(cell)
+    period = node.part.spec.sync.period
+    return tuple(_row(cell, pdo, pdo_rate(pdo, cell.settings.rate, period)) for pdo in node.pdos)
 
 
 def by_sdo_only(cell: ExpandedCell) -> tuple[str, ...]:
     """Variables that are objects and in no PDO, each with its place: `recipe[3] 2020h:04`."""
-    node = node_of(cell)
-    if node is None:
-        return ()
-    carried = {entry.variable for pdo in node.pdos for entry in pdo.entries}
+    node = the_node(cell)
+    carried = node.carried
     return tuple(
-        f"{cell.variables[one.variable].name} {object_place(one)}"
-        for one in node.objects
-        if one.variable not in carried
+        f"{cell.variables[placed.variable].name} {object_place(placed.plan.index, placed.plan.subindex)}"
+        for placed in node.objects
+        if placed.variable not in carried
     )
 
 
 def load_by_bit_rate(cell: ExpandedCell) -> dict[int, float]:
-    """The share of the bus that this cell alone can take, by bit-rate; empty without a node."""
-    node = node_of(cell)
-    if node is None:
-        return {}
-    shares = bus_shares([station_of(cell, node)])
+    """The share of the bus that this cell alone can take, by bit-rate."""
+    shares = bus_shares([cell])
     return {bit_rate: load(shares, bit_rate) for bit_rate in BIT_RATES}
 
 
-def as_document(cell: ExpandedCell) -> dict[str, Any] | None:
-    """The node for JSON: `interface`, `channel`, `bitrate`, `node`, `pdos` and `load`; None without one."""
-    node = node_of(cell)
-    if node is None:
-        return None
-    spec = node.part.spec
+def as_document(cell: ExpandedCell) -> dict[str, Any]:
+    """The node for JSON: `interface`, `channel`, `bitrate`, `node`, `pdos` and `load`."""
+    spec = the_node(cell).part.spec
+    pdos = [{**asdict(row), "direction": row.direction.value} for row in pdo_rows(cell)]
+    for pdo in pdos:
+        del pdo["runs"]
     return {
         "interface": spec.interface,
         "channel": spec.channel,
         "bitrate": spec.bitrate,
         "node": spec.node,
-        "pdos": [
-            {
-                "pdo": row.pdo,
-                "direction": row.direction.value,
-                "cob_id": row.cob_id,
-                "predefined": row.predefined,
-                "transmission": pdo.transmission,
-                "inhibit": row.inhibit,
-                "event": row.event,
-                "rate": row.rate,
-                "variables": [
-                    {
-                        "name": cell.variables[one.variable].name,
-                        "bit": bit,
-                        "bits": one.plan.type.bits,
-                        "object": object_place(one),
-                        "type": one.plan.type.name,
-                    }
-                    for bit, one in pdo.offsets
-                ],
-                "status": [
-                    {
-                        "name": word.name,
-                        "bit": bit,
-                        "bits": word.type.bits,
-                        "object": _status_place(word),
-                        "type": word.type.name,
-                    }
-                    for bit, word in pdo.status_offsets
-                ],
-            }
-            for row, pdo in zip(pdo_rows(cell), node.pdos, strict=True)
-        ],
+        "pdos": pdos,
         "load": {str(bit_rate): round(share, 6) for bit_rate, share in load_by_bit_rate(cell).items()},
     }
 
 
-def _runs(cell: ExpandedCell, pdo: ExpandedPdo) -> tuple[PdoRun, ...]:
-    groups: list[list[tuple[int, MappedObject]]] = []
-    for bit, one in pdo.offsets:
-        if groups and _follows(cell, groups[-1][-1][1], one):
-            groups[-1].append((bit, one))
-        else:
-            groups.append([(bit, one)])
-    words = (
-        PdoRun(f"status: {word.name}", bit, word.type.bits, _status_place(word), word.type.name)
-        for bit, word in pdo.status_offsets
+def _row(cell: ExpandedCell, pdo: ExpandedPdo, rate: float) -> PdoRow:
+    assert pdo.slot.cob_id is not None
+    event_driven = pdo.transmission >= FIRST_EVENT_TYPE
+    return PdoRow(
+        pdo.label,
+        pdo.direction,
+        cob(pdo.slot.cob_id),
+        pdo.slot.predefined,
+        pdo.transmission,
+        pdo.inhibit if event_driven else None,
+        pdo.event if event_driven or pdo.direction is Direction.INPUT else None,
+        rate,
+        tuple(_item(cell, [(bit, placed)]) for bit, placed in pdo.offsets),
+        tuple(
+            PdoItem(word.name, bit, word.type.bits, object_place(word.index, word.subindex), word.type.name)
+            for bit, word in pdo.status_offsets
+        ),
+        tuple(_item(cell, run) for run in _runs(cell, pdo)),
     )
-    return (*words, *(_run(cell, group) for group in groups))
 
 
-def _status_place(word: StatusWord) -> str:
-    return f"{word.index:04X}h:{word.subindex:02X}"
+def _runs(cell: ExpandedCell, pdo: ExpandedPdo) -> Iterator[list[tuple[int, MappedObject]]]:
+    run: list[tuple[int, MappedObject]] = []
+    for bit, placed in pdo.offsets:
+        if run and not _follows(cell, run[-1][1], placed):
+            yield run
+            run = []
+        run.append((bit, placed))
+    if run:
+        yield run
 
 
 def _follows(cell: ExpandedCell, earlier: MappedObject, later: MappedObject) -> bool:
@@ -203,13 +165,12 @@ def _follows(cell: ExpandedCell, earlier: MappedObject, later: MappedObject) -> 
     )
 
 
-def _run(cell: ExpandedCell, group: list[tuple[int, MappedObject]]) -> PdoRun:
-    bit, first = group[0]
-    last = group[-1][1]
-    names = cell.variables[first.variable].name
-    objects = object_place(first)
-    if len(group) > 1:
-        member = cell.variables[last.variable].member
-        names = f"{names.removesuffix(']')}..{member}]"
-        objects += f"-{last.plan.subindex:02X}"
-    return PdoRun(names, bit, sum(one.plan.type.bits for _, one in group), objects, first.plan.type.name)
+def _item(cell: ExpandedCell, run: list[tuple[int, MappedObject]]) -> PdoItem:
+    bit, first = run[0]
+    last = run[-1][1]
+    name = cell.variables[first.variable].name
+    place = object_place(first.plan.index, first.plan.subindex)
+    if len(run) > 1:
+        name = f"{name.removesuffix(']')}..{cell.variables[last.variable].member}]"
+        place += f"-{last.plan.subindex:02X}"
+    return PdoItem(name, bit, sum(placed.plan.type.bits for _, placed in run), place, first.plan.type.name)

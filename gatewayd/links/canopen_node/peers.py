@@ -36,7 +36,7 @@ class Peers:
 
     def resume(self, former: Peers) -> None:
         """The living writers of the cell that this one succeeded, by name; the cell has them counted already."""
-        names = {one.name: index for index, one in enumerate(self._cell.definition.writers)}
+        names = {writer.name: index for index, writer in enumerate(self._cell.definition.writers)}
         before = former._cell.definition.writers
         self._alive = {names[before[writer].name] for writer in former._alive if before[writer].name in names}
         for writer, requester in former._requesters.items():

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.heartbeat import Consumer
 from gatewayd.canopen.sync import SyncPlan
-from gatewayd.core.definition import CellDefinition, Direction
+from gatewayd.core.definition import Direction
 from gatewayd.mapping.plan import LinkPlan, Plan
 
-__all__ = ["FIRST_STATUS_OBJECT", "CanopenPlan", "ObjectPlan", "PdoEntry", "PdoPlan", "by_name", "canopen_of"]
+__all__ = ["FIRST_STATUS_OBJECT", "CanopenPlan", "ObjectPlan", "PdoEntry", "PdoPlan", "canopen_of"]
 
 FIRST_STATUS_OBJECT = 0x5F00
 """Where the status block begins in the object dictionary."""
@@ -38,11 +38,6 @@ class PdoEntry:
     bits: int
     quality_of: int | None = None
     """Index of the variable whose quality this word of the status block is."""
-
-    @property
-    def is_status(self) -> bool:
-        """Whether it is a word of the status block, which only a TPDO carries."""
-        return self.variable is None and self.index >= FIRST_STATUS_OBJECT
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,39 +86,6 @@ class CanopenPlan(LinkPlan):
     """The writer that RPDOs are; None: nobody writes by PDO."""
     sdo_writer: int | None
     """The writer that SDO clients are; None: variables are read-only by SDO."""
-
-
-def by_name(plan: CanopenPlan, definition: CellDefinition) -> tuple[object, ...]:
-    """The plan with names in place of the numbers that a mapping gives its variables and writers.
-
-    Two nodes whose results are equal are the same one for the bus, whatever else their mappings say.
-    """
-    variables = [variable.name for variable in definition.variables]
-    writers = [writer.name for writer in definition.writers]
-
-    def variable(index: int | None) -> str | None:
-        return None if index is None else variables[index]
-
-    def writer(index: int | None) -> str | None:
-        return None if index is None else writers[index]
-
-    return (
-        astuple(replace(plan, objects=(), pdos=(), consumers=(), rpdo_writer=None, sdo_writer=None)),
-        writer(plan.rpdo_writer),
-        writer(plan.sdo_writer),
-        [(one.node, one.timeout, writer(one.writer)) for one in plan.consumers],
-        [(variable(one.variable), one.index, one.subindex, one.type) for one in plan.objects],
-        [
-            (
-                astuple(replace(pdo, entries=())),
-                [
-                    (variable(one.variable), one.index, one.subindex, one.bits, variable(one.quality_of))
-                    for one in pdo.entries
-                ],
-            )
-            for pdo in plan.pdos
-        ],
-    )
 
 
 def canopen_of(plan: Plan) -> CanopenPlan | None:

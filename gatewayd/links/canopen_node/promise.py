@@ -114,11 +114,6 @@ class Promises:
         found = self._of.get(writer) if writer is not None else None
         return found.node if found is not None else None
 
-    def promised(self, node: int) -> float:
-        """Seconds that the mapping gives the node; infinity where nothing was promised."""
-        found = self._nodes.get(node)
-        return found.timeout if found is not None else math.inf
-
     def state(self, node: int) -> Promise | None:
         """How the node stands to it; None where nothing was promised."""
         found = self._nodes.get(node)

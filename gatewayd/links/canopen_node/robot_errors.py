@@ -31,6 +31,12 @@ FIRST_CONNECTION: Final = 2.0
 QUIET: Final = 1.0
 """Seconds without it after which an error is over."""
 
+_ERRORS: Final = (
+    ErrorCode.ROBOT_LOST,
+    ErrorCode.ROBOT_STALE,
+    ErrorCode.ROBOT_DIFFERS,
+    ErrorCode.ROBOT_UNAVAILABLE,
+)
 _STALE: Final = (Source.SILENT, Source.FROZEN, Source.LATE)
 
 
@@ -45,20 +51,25 @@ class RobotErrors:
         """Active errors whose cause has gone, and when they are over."""
         self._missed_at = math.inf
         """When a robot that was never there counts as lost."""
+        self._is_well = False
+        """None of its errors was active when it was last looked at: this is asked for with every change of the cell."""
 
     def tick(self, now: float) -> None:
         """Judge the cell as it is now."""
         if not self._running():
             return
-        state = self._cell.freshness.state
+        state, differing = self._cell.freshness.state, self._cell.health.differing
+        missing = self._cell.image.available.count(False)
+        if self._is_well and state is Source.FRESH and not differing and not missing:
+            return
         if self._missed_at == math.inf:
             self._missed_at = now + FIRST_CONNECTION
         if state is not Source.WAITING:
-            self._judge(ErrorCode.ROBOT_LOST, int(state is Source.LOST and self._is_missed(now)), now, b"")
-            stale = state in _STALE
-            self._judge(ErrorCode.ROBOT_STALE, int(stale), now, bytes([state, 0]))
-        self._count(ErrorCode.ROBOT_DIFFERS, self._cell.health.differing, now)
-        self._count(ErrorCode.ROBOT_UNAVAILABLE, self._cell.image.available.count(False), now)
+            self._judge(ErrorCode.ROBOT_LOST, state is Source.LOST and self._is_missed(now), 0, now)
+            self._judge(ErrorCode.ROBOT_STALE, state in _STALE, state, now)
+        self._judge(ErrorCode.ROBOT_DIFFERS, differing > 0, differing, now)
+        self._judge(ErrorCode.ROBOT_UNAVAILABLE, missing > 0, missing, now)
+        self._is_well = not any(map(self._emergency.active, _ERRORS))
 
     def next_deadline(self, now: float) -> float:
         """When `tick` has something to do whatever happens to the cell."""
@@ -70,13 +81,10 @@ class RobotErrors:
         known = self._cell.health.sessions > 0 or self._emergency.active(ErrorCode.ROBOT_LOST)
         return known or now >= self._missed_at
 
-    def _count(self, code: ErrorCode, count: int, now: float) -> None:
-        self._judge(code, count, now, min(count, 0xFFFF).to_bytes(2, "little"))
-
-    def _judge(self, code: ErrorCode, wrong: int, now: float, data: bytes) -> None:
+    def _judge(self, code: ErrorCode, wrong: bool, detail: int, now: float) -> None:
         if wrong:
             self._gone.pop(code, None)
-            self._emergency.raise_error(code, now, data)
+            self._emergency.raise_error(code, now, min(detail, 0xFFFF).to_bytes(2, "little"))
         elif self._emergency.active(code):
             over = self._gone.setdefault(code, now + max(QUIET, self._emergency.inhibit))
             if now >= over:

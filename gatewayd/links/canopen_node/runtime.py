@@ -59,11 +59,7 @@ class CanLink(Link, Observer):
         self._cell = cell
         self._bus: SupervisedBus | None = None
         self._transmitter = Transmitter(
-            self._offer,
-            self._renew,
-            now=clock.now,
-            punctual=self._offer_at_once,
-            overdue=clock.overdue,
+            self._offer, self._renew, now=clock.now, punctual=self._offer_at_once, overdue=clock.overdue
         )
         self._timer: asyncio.TimerHandle | None = None
         self._catching: asyncio.Handle | None = None
@@ -73,7 +69,7 @@ class CanLink(Link, Observer):
         self._beat = (-1, -math.inf)
         self._offset = math.inf
         self._lost = 0
-        self._lost_told = -math.inf
+        self._lost_reported = -math.inf
         self._other_bit_rate: int | None = None
         self._switch = (0, 0.0)
         self._switching = asyncio.Event()
@@ -192,9 +188,9 @@ class CanLink(Link, Observer):
     def on_lost(self, count: int, now: float) -> None:
         """Frames were lost for want of room."""
         self._lost += count
-        if now - self._lost_told >= LOSS_INTERVAL:
+        if now - self._lost_reported >= LOSS_INTERVAL:
             log.warning("CAN frames lost", extra=fields(**self._names(), frames=self._lost))
-            self._lost, self._lost_told = 0, now
+            self._lost, self._lost_reported = 0, now
         self.node.frames_lost(count, now)
         self._schedule(now)
 
@@ -236,7 +232,7 @@ class CanLink(Link, Observer):
         """Something for the log."""
         log.warning("CANopen: %s", text, extra=fields(**self._names()))
 
-    def time_told(self, moment: datetime, now: float) -> None:
+    def time_received(self, moment: datetime, now: float) -> None:
         """The network's clock: reported once, and when it was set."""
         offset = moment.timestamp() - now
         if abs(offset - self._offset) > CLOCK_STEP:

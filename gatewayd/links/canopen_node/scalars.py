@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Final, Literal
 
 from pydantic import BeforeValidator, Field, InstanceOf
@@ -82,20 +83,15 @@ def _timer(value: object, unit: float, ticks: str) -> float | None:
     return round(count) * unit
 
 
-def _milliseconds(value: object) -> float | None:
-    return _timer(value, 0.001, "milliseconds")
-
-
-def _inhibit(value: object) -> float | None:
-    return _timer(value, 0.0001, "tenths of a millisecond")
-
+_milliseconds = partial(_timer, unit=0.001, ticks="milliseconds")
+_tenths = partial(_timer, unit=0.0001, ticks="tenths of a millisecond")
 
 MillisecondTime = Annotated[
     float | None, BeforeValidator(_milliseconds, json_schema_input_type=OPTIONAL_DURATION_SCHEMA)
 ]
 """Seconds that a CANopen timer of 16-bit milliseconds holds, or `none`."""
 InhibitTime = Annotated[
-    float | None, BeforeValidator(_inhibit, json_schema_input_type=OPTIONAL_DURATION_SCHEMA)
+    float | None, BeforeValidator(_tenths, json_schema_input_type=OPTIONAL_DURATION_SCHEMA)
 ]
 """Seconds that a CANopen timer of 16-bit tenths of a millisecond holds, or `none`."""
 
@@ -130,8 +126,7 @@ _COB_ID_SCHEMA = int | Annotated[str, Field(pattern="^0x[0-9A-Fa-f]{1,3}$", exam
 _COB_IDS_SCHEMA = (
     int
     | Annotated[
-        str,
-        Field(pattern=r"^0x[0-9A-Fa-f]{1,3}(\.\.0x[0-9A-Fa-f]{1,3})?$", examples=["0x1A0..0x1AF"]),
+        str, Field(pattern=r"^0x[0-9A-Fa-f]{1,3}(\.\.0x[0-9A-Fa-f]{1,3})?$", examples=["0x1A0..0x1AF"])
     ]
 )
 CobId = Annotated[int, BeforeValidator(_cob_id, json_schema_input_type=_COB_ID_SCHEMA)]
@@ -161,8 +156,7 @@ def _transmission(value: object) -> int:
 
 
 Transmission = Annotated[
-    int,
-    BeforeValidator(_transmission, json_schema_input_type=Literal["event", "sync"] | int),
+    int, BeforeValidator(_transmission, json_schema_input_type=Literal["event", "sync"] | int)
 ]
 """Transmission type: `event` is 254, `sync` is 1."""
 
@@ -176,10 +170,6 @@ class Member:
     """Name of the line."""
     members: range | None = None
     """Members of the family; None: all that the line makes."""
-
-    def __str__(self) -> str:
-        """As written."""
-        return self.text
 
 
 def _member(value: object) -> Member:
@@ -216,10 +206,6 @@ class StatusMember:
     """Name of the field; empty for qualities."""
     variables: Member | None = None
     """The variables whose quality is meant."""
-
-    def __str__(self) -> str:
-        """As written."""
-        return self.text
 
 
 _QUALITY_OF: Final = "quality of "

@@ -28,10 +28,8 @@ __all__ = [
     "CanopenPlaces",
     "CanopenWriter",
     "CobIdPool",
-    "NumberType",
     "PdoDefaults",
     "PdoSpec",
-    "RealType",
     "Sync",
 ]
 
@@ -78,21 +76,26 @@ class Sync(Section):
     )
 
 
+_TRANSMISSION = "event (when a value changed), sync (every SYNC), or a type: 0, 1 to 240, 254, 255"
+Inhibit = Annotated[InhibitTime, Field(description="least time between two transmissions")]
+EventTime = Annotated[
+    MillisecondTime, Field(description="greatest time between two transmissions of a PDO from the robot")
+]
+Deadline = Annotated[
+    MillisecondTime,
+    Field(description="time without a PDO towards the robot after which it counts as missing"),
+]
+
+
 class PdoDefaults(Section):
     """What holds for every PDO that does not say otherwise."""
 
     transmission: Transmission = Field(
-        default=EVENT,
-        description="event (when a value changed), sync (every SYNC), or a type: 0, 1 to 240, 254, 255",
-        json_schema_extra={"default": "event"},
+        default=EVENT, description=_TRANSMISSION, json_schema_extra={"default": "event"}
     )
-    inhibit: InhibitTime = Field(default=None, description="least time between two transmissions")
-    event: MillisecondTime = Field(
-        default=None, description="greatest time between two transmissions of a PDO from the robot"
-    )
-    deadline: MillisecondTime = Field(
-        default=None, description="time without a PDO towards the robot after which it counts as missing"
-    )
+    inhibit: Inhibit = None
+    event: EventTime = None
+    deadline: Deadline = None
     real: RealType = Field(default="REAL64", description="type of reals that do not name their own")
 
 
@@ -111,17 +114,10 @@ class PdoSpec(Section):
     cob_id: CobId | None = Field(
         default=None, description="COB-ID; default: the next predefined one, then one of `cob_ids`"
     )
-    transmission: Transmission | None = Field(
-        default=None,
-        description="event (when a value changed), sync (every SYNC), or a type: 0, 1 to 240, 254, 255",
-    )
-    inhibit: InhibitTime = Field(default=None, description="least time between two transmissions")
-    event: MillisecondTime = Field(
-        default=None, description="greatest time between two transmissions of a PDO from the robot"
-    )
-    deadline: MillisecondTime = Field(
-        default=None, description="time without a PDO towards the robot after which it counts as missing"
-    )
+    transmission: Transmission | None = Field(default=None, description=_TRANSMISSION)
+    inhibit: Inhibit = None
+    event: EventTime = None
+    deadline: Deadline = None
     sync_start: Whole = Field(
         default=0, ge=0, le=240, description="counter value of the first SYNC that counts; 0: any"
     )
@@ -154,8 +150,7 @@ class Canopen(Section):
     node: Whole = Field(ge=1, le=127, description="node-ID")
     autostart: bool = Field(default=False, description="become OPERATIONAL without waiting for an NMT master")
     heartbeat: MillisecondTime = Field(
-        default=0.5,
-        description="time between two heartbeats; none: no heartbeat",
+        default=0.5, description="time between two heartbeats; none: no heartbeat"
     )
     sync: Sync = Field(default=Sync(), description="SYNC", json_schema_extra={"default": {}})
     pdo: PdoDefaults = Field(

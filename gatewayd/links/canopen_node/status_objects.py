@@ -66,12 +66,10 @@ class StatusObjects:
         yield record(HEADER, "Status", (self._field(*item) for item in enumerate(status_fields(), 1)))
         for table in TABLES:
             names = self._names(table)
-            first = TABLE_INDICES[table.name]
-            for chunk in range(-(-len(names) // MAX_ARRAY)):
-                start = chunk * MAX_ARRAY
+            for chunk, start in enumerate(range(0, len(names), MAX_ARRAY)):
                 title = f"Status {table.name}" + (f" {chunk + 1}" if chunk else "")
                 entries = self._cells(table, start, names[start : start + MAX_ARRAY])
-                yield array(first + chunk, title, entries)
+                yield array(TABLE_INDICES[table.name] + chunk, title, entries)
 
     def _field(self, subindex: int, field: StatusField) -> Entry:
         writable = field.offset in (REQUEST, RELEASE)
@@ -87,7 +85,7 @@ class StatusObjects:
         )
 
     def _names(self, table: StatusTable) -> Sequence[str]:
-        """What each entry of the table tells of."""
+        """What each entry of the table stands for."""
         variables = [variable.name for variable in self._definition.variables]
         if table.name == "writers_alive":
             return [writer.name for writer in self._definition.writers]
@@ -97,10 +95,10 @@ class StatusObjects:
         return variables
 
     def _cells(self, table: StatusTable, start: int, names: Sequence[str]) -> Iterator[Entry]:
-        for number, name in enumerate(names):
-            offset = table.offset + start + number
+        for number, name in enumerate(names, 1):
+            offset = table.offset + start + number - 1
             yield Entry(
-                number + 1,
+                number,
                 f"{table.name} {name}",
                 CanType.UNSIGNED16,
                 Access.RO,
@@ -110,7 +108,7 @@ class StatusObjects:
             )
 
     def _read(self, offset: int, words: int) -> bytes:
-        # The block has its high word first and its high byte first, so that all bytes are turned round.
+        # The block has its high word first and its high byte first, so that all bytes are reversed.
         return self._block.read(offset, words, self._clock())[::-1]
 
     def _write(self, offset: int, data: bytes) -> None:

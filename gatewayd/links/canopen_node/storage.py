@@ -14,28 +14,17 @@ import json
 import os
 import zlib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, Object, Pdo, array
 from gatewayd.canopen.nmt import NmtCommand
 from gatewayd.links.canopen_node.plan import FIRST_STATUS_OBJECT
 
-__all__ = [
-    "ALL",
-    "FORMAT",
-    "GROUPS",
-    "JsonStore",
-    "LssSettings",
-    "MemoryStore",
-    "Parameters",
-    "Saved",
-    "Store",
-    "StoreError",
-    "layout_of",
-]
+__all__ = ["JsonStore", "LssSettings", "Parameters", "Saved", "Store", "StoreError", "layout_of"]
 
 FORMAT = 1
 """Version of the file."""
@@ -54,7 +43,7 @@ _BOUND_TO_LAYOUT = (_PDOS, range(0x2000, 0x1_0000))
 _SAVE = b"save"
 _LOAD = b"load"
 _ON_COMMAND = 1
-"""Capability: saves and restores when told to, never by itself."""
+"""Capability: saves and restores on command, never by itself."""
 
 Key = tuple[int, int]
 """Index and sub-index."""
@@ -84,32 +73,22 @@ class Saved:
     lss: LssSettings | None = None
 
 
-class Store(Protocol):
-    """Keeps one node's `Saved`."""
-
-    def load(self) -> Saved:
-        """What was saved last; empty if nothing was. Raises StoreError."""
-
-    def save(self, saved: Saved) -> None:
-        """Keep it, whole or not at all. Raises StoreError."""
-
-
-class MemoryStore:
-    """Keeps nothing beyond the process: for a node without a state directory."""
+class Store:
+    """Keeps one node's `Saved`; this one no longer than the process lives."""
 
     def __init__(self) -> None:
         self._saved = Saved()
 
     def load(self) -> Saved:
-        """What was saved last."""
+        """What was saved last; empty if nothing was. Raises StoreError."""
         return self._saved
 
     def save(self, saved: Saved) -> None:
-        """Keep it in memory."""
+        """Keep it, whole or not at all. Raises StoreError."""
         self._saved = saved
 
 
-class JsonStore:
+class JsonStore(Store):
     """A JSON file, replaced as a whole. Saving waits for the disk, which is why no node saves while OPERATIONAL."""
 
     def __init__(self, path: Path) -> None:
@@ -152,18 +131,18 @@ def layout_of(dictionary: Iterable[Object], node: int, values: Mapping[Key, byte
     """32 bits that change when the defaults of a PDO change, or an object that it may carry, or one that is stored.
 
     Defaults that contain the node-ID count without it: another node-ID is not another layout. The status block lies
-    where it lies; which variable an entry of its tables tells of counts only where `values` put one into a PDO.
+    where it lies; which variable an entry of its tables stands for counts only where `values` put one into a PDO.
     """
     digest = 0
     tables = any(map(_maps_status_table, (values or {}).items()))
-    for one in dictionary:
-        if not _is_bound(one.index) or (one.index >= FIRST_STATUS_OBJECT and not tables):
+    for item in dictionary:
+        if not _is_bound(item.index) or (item.index >= FIRST_STATUS_OBJECT and not tables):
             continue
-        for entry in one.entries:
+        for entry in item.entries:
             if not entry.stored and entry.pdo is Pdo.NONE:
                 continue
             default = _rebased(entry, node, 0) if entry.plus_node else entry.default
-            text = f"{one.index:x}:{entry.subindex:x} {entry.type.name} {entry.name} {entry.pdo.name} "
+            text = f"{item.index:x}:{entry.subindex:x} {entry.type.name} {entry.name} {entry.pdo.name} "
             kept = default.hex() if entry.stored else ""
             digest = zlib.crc32((text + kept).encode(), digest)
     return digest
@@ -172,7 +151,7 @@ def layout_of(dictionary: Iterable[Object], node: int, values: Mapping[Key, byte
 class Parameters:
     """1010h, 1011h and the power-on values of all entries. Reads the store when it is made.
 
-    `node` is the node-ID of the mapping. `ready()` tells whether the node may wait for a disk now; `report(text)` is
+    `node` is the node-ID of the mapping. `ready()` says whether the node may wait for a disk now; `report(text)` is
     called for what could not be taken over, `failed(whether)` when reading the store failed or a save put that right.
     """
 
@@ -215,11 +194,10 @@ class Parameters:
         self._dictionary = dictionary
         self._layout = layout_of(dictionary, self._node, self._saved.values)
         kept = {key: value for key, value in self._saved.values.items() if self._fits(key, value)}
-        dropped = [f"{index:04X}h:{sub:02X}" for index, sub in self._saved.values if (index, sub) not in kept]
+        dropped = sorted(self._saved.values.keys() - kept.keys())
         if dropped:
-            self._report(
-                "stored parameters do not fit this mapping, defaults are used: " + ", ".join(sorted(dropped))
-            )
+            names = ", ".join(map(_place, dropped))
+            self._report(f"stored parameters do not fit this mapping, defaults are used: {names}")
         self._saved = replace(self._saved, values=kept, layout=self._layout)
 
     def report_differences(self) -> None:
@@ -233,12 +211,12 @@ class Parameters:
         """
         assert self._dictionary is not None
         indices = _COMMUNICATION if command is NmtCommand.RESET_COMMUNICATION else ALL
-        for one in self._dictionary:
-            for entry in one.entries:
-                if entry.plus_node and one.index not in _PDOS:
+        for item in self._dictionary:
+            for entry in item.entries:
+                if entry.plus_node and item.index not in _PDOS:
                     entry.default = _rebased(entry, self._node, node)
-                if one.index in indices:
-                    entry.value = self._saved.values.get((one.index, entry.subindex), entry.default)
+                if item.index in indices:
+                    entry.value = self._saved.values.get((item.index, entry.subindex), entry.default)
         self._node = node
 
     def save_lss(self, node: int, bitrate: int | None) -> bool:
@@ -273,7 +251,7 @@ class Parameters:
                 CanType.UNSIGNED32,
                 Access.RW,
                 CanType.UNSIGNED32.pack(_ON_COMMAND),
-                sink=_bound(act, indices),
+                sink=partial(act, indices),
             )
 
     def _save(self, indices: range, signature: bytes) -> None:
@@ -281,11 +259,11 @@ class Parameters:
         assert self._dictionary is not None
         self._permit(signature, _SAVE)
         values = {key: value for key, value in self._saved.values.items() if key[0] not in indices}
-        for one in self._dictionary:
-            if one.index in indices:
+        for item in self._dictionary:
+            if item.index in indices:
                 values.update(
-                    ((one.index, entry.subindex), entry.value)
-                    for entry in one.entries
+                    ((item.index, entry.subindex), entry.value)
+                    for entry in item.entries
                     if entry.stored and entry.value != entry.default
                 )
         self._commit(values)
@@ -294,9 +272,9 @@ class Parameters:
     def _report_stored(self, values: Mapping[Key, bytes], what: str) -> None:
         assert self._dictionary is not None
         found = [
-            f"{index:04X}h:{sub:02X}"
-            for (index, sub), value in sorted(values.items())
-            if value != self._dictionary.entry(index, sub).default
+            _place(key)
+            for key, value in sorted(values.items())
+            if value != self._dictionary.entry(*key).default
         ]
         if found:
             self._report(f"{what}: {', '.join(found)}")
@@ -338,6 +316,11 @@ class Parameters:
         return entry.stored and same_layout and entry.type.size in (None, len(value))
 
 
+def _place(key: Key) -> str:
+    index, subindex = key
+    return f"{index:04X}h:{subindex:02X}"
+
+
 def _is_bound(index: int) -> bool:
     return any(index in indices for indices in _BOUND_TO_LAYOUT)
 
@@ -352,10 +335,6 @@ def _rebased(entry: Entry, old: int, new: int) -> bytes:
     return (int.from_bytes(entry.default, "little") - old + new).to_bytes(size, "little")
 
 
-def _bound(act: Callable[[range, bytes], None], indices: range) -> Callable[[bytes], None]:
-    return lambda data: act(indices, data)
-
-
 def _encode(saved: Saved) -> dict[str, Any]:
     lss = saved.lss
     content: dict[str, Any] = {
@@ -363,7 +342,7 @@ def _encode(saved: Saved) -> dict[str, Any]:
         "values": {
             f"{index:04x}:{sub:02x}": value.hex() for (index, sub), value in sorted(saved.values.items())
         },
-        "lss": None if lss is None else {"node": lss.node, "replaces": lss.replaces, "bitrate": lss.bitrate},
+        "lss": None if lss is None else asdict(lss),
     }
     return {"format": FORMAT, "checksum": _checksum(content), **content}
 

@@ -9,11 +9,14 @@ from gatewayd.core.definition import Direction
 from gatewayd.links.canopen_node.declaration import KIND
 from gatewayd.links.canopen_node.expand import node_of
 from gatewayd.links.canopen_node.pdo_table import (
+    PdoItem,
+    PdoRow,
     as_document,
     by_sdo_only,
     load_by_bit_rate,
     object_place,
     pdo_rows,
+    transmission_words,
 )
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.tables import LinkTables
@@ -47,13 +50,17 @@ class CanopenTables(LinkTables):
             return {}
         empty = {column.name: column.empty for column in self.columns}
         found: dict[int, dict[str, object]] = {
-            one.variable: {**empty, "object": object_place(one), "can_type": one.plan.type.name}
-            for one in node.objects
+            placed.variable: {
+                **empty,
+                "object": object_place(placed.plan.index, placed.plan.subindex),
+                "can_type": placed.plan.type.name,
+            }
+            for placed in node.objects
         }
         for pdo in node.pdos:
             assert pdo.slot.cob_id is not None
-            for bit, one in pdo.offsets:
-                found[one.variable] |= {"pdo": pdo.label, "cob_id": cob(pdo.slot.cob_id), "pdo_bit": bit}
+            for bit, placed in pdo.offsets:
+                found[placed.variable] |= {"pdo": pdo.label, "cob_id": cob(pdo.slot.cob_id), "pdo_bit": bit}
         return {index: [row] for index, row in found.items()}
 
     def on_screen(self, first: Row, last: Row) -> Mapping[str, str]:
@@ -86,22 +93,13 @@ class CanopenTables(LinkTables):
         if node is None:
             return None
         spec = node.part.spec
-        head = (
-            "PDO",
-            "COB-ID",
-            "transmission",
-            "inhibit",
-            "event or deadline",
-            "bit",
-            "variable",
-            "object",
-            "type",
-        )
+        event = "event or deadline"
+        head = ("PDO", "COB-ID", "transmission", "inhibit", event, "bit", "variable", "object", "type")
         rows = [
-            (row.pdo, row.cob_id, row.transmission, _time(row.inhibit), _time(row.event), str(run.bit),
-             run.names, run.objects, run.type)
+            (row.pdo, row.cob_id, transmission_words(row.transmission), _time(row.inhibit), _time(row.event),
+             str(item.bit), name, item.object, item.type)
             for row in pdo_rows(cell)
-            for run in row.runs
+            for name, item in _items(row)
         ]  # fmt: skip
         return ReportTable(
             head,
@@ -121,18 +119,24 @@ def _screen_rows(cell: ExpandedCell) -> Iterator[Sequence[Text]]:
         own: tuple[Text, ...] = (
             (row.pdo, "bold"),
             row.cob_id,
-            row.transmission,
+            transmission_words(row.transmission),
             _time(row.inhibit),
             _time(row.event),
         )
-        for number, run in enumerate(row.runs):
+        for name, item in _items(row):
             yield (
-                *(own if number == 0 else [""] * len(own)),
-                span(str(run.bit), str(run.bit + run.bits - 1)),
-                (f"{'->' if receives else '<-'} {run.names}", "cyan" if receives else "green"),
-                run.objects,
-                run.type,
+                *own,
+                span(str(item.bit), str(item.bit + item.bits - 1)),
+                (f"{'->' if receives else '<-'} {name}", "cyan" if receives else "green"),
+                item.object,
+                item.type,
             )
+            own = ("",) * len(own)
+
+
+def _items(row: PdoRow) -> Iterator[tuple[str, PdoItem]]:
+    yield from ((f"status: {word.name}", word) for word in row.status)
+    yield from ((run.name, run) for run in row.runs)
 
 
 def _time(duration: float | None) -> str:

@@ -15,17 +15,7 @@ from itertools import groupby
 from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import (
-    Abort,
-    AbortCode,
-    Access,
-    Entry,
-    Object,
-    Pdo,
-    array,
-    record,
-    variable,
-)
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, Pdo, array, record, variable
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Direction, Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
@@ -48,7 +38,7 @@ ABORT_OF: Final = {
     Reason.WAITED: AbortCode.DEVICE_STATE,
     Reason.NOT_MEANT: AbortCode.LOCAL_CONTROL,
 }
-"""What an SDO client is told when the cell refuses."""
+"""The abort code for an SDO client whose request the cell refuses."""
 
 
 class VariableObjects:
@@ -94,18 +84,16 @@ class VariableObjects:
         return make(index, name, entries)
 
     def _entry(self, item: ObjectPlan) -> Entry:
-        one = self._cell.definition.variables[item.variable]
-        source = partial(self._read, item)
-        default = item.type.pack(fit(one.kind.zero, item.type))
-        if one.direction is Direction.OUTPUT:
-            return Entry(
-                item.subindex, one.name, item.type, Access.RO, default, pdo=Pdo.TRANSMIT, source=source
-            )
-        low, high = _declared_bounds(one, item.type)
+        declared = self._cell.definition.variables[item.variable]
+        name, source = declared.name, partial(self._read, item)
+        default = item.type.pack(fit(declared.kind.zero, item.type))
+        if declared.direction is Direction.OUTPUT:
+            return Entry(item.subindex, name, item.type, Access.RO, default, pdo=Pdo.TRANSMIT, source=source)
+        low, high = _declared_bounds(declared, item.type)
         writable = self._is_writable(item.variable)
         return _Input(
             item.subindex,
-            one.name,
+            name,
             item.type,
             Access.RWW if writable else Access.RO,
             default,
@@ -130,20 +118,17 @@ class VariableObjects:
             return item.type.pack(fit(value, item.type))
 
     def _write(self, item: ObjectPlan, data: bytes) -> None:
-        one, requester, now = (
-            self._cell.definition.variables[item.variable],
-            self._requester(),
-            self._clock(),
-        )
-        refusal, value = self._meaning(item, data, one)
+        declared = self._cell.definition.variables[item.variable]
+        requester, now = self._requester(), self._clock()
+        refusal, value = self._meaning(item, data, declared.kind)
         if refusal is not None:
             self._cell.refuse(requester, refusal, now, value)
         elif value is not None:
             refusal = self._cell.write(requester, [Change(item.variable, value)], now)
         if refusal is not None:
-            raise Abort(_abort_code(refusal, one, value))
+            raise Abort(_abort_code(refusal, declared, value))
 
-    def _meaning(self, item: ObjectPlan, data: bytes, one: Variable) -> tuple[Refusal | None, Value | None]:
+    def _meaning(self, item: ObjectPlan, data: bytes, kind: ValueKind) -> tuple[Refusal | None, Value | None]:
         """What the cell is asked for, or why it need not be."""
         if self._plan.sdo_writer is None:
             return Refusal(Reason.NOT_WRITABLE, item.variable), None
@@ -151,12 +136,12 @@ class VariableObjects:
             return Refusal(Reason.PARTIAL_VALUE, item.variable), None
         if item.type is CanType.BOOLEAN and data[0] > 1:
             return Refusal(Reason.OUT_OF_LIMITS, item.variable), data[0]
-        value = native(item.type.unpack(data), one.kind)
+        value = native(item.type.unpack(data), kind)
         return (Refusal(Reason.OUT_OF_LIMITS, item.variable) if value is None else None), value
 
 
 class _Input(Entry):
-    """Leaves length and range to the cell, which records refusals; `low` and `high` are what the EDS tells of them."""
+    """Leaves length and range to the cell, which records refusals; `low` and `high` are for the EDS."""
 
     __slots__ = ()
 
@@ -166,9 +151,9 @@ class _Input(Entry):
         self.sink(data)
 
 
-def _abort_code(refusal: Refusal, one: Variable, value: Value | None) -> AbortCode:
+def _abort_code(refusal: Refusal, declared: Variable, value: Value | None) -> AbortCode:
     if refusal.reason is Reason.OUT_OF_LIMITS and value is not None:
-        low, high = _accepted(one)
+        low, high = _accepted(declared)
         if value > high:
             return AbortCode.VALUE_TOO_HIGH
         if value < low:
@@ -176,29 +161,23 @@ def _abort_code(refusal: Refusal, one: Variable, value: Value | None) -> AbortCo
     return ABORT_OF[refusal.reason]
 
 
-def _accepted(one: Variable) -> tuple[float, float]:
-    """Between which values the cell may take one as it is, or clamp it."""
-    if one.kind is ValueKind.BOOL:
+def _accepted(declared: Variable) -> tuple[float, float]:
+    """Between which values the cell may take a value as it is, or clamp it."""
+    if declared.kind is ValueKind.BOOL:
         return 0, 1
-    low = -math.inf if one.low is None else one.low
-    high = math.inf if one.high is None else one.high
-    limits = one.limits
+    low = -math.inf if declared.low is None else declared.low
+    high = math.inf if declared.high is None else declared.high
+    limits = declared.limits
     if limits is None or limits.clamp:
         return low, high
     return max(low, limits.low), min(high, limits.high)
 
 
-def _declared_bounds(one: Variable, can_type: CanType) -> tuple[float | None, float | None]:
-    """The limits that the EDS tells: those that the type does not tell already."""
-    low, high = _accepted(one)
-    if can_type is CanType.BOOLEAN or can_type.is_real:
-        least, greatest = (-math.inf, math.inf) if can_type.is_real else (0.0, 1.0)
-    else:
-        signed = can_type.char.islower()
-        least = -(1 << can_type.bits - 1) if signed else 0
-        greatest = (1 << can_type.bits - signed) - 1
-        low, high = (
-            bound if math.isinf(bound) else rounded(bound)
-            for bound, rounded in ((low, math.ceil), (high, math.floor))
-        )
+def _declared_bounds(declared: Variable, can_type: CanType) -> tuple[float | None, float | None]:
+    """The limits for the EDS: those that do not follow from the type."""
+    low, high = _accepted(declared)
+    least, greatest = (-math.inf, math.inf) if can_type.is_real else can_type.bounds
+    if not can_type.is_real:
+        low = low if math.isinf(low) else math.ceil(low)
+        high = high if math.isinf(high) else math.floor(high)
     return (low if low > least else None), (high if high < greatest else None)

@@ -1,4 +1,4 @@
-"""A bus handler that remembers what it was told."""
+"""A bus handler that remembers what was reported to it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The worst-case load of a bus, against figures worked out by hand and bit by bit."""
+"""The worst-case load of a bus, against numbers worked out by hand and bit by bit."""
 
 from __future__ import annotations
 
@@ -9,13 +9,10 @@ import pytest
 from gatewayd.links.canopen_node.bus_load import (
     BIT_RATES,
     Share,
-    Station,
     bus_shares,
     frame_bits,
     load,
-    station_of,
 )
-from gatewayd.links.canopen_node.expand import CanopenCell, node_of
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.loader import load as load_file
 from gatewayd.mapping.loader import load_together
@@ -41,19 +38,12 @@ variables:
 """
 
 
-def the_node(cell: ExpandedCell) -> CanopenCell:
-    node = node_of(cell)
-    assert node is not None
-    return node
-
-
-def station(text: str) -> Station:
-    cell = load_file(text.encode(), "cell.yaml").cell
-    return station_of(cell, the_node(cell))
+def loaded(text: str) -> ExpandedCell:
+    return load_file(text.encode(), "cell.yaml").cell
 
 
 def shares(text: str) -> dict[str, Share]:
-    return {share.what: share for share in bus_shares([station(text)])}
+    return {share.what: share for share in bus_shares([loaded(text)])}
 
 
 @pytest.mark.parametrize("length, bits", [(0, 55), (1, 65), (8, 135)])
@@ -110,7 +100,7 @@ def test_no_frame_is_longer_than_that() -> None:
 )
 def test_the_full_image_as_it_is_known(frequency: int, real: str, share: float) -> None:
     """74 PDOs with REAL64, 50 with REAL32."""
-    found = bus_shares([station(FULL.format(frequency=frequency, real=real))])
+    found = bus_shares([loaded(FULL.format(frequency=frequency, real=real))])
     assert load(found, 1_000_000) == pytest.approx(share, abs=0.006)
     assert load(found, 250_000) == pytest.approx(4 * load(found, 1_000_000))
 
@@ -166,7 +156,7 @@ def test_greatest_rate_of_a_tpdo(canopen: str, frames: float) -> None:
     ],
 )
 def test_greatest_rate_of_an_rpdo(canopen: str, frames: float) -> None:
-    """Its producer tells no more often than the robot takes; a synchronous one comes with each SYNC."""
+    """Its producer sends no more often than the robot takes; a synchronous one comes with each SYNC."""
     assert rate(canopen, "input_int_register_0") == pytest.approx(frames)
 
 
@@ -182,8 +172,7 @@ def test_cells_on_one_bus_share_sync_and_watched_heartbeats() -> None:
     text = ONE.format(canopen="  sync: {period: 10ms}", robot="output_int_register_0")
     other = text.replace("cell: one", "cell: two").replace("node: 16", "node: 17").replace("1.10", "1.11")
     cells = [one.cell for one in load_together([("a", text.encode()), ("b", other.encode())])]
-    stations = [station_of(cell, the_node(cell)) for cell in cells]
-    what = [share.what for share in bus_shares(stations)]
+    what = [share.what for share in bus_shares(cells)]
     assert sorted(what) == sorted(
         [
             "node 16: TPDO 1",
@@ -215,5 +204,5 @@ canopen:
 variables: {a: {robot: robot_mode}}
 """
     cell = load_file(text.encode(), "c.yaml").cell
-    (share,) = bus_shares([station_of(cell, the_node(cell))])
+    (share,) = bus_shares([cell])
     assert (share.what, share.bits, share.rate) == ("node 16: TPDO 1 (state)", frame_bits(8), 10)

@@ -16,7 +16,7 @@ import pytest
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Dictionary, Entry, ObjectCode, array, variable
 from gatewayd.canopen.importer import differences
-from gatewayd.links.canopen_node.eds import Commissioning, Sheet, dcf_text, eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.eds import Sheet, dcf_text, eds_text, objects_of, sheet_of
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
@@ -26,7 +26,7 @@ GOLDEN = Path(__file__).parent / "golden" / "two-buses.eds"
 MAPPING = ROOT / "mappings" / "two-buses.yaml"
 NODE = 20
 OTHER_NODE = 77
-SHEET = Sheet("test.eds", "test", 0x1234_5678, NODE)
+SHEET = Sheet("test", 0x1234_5678, NODE, 500_000)
 
 
 @pytest.fixture(scope="module")
@@ -202,11 +202,7 @@ def test_sub_indices_with_gaps_are_counted_not_numbered() -> None:
 def test_configuration_of_a_commissioned_node(plan: Plan, dictionary: Dictionary) -> None:
     """Node-ID, bit-rate, and the value of whatever the node stores; nothing of what it only shows."""
     assert canopen_of(plan) is not None
-    text = dcf_text(
-        dictionary,
-        sheet_of(plan.the(CanopenPlan), plan.cell, "dcf"),
-        Commissioning(NODE, 500_000, "two-buses"),
-    )
+    text = dcf_text(dictionary, sheet_of(plan.the(CanopenPlan), plan.cell))
     od = imported(text, None)
     assert (od.node_id, od.bitrate) == (NODE, 500_000)
     assert od[0x1400][1].value == 0x200 + NODE

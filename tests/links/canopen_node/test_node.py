@@ -26,8 +26,15 @@ from gatewayd.core.succession import succeed
 from gatewayd.links.canopen_node.communication_errors import OVERRUN_TIME
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
-from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, PdoPlan, canopen_of
-from gatewayd.links.canopen_node.storage import MemoryStore, Saved, Store
+from gatewayd.links.canopen_node.plan import (
+    FIRST_STATUS_OBJECT,
+    CanopenPlan,
+    ObjectPlan,
+    PdoEntry,
+    PdoPlan,
+    canopen_of,
+)
+from gatewayd.links.canopen_node.storage import Saved, Store
 from gatewayd.mapping.loader import load
 from tests.links.canopen_node.wire import Wire
 
@@ -101,7 +108,7 @@ PLAN = CanopenPlan(
 
 
 class Notebook(Observer):
-    """Remembers what it was told."""
+    """Remembers what was reported to it."""
 
     def __init__(self) -> None:
         self.filters = 0
@@ -115,7 +122,7 @@ class Notebook(Observer):
     def report(self, text: str) -> None:
         self.reports.append(text)
 
-    def time_told(self, moment: datetime, now: float) -> None:
+    def time_received(self, moment: datetime, now: float) -> None:
         self.times.append(moment)
 
     def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
@@ -138,7 +145,7 @@ class Plant:
             plan,
             self.cell,
             self.wire.send,
-            store or MemoryStore(),
+            store or Store(),
             lambda _now: self.alive,
             observer=self.notebook,
         )
@@ -185,7 +192,7 @@ class Plant:
         return self.take()
 
     def show(self, variable: int, value: Value) -> list[Frame]:
-        """The robot tells a value."""
+        """The robot reports a value."""
         self.cell.image.values[variable] = value
         self.cell.outputs_written(self.now)
         return self.take()
@@ -491,7 +498,7 @@ def test_a_writer_that_has_timed_out_writes_nothing_with_a_sync() -> None:
     cell = plant.cell = Cell(definition)
     cell.robot_connected(plant.now)
     cell.adopt({PART: 0, SPEED: 0.0}, plant.now)
-    plant.node = Node(PLAN, cell, plant.wire.send, MemoryStore(), lambda _now: True)
+    plant.node = Node(PLAN, cell, plant.wire.send, Store(), lambda _now: True)
     plant.operational()
     plant.hear(0x305, CanType.REAL32.pack(2.5))
     plant.run(2.0)
@@ -519,7 +526,7 @@ def test_heartbeat_feeds_a_writer_that_sends_only_changes() -> None:
     cell = plant.cell = Cell(definition)
     cell.robot_connected(plant.now)
     cell.adopt({PART: 0, SPEED: 0.0}, plant.now)
-    plant.node = Node(PLAN, cell, plant.wire.send, MemoryStore(), lambda _now: True)
+    plant.node = Node(PLAN, cell, plant.wire.send, Store(), lambda _now: True)
     plant.operational()
     plant.part(7)
     for _ in range(10):
@@ -560,7 +567,7 @@ variables:
 """
 
 
-def _told_by_tpdo_3(frames: list[Frame]) -> list[tuple[int, ...]]:
+def _sent_in_tpdo_3(frames: list[Frame]) -> list[tuple[int, ...]]:
     """The words behind the output."""
     return [struct.unpack_from("<2H", frame.data, 4) for frame in frames if frame.can_id == 0x385]
 
@@ -570,42 +577,42 @@ def test_an_event_driven_tpdo_tells_states_and_qualities_when_the_robot_is_lost(
     plant.operational()
     plant.show(CYCLES, 5)
     plant.cell.robot_lost("cable", plant.now)
-    assert _told_by_tpdo_3(plant.take())[-1] == (0, 1)
+    assert _sent_in_tpdo_3(plant.take())[-1] == (0, 1)
     plant.cell.robot_connected(plant.now)
     plant.cell.adopt({}, plant.now)
-    assert _told_by_tpdo_3(plant.take())[-1] == (1, 1)
+    assert _sent_in_tpdo_3(plant.take())[-1] == (1, 1)
     plant.cell.package_arrived(2.0, plant.now)
-    assert _told_by_tpdo_3(plant.show(CYCLES, 5)) == [(2, 0)]
-    assert _told_by_tpdo_3(plant.run(5.0)) == []
+    assert _sent_in_tpdo_3(plant.show(CYCLES, 5)) == [(2, 0)]
+    assert _sent_in_tpdo_3(plant.run(5.0)) == []
 
 
-def test_an_owner_in_a_tpdo_is_told_when_it_changes() -> None:
+def test_an_owner_in_a_tpdo_is_reported_when_it_changes() -> None:
     plant = _status_pdo(254, (0x5F10, PART + 1), (0x5F10, SPEED + 1))
     plant.operational()
-    assert _told_by_tpdo_3(plant.part(7)) == [(1, 0)]
-    assert _told_by_tpdo_3(plant.heartbeat(0)) == [(0, 0)], "a master that boots has lost its lock"
+    assert _sent_in_tpdo_3(plant.part(7)) == [(1, 0)]
+    assert _sent_in_tpdo_3(plant.heartbeat(0)) == [(0, 0)], "a master that boots has lost its lock"
     assert plant.write(0x5F00, 26, SPEED + 1, 2) == 0
-    assert _told_by_tpdo_3(plant.run(0.11)) == [(0, 2)], "a lock request changes no value"
+    assert _sent_in_tpdo_3(plant.run(0.11)) == [(0, 2)], "a lock request changes no value"
 
 
 def test_a_word_that_changes_with_time_is_sent_as_the_inhibit_time_allows() -> None:
     for inhibit, least, most in ((0, 9, 11), (5000, 1, 3)):
         plant = _status_pdo(255, (0x5F00, _HEARTBEAT_WORD), (0x5F00, _ROBOT_STATE), inhibit=inhibit)
         plant.operational()
-        told = []
+        reported = []
         for _ in range(10):
             plant.cell.health.heartbeat += 1
-            told += _told_by_tpdo_3(plant.run(0.1))
-        assert least <= len(told) <= most
+            reported += _sent_in_tpdo_3(plant.run(0.1))
+        assert least <= len(reported) <= most
 
 
 def test_status_words_with_sync() -> None:
     plant = _status_pdo(1, (0x5F00, _ROBOT_STATE), (0x5F40, CYCLES + 1))
     plant.operational()
     plant.show(CYCLES, 5)
-    assert _told_by_tpdo_3(plant.hear(0x80)) == [(2, 0)]
+    assert _sent_in_tpdo_3(plant.hear(0x80)) == [(2, 0)]
     plant.cell.robot_lost("cable", plant.now)
-    assert _told_by_tpdo_3(plant.hear(0x80)) == [(0, 1)]
+    assert _sent_in_tpdo_3(plant.hear(0x80)) == [(0, 1)]
 
 
 def test_words_that_a_mapping_puts_into_a_tpdo_are_shown_as_its_mapping_and_sent() -> None:
@@ -613,11 +620,13 @@ def test_words_that_a_mapping_puts_into_a_tpdo_are_shown_as_its_mapping_and_sent
     assert plan is not None
     assert canopen_of(plan) is not None
     wire, cell = Wire(), Cell(plan.cell)
-    node = Node(plan.the(CanopenPlan), cell, wire.send, MemoryStore(), lambda _now: True)
+    node = Node(plan.the(CanopenPlan), cell, wire.send, Store(), lambda _now: True)
     node.bus_changed(BusState.ACTIVE, 1.0)
     node.start(1.0)
     number = next(
-        pdo.number for pdo in plan.the(CanopenPlan).pdos if any(one.is_status for one in pdo.entries)
+        pdo.number
+        for pdo in plan.the(CanopenPlan).pdos
+        if any(entry.index >= FIRST_STATUS_OBJECT for entry in pdo.entries)
     )
     shown = [node.dictionary.read(0x1A00 + number - 1, slot)[::-1].hex() for slot in (1, 2, 3)]
     assert sorted(shown) == ["5f000210", "5f000710", "5f400210"]
@@ -730,7 +739,7 @@ def test_a_read_begins_nothing() -> None:
 @pytest.mark.parametrize("time", [0, 60_000])
 def test_a_promise_cannot_be_switched_off_from_the_bus(time: int) -> None:
     """The configuration tool is confirmed, its value is read back and stored; the master dies, and its command ends."""
-    store = MemoryStore()
+    store = Store()
     plant = Plant(replace(PLAN, sdo_writer=LINE), store).power_on()
     value = MASTER << 16 | time if time else 0
     for _ in range(2):
@@ -738,10 +747,10 @@ def test_a_promise_cannot_be_switched_off_from_the_bus(time: int) -> None:
         plant.run(0.01)
     assert plant.write(0x1010, 1, b"save") == 0
     assert plant.read(0x1016, 1) == value
-    told = [text for text in plant.notebook.reports if "1016h" in text]
-    assert len(told) == 2, told
-    assert "line" in told[0]
-    assert "1016h:01" in told[1]
+    reported = [text for text in plant.notebook.reports if "1016h" in text]
+    assert len(reported) == 2, reported
+    assert "line" in reported[0]
+    assert "1016h:01" in reported[1]
     for _ in range(2):
         plant.hear(0, START)
         plant.heartbeat()
@@ -771,7 +780,7 @@ def test_1016h_may_be_stricter_than_the_promise() -> None:
 
 
 def test_a_stricter_mapping_counts_at_once_whatever_was_stored() -> None:
-    store = MemoryStore()
+    store = Store()
     plant = Plant(PLAN, store).power_on()
     plant.write(0x1016, 1, MASTER << 16 | 400)
     plant.write(0x1010, 1, b"save")
@@ -812,13 +821,13 @@ def test_what_a_lost_writer_goes_on_sending_is_refused_until_its_heartbeat_is_ba
     plant.part(7)
     plant.run(0.6)
     seen = set()
-    told = []
+    reported = []
     for _ in range(20):
-        told += _emergencies(plant.part(7)) + _emergencies(plant.run(0.1))
+        reported += _emergencies(plant.part(7)) + _emergencies(plant.run(0.1))
         seen.add(plant.cell.image.values[PART])
         assert (plant.cell.writers.alive, plant.cell.writers.connections) == ([False, False], [0, 0])
-    assert (seen, told) == ({0}, [0xFF06])
-    assert plant.node.receive_pdos.refused == 20
+    assert (seen, reported) == ({0}, [0xFF06])
+    assert plant.cell.health.writes_refused == 20
     assert plant.cell.ownership.owners == [None, None]
     assert plant.read(0x5F00, 0x15) == Reason.HEARTBEAT_LOST
     assert _emergencies(plant.heartbeat()) == []
@@ -928,7 +937,7 @@ def _reload(plant: Plant) -> None:
     """The cell goes on with another definition, and the node with it."""
     former = plant.node
     plant.cell = succeed(plant.cell, _CELL, plant.now).cell
-    plant.node = Node(former.plan, plant.cell, plant.wire.send, MemoryStore(), lambda _now: True)
+    plant.node = Node(former.plan, plant.cell, plant.wire.send, Store(), lambda _now: True)
     plant.node.resume(former, plant.now)
 
 
@@ -1117,9 +1126,9 @@ def test_an_rpdo_that_waited_longer_than_its_writer_may_be_silent_is_dropped_and
     plant = Plant(replace(PLAN, consumers=())).operational()
     plant.part(7)
     _stand_still(plant, seconds)
-    told = _emergencies(plant.part(8))
+    reported = _emergencies(plant.part(8))
     assert (plant.cell.image.values[PART], plant.cell.ownership.owners[0]) == (value, owner)
-    assert told == ([] if owner == LINE else [0xFF08])
+    assert reported == ([] if owner == LINE else [0xFF08])
     plant.node.caught_up()
     assert _emergencies(plant.part(9)) == ([] if owner == LINE else [0])
     assert plant.cell.image.values[PART] == 9
@@ -1140,13 +1149,13 @@ def test_a_synchronous_rpdo_that_waited_is_not_written_with_a_later_sync(
         _stand_still(plant, 5.0)
         plant.hear(0x305, speed)
     if sync_waits:
-        told = plant.hear(0x80)
+        reported = plant.hear(0x80)
         plant.node.caught_up()
     else:
         plant.node.caught_up()
-        told = plant.hear(0x80)
+        reported = plant.hear(0x80)
     assert plant.cell.image.values[SPEED] == 0.0
-    assert _emergencies(told) == [0xFF08]
+    assert _emergencies(reported) == [0xFF08]
     plant.hear(0x305, speed)
     plant.hear(0x80)
     assert plant.cell.image.values[SPEED] == 2.5
@@ -1263,7 +1272,7 @@ def test_life_guarding_is_watched_again_from_the_first_request_after_a_loss() ->
 
 
 def test_saved_communication_parameters_and_mappings_survive_a_restart() -> None:
-    store = MemoryStore()
+    store = Store()
     first = Plant(store=store).power_on()
     assert first.write(0x1017, 0, 250, 2) == 0
     assert first.write(0x1800, 1, 0xC000_0185) == 0
@@ -1281,7 +1290,7 @@ def test_saved_communication_parameters_and_mappings_survive_a_restart() -> None
 
 
 def test_stored_values_that_make_no_pdo_are_reported_and_defaults_used() -> None:
-    store = MemoryStore()
+    store = Store()
     plant = Plant(store=store).power_on()
     plant.write(0x1010, 1, b"save")
     store.save(Saved(store.load().layout, {(0x1800, 2): b"\xfc"}))
@@ -1301,7 +1310,7 @@ def _lss(plant: Plant, *data: int) -> list[Frame]:
 
 
 def test_new_node_id_comes_with_reset_communication_and_is_kept_if_stored() -> None:
-    store = MemoryStore()
+    store = Store()
     plant = Plant(store=store).power_on()
     plant.take()
     _lss(plant, 0x04, 1)
@@ -1353,11 +1362,11 @@ def test_filters_hold_exactly_what_the_node_hears() -> None:
 
 def test_changed_cob_ids_are_announced() -> None:
     plant = Plant().power_on()
-    told = plant.notebook.filters
+    reported = plant.notebook.filters
     plant.write(0x1400, 1, 0x8000_0205)
     plant.write(0x1400, 1, 0x190)
     plant.write(0x1005, 0, 0x90)
-    assert plant.notebook.filters > told
+    assert plant.notebook.filters > reported
     assert plant.node.cob_ids() == {0x000, 0x090, 0x100, 0x190, 0x305, 0x605, 0x701, 0x705, 0x7E5}
     plant.hear(0, START)
     plant.hear(0x190, b"\7\0\0\0")

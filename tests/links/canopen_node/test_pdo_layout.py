@@ -114,7 +114,7 @@ def test_a_predefined_cob_id_that_is_written_out_has_its_own_number() -> None:
     )
 
 
-def test_missing_cob_ids_are_told() -> None:
+def test_missing_cob_ids_are_reported() -> None:
     found = assign([None] * 6, 16, [0x1A0], transmit=True)
     assert [slot.cob_id is None for slot in found] == [False] * 5 + [True]
 

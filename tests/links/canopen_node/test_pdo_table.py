@@ -13,6 +13,7 @@ from gatewayd.links.canopen_node.pdo_table import (
     pdo_rows,
     transmission_words,
 )
+from gatewayd.links.canopen_node.tables import TABLES
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.loader import load
 from gatewayd.report.table import rows
@@ -27,14 +28,17 @@ def cell() -> ExpandedCell:
 
 def test_rows(cell: ExpandedCell) -> None:
     table = pdo_rows(cell)
-    assert [(row.pdo, row.cob_id, row.predefined, row.transmission, row.event) for row in table] == [
+    assert [
+        (row.pdo, row.cob_id, row.predefined, transmission_words(row.transmission), row.event)
+        for row in table
+    ] == [
         ("RPDO 1 (command)", "0x214", True, "sync (1)", 0.1),
         ("RPDO 2", "0x314", True, "sync (1)", 0.1),
         ("TPDO 1", "0x194", True, "sync (1)", None),
         ("TPDO 2", "0x294", True, "sync (1)", None),
         ("TPDO 3 (forces)", "0x1C0", False, "every 5 SYNCs (5)", None),
     ]
-    assert [(run.names, run.bit, run.bits, run.objects, run.type) for run in table[0].runs] == [
+    assert [(run.name, run.bit, run.bits, run.object, run.type) for run in table[0].runs] == [
         ("recipe", 0, 16, "2070h:01", "UNSIGNED16"),
         ("line_stop", 16, 1, "2000h:01", "BOOLEAN"),
         ("feed_ready", 17, 1, "2000h:02", "BOOLEAN"),
@@ -44,7 +48,7 @@ def test_rows(cell: ExpandedCell) -> None:
 def test_neighbours_of_a_family_are_one_run() -> None:
     cell = load((MAPPINGS / "canopen-only.yaml").read_bytes(), "canopen-only.yaml").cell
     (run,) = pdo_rows(cell)[0].runs
-    assert (run.names, run.objects, run.bits) == ("in_bits[0..63]", "2000h:01-40", 64)
+    assert (run.name, run.object, run.bits) == ("in_bits[0..63]", "2000h:01-40", 64)
 
 
 def test_what_no_pdo_carries(cell: ExpandedCell) -> None:
@@ -58,17 +62,11 @@ def test_load_falls_with_the_bit_rate(cell: ExpandedCell) -> None:
 
 def test_without_a_node_there_is_nothing() -> None:
     cell = load((MAPPINGS / "full-image.yaml").read_bytes(), "full-image.yaml").cell
-    assert (pdo_rows(cell), load_by_bit_rate(cell), as_document(cell), by_sdo_only(cell)) == (
-        (),
-        {},
-        None,
-        (),
-    )
+    assert (TABLES.rows(cell), TABLES.page_table(cell)) == ({}, None)
 
 
 def test_document_has_every_bit(cell: ExpandedCell) -> None:
     document = as_document(cell)
-    assert document is not None
     assert (document["node"], document["bitrate"]) == (20, 500_000)
     assert document["pdos"][0]["variables"][2] == {
         "name": "feed_ready",
@@ -121,15 +119,14 @@ variables: {force: {robot: output_double_register_0, canopen: {type: REAL32}}}
 """
     cell = load(text.encode(), "c.yaml").cell
     (row,) = pdo_rows(cell)
-    assert [(run.names, run.bit, run.bits, run.objects, run.type) for run in row.runs] == [
-        ("status: flags", 0, 16, "5F00h:02", "UNSIGNED16"),
-        ("status: quality of force", 16, 16, "5F40h:01", "UNSIGNED16"),
+    assert [(run.name, run.bit, run.bits, run.object, run.type) for run in (*row.status, *row.runs)] == [
+        ("flags", 0, 16, "5F00h:02", "UNSIGNED16"),
+        ("quality of force", 16, 16, "5F40h:01", "UNSIGNED16"),
         ("force", 32, 32, "2430h:01", "REAL32"),
     ]
     document = as_document(cell)
-    assert document is not None
     (pdo,) = document["pdos"]
-    assert pdo["status"] == [
+    assert list(pdo["status"]) == [
         {"name": "flags", "bit": 0, "bits": 16, "object": "5F00h:02", "type": "UNSIGNED16"},
         {"name": "quality of force", "bit": 16, "bits": 16, "object": "5F40h:01", "type": "UNSIGNED16"},
     ]

@@ -53,7 +53,7 @@ class Bench:
         return self.cell.writers.alive
 
     @property
-    def told(self) -> list[EventKind]:
+    def reported(self) -> list[EventKind]:
         return [event.kind for event in self.cell.events]
 
 
@@ -70,7 +70,7 @@ def test_one_connection_however_often_it_is_heard(bench: Bench) -> None:
     bench.peers.lose(FREE, "bus off", 3.0)
     bench.peers.lose(FREE, "bus off", 3.0)
     assert (bench.alive, bench.cell.writers.connections) == ([False] * 3, [0] * 3)
-    assert bench.told == [EventKind.WRITER_CONNECTED, EventKind.WRITER_LOST]
+    assert bench.reported == [EventKind.WRITER_CONNECTED, EventKind.WRITER_LOST]
 
 
 def test_a_lost_writer_comes_back(bench: Bench) -> None:
@@ -120,7 +120,7 @@ def test_a_sign_of_one_writer_is_that_of_its_node(bench: Bench) -> None:
     assert bench.rpdo(LINE, 0.0)
     assert bench.peers.connect(TOOL, "SDO", 0.3)
     bench.tick(0.5)
-    assert bench.told.count(EventKind.WRITER_LOST) == 2
+    assert bench.reported.count(EventKind.WRITER_LOST) == 2
     assert not bench.peers.connect(TOOL, "SDO", 0.6)
     assert bench.peers.connect(FREE, "SDO", 0.6), "who promised nothing is believed"
 

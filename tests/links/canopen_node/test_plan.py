@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from gatewayd.links.canopen_node.plan import CanopenPlan, by_name
+from gatewayd.links.canopen_node.description import by_name
+from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 
@@ -18,7 +19,7 @@ def plan(before: str = "", more: str = "", modbus: str = "") -> Plan:
     return loaded.plan
 
 
-def node(of: Plan) -> tuple[object, ...]:
+def node(of: Plan) -> dict[str, str]:
     assert of.the(CanopenPlan) is not None
     return by_name(of.the(CanopenPlan), of.cell)
 

@@ -14,7 +14,7 @@ from tests.links.canopen_node.wire import Client, Wire
 
 
 class Bench:
-    """A cell of two outputs, and what is told of it on the bus."""
+    """A cell of two outputs, and what is reported of it on the bus."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -38,7 +38,7 @@ class Bench:
         self.cell.outputs_written(self.now)
 
     def look(self, seconds: float = 0.0) -> list[str]:
-        """What is told when the cell is looked at so much later: code, register, data."""
+        """What is reported when the cell is looked at so much later: code, register, data."""
         self.now += seconds
         self.errors.tick(self.now)
         return [
@@ -102,21 +102,21 @@ def test_read_back_and_registers_are_counted(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("inhibit", [0, 50_000])
-def test_what_comes_and_goes_is_told_once(bench: Bench, inhibit: int) -> None:
+def test_what_comes_and_goes_is_reported_once(bench: Bench, inhibit: int) -> None:
     bench.client.write(0x1015, 0, inhibit)
     quiet = max(QUIET, inhibit / 10_000)
-    told = []
+    reported = []
     for _ in range(100):
         bench.cell.robot_lost("cable", bench.now)
-        told += bench.look(quiet * 0.4)
+        reported += bench.look(quiet * 0.4)
         bench.well()
-        told += bench.look(quiet * 0.4)
-    assert told == ["FF10 81 0000"]
-    told = bench.look(quiet)
-    assert told == ["0000 00 0000"]
+        reported += bench.look(quiet * 0.4)
+    assert reported == ["FF10 81 0000"]
+    reported = bench.look(quiet)
+    assert reported == ["0000 00 0000"]
 
 
-def test_after_a_reset_what_is_still_wrong_is_told_again(bench: Bench) -> None:
+def test_after_a_reset_what_is_still_wrong_is_reported_again(bench: Bench) -> None:
     bench.cell.robot_lost("cable", 0.0)
     bench.look()
     bench.emergency.restart(forget=True)

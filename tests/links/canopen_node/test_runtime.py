@@ -24,7 +24,7 @@ from gatewayd.links.canopen_node import runtime as link_module
 from gatewayd.links.canopen_node.declaration import KIND
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import LOSS_INTERVAL, CanLink
-from gatewayd.links.canopen_node.storage import MemoryStore
+from gatewayd.links.canopen_node.storage import Store
 from gatewayd.links.contract import Level
 from gatewayd.loop import clock
 from tests.links.canopen_node.conformance.bench import compiled
@@ -48,7 +48,7 @@ class Station:
         self.cell.adopt({self.names["ints_in[0]"]: 0, self.names["ints_in[1]"]: 0}, now)
         self.cell.package_arrived(1.0, now)
         self.cell.outputs_written(now)
-        self.link = CanLink(plan, self.cell, MemoryStore())
+        self.link = CanLink(plan, self.cell, Store())
         self.peer = can.Bus(channel, interface="virtual")
         self.heard: list[Frame] = []
         self.beating = True
@@ -154,7 +154,7 @@ async def test_nothing_runs_on_after_the_end(station: Station) -> None:
     assert station.cell.health.words["can_bus"] == BusState.DOWN + 1
 
 
-async def test_a_bus_that_cannot_be_used_is_told_once_and_shown_as_absent(
+async def test_a_bus_that_cannot_be_used_is_reported_once_and_shown_as_absent(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(link_module, "RETRY", 0.01)
@@ -205,7 +205,7 @@ async def test_end_while_the_bit_rate_is_switched(station: Station) -> None:
     assert station.cell.health.words["can_bus"] == BusState.DOWN + 1
 
 
-async def test_lost_frames_are_told_seldom_and_all_counted(
+async def test_lost_frames_are_reported_seldom_and_all_counted(
     station: Station, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.WARNING)
@@ -214,8 +214,8 @@ async def test_lost_frames_are_told_seldom_and_all_counted(
         begin = time.monotonic()
         for number in range(100):
             station.link.on_lost(3, begin + number * LOSS_INTERVAL / 50)
-    told = [record for record in caplog.records if record.message == "CAN frames lost"]
-    assert len(told) == 2
+    reported = [record for record in caplog.records if record.message == "CAN frames lost"]
+    assert len(reported) == 2
     assert station.link.node.counters.overruns == 300
 
 
@@ -300,7 +300,7 @@ async def test_more_than_is_read_in_one_go_has_waited_all_the_same(
         await until(lambda: node._waiting.seconds == 0.0)
 
 
-def test_a_pdo_that_a_gap_kept_from_being_sent_tells_what_is_so_after_it(station: Station) -> None:
+def test_a_pdo_that_a_gap_kept_from_being_sent_shows_what_is_so_after_it(station: Station) -> None:
     """Stopped between a package of the robot and the PDO that it leads to."""
 
     async def main() -> None:

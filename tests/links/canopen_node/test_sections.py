@@ -1,4 +1,4 @@
-"""The CANopen part of the language: what it takes, and how a mistake in it is told."""
+"""The CANopen part of the language: what it takes, and how a mistake in it is reported."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def test_a_variable_says_where_it_is(text: str, place: CanopenPlace) -> None:
         ),
     ],
 )
-def test_mistakes_are_told_with_a_remedy(text: str, slug: str, hint: str) -> None:
+def test_mistakes_are_reported_with_a_remedy(text: str, slug: str, hint: str) -> None:
     _, (finding,) = read(f"canopen: {text}")
     assert finding.rule.slug == slug
     assert hint in (finding.hint or "")
@@ -133,7 +133,7 @@ def test_writers(text: str, slugs: list[str]) -> None:
 
 
 def test_supervision_of_a_writer() -> None:
-    """A heartbeat tells of the CANopen side alone."""
+    """A heartbeat says something of the CANopen side alone."""
     writers = read(
         "writers: {a: {canopen: rpdo}, b: {canopen: rpdo, node: 1, heartbeat: 1s}, c: {canopen: any, timeout: 1s},"
         " d: {canopen: sdo, modbus: 10.0.0.1, node: 1, heartbeat: 1s}}"

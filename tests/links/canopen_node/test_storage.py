@@ -13,7 +13,6 @@ from gatewayd.canopen.nmt import NmtCommand
 from gatewayd.links.canopen_node.storage import (
     JsonStore,
     LssSettings,
-    MemoryStore,
     Parameters,
     Saved,
     Store,
@@ -69,7 +68,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_cct_testing_other_01_capabilities_are_on_command() -> None:
-    client = Kept(MemoryStore()).client
+    client = Kept(Store()).client
     for index in (0x1010, 0x1011):
         assert [client.read(index, number) for number in range(5)] == [4, 1, 1, 1, 1]
 
@@ -77,7 +76,7 @@ def test_cct_testing_other_01_capabilities_are_on_command() -> None:
 @pytest.mark.parametrize("index, signature", [(0x1010, b"load"), (0x1010, b"evas"), (0x1011, b"save")])
 def test_cct_testing_other_02_wrong_signature_is_refused(index: int, signature: bytes) -> None:
     with pytest.raises(Abort) as caught:
-        Kept(MemoryStore()).signed(index, 1, signature)
+        Kept(Store()).signed(index, 1, signature)
     assert caught.value.code is AbortCode.CANNOT_STORE
 
 
@@ -105,7 +104,7 @@ def test_cct_testing_other_04_restored_defaults_come_with_the_next_reset(path: P
     "subindex, kept_values", [(1, (50, 7, 8)), (2, (50, 0, 0)), (3, (1000, 0, 8)), (4, (1000, 7, 0))]
 )
 def test_groups_are_saved_and_restored_apart(subindex: int, kept_values: tuple[int, ...]) -> None:
-    kept = Kept(MemoryStore())
+    kept = Kept(Store())
     kept.client.write(0x1017, 0, 50)
     kept.client.write(0x2000, 1, 7)
     kept.client.write(0x6000, 1, 8)
@@ -119,7 +118,7 @@ def test_groups_are_saved_and_restored_apart(subindex: int, kept_values: tuple[i
 
 
 def test_reset_communication_leaves_the_application_alone() -> None:
-    kept = Kept(MemoryStore())
+    kept = Kept(Store())
     kept.client.write(0x1017, 0, 50)
     kept.client.write(0x2000, 1, 7)
     kept.service.apply(NmtCommand.RESET_COMMUNICATION, 5)
@@ -127,7 +126,7 @@ def test_reset_communication_leaves_the_application_alone() -> None:
 
 
 def test_what_is_not_marked_is_not_stored() -> None:
-    kept = Kept(MemoryStore())
+    kept = Kept(Store())
     kept.client.write(0x1007, 0, 3)
     kept.signed(0x1010, 1, b"save")
     kept.service.apply(NmtCommand.RESET_NODE, 5)
@@ -135,7 +134,7 @@ def test_what_is_not_marked_is_not_stored() -> None:
 
 
 def test_defaults_follow_the_node_id_and_saved_values_do_not() -> None:
-    kept = Kept(MemoryStore())
+    kept = Kept(Store())
     kept.service.apply(NmtCommand.RESET_COMMUNICATION, 9)
     assert kept.client.read(0x1014) == 0x89
     kept.client.write(0x1014, 0, 0x1A0)
@@ -146,7 +145,7 @@ def test_defaults_follow_the_node_id_and_saved_values_do_not() -> None:
 
 
 def test_pdo_and_manufacturer_values_do_not_outlive_their_layout() -> None:
-    store = MemoryStore()
+    store = Store()
     old = Kept(store)
     old.client.write(0x1017, 0, 50)
     old.client.write(0x1800, 1, 0x190)
@@ -182,14 +181,14 @@ def test_the_order_of_variables_counts_where_a_stored_pdo_tells_their_qualities(
 
 
 def test_an_operational_node_does_not_wait_for_a_disk() -> None:
-    kept = Kept(MemoryStore())
+    kept = Kept(Store())
     kept.ready = False
     with pytest.raises(Abort) as caught:
         kept.signed(0x1010, 1, b"save")
     assert caught.value.code is AbortCode.DEVICE_STATE
 
 
-def test_a_disk_that_fails_is_told_and_nothing_changes(tmp_path: Path) -> None:
+def test_a_disk_that_fails_is_reported_and_nothing_changes(tmp_path: Path) -> None:
     kept = Kept(JsonStore(tmp_path / "missing" / "file.json"))
     kept.client.write(0x1017, 0, 50)
     with pytest.raises(Abort) as caught:
@@ -212,7 +211,7 @@ def test_lss_settings_and_parameters_share_the_file(path: Path) -> None:
 
 
 def test_a_mapping_with_another_node_id_wins_over_lss() -> None:
-    store = MemoryStore()
+    store = Store()
     store.save(Saved(lss=LssSettings(9, 5)))
     kept = Kept(store, node=6)
     assert (kept.service.node, kept.service.lss) == (6, None)

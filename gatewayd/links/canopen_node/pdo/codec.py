@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, groupby
 from operator import itemgetter
-from typing import Final, Protocol
+from typing import Any, Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.cell import Change
@@ -59,9 +59,7 @@ def fit(value: Value, can_type: CanType) -> Value:
         return _fit_real(value, can_type)
     if math.isnan(value):
         return 0
-    signed = can_type.char.islower()
-    low = -(1 << can_type.bits - 1) if signed else 0
-    high = (1 << can_type.bits - signed) - 1
+    low, high = can_type.bounds
     return low if value <= low else high if value >= high else round(value)
 
 
@@ -85,10 +83,10 @@ def native(raw: Value, kind: ValueKind) -> Value | None:
 def is_aligned(types: Iterable[CanType]) -> bool:
     """Whether entries of these types, one after the other, leave only BOOLEANs off a byte boundary."""
     position = 0
-    for one in types:
-        if one is not CanType.BOOLEAN and position % 8:
+    for can_type in types:
+        if can_type is not CanType.BOOLEAN and position % 8:
             return False
-        position += one.bits
+        position += can_type.bits
     return True
 
 
@@ -100,20 +98,30 @@ ReadWord = Callable[[int, int], int]
 class Layout:
     """A compiled mapping of at most 64 bits, aligned as `is_aligned` says."""
 
-    __slots__ = ("_pack", "_parts", "_runs", "_unpack", "content", "gather", "mapping", "size", "variables")
+    __slots__ = (
+        "_pack",
+        "_receivers",
+        "_runs",
+        "_unpack",
+        "content",
+        "gather",
+        "mapping",
+        "size",
+        "variables",
+    )
 
     def __init__(self, mapping: Sequence[Mapped], variables: Sequence[Variable]) -> None:
-        types = [one.type for one in mapping]
-        bits = sum(one.bits for one in types)
+        types = [entry.type for entry in mapping]
+        bits = sum(can_type.bits for can_type in types)
         assert bits <= MAX_BITS
         assert is_aligned(types)
-        assert all(one.variable is not None for one in mapping if one.type is CanType.BOOLEAN)
+        assert all(entry.variable is not None for entry in mapping if entry.type is CanType.BOOLEAN)
         self.mapping = tuple(mapping)
         self.size = (bits + 7) // 8
         """Bytes."""
-        self.variables = tuple(one.variable for one in mapping if one.variable is not None)
+        self.variables = tuple(entry.variable for entry in mapping if entry.variable is not None)
         """Variables in the order of the mapping, without dummies and status words."""
-        self.content = tuple(one for one in mapping if not one.is_dummy)
+        self.content = tuple(entry for entry in mapping if not entry.is_dummy)
         """What a PDO holds, in the order of the mapping."""
         self.gather: Gather = _gatherer(self.variables)
         """Copies the content out of an image's values: what `pack` takes, and comparable with `==`. For a mapping with
@@ -122,8 +130,8 @@ class Layout:
         compiled = struct.Struct("<" + "".join(run.format for run in runs))
         self._pack = compiled.pack
         self._unpack = compiled.unpack
-        self._runs = tuple(_slices(runs)) if any(run.bits for run in runs) else None
-        self._parts = tuple(part for run in runs for part in run.parts(variables))
+        self._runs = tuple(_slices(runs)) if any(run.size for run in runs) else None
+        self._receivers = tuple(run.receiver(variables) for run in runs if run.values)
 
     @property
     def has_status(self) -> bool:
@@ -134,7 +142,7 @@ class Layout:
         """What copies the content together where some of it is in the status block."""
         if not self.has_status:
             return self.gather
-        places = [(one.variable, one.offset or 0, one.type.bits // 16) for one in self.content]
+        places = [(entry.variable, entry.offset or 0, entry.type.bits // 16) for entry in self.content]
 
         def gather(values: Sequence[Value]) -> tuple[Value, ...]:
             return tuple(
@@ -150,7 +158,7 @@ class Layout:
             return self._packed(content)
         except (struct.error, OverflowError, ValueError, TypeError):
             return self._packed(
-                [fit(value, one.type) for value, one in zip(content, self.content, strict=True)]
+                [fit(value, entry.type) for value, entry in zip(content, self.content, strict=True)]
             )
 
     def changes(self, data: bytes) -> list[Change] | Refusal:
@@ -159,8 +167,8 @@ class Layout:
         A refusal says which variable has no value for what was received.
         """
         changes: list[Change] = []
-        for part, raw in zip(self._parts, self._unpack(data), strict=True):
-            refusal = part.add(raw, changes)
+        for receive, raw in zip(self._receivers, self._unpack(data), strict=True):
+            refusal = receive(raw, changes)
             if refusal is not None:
                 return refusal
         return changes
@@ -192,94 +200,73 @@ class _Run:
     """Neighbours of a mapping that are handled together: one number, one dummy, or BOOLEANs."""
 
     mapped: tuple[Mapped, ...]
-    bits: bool
+    size: int
+    """Bytes of a run of bits; 0 for a number or a dummy."""
 
     @property
     def format(self) -> str:
         """Its part of the `struct` format."""
-        if self.bits:
+        if self.size:
             return f"{self.size}s"
-        one = self.mapped[0]
-        return one.type.char if not one.is_dummy else f"{one.type.bits // 8}x"
-
-    @property
-    def size(self) -> int:
-        """Bytes of a run of bits."""
-        return (len(self.mapped) + 7) // 8
+        number = self.mapped[0]
+        return number.type.char if not number.is_dummy else f"{number.type.bits // 8}x"
 
     @property
     def values(self) -> int:
         """How many values of the content it takes."""
-        return sum(not one.is_dummy for one in self.mapped)
+        return sum(not entry.is_dummy for entry in self.mapped)
 
-    def parts(self, variables: Sequence[Variable]) -> Iterator[_Part]:
+    def receiver(self, variables: Sequence[Variable]) -> Receive:
         """What takes its value when a PDO is received."""
-        members = [one.variable for one in self.mapped if one.variable is not None]
-        if self.bits:
-            yield _Bits(members, variables)
-        elif members:
-            yield _Number(members[0], self.mapped[0].type, variables[members[0]].kind)
+        members = [entry.variable for entry in self.mapped if entry.variable is not None]
+        if self.size:
+            return _bit_receiver(members, variables)
+        if members:
+            return _number_receiver(members[0], self.mapped[0].type, variables[members[0]].kind)
+        return lambda _raw, _changes: None  # a word of the status block, which is only sent
 
 
 def _runs(mapping: Sequence[Mapped]) -> Iterator[_Run]:
-    for bits, group in groupby(mapping, key=lambda one: one.type is CanType.BOOLEAN):
-        if bits:
-            yield _Run(tuple(group), bits=True)
+    for is_bits, group in groupby(mapping, key=lambda entry: entry.type is CanType.BOOLEAN):
+        entries = tuple(group)
+        if is_bits:
+            yield _Run(entries, (len(entries) + 7) // 8)
         else:
-            for one in group:
-                yield _Run((one,), bits=False)
+            yield from (_Run((entry,), 0) for entry in entries)
 
 
 def _slices(runs: Iterable[_Run]) -> Iterator[tuple[slice, int]]:
     """Where each run lies in the content; with its bytes for bits, 0 for numbers."""
     position = 0
     for run in runs:
-        yield slice(position, position + run.values), run.size if run.bits else 0
+        yield slice(position, position + run.values), run.size
         position += run.values
 
 
-class _Part(Protocol):
-    """Makes changes of one item of the unpacked PDO."""
-
-    def add(self, raw: Value | bytes, changes: list[Change]) -> Refusal | None:
-        """Append to `changes`, or return why not."""
+Receive = Callable[[Any, list[Change]], Refusal | None]
+"""Appends what an item of the unpacked PDO means to the changes, or returns why not."""
 
 
-class _Number:
-    __slots__ = ("_direct", "_kind", "_variable")
+def _number_receiver(variable: int, can_type: CanType, kind: ValueKind) -> Receive:
+    is_direct = kind is (ValueKind.FLOAT if can_type.is_real else ValueKind.INT)
 
-    def __init__(self, variable: int, can_type: CanType, kind: ValueKind) -> None:
-        self._variable = variable
-        self._kind = kind
-        self._direct = kind is (ValueKind.FLOAT if can_type.is_real else ValueKind.INT)
-
-    def add(self, raw: Value | bytes, changes: list[Change]) -> Refusal | None:
-        assert not isinstance(raw, bytes)
-        value = raw if self._direct else native(raw, self._kind)
+    def receive(raw: Any, changes: list[Change]) -> Refusal | None:
+        value = raw if is_direct else native(raw, kind)
         if value is None:
-            return Refusal(Reason.OUT_OF_LIMITS, self._variable)
-        changes.append(Change(self._variable, value))
+            return Refusal(Reason.OUT_OF_LIMITS, variable)
+        changes.append(Change(variable, value))
         return None
 
+    return receive
 
-class _Bits:
+
+def _bit_receiver(members: Sequence[int], variables: Sequence[Variable]) -> Receive:
     """Both changes of every bit are made in advance."""
+    values = {ValueKind.BOOL: (False, True), ValueKind.INT: (0, 1), ValueKind.FLOAT: (0.0, 1.0)}
+    pairs = [tuple(Change(index, value) for value in values[variables[index].kind]) for index in members]
 
-    __slots__ = ("_pairs",)
-
-    def __init__(self, members: Sequence[int], variables: Sequence[Variable]) -> None:
-        self._pairs = tuple(
-            tuple(Change(index, _truth(variables[index].kind, bit)) for bit in (False, True))
-            for index in members
-        )
-
-    def add(self, raw: Value | bytes, changes: list[Change]) -> None:
-        assert isinstance(raw, bytes)
+    def receive(raw: Any, changes: list[Change]) -> None:
         bits = chain.from_iterable(map(_BITS_OF.__getitem__, raw))
-        changes += [pair[bit] for pair, bit in zip(self._pairs, bits)]  # noqa: B905 - the last byte may have bits to spare
+        changes += [pair[bit] for pair, bit in zip(pairs, bits)]  # noqa: B905 - the last byte may have bits to spare
 
-
-def _truth(kind: ValueKind, bit: bool) -> Value:
-    value = native(bit, kind)
-    assert value is not None
-    return value
+    return receive

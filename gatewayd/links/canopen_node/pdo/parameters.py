@@ -21,9 +21,8 @@ CANopenNode's, which its conformance test accepts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Final
 
 from gatewayd.canopen.cob_ids import BASIC_FRAME, INVALID, is_restricted, predefined_pdo
@@ -31,7 +30,7 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, Pdo, record
 from gatewayd.core.definition import Direction, Variable
 from gatewayd.links.canopen_node.pdo.codec import MAX_BITS, Layout, Mapped, is_aligned
-from gatewayd.links.canopen_node.plan import CanopenPlan, PdoEntry, PdoPlan
+from gatewayd.links.canopen_node.plan import CanopenPlan, PdoPlan
 from gatewayd.links.canopen_node.status_objects import status_word
 
 __all__ = ["MIN_NUMBER", "Configuration", "PdoParameters", "PdoTable"]
@@ -46,8 +45,8 @@ _SYNCHRONOUS: Final = 240
 """Greatest synchronous transmission type, and greatest value of the SYNC counter."""
 _EVENT_DRIVEN: Final = (254, 255)
 _DUMMIES: Final = {
-    one.code: one
-    for one in (
+    can_type.code: can_type
+    for can_type in (
         CanType.INTEGER8,
         CanType.INTEGER16,
         CanType.INTEGER32,
@@ -86,7 +85,7 @@ class Configuration:
 
 
 Changed = Callable[[Direction, int, Configuration | None], None]
-"""Told the direction and number of a PDO and what it is now; None: it does not exist."""
+"""Gets the direction and number of a PDO and what it is now; None: it does not exist."""
 Find = Callable[[int, int], Entry]
 """The entry at index and sub-index. Raises Abort if there is none. Called when parameters are written, not before."""
 
@@ -98,7 +97,6 @@ class _Surroundings:
     objects: Mapping[tuple[int, int], Mapped]
     variables: Sequence[Variable]
     find: Find
-    refused: Callable[[int], bool]
     taken: Callable[[PdoParameters, int], bool]
     changed: Changed
 
@@ -124,13 +122,11 @@ _KINDS: Final = {
 class PdoParameters:
     """The parameters of one PDO. Its entries in the dictionary are its state; `configuration` follows from them."""
 
-    def __init__(
-        self, direction: Direction, number: int, plan: PdoPlan | None, around: _Surroundings
-    ) -> None:
-        self.direction = direction
-        self.number = number
+    def __init__(self, plan: PdoPlan, around: _Surroundings) -> None:
+        self.direction = plan.direction
+        self.number = plan.number
         self.configuration: Configuration | None = None
-        self._kind = _KINDS[direction]
+        self._kind = _KINDS[plan.direction]
         self._plan = plan
         self._around = around
         self._cob_id = self._entry(1, "COB-ID", CanType.UNSIGNED32, self._check_cob_id)
@@ -140,8 +136,17 @@ class PdoParameters:
         self._sync_start = self._entry(6, "SYNC start value", CanType.UNSIGNED8, self._check_sync_start)
         self._count = self._entry(0, "Number of mapped objects", CanType.UNSIGNED8, self._check_count)
         self._slots = tuple(
-            self._entry(one, f"Mapped object {one}", CanType.UNSIGNED32, partial(self._check_slot, one))
-            for one in range(1, MAX_BITS + 1)
+            self._entry(number, f"Mapped object {number}", CanType.UNSIGNED32, self._check_slot)
+            for number in range(1, MAX_BITS + 1)
+        )
+        self._entries = (
+            self._cob_id,
+            self._transmission,
+            self._inhibit,
+            self._event,
+            self._sync_start,
+            self._count,
+            *self._slots,
         )
 
     @property
@@ -178,21 +183,17 @@ class PdoParameters:
     def restore(self, node: int) -> None:
         """Put the defaults back; those that follow the node-ID follow `node`."""
         plan = self._plan
-        self._cob_id.default, self._cob_id.plus_node = self._default_cob_id(node)
-        mapped = [_number(one) for one in plan.entries] if plan is not None else []
-        _set_default(self._transmission, plan.transmission if plan is not None else 255)
-        _set_default(self._inhibit, plan.inhibit if plan is not None else 0)
-        _set_default(self._event, plan.event if plan is not None else 0)
-        _set_default(self._sync_start, plan.sync_start if plan is not None else 0)
-        _set_default(self._count, len(mapped))
-        for position, slot in enumerate(self._slots):
-            _set_default(slot, mapped[position] if position < len(mapped) else 0)
-        for entry in self._entries():
-            entry.value = entry.default
+        cob_id, self._cob_id.plus_node = self._default_cob_id(node)
+        mapped = [entry.index << 16 | entry.subindex << 8 | entry.bits for entry in plan.entries]
+        unset = [0] * (MAX_BITS - len(mapped))
+        defaults = (cob_id, plan.transmission, plan.inhibit, plan.event, plan.sync_start, len(mapped))
+        for entry, value in zip(self._entries, (*defaults, *mapped, *unset), strict=True):
+            assert entry.type.size is not None
+            entry.value = entry.default = value.to_bytes(entry.type.size, "little")
 
     def verify(self) -> None:
         """Check values that did not come through `Entry.write`. Raises Abort for what could not have been written."""
-        for entry in self._entries():
+        for entry in self._entries:
             if len(entry.value) != entry.type.size:
                 raise Abort(AbortCode.LENGTH)
         self._verify_cob_id(self._cob_id.number)
@@ -202,7 +203,7 @@ class PdoParameters:
         self._mapping(self._count.number)
 
     def apply(self) -> None:
-        """Work out `configuration` anew and tell if it has changed."""
+        """Work out `configuration` anew, and report it if it has changed."""
         configuration = self._configured() if self.is_valid else None
         if configuration != self.configuration:
             self.configuration = configuration
@@ -223,7 +224,7 @@ class PdoParameters:
             raise Abort(AbortCode.INVALID_VALUE)
         if cob_id & INVALID:
             return
-        if self._around.refused(identifier) or self._around.taken(self, identifier) or not self._count.number:
+        if is_restricted(identifier) or self._around.taken(self, identifier) or not self._count.number:
             raise Abort(AbortCode.INVALID_VALUE)
 
     def _check_inhibit(self, _data: bytes) -> None:
@@ -239,7 +240,7 @@ class PdoParameters:
             raise Abort(AbortCode.UNSUPPORTED_ACCESS)
         self._mapping(data[0])
 
-    def _check_slot(self, _number: int, data: bytes) -> None:
+    def _check_slot(self, data: bytes) -> None:
         if self.is_valid or self._count.number:
             raise Abort(AbortCode.UNSUPPORTED_ACCESS)
         value = int.from_bytes(data, "little")
@@ -256,41 +257,45 @@ class PdoParameters:
         if 0 in values:
             raise Abort(AbortCode.NOT_MAPPABLE)
         mapping = tuple(self._mapped(value) for value in values)
-        if sum(one.type.bits for one in mapping) > MAX_BITS:
+        if sum(mapped.type.bits for mapped in mapping) > MAX_BITS:
             raise Abort(AbortCode.PDO_LENGTH)
-        if not is_aligned(one.type for one in mapping):
+        if not is_aligned(mapped.type for mapped in mapping):
             raise Abort(AbortCode.NOT_MAPPABLE)
         return mapping
 
     def _mapped(self, value: int) -> Mapped:
+        """A mapped object as it is written. Raises Abort if a PDO of this direction cannot hold it."""
         index, subindex, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
         if bits > MAX_BITS:
             raise Abort(AbortCode.PDO_LENGTH)
-        mapped = self._dummy(index, subindex) or self._object(index, subindex)
-        if mapped.type.bits != bits:
+        mapped = self._known(value)
+        if mapped is None or not mapped.is_dummy:
+            try:
+                entry = self._around.find(index, subindex)
+            except Abort as abort:
+                raise Abort(AbortCode.NO_OBJECT) from abort
+            if entry.pdo is not self._kind.pdo:
+                raise Abort(AbortCode.NOT_MAPPABLE)
+        if mapped is None or mapped.type.bits != bits:
             raise Abort(AbortCode.NOT_MAPPABLE)
         return mapped
 
-    def _dummy(self, index: int, subindex: int) -> Mapped | None:
+    def _known(self, value: int) -> Mapped | None:
+        """The same without a look into the dictionary."""
+        index, subindex = value >> 16, value >> 8 & 0xFF
         dummy = self._kind.dummies.get(index) if subindex == 0 else None
-        return Mapped(None, dummy) if dummy is not None else None
-
-    def _object(self, index: int, subindex: int) -> Mapped:
-        try:
-            entry = self._around.find(index, subindex)
-        except Abort as abort:
-            raise Abort(AbortCode.NO_OBJECT) from abort
-        mapped = self._around.objects.get((index, subindex)) or status_word(index, subindex)
-        if mapped is None or entry.pdo is not self._kind.pdo:
-            raise Abort(AbortCode.NOT_MAPPABLE)
-        return mapped
+        if dummy is not None:
+            return Mapped(None, dummy)
+        return self._around.objects.get((index, subindex)) or status_word(index, subindex)
 
     # -- inside --------------------------------------------------------------------------------------------------
 
     def _configured(self) -> Configuration:
         # What is in the entries was verified when it was written, so nothing is looked up in a dictionary here: the
         # plan's own PDOs are configured before there is one.
-        mapping = tuple(self._known(slot.number) for slot in self._slots[: self._count.number])
+        known = (self._known(slot.number) for slot in self._slots[: self._count.number])
+        mapping = tuple(mapped for mapped in known if mapped is not None)
+        assert len(mapping) == self._count.number
         return Configuration(
             direction=self.direction,
             number=self.number,
@@ -303,32 +308,13 @@ class PdoParameters:
             sync_start=self._sync_start.number,
         )
 
-    def _known(self, value: int) -> Mapped:
-        index, subindex = value >> 16, value >> 8 & 0xFF
-        known = self._dummy(index, subindex) or self._around.objects.get((index, subindex))
-        mapped = known or status_word(index, subindex)
-        assert mapped is not None
-        return mapped
-
-    def _default_cob_id(self, node: int) -> tuple[bytes, bool]:
+    def _default_cob_id(self, node: int) -> tuple[int, bool]:
+        """The COB-ID, and whether it follows the node-ID."""
         plan, flags = self._plan, self._kind.flags
         predefined = predefined_pdo(self.number, node, transmit=self.direction is Direction.OUTPUT)
-        if plan is None:
-            flags |= INVALID
-        if predefined is not None and (plan is None or plan.predefined):
-            return (flags | predefined).to_bytes(4, "little"), True
-        return (flags | (plan.cob_id if plan is not None else 0)).to_bytes(4, "little"), False
-
-    def _entries(self) -> Iterator[Entry]:
-        yield from (
-            self._cob_id,
-            self._transmission,
-            self._inhibit,
-            self._event,
-            self._sync_start,
-            self._count,
-        )
-        yield from self._slots
+        if predefined is not None and plan.predefined:
+            return flags | plan.cob_id & INVALID | predefined, True
+        return flags | plan.cob_id, False
 
     def _entry(
         self, subindex: int, name: str, can_type: CanType, check: Callable[[bytes], None] | None = None
@@ -339,8 +325,8 @@ class PdoParameters:
 class PdoTable:
     """The parameters of all PDOs of a node: those of the plan, and unused ones up to `least` in each direction.
 
-    `changed` is told of every PDO that is valid from the start, while the table is made, and of every change
-    afterwards. `refused` says which identifiers no PDO may have.
+    `changed` is called for every PDO that is valid from the start, while the table is made, and of every change
+    afterwards.
     """
 
     def __init__(
@@ -351,19 +337,20 @@ class PdoTable:
         changed: Changed,
         *,
         least: int = MIN_NUMBER,
-        refused: Callable[[int], bool] = is_restricted,
     ) -> None:
         around = _Surroundings(
-            objects={(one.index, one.subindex): Mapped(one.variable, one.type) for one in plan.objects},
+            objects={
+                (placed.index, placed.subindex): Mapped(placed.variable, placed.type)
+                for placed in plan.objects
+            },
             variables=variables,
             find=find,
-            refused=refused,
             taken=self._is_taken,
             changed=changed,
         )
         self._node = plan.node
         self.pdos = tuple(
-            PdoParameters(direction, number, planned.get(number), around)
+            PdoParameters(planned.get(number) or _unused(direction, number), around)
             for direction in (Direction.INPUT, Direction.OUTPUT)
             for planned in [{pdo.number: pdo for pdo in plan.pdos if pdo.direction is direction}]
             for number in range(1, max(least, *planned, 0) + 1)
@@ -373,7 +360,7 @@ class PdoTable:
 
     def objects(self) -> Iterable[Object]:
         """The objects of all PDOs."""
-        return (one for pdo in self.pdos for one in pdo.objects())
+        return (parameter for pdo in self.pdos for parameter in pdo.objects())
 
     def restore(self, node: int | None = None) -> None:
         """Put the defaults of the mapping back, for another node-ID if one is given."""
@@ -421,10 +408,8 @@ def _check_transmission(data: bytes) -> None:
         raise Abort(AbortCode.INVALID_VALUE)
 
 
-def _number(entry: PdoEntry) -> int:
-    return entry.index << 16 | entry.subindex << 8 | entry.bits
-
-
-def _set_default(entry: Entry, value: int) -> None:
-    assert entry.type.size is not None
-    entry.default = value.to_bytes(entry.type.size, "little")
+def _unused(direction: Direction, number: int) -> PdoPlan:
+    """A PDO that the mapping does not use: invalid, with nothing mapped."""
+    return PdoPlan(
+        number, direction, INVALID, predefined=True, transmission=255, inhibit=0, event=0, entries=()
+    )

@@ -12,9 +12,9 @@ with the next SYNC, if its writer still lives. Both only in OPERATIONAL.
 | it waited too long while the gateway stood still | dropped, and the locks that it would have renewed are released \
 | FF08h |
 
-Each fault is told once per PDO. It is cleared by the opposite: a frame of the right length, any usable frame, a write
-that succeeds; and when the PDO is no longer received (configured anew, OPERATIONAL left). While the writer's heartbeat
-stays away its frames are refused as they come, whatever the type: none is kept for SYNC.
+Each fault is reported once per PDO. It is cleared by the opposite: a frame of the right length, any usable frame, a
+write that succeeds; and when the PDO is no longer received (configured anew, OPERATIONAL left). While the writer's
+heartbeat stays away its frames are refused as they come, whatever the type: none is kept for SYNC.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.links.canopen_node.pdo.parameters import Configuration
 
-__all__ = ["Fault", "ReceiveEngine", "ReceivePdo", "Tell"]
+__all__ = ["Fault", "ReceiveEngine", "ReportFault"]
 
 
 class Fault(Enum):
@@ -55,45 +55,21 @@ class Fault(Enum):
         return self.value >= 0xFF00
 
 
-_FAULTS: Final = {
-    Reason.HELD: Fault.HELD,
-    Reason.OUT_OF_LIMITS: Fault.OUT_OF_LIMITS,
-    Reason.ROBOT_LOST: Fault.ROBOT_LOST,
-    Reason.CLAIMED_ELSEWHERE: Fault.CLAIMED_ELSEWHERE,
-    Reason.NOT_WRITABLE: Fault.NOT_WRITABLE,
-    Reason.HEARTBEAT_LOST: Fault.HEARTBEAT_LOST,
-    Reason.PARTIAL_TAKEOVER: Fault.PARTIAL_TAKEOVER,
-    Reason.WAITED: Fault.WAITED,
-}
+_FAULTS: Final = {Reason[fault.name]: fault for fault in Fault if fault.is_refusal}
 """The reasons that a write of whole, mapped variables can be refused for."""
 
-Tell = Callable[[Fault, int, float], None]
+ReportFault = Callable[[Fault, int, float], None]
 """Takes a fault, the number of the RPDO, and the time."""
 
 
 class ReceivePdo:
     """One valid RPDO and what is known of the last reception."""
 
-    __slots__ = (
-        "changes",
-        "configuration",
-        "data",
-        "due",
-        "faults",
-        "latched",
-        "received",
-        "size",
-        "spared",
-        "waited",
-    )
-
     def __init__(self, configuration: Configuration) -> None:
         self.configuration = configuration
         self.size = configuration.layout.size
         self.faults: set[Fault] = set()
         """What is wrong now."""
-        self.received = 0
-        """Frames, faulty ones included."""
         self.latched: bytes | None = None
         """What waits for SYNC."""
         self.waited = 0.0
@@ -118,17 +94,12 @@ class ReceiveEngine:
     """All RPDOs of a node.
 
     They write as `requester()`, asked anew for each frame. Each frame of the right length is a sign of life of a
-    trusted writer, whether its write is refused or not. `raised` and `cleared` are called for each fault of each PDO; a
-    fault of one PDO may have been cleared while `standing` still has it for another.
+    trusted writer, whether its write is refused or not. `raised` and `cleared` are called for each fault of each PDO.
     """
 
-    def __init__(self, cell: Cell, requester: Callable[[], Requester], raised: Tell, cleared: Tell) -> None:
-        self.received = 0
-        """Frames in OPERATIONAL, faulty ones included."""
-        self.refused = 0
-        """Frames whose write the cell refused."""
-        self.wrong_length = 0
-        """Frames that were too short or too long."""
+    def __init__(
+        self, cell: Cell, requester: Callable[[], Requester], raised: ReportFault, cleared: ReportFault
+    ) -> None:
         self.is_operational = False
         self.synchronous_ids: frozenset[int] = frozenset()
         """The identifiers of RPDOs that all wait for SYNC."""
@@ -141,7 +112,7 @@ class ReceiveEngine:
         self._synchronous: tuple[ReceivePdo, ...] = ()
         self._deadline: float | None = math.inf
         self._now = 0.0
-        """The last time that was told, for `configure`."""
+        """The time of the last call, for `configure`."""
 
     @property
     def pdos(self) -> tuple[ReceivePdo, ...]:
@@ -153,27 +124,20 @@ class ReceiveEngine:
         """The identifiers to listen to."""
         return frozenset(self._by_can_id)
 
-    @property
-    def standing(self) -> frozenset[Fault]:
-        """What is wrong with any RPDO now."""
-        return frozenset[Fault]().union(*(pdo.faults for pdo in self._pdos.values()))
-
     def configure(self, number: int, configuration: Configuration | None) -> None:
         """An RPDO is now like this; None: it does not exist. What is kept for SYNC is dropped."""
         former = self._pdos.pop(number, None)
         if former is not None:
             self._clear(former, tuple(former.faults), self._now)
         if configuration is not None:
-            pdo = ReceivePdo(configuration)
-            pdo.received = former.received if former is not None else 0
-            self._pdos[number] = pdo
+            self._pdos[number] = ReceivePdo(configuration)
         by_can_id: dict[int, tuple[ReceivePdo, ...]] = {}
         for pdo in self.pdos:
             can_id = pdo.configuration.can_id
             by_can_id[can_id] = (*by_can_id.get(can_id, ()), pdo)
         self._by_can_id = by_can_id
         self._synchronous = tuple(pdo for pdo in self.pdos if pdo.configuration.is_synchronous)
-        immediate = {pdo.configuration.can_id for pdo in self.pdos if not pdo.configuration.is_synchronous}
+        immediate = {pdo.configuration.can_id for pdo in self.pdos if pdo not in self._synchronous}
         self.synchronous_ids = self.can_ids - immediate
         self._deadline = None
 
@@ -195,7 +159,6 @@ class ReceiveEngine:
             before = former._pdos.get(number)
             if before is not None:
                 pdo.faults = before.faults
-                pdo.received = before.received
                 pdo.latched, pdo.waited = before.latched, before.waited
                 pdo.due, pdo.spared = before.due, before.spared
         self._deadline = None
@@ -259,17 +222,16 @@ class ReceiveEngine:
     # -- inside --------------------------------------------------------------------------------------------------
 
     def _take(self, pdo: ReceivePdo, data: bytes, now: float, requester: Requester) -> None:
-        self.received += 1
-        pdo.received += 1
-        if len(data) != pdo.size and not self._use_long(pdo, data, now):
+        length = len(data)
+        if length < pdo.size:
+            self._raise(pdo, Fault.SHORT, now)
             return
+        if length > pdo.size:
+            self._raise(pdo, Fault.LONG, now)
+            data = data[: pdo.size]
         if pdo.faults:
-            good = (
-                (Fault.SHORT, Fault.LONG, Fault.TIMEOUT)
-                if len(data) == pdo.size
-                else (Fault.SHORT, Fault.TIMEOUT)
-            )
-            self._clear(pdo, good, now)
+            good = {Fault.SHORT, Fault.LONG, Fault.TIMEOUT}
+            self._clear(pdo, good if length == pdo.size else good - {Fault.LONG}, now)
         pdo.spared = False
         event = pdo.configuration.event
         if event:
@@ -277,19 +239,11 @@ class ReceiveEngine:
             if self._deadline is not None:
                 self._deadline = min(self._deadline, pdo.due)
         self._cell.writer_seen(requester, now)
-        data = data[: pdo.size]
         if pdo.configuration.is_synchronous and requester.trusted:
             pdo.latched = data
             pdo.waited = requester.waited
         else:
             self._write(pdo, data, now, requester)
-
-    def _use_long(self, pdo: ReceivePdo, data: bytes, now: float) -> bool:
-        """Tell of a wrong length. Returns whether the frame can be used all the same."""
-        self.wrong_length += 1
-        is_long = len(data) > pdo.size
-        self._raise(pdo, Fault.LONG if is_long else Fault.SHORT, now)
-        return is_long
 
     def _write(self, pdo: ReceivePdo, data: bytes, now: float, requester: Requester) -> None:
         changes = pdo.meaning(data)
@@ -299,7 +253,6 @@ class ReceiveEngine:
         else:
             refusal = self._cell.write(requester, changes, now)
         if refusal is not None:
-            self.refused += 1
             if refusal.reason is Reason.WAITED:
                 self._cell.drop_waited(requester, pdo.configuration.layout.variables, now)
             self._raise(pdo, _FAULTS[refusal.reason], now)
@@ -312,6 +265,6 @@ class ReceiveEngine:
             self._raised(fault, pdo.configuration.number, now)
 
     def _clear(self, pdo: ReceivePdo, faults: Iterable[Fault], now: float) -> None:
-        for fault in sorted(pdo.faults.intersection(faults), key=lambda one: one.value):
+        for fault in sorted(pdo.faults.intersection(faults), key=lambda fault: fault.value):
             pdo.faults.discard(fault)
             self._cleared(fault, pdo.configuration.number, now)

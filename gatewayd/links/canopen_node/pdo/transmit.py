@@ -96,35 +96,16 @@ MOVES: dict[tuple[Schedule, TransmitSignal], TransmitMove] = {
 class TransmitPdo:
     """One valid TPDO: its compiled content and what is known of the last transmission."""
 
-    __slots__ = (
-        "can_id",
-        "configuration",
-        "content",
-        "countdown",
-        "data",
-        "deadbands",
-        "due",
-        "earliest",
-        "forced",
-        "gather",
-        "guarded",
-        "has_status",
-        "is_stopped",
-        "moves",
-        "pack",
-        "sent",
-        "waits",
-    )
-
     def __init__(self, configuration: Configuration, variables: Sequence[Variable], read: ReadWord) -> None:
         layout = configuration.layout
         schedule = Schedule.of(configuration.transmission)
         deadbands = tuple(
-            variables[one.variable].deadband if one.variable is not None else 0.0 for one in layout.content
+            variables[entry.variable].deadband if entry.variable is not None else 0.0
+            for entry in layout.content
         )
         self.configuration = configuration
         self.can_id = configuration.can_id
-        self.moves = {signal: move for (one, signal), move in MOVES.items() if one is schedule}
+        self.moves = {signal: move for (when, signal), move in MOVES.items() if when is schedule}
         self.gather = layout.gatherer(read)
         self.has_status = layout.has_status
         self.pack = layout.pack
@@ -146,8 +127,6 @@ class TransmitPdo:
         """SYNCs until the next cyclic transmission; None: before the first one."""
         self.is_stopped = False
         """A variable of it may not be read now."""
-        self.sent = 0
-        """Frames."""
 
     @property
     def deadline(self) -> float:
@@ -194,10 +173,6 @@ class TransmitEngine:
     """
 
     def __init__(self, cell: Cell, send: Send) -> None:
-        self.sent = 0
-        """Frames of all TPDOs since the engine was made."""
-        self.stopped = 0
-        """How often a TPDO has stopped because a variable may not be read."""
         self.is_operational = False
         self._cell = cell
         self._values = cell.image.values
@@ -234,7 +209,6 @@ class TransmitEngine:
             pdo = TransmitPdo(configuration, self._cell.definition.variables, self._read_word)
             if former is not None:
                 pdo.earliest = 0.0 if configuration.is_synchronous else former.earliest
-                pdo.sent = former.sent
             self._pdos[number] = pdo
             self._fresh.append(pdo)
         pdos = self.pdos
@@ -254,7 +228,7 @@ class TransmitEngine:
         self._deadline = None
         if operational:
             self._fresh = list(self.pdos)
-            self._start_fresh(now)
+            self._judge(now)
             return
         for pdo in self._pdos.values():
             pdo.rest()
@@ -349,35 +323,20 @@ class TransmitEngine:
 
     def _look(self, now: float) -> None:
         """Notice what happened beside the image: PDOs configured anew, variables that may be read or not."""
-        if self._cell.unreadable is not self._unreadable:
+        if self._fresh or self._cell.unreadable is not self._unreadable:
             self._judge(now)
-        if self._fresh:
-            self._start_fresh(now)
 
     def _judge(self, now: float) -> None:
-        self._unreadable = self._cell.unreadable
-        for pdo in self._pdos.values():
-            was_stopped, pdo.is_stopped = pdo.is_stopped, not self._unreadable.isdisjoint(pdo.guarded)
-            if pdo.is_stopped and not was_stopped:
-                self._stop(pdo)
-            elif was_stopped and not pdo.is_stopped and pdo not in self._fresh:
-                self._happened(pdo, TransmitSignal.START, now)
-        self._deadline = None
-
-    def _start_fresh(self, now: float) -> None:
+        """Stop what may not be read now; start what may again, and what is new."""
         self._unreadable = self._cell.unreadable
         fresh, self._fresh = self._fresh, []
-        for pdo in fresh:
+        for pdo in self.pdos:
             was_stopped, pdo.is_stopped = pdo.is_stopped, not self._unreadable.isdisjoint(pdo.guarded)
-            if not pdo.is_stopped:
+            if pdo.is_stopped:
+                pdo.rest()
+            elif was_stopped or pdo in fresh:
                 self._happened(pdo, TransmitSignal.START, now)
-            elif not was_stopped:
-                self._stop(pdo)
         self._deadline = None
-
-    def _stop(self, pdo: TransmitPdo) -> None:
-        self.stopped += 1
-        pdo.rest()
 
     def _happened(self, pdo: TransmitPdo, signal: TransmitSignal, now: float) -> None:
         move = pdo.moves.get(signal)
@@ -423,8 +382,6 @@ class TransmitEngine:
         pdo.content = content
         pdo.data = data
         pdo.forced = False
-        pdo.sent += 1
-        self.sent += 1
         configuration = pdo.configuration
         if not configuration.is_synchronous:
             pdo.earliest = now + configuration.inhibit

@@ -12,14 +12,14 @@ from gatewayd.links.canopen_node.bus_load import (
     FIRST_EVENT_TYPE,
     WARNING_ABOVE,
     Share,
-    Station,
     bus_shares,
     load,
     pdo_bits,
-    station_of,
 )
-from gatewayd.links.canopen_node.expand import CanopenCell, node_of
+from gatewayd.links.canopen_node.expand import CanopenCell, node_of, the_node
 from gatewayd.links.canopen_node.rules.pdos import cob_id_place
+from gatewayd.links.canopen_node.rules.registry import first_at_each_place
+from gatewayd.links.canopen_node.sections import Canopen
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import plant_rule
@@ -29,15 +29,15 @@ __all__: list[str] = []
 
 
 @plant_rule("GW407")
+@first_at_each_place
 def bus_cob_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Two cells on one bus that send with the same COB-ID."""
-    for nodes in _buses(cells):
+    for nodes in _nodes(cells):
         used: dict[int, tuple[CanopenCell, str, Position]] = {}
         for node in nodes:
             number = node.part.spec.node
             used.setdefault(Function.EMCY + number, (node, f"EMCY of node {number}", node.part.at("node")))
         for node in nodes:
-            reported: set[Position] = set()
             for pdo in node.pdos:
                 own = pdo.slot.cob_id
                 if pdo.direction is Direction.INPUT or own is None or is_restricted(own):
@@ -46,9 +46,8 @@ def bus_cob_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diag
                 what = f"{pdo.label} of node {node.part.spec.node}"
                 other, known, where = used.setdefault(own, (node, what, place))
                 # Equal node-IDs have a rule of their own, and within a cell GW405 looks.
-                if other is node or other.part.spec.node == node.part.spec.node or place in reported:
+                if other is node or other.part.spec.node == node.part.spec.node:
                     continue
-                reported.add(place)
                 related = (Related(where, f"{known} is {cob(own)}"),)
                 message = f"{pdo.label} has the COB-ID {cob(own)}, which is {known} on the same bus"
                 yield rule.at(place, message, hint="choose another COB-ID", related=related)
@@ -57,22 +56,18 @@ def bus_cob_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diag
 @plant_rule("GW408")
 def node_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Two cells with the same node-ID on one bus."""
-    for nodes in _buses(cells):
-        first: dict[int, CanopenCell] = {}
-        for node in nodes:
-            other = first.setdefault(node.part.spec.node, node)
-            if other is not node:
-                spec = node.part.spec
-                message = f"node {spec.node} on {spec.channel} is already another cell"
-                related = (Related(other.part.at("node"), f"node {spec.node} first used here"),)
-                hint = "give each cell its own node-ID, 1 to 127"
-                yield rule.at(node.part.at("node"), message, hint=hint, related=related)
+    for node, other in _same(cells, lambda spec: spec.node):
+        spec = node.part.spec
+        message = f"node {spec.node} on {spec.channel} is already another cell"
+        related = (Related(other.part.at("node"), f"node {spec.node} first used here"),)
+        hint = "give each cell its own node-ID, 1 to 127"
+        yield rule.at(node.part.at("node"), message, hint=hint, related=related)
 
 
 @plant_rule("GW428")
 def bit_rate_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Two cells on one bus with different bit-rates."""
-    for first, *others in _buses(cells):
+    for first, *others in _nodes(cells):
         for node in others:
             spec, other = node.part.spec, first.part.spec
             if spec.bitrate != other.bitrate:
@@ -87,16 +82,12 @@ def bit_rate_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagno
 @plant_rule("GW429")
 def two_sync_producers(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
     """Two cells that send the same SYNC."""
-    for nodes in _buses(cells):
-        first: dict[int, CanopenCell] = {}
-        for node in nodes:
-            sync = node.part.spec.sync
-            other = first.setdefault(sync.cob_id, node) if sync.producer else node
-            if other is not node:
-                message = f"another cell on {node.part.spec.channel} sends SYNC ({cob(sync.cob_id)}) already"
-                related = (Related(other.part.at("sync", "producer"), "the other producer is here"),)
-                hint = "remove `producer` in one of the two files"
-                yield rule.at(node.part.at("sync", "producer"), message, hint=hint, related=related)
+    for node, other in _same(cells, lambda spec: spec.sync.cob_id if spec.sync.producer else None):
+        spec = node.part.spec
+        message = f"another cell on {spec.channel} sends SYNC ({cob(spec.sync.cob_id)}) already"
+        related = (Related(other.part.at("sync", "producer"), "the other producer is here"),)
+        hint = "remove `producer` in one of the two files"
+        yield rule.at(node.part.at("sync", "producer"), message, hint=hint, related=related)
 
 
 @plant_rule("GW426", Severity.WARNING)
@@ -114,29 +105,28 @@ def bus_load_too_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Dia
 def _loaded(
     rule: Rule, cells: Sequence[ExpandedCell], is_meant: Callable[[float], bool]
 ) -> Iterator[Diagnostic]:
-    by_node = {id(node_of(cell)): cell for cell in cells}
-    for nodes in _buses(cells):
-        bus = [station_of(by_node[id(node)], node) for node in nodes]
+    for bus in _buses(cells):
         shares = bus_shares(bus)
-        spec = bus[0].node.part.spec
-        share = load(shares, spec.bitrate)
+        part = the_node(bus[0]).part
+        channel, bit_rate = part.spec.channel, part.spec.bitrate
+        share = load(shares, bit_rate)
         if not is_meant(share):
             continue
-        most = max(shares, key=lambda one: one.bits_per_second)
+        most = max(shares, key=lambda share: share.bits_per_second)
         others = "" if len(bus) == 1 else f" by {len(bus)} cells"
         message = (
-            f"{spec.channel} can be loaded with {share:.0%} of {spec.bitrate} bit/s{others}, "
-            f"most of it by {most.what} ({most.rate:.4g} frames/s, {load([most], spec.bitrate):.1%})"
+            f"{channel} can be loaded with {share:.0%} of {bit_rate} bit/s{others}, "
+            f"most of it by {most.what} ({most.rate:.4g} frames/s, {load([most], bit_rate):.1%})"
         )
-        yield rule.at(bus[0].node.part.at("bitrate"), message, hint=_remedy(bus, shares, spec.bitrate))
+        yield rule.at(part.at("bitrate"), message, hint=_remedy(bus, shares, bit_rate))
 
 
-def _remedy(bus: Sequence[Station], shares: Sequence[Share], bit_rate: int) -> str:
+def _remedy(bus: Sequence[ExpandedCell], shares: Sequence[Share], bit_rate: int) -> str:
     """The inhibit time that brings all event-driven PDOs below the warning, if one does."""
     events = {
-        f"node {station.node.part.spec.node}: {pdo.label}": pdo_bits(pdo)
-        for station in bus
-        for pdo in station.node.pdos
+        f"node {node.part.spec.node}: {pdo.label}": pdo_bits(pdo)
+        for node in map(the_node, bus)
+        for pdo in node.pdos
         if pdo.transmission >= FIRST_EVENT_TYPE
     }
     rest = load([share for share in shares if share.what not in events], bit_rate)
@@ -148,11 +138,29 @@ def _remedy(bus: Sequence[Station], shares: Sequence[Share], bit_rate: int) -> s
     return "use a slower SYNC, REAL32, fewer variables in PDOs, or a higher bit-rate"
 
 
-def _buses(cells: Sequence[ExpandedCell]) -> Iterator[list[CanopenCell]]:
-    """The nodes on each bus, in the order of the files."""
-    buses: dict[tuple[str, str], list[CanopenCell]] = {}
-    for node in map(node_of, cells):
+def _same(
+    cells: Sequence[ExpandedCell], key: Callable[[Canopen], int | None]
+) -> Iterator[tuple[CanopenCell, CanopenCell]]:
+    """Each node with the first one on its bus that has the same key; None is the same as nothing."""
+    for nodes in _nodes(cells):
+        first: dict[int, CanopenCell] = {}
+        for node in nodes:
+            found = key(node.part.spec)
+            if found is not None and first.setdefault(found, node) is not node:
+                yield node, first[found]
+
+
+def _buses(cells: Sequence[ExpandedCell]) -> Iterator[list[ExpandedCell]]:
+    """The cells with a node on each bus, in the order of the files."""
+    buses: dict[tuple[str, str], list[ExpandedCell]] = {}
+    for cell in cells:
+        node = node_of(cell)
         if node is not None:
             spec = node.part.spec
-            buses.setdefault((spec.interface, spec.channel), []).append(node)
+            buses.setdefault((spec.interface, spec.channel), []).append(cell)
     yield from buses.values()
+
+
+def _nodes(cells: Sequence[ExpandedCell]) -> Iterator[list[CanopenCell]]:
+    """The nodes on each bus."""
+    return ([the_node(cell) for cell in bus] for bus in _buses(cells))

@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction, ValueKind
 from gatewayd.links.canopen_node.bus_load import BIT_RATES, FIRST_EVENT_TYPE
-from gatewayd.links.canopen_node.expand import MappedObject, node_of, place_of
-from gatewayd.links.canopen_node.sections import Canopen, CanopenPlaces, CanopenWriter
+from gatewayd.links.canopen_node.expand import CanopenCell, MappedObject, place_of
+from gatewayd.links.canopen_node.rules.registry import first_at_each_place, node_rule
+from gatewayd.links.canopen_node.sections import CanopenPlaces, CanopenWriter
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
+from gatewayd.mapping.document import Part
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.model import WriterSpec
 from gatewayd.mapping.rules.registry import cell_rule
@@ -33,19 +35,19 @@ def no_canopen_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             message = f"`{part.name}` is on CANopen, but the file has no section `canopen`"
             yield rule.at(part.key_at("canopen"), message, hint=hint)
             return
-    for writer in cell.document.writers.values():
-        if writer.spec.by(CanopenWriter).canopen is not None:
+    for writer, spec in _writers(cell):
+        if spec.canopen is not None:
             message = f"the writer `{writer.name}` is on CANopen, but the file has no section `canopen`"
             yield rule.at(writer.key_at("canopen"), message, hint=hint)
             return
 
 
-@cell_rule("GW413")
-def canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW413")
+def canopen_type(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A CANopen type that does not suit the robot's type."""
-    for variable, one in _lines(cell):
+    for variable, placed in _lines(cell, node):
         place = place_of(variable)
-        if not one.fits and place is not None:
+        if not placed.fits and place is not None:
             message = f"`{variable.part.name}` ({variable.target}, {variable.type}) cannot be {place.type}"
             hint = f"write {_suited(variable)}, or leave `type` out"
             yield rule.at(variable.at("canopen", "type"), message, hint=hint)
@@ -57,12 +59,12 @@ def _suited(variable: ExpandedVariable) -> str:
     return "REAL64 or REAL32" if variable.kind is ValueKind.FLOAT else "an INTEGER or UNSIGNED type"
 
 
-@cell_rule("GW414", Severity.WARNING)
-def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW414", Severity.WARNING)
+def real32_loss(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A double of the robot in a REAL32 that loses digits."""
-    for variable, one in _lines(cell):
+    for variable, placed in _lines(cell, node):
         place = place_of(variable)
-        if one.plan.type is not CanType.REAL32 or variable.kind is not ValueKind.FLOAT:
+        if placed.plan.type is not CanType.REAL32 or variable.kind is not ValueKind.FLOAT:
             continue
         limits = variable.spec.limits
         coarse = limits is not None and max(-limits[0], limits[1]) > _REAL32_DIGITS
@@ -75,60 +77,55 @@ def real32_loss(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_type_place(variable), message, hint=hint)
 
 
-@cell_rule("GW415", Severity.WARNING)
-def narrow_canopen_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW415", Severity.WARNING)
+def narrow_canopen_type(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """An integer from the robot in a CANopen type too small for it."""
-    for variable, one in _lines(cell):
+    for variable, placed in _lines(cell, node):
         bounds = variable.range
-        if variable.direction is Direction.INPUT or bounds is None or not one.fits:
+        if variable.direction is Direction.INPUT or bounds is None or not placed.fits:
             continue
-        low, high = one.plan.type.bounds
+        low, high = placed.plan.type.bounds
         if bounds[0] < low or bounds[1] > high:
             message = (
                 f"`{variable.part.name}` can be {number(bounds[0])} to {number(bounds[1])}, "
-                f"{one.plan.type.name} shows {low} to {high}"
+                f"{placed.plan.type.name} shows {low} to {high}"
             )
             hint = "use a wider type, or state the range with `limits: [least, greatest]`"
             yield rule.at(_type_place(variable), message, hint=hint)
 
 
-@cell_rule("GW420")
-def watched_itself(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW420")
+def watched_itself(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A writer whose heartbeat is that of this node."""
-    canopen = cell.document.part(Canopen)
-    if canopen is None:
-        return
-    for writer in cell.document.writers.values():
-        node = writer.spec.by(CanopenWriter).node
-        if node == canopen.spec.node:
-            message = f"the writer `{writer.name}` has the node-ID {node}, which is this cell's own"
-            related = (Related(canopen.at("node"), f"this cell is node {canopen.spec.node}"),)
+    own = node.part.spec.node
+    for writer, spec in _writers(cell):
+        if spec.node == own:
+            message = f"the writer `{writer.name}` has the node-ID {own}, which is this cell's own"
+            related = (Related(node.part.at("node"), f"this cell is node {own}"),)
             hint = "write the node-ID of the master, often 1 or 127"
             yield rule.at(writer.at("node"), message, hint=hint, related=related)
 
 
-@cell_rule("GW421")
-def unknown_bit_rate(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW421")
+def unknown_bit_rate(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A bit-rate that CANopen does not have."""
-    canopen = cell.document.part(Canopen)
-    if canopen is None or canopen.spec.bitrate in BIT_RATES:
+    rate = node.part.spec.bitrate
+    if rate in BIT_RATES:
         return
-    rate = canopen.spec.bitrate
     near = rate * 1000 if rate * 1000 in BIT_RATES else min(BIT_RATES, key=lambda known: abs(known - rate))
     message = f"{rate} bit/s is no bit-rate of CANopen"
-    yield rule.at(canopen.at("bitrate"), message, hint=f"write {near}, if that is the bit-rate of the bus")
+    hint = f"write {near}, if that is the bit-rate of the bus"
+    yield rule.at(node.part.at("bitrate"), message, hint=hint)
 
 
-@cell_rule("GW422", Severity.WARNING)
-def idle_canopen_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW422", Severity.WARNING)
+def idle_canopen_writer(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A writer by PDO or SDO where there is nothing for it to write."""
-    node = node_of(cell)
-    if node is None or len(cell.document.declared("variables")) > len(cell.document.variables):
+    if len(cell.document.declared("variables")) > len(cell.document.variables):
         return
-    by_sdo = any(one.direction is Direction.INPUT for one in node.objects)
+    by_sdo = any(placed.direction is Direction.INPUT for placed in node.objects)
     by_rpdo = any(entry.direction is Direction.INPUT for pdo in node.pdos for entry in pdo.entries)
-    for writer in cell.document.writers.values():
-        spec = writer.spec.by(CanopenWriter)
+    for writer, spec in _writers(cell):
         if (spec.canopen == "rpdo" and not by_rpdo) or (spec.by_sdo and not by_sdo):
             what = "in a PDO" if by_sdo else "on CANopen"
             message = f"`{writer.name}` writes by {spec.canopen}, and no variable towards the robot is {what}"
@@ -136,8 +133,8 @@ def idle_canopen_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.at("canopen"), message, hint=hint)
 
 
-@cell_rule("GW423")
-def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW423")
+def out_of_reach(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """An input that none of its owners can write where it lies."""
     if not cell.document.writers:
         return
@@ -161,10 +158,10 @@ def out_of_reach(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(variable.position, message, hint=hint)
 
 
-@cell_rule("GW432", Severity.WARNING)
-def owner_elsewhere(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW432", Severity.WARNING)
+@first_at_each_place
+def owner_elsewhere(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """An owner that cannot write where the variable lies."""
-    reported: set[Position] = set()
     for variable in _inputs(cell):
         assert variable.lock is not None
         lock = cell.locks[variable.lock]
@@ -173,8 +170,7 @@ def owner_elsewhere(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if lock.is_any or not ways or not any(ways & ways_of(writer) for _, writer in owners):
             continue
         for name, writer in owners:
-            if not ways & ways_of(writer) and lock.position not in reported:
-                reported.add(lock.position)
+            if not ways & ways_of(writer):
                 message = (
                     f"the owner `{name}` writes by {' and '.join(sorted(ways_of(writer)))}, "
                     f"`{variable.part.name}` can be written by {' and '.join(sorted(ways))} only"
@@ -190,10 +186,7 @@ def _owners(cell: ExpandedCell, variable: ExpandedVariable) -> list[tuple[str, W
 
 
 def _inputs(cell: ExpandedCell) -> Iterator[ExpandedVariable]:
-    """The first input of each line that has an owner, on a cell with a node."""
-    node = node_of(cell)
-    if node is None:
-        return
+    """The first input of each line that has an owner."""
     for variable in cell.variables:
         if variable.direction is Direction.INPUT and variable.lock is not None and not variable.member:
             yield variable
@@ -202,9 +195,8 @@ def _inputs(cell: ExpandedCell) -> Iterator[ExpandedVariable]:
 @cell_rule("GW424")
 def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Two writers for one service of the node."""
-    writers = [(writer, writer.spec.by(CanopenWriter)) for writer in cell.document.writers.values()]
     for service in ("by_rpdo", "by_sdo"):
-        found = [(writer, spec) for writer, spec in writers if getattr(spec, service)]
+        found = [(writer, spec) for writer, spec in _writers(cell) if getattr(spec, service)]
         for other, spec in found[1:]:
             first, former = found[0]
             if service == "by_sdo" and spec.by_rpdo and former.by_rpdo:
@@ -218,8 +210,7 @@ def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW425")
 def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A watched heartbeat without a node, a time, or CANopen."""
-    for writer in cell.document.writers.values():
-        spec = writer.spec.by(CanopenWriter)
+    for writer, spec in _writers(cell):
         given = [key for key in ("node", "heartbeat") if getattr(spec, key) is not None]
         if not given:
             continue
@@ -228,43 +219,40 @@ def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             hint = f"add `canopen: rpdo`, or remove `{given[0]}`"
             yield rule.at(writer.key_at(given[0]), message, hint=hint)
         elif len(given) == 1:
-            other = "heartbeat" if given[0] == "node" else "node"
+            other, hint = "node", "add `node: 1`, the node-ID of the writer"
+            if given[0] == "node":
+                other, hint = "heartbeat", "add `heartbeat: 500ms`"
             message = f"the writer `{writer.name}` has `{given[0]}` without `{other}`"
-            hint = (
-                "add `heartbeat: 500ms`"
-                if other == "heartbeat"
-                else "add `node: 1`, the node-ID of the writer"
-            )
             yield rule.at(writer.key_at(given[0]), message, hint=hint)
 
 
-@cell_rule("GW435", Severity.WARNING)
-def timeout_of_silence(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW435", Severity.WARNING)
+def timeout_of_silence(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A timeout for a CANopen writer that may be silent for good reason."""
-    node = node_of(cell)
-    if node is None:
-        return
     received = [pdo for pdo in node.pdos if pdo.direction is Direction.INPUT]
     if not received or any(pdo.event is not None or pdo.transmission < FIRST_EVENT_TYPE for pdo in received):
         return
-    for writer in cell.document.writers.values():
-        timeout, spec = writer.spec.timeout, writer.spec.by(CanopenWriter)
-        only_here = len(known_by(writer.spec)) == 1
+    for writer, spec in _writers(cell):
+        timeout, only_here = writer.spec.timeout, len(known_by(writer.spec)) == 1
         if spec.by_rpdo and only_here and timeout is not None and spec.heartbeat is None:
             message = f"`{writer.name}` is lost after {seconds(timeout)} without a PDO, and none has to come"
             hint = "write `node: 1, heartbeat: 1s` in place of `timeout`, or give the PDOs a `deadline`"
             yield rule.at(writer.at("timeout"), message, hint=hint)
 
 
-def _lines(cell: ExpandedCell) -> Iterator[tuple[ExpandedVariable, MappedObject]]:
+def _writers(cell: ExpandedCell) -> Iterator[tuple[Part[WriterSpec], CanopenWriter]]:
+    """Each writer, and what it has by CANopen."""
+    return ((writer, writer.spec.by(CanopenWriter)) for writer in cell.document.writers.values())
+
+
+def _lines(cell: ExpandedCell, node: CanopenCell) -> Iterator[tuple[ExpandedVariable, MappedObject]]:
     """The first variable of each line that is an object, with the object."""
-    node = node_of(cell)
     seen: set[str] = set()
-    for one in node.objects if node is not None else ():
-        variable = cell.variables[one.variable]
+    for placed in node.objects:
+        variable = cell.variables[placed.variable]
         if variable.part.name not in seen:
             seen.add(variable.part.name)
-            yield variable, one
+            yield variable, placed
 
 
 def _canopen_place(variable: ExpandedVariable) -> Position:

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gatewayd.links.canopen_node.expand import MemberProblem, Misnamed, node_of
+from gatewayd.links.canopen_node.expand import CanopenCell, MemberProblem, Misnamed
+from gatewayd.links.canopen_node.rules.registry import node_rule
 from gatewayd.links.canopen_node.sections import AUTO, NO_PDO, CanopenPlaces, PdoSpec
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule
 from gatewayd.mapping.expanded import ExpandedCell
-from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.report.wording import did_you_mean
 
 __all__: list[str] = []
 
 
-@cell_rule("GW410")
-def unknown_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW410")
+def unknown_pdo(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A PDO that is not declared."""
-    node = node_of(cell)
-    if node is None:
-        return
     known = node.part.spec.pdos
     for part in cell.document.variables.values():
         place = part.spec.by(CanopenPlaces).canopen
@@ -31,29 +28,27 @@ def unknown_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(part.at("canopen", "pdo"), message, hint=hint)
 
 
-@cell_rule("GW411")
-def variable_in_two_pdos(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW411")
+def variable_in_two_pdos(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A variable in two PDOs, or twice in one."""
-    for wrong in _once(cell, MemberProblem.TAKEN, MemberProblem.OBJECT_ONLY):
+    for wrong in _once(node, MemberProblem.TAKEN, MemberProblem.OBJECT_ONLY):
         assert wrong.variable is not None
         variable = cell.variables[wrong.variable]
         place = wrong.position or variable.part.at("canopen", "pdo")
         if wrong.problem is MemberProblem.OBJECT_ONLY:
             message = f"the PDO `{wrong.pdo}` names `{variable.name}`, whose line says `canopen: object`"
             related = (Related(variable.part.at("canopen"), "the line is here"),)
-            yield rule.at(
-                place, message, hint="write `canopen: auto` there, or remove it here", related=related
-            )
+            hint = "write `canopen: auto` there, or remove it here"
+            yield rule.at(place, message, hint=hint, related=related)
             continue
         message = f"`{variable.name}` is in the PDO `{wrong.other}` already"
         yield rule.at(place, message, hint=f"remove it from `{wrong.pdo}` or from `{wrong.other}`")
 
 
-@cell_rule("GW412")
-def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW412")
+def empty_pdo(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A PDO that carries nothing."""
-    node = node_of(cell)
-    if node is None or len(cell.document.declared("variables")) > len(cell.document.variables):
+    if len(cell.document.declared("variables")) > len(cell.document.variables):
         return
     broken = {wrong.pdo for wrong in node.misnamed}
     unresolved = {missing.part.name for missing in cell.unresolved}
@@ -65,19 +60,20 @@ def empty_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(node.part.key_at("pdos", name), message, hint=hint)
 
 
-@cell_rule("GW430")
-def unknown_pdo_variable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW430")
+def unknown_pdo_variable(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A PDO that names a variable that does not exist."""
     declared = cell.document.declared("variables")
     unresolved = {missing.part.name for missing in cell.unresolved}
-    for wrong in _once(cell, MemberProblem.UNKNOWN):
+    for wrong in _once(node, MemberProblem.UNKNOWN):
         name = wrong.text.partition("[")[0]
         if name in unresolved or (name in declared and name not in cell.document.variables):
             continue
-        count = sum(variable.part.name == name for variable in cell.variables)
-        if count:
+        family = [variable for variable in cell.variables if variable.part.name == name]
+        if family:
+            count = len(family)
             message = f"the PDO `{wrong.pdo}` names `{wrong.text}`, and `{name}` "
-            single = count == 1 and all(one.member is None for one in cell.variables if one.part.name == name)
+            single = count == 1 and family[0].member is None
             message += "is a single variable" if single else f"has {count} members"
             hint = f"write `{name}`" if single else f"write `{name}[0..{count - 1}]` or less"
         else:
@@ -93,11 +89,10 @@ def _named(pdo: PdoSpec) -> Iterator[str]:
     yield from (member.variables.name for member in pdo.status if member.variables is not None)
 
 
-def _once(cell: ExpandedCell, *problems: MemberProblem) -> Iterator[Misnamed]:
+def _once(node: CanopenCell, *problems: MemberProblem) -> Iterator[Misnamed]:
     """The first of each name in each PDO."""
-    node = node_of(cell)
     seen: set[tuple[str, str]] = set()
-    for wrong in node.misnamed if node is not None else ():
+    for wrong in node.misnamed:
         if wrong.problem in problems and (wrong.pdo, wrong.text) not in seen:
             seen.add((wrong.pdo, wrong.text))
             yield wrong

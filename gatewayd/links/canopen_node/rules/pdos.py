@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 from gatewayd.canopen.cob_ids import Function, is_restricted
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction
 from gatewayd.links.canopen_node.bus_load import FIRST_EVENT_TYPE
-from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo, node_of
+from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo
 from gatewayd.links.canopen_node.pdo_layout import PDO_BITS, PDO_NUMBERS
+from gatewayd.links.canopen_node.rules.registry import first_at_each_place, node_rule
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
-from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.report.wording import cob, seconds
 
 __all__ = ["cob_id_place"]
@@ -26,10 +27,10 @@ _KEYS = {Direction.INPUT: "rpdo", Direction.OUTPUT: "tpdo"}
 _WORDS = {Direction.INPUT: "towards the robot", Direction.OUTPUT: "from the robot"}
 
 
-@cell_rule("GW402")
-def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW402")
+def pdo_too_long(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A PDO with more than 64 bits."""
-    for pdo in _pdos(cell):
+    for pdo in _declared(node):
         if pdo.bits > PDO_BITS:
             name = next(name for name, end in _contents(cell, pdo) if end > PDO_BITS)
             message = (
@@ -39,10 +40,10 @@ def pdo_too_long(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(pdo.position, message, hint=hint)
 
 
-@cell_rule("GW403")
-def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW403")
+def pdo_misaligned(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A number in a PDO that does not begin at a byte."""
-    for pdo in _pdos(cell):
+    for pdo in _declared(node):
         for offset, entry in pdo.offsets:
             if entry.plan.type is not CanType.BOOLEAN and offset % 8:
                 name = cell.variables[entry.variable].name
@@ -52,10 +53,10 @@ def pdo_misaligned(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 break
 
 
-@cell_rule("GW404")
-def mixed_pdo(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW404")
+def mixed_pdo(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A PDO with variables of both directions."""
-    for pdo in _pdos(cell):
+    for pdo in _declared(node):
         other = next((entry for entry in pdo.entries if entry.direction is not pdo.direction), None)
         if other is not None:
             name = cell.variables[other.variable].name
@@ -74,26 +75,18 @@ class _Use:
     place: Position
 
 
-@cell_rule("GW405")
-def cob_id_clash(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW405")
+@first_at_each_place
+def cob_id_clash(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """One COB-ID for two services of the node."""
-    node = node_of(cell)
-    if node is None:
-        return
     used = {use.cob_id: use for use in _services(node)}
     sync = node.part.spec.sync
     if not is_restricted(sync.cob_id):
         place = node.part.at("sync", "cob_id")
         yield from _clash(rule, used, _Use(sync.cob_id, "SYNC", place))
-    reported: set[Position] = set()
     for pdo in node.pdos:
-        if pdo.slot.cob_id is None or is_restricted(pdo.slot.cob_id):
-            continue
-        place = cob_id_place(node, pdo)
-        for finding in _clash(rule, used, _Use(pdo.slot.cob_id, pdo.label, place)):
-            if place not in reported:
-                reported.add(place)
-                yield finding
+        if pdo.slot.cob_id is not None and not is_restricted(pdo.slot.cob_id):
+            yield from _clash(rule, used, _Use(pdo.slot.cob_id, pdo.label, cob_id_place(node, pdo)))
 
 
 def _clash(rule: Rule, used: dict[int, _Use], use: _Use) -> Iterator[Diagnostic]:
@@ -111,12 +104,9 @@ def _services(node: CanopenCell) -> Iterator[_Use]:
     yield _Use(Function.TIME, "TIME", place)
 
 
-@cell_rule("GW406")
-def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW406")
+def restricted_cob_id(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A COB-ID that no PDO and no SYNC may have."""
-    node = node_of(cell)
-    if node is None:
-        return
     spec, part = node.part.spec, node.part
     hint = "use one of a node-ID that does not exist, such as 0x1C0, or one from 0x680 to 0x6DF"
     written = [(spec.sync.cob_id, "SYNC", part.at("sync", "cob_id"))]
@@ -135,12 +125,9 @@ def restricted_cob_id(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(place, f"{what} has the COB-ID {cob(cob_id)}, which is reserved", hint=hint)
 
 
-@cell_rule("GW409")
-def too_few_cob_ids(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW409")
+def too_few_cob_ids(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """More PDOs than COB-IDs."""
-    node = node_of(cell)
-    if node is None:
-        return
     used = {pdo.slot.cob_id for pdo in node.pdos if pdo.slot.cob_id is not None}
     used |= {use.cob_id for use in _services(node)} | {node.part.spec.sync.cob_id}
     for direction, key in reversed(_KEYS.items()):
@@ -158,13 +145,10 @@ def too_few_cob_ids(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         )
         hint = "use REAL32, or keep variables out of PDOs with `canopen: object`"
         if len(proposal) == missing:
-            hint = f"add `cob_ids: {{{key}: {_spans([*_written(declared), *proposal])}}}` if nobody else uses them"
+            spans = _spans([*chain.from_iterable(declared), *proposal])
+            hint = f"add `cob_ids: {{{key}: {spans}}}` if nobody else uses them"
         place = node.part.at("cob_ids", key) if declared else node.part.key
         yield rule.at(place, message, hint=hint)
-
-
-def _written(ranges: Iterable[range]) -> Iterator[int]:
-    return (cob_id for one in ranges for cob_id in one)
 
 
 def _proposal(count: int, used: set[int]) -> list[int]:
@@ -185,19 +169,16 @@ def _spans(cob_ids: list[int]) -> str:
     return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
 
 
-@cell_rule("GW431")
-def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW431")
+def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A key of a PDO that means nothing in its direction."""
-    node = node_of(cell)
-    for pdo in _pdos(cell):
-        assert node is not None
+    for pdo in _declared(node):
         receives = pdo.direction is Direction.INPUT
         written = node.part.spec.pdos[pdo.name].model_fields_set
         wrong, right = ("event", "deadline") if receives else ("deadline", "event")
         if wrong in written:
-            message = f"the PDO `{pdo.name}` goes {_WORDS[pdo.direction]} and has `{wrong}`"
-            if not receives:
-                message = f"the PDO `{pdo.name}` comes {_WORDS[pdo.direction]} and has `{wrong}`"
+            verb = "goes" if receives else "comes"
+            message = f"the PDO `{pdo.name}` {verb} {_WORDS[pdo.direction]} and has `{wrong}`"
             place = node.part.key_at("pdos", pdo.name, wrong)
             yield rule.at(place, message, hint=f"write `{right}`, or remove it")
         if "sync_start" in written and (receives or not 0 < pdo.transmission < FIRST_EVENT_TYPE):
@@ -206,11 +187,10 @@ def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
             yield rule.at(place, message, hint="remove `sync_start`, or write `transmission: sync`")
 
 
-@cell_rule("GW416", Severity.WARNING)
-def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW416", Severity.WARNING)
+def sync_without_period(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """Synchronous PDOs, and nobody says how often SYNC comes."""
-    node = node_of(cell)
-    if node is None or node.part.spec.sync.period is not None:
+    if node.part.spec.sync.period is not None:
         return
     pdo = next((pdo for pdo in node.pdos if pdo.transmission < FIRST_EVENT_TYPE), None)
     if pdo is not None:
@@ -219,36 +199,29 @@ def sync_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(_key_place(node, pdo, "transmission"), message, hint=hint)
 
 
-@cell_rule("GW417")
-def producer_without_period(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW417")
+def producer_without_period(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A SYNC producer without a period."""
-    node = node_of(cell)
-    if node is not None and node.part.spec.sync.producer and node.part.spec.sync.period is None:
+    if node.part.spec.sync.producer and node.part.spec.sync.period is None:
         message = f"node {node.part.spec.node} is to produce SYNC without a period"
         yield rule.at(node.part.at("sync", "producer"), message, hint="add `period: 10ms` to `sync`")
 
 
-@cell_rule("GW419", Severity.WARNING)
-def event_below_inhibit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+@node_rule("GW419", Severity.WARNING)
+@first_at_each_place
+def event_below_inhibit(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """An event time shorter than the inhibit time."""
-    node = node_of(cell)
-    if node is None:
-        return
-    reported: set[Position] = set()
     for pdo in node.pdos:
         if pdo.direction is Direction.INPUT or pdo.transmission < FIRST_EVENT_TYPE:
             continue
         if pdo.event is None or pdo.inhibit is None or pdo.event >= pdo.inhibit:
             continue
-        place = _key_place(node, pdo, "event")
-        if place not in reported:
-            reported.add(place)
-            message = (
-                f"the event time of {pdo.label}, {seconds(pdo.event)}, is shorter than its inhibit time, "
-                f"{seconds(pdo.inhibit)}"
-            )
-            hint = "make the event time some times as long as the inhibit time"
-            yield rule.at(place, message, hint=hint)
+        message = (
+            f"the event time of {pdo.label}, {seconds(pdo.event)}, is shorter than its inhibit time, "
+            f"{seconds(pdo.inhibit)}"
+        )
+        hint = "make the event time some times as long as the inhibit time"
+        yield rule.at(_key_place(node, pdo, "event"), message, hint=hint)
 
 
 def cob_id_place(node: CanopenCell, pdo: ExpandedPdo) -> Position:
@@ -271,11 +244,9 @@ def _key_place(node: CanopenCell, pdo: ExpandedPdo, key: str) -> Position:
     return node.part.at("pdo", key)
 
 
-def _pdos(cell: ExpandedCell) -> Iterator[ExpandedPdo]:
+def _declared(node: CanopenCell) -> Iterator[ExpandedPdo]:
     """The PDOs of the file; those of the automatic layout have none of these mistakes."""
-    node = node_of(cell)
-    if node is not None:
-        yield from (pdo for pdo in node.pdos if pdo.name)
+    return (pdo for pdo in node.pdos if pdo.name)
 
 
 def _contents(cell: ExpandedCell, pdo: ExpandedPdo) -> Iterator[tuple[str, int]]:

@@ -25,7 +25,7 @@ from gatewayd.core.definition import Direction, Value
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import CanLink
-from gatewayd.links.canopen_node.storage import MemoryStore
+from gatewayd.links.canopen_node.storage import Store
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 
@@ -78,7 +78,7 @@ class Device(ABC):
         self.plan = plan if plan is not None else compiled()
         assert canopen_of(self.plan) is not None
         self.canopen: CanopenPlan = self.plan.the(CanopenPlan)
-        self.store = MemoryStore()
+        self.store = Store()
         self.variables = {one.name: index for index, one in enumerate(self.plan.cell.variables)}
 
     def _new_cell(self, now: float) -> Cell:
@@ -194,7 +194,7 @@ class LinkDevice(Device):
         link = asyncio.create_task(self._link.run())
         clock = asyncio.create_task(self._tick())
         # What is sent before the bus is open, nobody hears.
-        while self._cell.health.words["can_bus"] != BusState.ACTIVE + 1:  # noqa: ASYNC110 - the link tells nobody
+        while self._cell.health.words["can_bus"] != BusState.ACTIVE + 1:  # noqa: ASYNC110 - the link reports it to nobody
             await asyncio.sleep(0.001)
         started.set()
         await self._off.wait()
@@ -389,14 +389,14 @@ class Tester:
         self.reaches(0)
 
     def heartbeats(self, milliseconds: int = 20) -> None:
-        """Let the node tell its state."""
+        """Let the node send its state."""
         self.set(0x1017, 0, milliseconds, 2)
 
     def reaches(self, state: int) -> None:
         """Heartbeats of the former state are followed by one of this one; 0 is the boot-up."""
         deadline = self.device.now + PATIENCE
-        while (told := self.expect(0x700 + self.node)) != bytes([state]):
-            assert self.device.now < deadline, f"the node is in state {told.hex()}"
+        while (reported := self.expect(0x700 + self.node)) != bytes([state]):
+            assert self.device.now < deadline, f"the node is in state {reported.hex()}"
 
     def stays(self, state: int) -> None:
         """What was sent so far has not changed the state."""
@@ -436,15 +436,15 @@ class Tester:
     # -- the robot -----------------------------------------------------------------------------------------------
 
     def robot(self, **values: Value) -> None:
-        """The robot tells values, in one package. `ints_out__0` stands for `ints_out[0]`."""
+        """The robot reports values, in one package. `ints_out__0` stands for `ints_out[0]`."""
         names = {self._name(name): value for name, value in values.items()}
 
-        def tell(_node: Node, cell: Cell, now: float) -> None:
+        def report(_node: Node, cell: Cell, now: float) -> None:
             for name, value in names.items():
                 cell.image.values[self.device.variables[name]] = value
             cell.outputs_written(now)
 
-        self.device.do(tell)
+        self.device.do(report)
 
     def value(self, name: str) -> Value:
         """What the cell holds."""

@@ -62,12 +62,12 @@ class Master:
         return self.device.do(lambda _node, cell, _now: [cell.image.values[index] for index in indices])
 
     def robot(self, **values: Any) -> None:
-        def tell(_node: Any, cell: Any, now: float) -> None:
+        def report(_node: Any, cell: Any, now: float) -> None:
             for name, value in values.items():
                 cell.image.values[self.device.variables[name]] = value
             cell.outputs_written(now)
 
-        self.device.do(tell)
+        self.device.do(report)
 
 
 @pytest.fixture

@@ -66,7 +66,7 @@ def test_cct_od_02_every_entry_has_the_length_of_its_type(exact: Tester) -> None
 
 
 def test_cct_od_03_every_entry_has_its_default(exact: Tester) -> None:
-    """Numbers of the communication profile; the others tell the present state of the cell."""
+    """Numbers of the communication profile; the others show the present state of the cell."""
     for entry in NUMBERS:
         if entry.index < 0x2000 and entry.default is not None and _place(entry) != (0x1002, 0):
             data = exact.upload(*_place(entry))

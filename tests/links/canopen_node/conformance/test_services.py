@@ -37,7 +37,7 @@ def test_cct_emergency_01_no_error_after_power_on(dut: Tester) -> None:
 
 
 def test_cct_emergency_02_error_and_its_end(dut: Tester) -> None:
-    """Code, error register and the manufacturer's bytes, once each; 1001h and 1003h tell the same."""
+    """Code, error register and the manufacturer's bytes, once each; 1001h and 1003h show the same."""
     dut.start()
     _fail(dut)
     _fail(dut)
@@ -194,7 +194,7 @@ def test_cct_synchronization_09_counter_of_a_producer(exact: Tester) -> None:
 
 
 def test_cct_synchronization_10_window_and_length(dut: Tester) -> None:
-    """A SYNC of the wrong length is told and means nothing; what comes after the window is dropped."""
+    """A SYNC of the wrong length is reported and means nothing; what comes after the window is dropped."""
     dut.transmission(0x1401, 1)
     dut.start()
     dut.sync(7)

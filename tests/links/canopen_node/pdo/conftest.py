@@ -81,7 +81,7 @@ def draw() -> tuple[list[Variable], list[ObjectPlan]]:
 
 @dataclass
 class Bench:
-    """The cell, the dictionary, the PDO table, and what was sent and told."""
+    """The cell, the dictionary, the PDO table, and what was sent and reported."""
 
     variables: list[Variable]
     objects: list[ObjectPlan]

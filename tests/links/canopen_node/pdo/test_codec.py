@@ -211,7 +211,7 @@ def test_only_booleans_may_lie_off_a_byte_boundary() -> None:
     assert not is_aligned([*bits * 3, CanType.INTEGER8])
 
 
-def test_gathers_neighbours_and_strangers_alike() -> None:
+def test_gathers_neighbours_and_others_alike() -> None:
     variables = [variable(index, ValueKind.INT) for index in range(4)]
     for order in ([0, 1, 2], [2, 0, 3], [3], [1, 1], []):
         layout = Layout([Mapped(index, CanType.INTEGER8) for index in order], variables)

@@ -351,15 +351,15 @@ def test_restore_for_another_node_moves_what_follows_the_node(case: Case) -> Non
     assert case.bench.dictionary.entry(case.communication, 1).default[0] == (case.cob_id + 4) & 0xFF
 
 
-def test_only_changes_are_told(case: Case) -> None:
-    told = case.bench.changes
+def test_only_changes_are_reported(case: Case) -> None:
+    reported = case.bench.changes
     case.com(2, 255)
     case.com(1, case.cob_id | case.flags)
     case.table.restore()
-    assert case.bench.changes == told
+    assert case.bench.changes == reported
     case.com(1, case.cob_id | INVALID)
     case.map(0, 0)
-    assert case.bench.changes == told + 1
+    assert case.bench.changes == reported + 1
 
 
 def _values(table: PdoTable) -> dict[tuple[int, int], bytes]:
@@ -440,7 +440,7 @@ def test_no_sequence_of_writes_makes_an_inconsistent_pdo_and_a_failed_one_change
     shared_bench.configurations.clear()
     case = Case(shared_bench, direction)
     for number, subindex, (what, value) in data.draw(st.lists(writes(), max_size=40)):
-        before, told = _values(case.table), case.bench.changes
+        before, reported = _values(case.table), case.bench.changes
         if what in ("count", "slot"):
             resolved = value if isinstance(value, int) else case.entry(value)
             abort = case.bench.write(case.mapping + number, subindex, resolved)
@@ -451,7 +451,7 @@ def test_no_sequence_of_writes_makes_an_inconsistent_pdo_and_a_failed_one_change
             continue
         if abort is not None:
             assert _values(case.table) == before
-            assert case.bench.changes == told
+            assert case.bench.changes == reported
         check(case)
 
 
