@@ -48,8 +48,7 @@ class CanopenLanguage(LinkLanguage):
     variable_keys = CanopenPlaces
     writer_keys = CanopenWriter
     rules = tuple(
-        f"gatewayd.links.canopen_node.rules.{name}"
-        for name in ("node", "pdos", "pdo_members", "pdo_company", "bus")
+        f"gatewayd.links.canopen_node.rules.{name}" for name in ("node", "pdos", "pdo_members", "bus")
     )
     tables = "gatewayd.links.canopen_node.tables"
     exports = "gatewayd.links.canopen_node.exports"

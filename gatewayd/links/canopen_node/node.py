@@ -108,7 +108,9 @@ class Node:
         self.nmt = NmtSlave(
             self._send, lambda: self.lss.node, self._nmt_changed, self._reset, autostart=plan.autostart
         )
-        self.emergency = Emergency(self._send, node, self._emergencies_allowed)
+        self.emergency = Emergency(
+            self._send, node, lambda: self.bus.carries and self.nmt.allows(Service.EMCY)
+        )
         self.robot_errors = RobotErrors(
             cell, self.emergency, lambda: self._started and self.nmt.state is not NmtState.INITIALISING
         )
@@ -422,9 +424,6 @@ class Node:
         self._route()
         for text in self.promises.weakened([writer.name for writer in self.cell.definition.writers]):
             self._observer.report(text)
-
-    def _emergencies_allowed(self) -> bool:
-        return self.bus.carries and self.nmt.allows(Service.EMCY)
 
     def _store_failed(self, damaged: bool) -> None:
         self._store_damaged = damaged

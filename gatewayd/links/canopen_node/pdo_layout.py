@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Final
 
 from gatewayd.canopen.cob_ids import predefined_pdo
@@ -61,9 +62,9 @@ def place_objects(variables: Iterable[tuple[int, Direction, CanType]]) -> tuple[
     counts: dict[tuple[Direction, CanType], int] = {}
     placed = []
     for variable, direction, can_type in variables:
-        count = counts.get((direction, can_type), 0)
-        counts[direction, can_type] = count + 1
-        further, member = divmod(count, _LAST_SUBINDEX)
+        before = counts.get((direction, can_type), 0)
+        counts[direction, can_type] = before + 1
+        further, member = divmod(before, _LAST_SUBINDEX)
         index = FIRST_INDEX[direction] + OBJECT_BASES[can_type] + further
         placed.append(ObjectPlan(variable, index, member + 1, can_type))
     return tuple(placed)
@@ -113,30 +114,22 @@ def assign(
         if (cob_id := predefined_pdo(number, node, transmit=transmit)) is not None
     }
     by_cob_id = {cob_id: number for number, cob_id in predefined.items()}
-    slots: dict[int, Slot] = {}
-    taken: set[int] = set()
+    numbers: dict[int, int] = {}
+    """Position -> number of a predefined COB-ID."""
     for position, cob_id in enumerate(wanted):
-        number = by_cob_id.get(cob_id) if cob_id is not None else None
-        if number is not None and number not in taken:
-            slots[position] = Slot(number, cob_id, predefined=True)
-            taken.add(number)
-    free = iter(
-        [number for number, cob_id in predefined.items() if number not in taken and cob_id not in own]
-    )
-    pool = iter(
-        [cob_id for cob_id in dict.fromkeys(declared) if cob_id not in own and cob_id not in by_cob_id]
-    )
-    later: list[tuple[int, int | None]] = []
+        if cob_id in by_cob_id and by_cob_id[cob_id] not in numbers.values():
+            numbers[position] = by_cob_id[cob_id]
+    free = (number for number, cob_id in predefined.items() if cob_id not in own)
+    without = (position for position, cob_id in enumerate(wanted) if cob_id is None)
+    numbers.update(zip(without, free, strict=False))
+    pool = (cob_id for cob_id in dict.fromkeys(declared) if cob_id not in own and cob_id not in by_cob_id)
+    taken = set(numbers.values())
+    left = (number for number in count(1) if number not in taken)
+    slots: list[Slot] = []
     for position, cob_id in enumerate(wanted):
-        if position in slots:
-            continue
-        number = next(free, None) if cob_id is None else None
-        if number is not None:
-            slots[position] = Slot(number, predefined[number], predefined=True)
-            taken.add(number)
+        if position in numbers:
+            slots.append(Slot(numbers[position], predefined[numbers[position]], predefined=True))
         else:
-            later.append((position, cob_id if cob_id is not None else next(pool, None)))
-    numbers = iter(number for number in range(1, len(wanted) + _PREDEFINED + 1) if number not in taken)
-    for position, cob_id in later:
-        slots[position] = Slot(next(numbers), cob_id, predefined=False)
-    return tuple(slots[position] for position in range(len(wanted)))
+            found = next(pool, None) if cob_id is None else cob_id
+            slots.append(Slot(next(left), found, predefined=False))
+    return tuple(slots)

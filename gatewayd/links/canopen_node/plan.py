@@ -10,10 +10,7 @@ from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.plan import LinkPlan, Plan
 
-__all__ = ["FIRST_STATUS_OBJECT", "CanopenPlan", "ObjectPlan", "PdoEntry", "PdoPlan", "canopen_of"]
-
-FIRST_STATUS_OBJECT = 0x5F00
-"""Where the status block begins in the object dictionary."""
+__all__ = ["CanopenPlan", "ObjectPlan", "PdoEntry", "PdoPlan", "canopen_of"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,7 +59,11 @@ class CanLink(Link, Observer):
         self._cell = cell
         self._bus: SupervisedBus | None = None
         self._transmitter = Transmitter(
-            self._offer, self._renew, now=clock.now, punctual=self._offer_at_once, overdue=clock.overdue
+            self._offer,
+            lambda can_id: self.node.renew(can_id, clock.now()),
+            now=clock.now,
+            punctual=self._offer_at_once,
+            overdue=clock.overdue,
         )
         self._timer: asyncio.TimerHandle | None = None
         self._catching: asyncio.Handle | None = None
@@ -328,9 +332,6 @@ class CanLink(Link, Observer):
         """A frame that may not be late: not where older ones still wait in the kernel."""
         bus = self._bus
         return bus is not None and not bus.lags(self.node.bit_rate) and bus.send(frame)
-
-    def _renew(self, can_id: int) -> Frame | None:
-        return self.node.renew(can_id, clock.now())
 
     def _close_bus(self, reason: str) -> None:
         bus, self._bus = self._bus, None

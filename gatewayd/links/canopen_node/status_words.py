@@ -10,7 +10,6 @@ from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.status_layout import RELEASE, REQUEST
-from gatewayd.links.canopen_node.plan import FIRST_STATUS_OBJECT
 from gatewayd.links.registry import status_fields
 
 __all__ = [
@@ -24,8 +23,8 @@ __all__ = [
     "quality_word",
 ]
 
-HEADER: Final = FIRST_STATUS_OBJECT
-"""The record of the header's fields, in the order of `registry.status_fields`."""
+HEADER: Final = 0x5F00
+"""The record of the header's fields, in the order of `registry.status_fields`: the first object of the block."""
 TABLE_INDICES: Final = {
     "good": 0x5F01,
     "writers_alive": 0x5F02,

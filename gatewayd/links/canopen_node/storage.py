@@ -22,7 +22,7 @@ from typing import Any
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, Object, Pdo, array
 from gatewayd.canopen.nmt import NmtCommand
-from gatewayd.links.canopen_node.plan import FIRST_STATUS_OBJECT
+from gatewayd.links.canopen_node.status_words import HEADER
 
 __all__ = ["JsonStore", "LssSettings", "Parameters", "Saved", "Store", "StoreError", "layout_of"]
 
@@ -136,7 +136,7 @@ def layout_of(dictionary: Iterable[Object], node: int, values: Mapping[Key, byte
     digest = 0
     tables = any(map(_maps_status_table, (values or {}).items()))
     for item in dictionary:
-        if not _is_bound(item.index) or (item.index >= FIRST_STATUS_OBJECT and not tables):
+        if not _is_bound(item.index) or (item.index >= HEADER and not tables):
             continue
         for entry in item.entries:
             if not entry.stored and entry.pdo is Pdo.NONE:
@@ -327,7 +327,7 @@ def _is_bound(index: int) -> bool:
 
 def _maps_status_table(item: tuple[Key, bytes]) -> bool:
     (index, subindex), value = item
-    return index in _MAPPINGS and subindex > 0 and int.from_bytes(value, "little") >> 16 > FIRST_STATUS_OBJECT
+    return index in _MAPPINGS and subindex > 0 and int.from_bytes(value, "little") >> 16 > HEADER
 
 
 def _rebased(entry: Entry, old: int, new: int) -> bytes:

@@ -27,13 +27,13 @@ from gatewayd.links.canopen_node.communication_errors import OVERRUN_TIME
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
 from gatewayd.links.canopen_node.plan import (
-    FIRST_STATUS_OBJECT,
     CanopenPlan,
     ObjectPlan,
     PdoEntry,
     PdoPlan,
     canopen_of,
 )
+from gatewayd.links.canopen_node.status_words import HEADER
 from gatewayd.links.canopen_node.storage import Saved, Store
 from gatewayd.mapping.loader import load
 from tests.links.canopen_node.wire import Wire
@@ -626,7 +626,7 @@ def test_words_that_a_mapping_puts_into_a_tpdo_are_shown_as_its_mapping_and_sent
     number = next(
         pdo.number
         for pdo in plan.the(CanopenPlan).pdos
-        if any(entry.index >= FIRST_STATUS_OBJECT for entry in pdo.entries)
+        if any(entry.index >= HEADER for entry in pdo.entries)
     )
     shown = [node.dictionary.read(0x1A00 + number - 1, slot)[::-1].hex() for slot in (1, 2, 3)]
     assert sorted(shown) == ["5f000210", "5f000710", "5f400210"]

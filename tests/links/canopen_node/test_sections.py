@@ -58,7 +58,7 @@ def test_everything_at_once() -> None:
         10,
     )
     assert spec.cob_ids.tpdo == (range(0x680, 0x681), range(0x690, 0x6A0))
-    assert [str(member) for member in spec.pdos["forces"].variables] == ["a", "b[1..2]"]
+    assert [member.text for member in spec.pdos["forces"].variables] == ["a", "b[1..2]"]
 
 
 @pytest.mark.parametrize(

@@ -98,25 +98,12 @@ ReadWord = Callable[[int, int], int]
 class Layout:
     """A compiled mapping of at most 64 bits, aligned as `is_aligned` says."""
 
-    __slots__ = (
-        "_pack",
-        "_receivers",
-        "_runs",
-        "_unpack",
-        "content",
-        "gather",
-        "mapping",
-        "size",
-        "variables",
-    )
-
     def __init__(self, mapping: Sequence[Mapped], variables: Sequence[Variable]) -> None:
         types = [entry.type for entry in mapping]
         bits = sum(can_type.bits for can_type in types)
         assert bits <= MAX_BITS
         assert is_aligned(types)
         assert all(entry.variable is not None for entry in mapping if entry.type is CanType.BOOLEAN)
-        self.mapping = tuple(mapping)
         self.size = (bits + 7) // 8
         """Bytes."""
         self.variables = tuple(entry.variable for entry in mapping if entry.variable is not None)
@@ -126,7 +113,7 @@ class Layout:
         self.gather: Gather = _gatherer(self.variables)
         """Copies the content out of an image's values: what `pack` takes, and comparable with `==`. For a mapping with
         status words `gatherer` makes it."""
-        runs = list(_runs(self.mapping))
+        runs = list(_runs(mapping))
         compiled = struct.Struct("<" + "".join(run.format for run in runs))
         self._pack = compiled.pack
         self._unpack = compiled.unpack

@@ -62,8 +62,6 @@ _DUMMIES: Final = {
 class Configuration:
     """A valid PDO as its parameters are now."""
 
-    direction: Direction
-    """INPUT: an RPDO; OUTPUT: a TPDO."""
     number: int
     """From 1 within its direction."""
     can_id: int
@@ -297,7 +295,6 @@ class PdoParameters:
         mapping = tuple(mapped for mapped in known if mapped is not None)
         assert len(mapping) == self._count.number
         return Configuration(
-            direction=self.direction,
             number=self.number,
             can_id=self._cob_id.number & BASIC_FRAME,
             transmission=self._transmission.number,

@@ -1,14 +1,15 @@
-"""Rules GW410 to GW412 and GW430: what PDOs name, and what names them."""
+"""Rules GW410 to GW412, GW430, GW433 and GW434: what PDOs name, what names them, and what shares the fate of one."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gatewayd.links.canopen_node.expand import CanopenCell, MemberProblem, Misnamed
-from gatewayd.links.canopen_node.rules.registry import node_rule
-from gatewayd.links.canopen_node.sections import AUTO, NO_PDO, CanopenPlaces, PdoSpec
-from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule
-from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.core.definition import Direction, FallbackKind
+from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo, MemberProblem, Misnamed
+from gatewayd.links.canopen_node.rules.registry import first_at_each_place, node_rule
+from gatewayd.links.canopen_node.sections import AUTO, NO_PDO, CanopenPlaces, CanopenWriter, PdoSpec
+from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
+from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock, ExpandedVariable
 from gatewayd.report.wording import did_you_mean
 
 __all__: list[str] = []
@@ -83,6 +84,47 @@ def unknown_pdo_variable(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> I
         yield rule.at(wrong.position, message, hint=hint)
 
 
+@node_rule("GW433", Severity.WARNING)
+@first_at_each_place
+def silenced_neighbour(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
+    """A variable whose PDO stops because of another variable in it."""
+    for pdo in _pdos(node, Direction.OUTPUT):
+        variables = [cell.variables[entry.variable] for entry in pdo.entries]
+        silent = [variable for variable in variables if variable.spec.on_stale.kind is FallbackKind.EXCEPTION]
+        others = [
+            variable for variable in variables if variable.spec.on_stale.kind is not FallbackKind.EXCEPTION
+        ]
+        if not silent or not (others or pdo.status):
+            continue
+        other = others[0].name if others else pdo.status[0].name
+        message = f"{pdo.label} stops when `{silent[0].name}` is stale, and `{other}` is in it too"
+        hint = f"put `{silent[0].part.name}` into a PDO of its own"
+        if others:
+            related = (Related(others[0].position, f"`{other}` has another policy"),)
+            hint += ", or write `on_stale: exception` at both"
+        else:
+            related = (Related(pdo.position, f"`{other}` is in this PDO"),)
+        yield rule.at(silent[0].at("on_stale"), message, hint=hint, related=related)
+
+
+@node_rule("GW434", Severity.WARNING)
+@first_at_each_place
+def contended_pdo(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
+    """Variables in one PDO that may be held by different owners."""
+    for pdo in _pdos(node, Direction.INPUT):
+        locked = list(_locked(cell, pdo))
+        if len({lock.members for _, lock in locked}) < 2:
+            continue
+        shared = next((variable for variable, lock in locked if _is_contended(cell, lock)), None)
+        if shared is None:
+            continue
+        other = next(variable for variable, _ in locked if variable.lock != shared.lock)
+        message = f"{pdo.label} carries `{shared.name}`, which another owner may hold, and `{other.name}`"
+        related = (Related(other.position, f"`{other.name}` is refused with it"),)
+        hint = "write `group: NAME` at both, make a PDO for each, or give both one owner"
+        yield rule.at(shared.position, message, hint=hint, related=related)
+
+
 def _named(pdo: PdoSpec) -> Iterator[str]:
     """The lines that a PDO names."""
     yield from (member.name for member in pdo.variables)
@@ -96,3 +138,21 @@ def _once(node: CanopenCell, *problems: MemberProblem) -> Iterator[Misnamed]:
         if wrong.problem in problems and (wrong.pdo, wrong.text) not in seen:
             seen.add((wrong.pdo, wrong.text))
             yield wrong
+
+
+def _locked(cell: ExpandedCell, pdo: ExpandedPdo) -> Iterator[tuple[ExpandedVariable, ExpandedLock]]:
+    for entry in pdo.entries:
+        variable = cell.variables[entry.variable]
+        if variable.lock is not None:
+            yield variable, cell.locks[variable.lock]
+
+
+def _is_contended(cell: ExpandedCell, lock: ExpandedLock) -> bool:
+    """Whether a writer that does not write by RPDO may own it."""
+    return any(not cell.document.writers[name].spec.by(CanopenWriter).by_rpdo for name in lock.owners)
+
+
+def _pdos(node: CanopenCell, direction: Direction) -> Iterator[ExpandedPdo]:
+    for pdo in node.pdos:
+        if pdo.direction is direction and all(entry.direction is direction for entry in pdo.entries):
+            yield pdo

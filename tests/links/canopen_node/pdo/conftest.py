@@ -121,7 +121,6 @@ class Bench:
 
     def configuration(
         self,
-        direction: Direction,
         names: Iterable[str],
         *,
         number: int = 1,
@@ -133,9 +132,7 @@ class Bench:
     ) -> Configuration:
         mapping = tuple(self.mapped(name) for name in names)
         layout = Layout(mapping, self.variables)
-        return Configuration(
-            direction, number, can_id, transmission, mapping, layout, inhibit, event, sync_start
-        )
+        return Configuration(number, can_id, transmission, mapping, layout, inhibit, event, sync_start)
 
     def mapped(self, name: str) -> Mapped:
         entry = self.entry(name)

@@ -42,7 +42,7 @@ class Receiver:
 
     def configure(self, number: int, *names: str, **parameters: Any) -> None:
         parameters = {"number": number, "can_id": 0x205, **parameters}
-        self.engine.configure(number, self.bench.configuration(Direction.INPUT, names, **parameters))
+        self.engine.configure(number, self.bench.configuration(names, **parameters))
 
     def receive(self, data: str, after: float = 0.0, can_id: int = 0x205, *, heard: bool = True) -> list[str]:
         """What was reported of this frame."""
@@ -240,7 +240,7 @@ def test_number_that_the_variable_cannot_be_is_out_of_limits(bench: Bench) -> No
     receiver = Receiver(bench)
     mapping = (Mapped(bench.by_name["in_int_0"], CanType.REAL32),)
     layout = Layout(mapping, bench.variables)
-    receiver.engine.configure(1, Configuration(Direction.INPUT, 1, 0x205, 255, mapping, layout))
+    receiver.engine.configure(1, Configuration(1, 0x205, 255, mapping, layout))
     assert receiver.receive("0000c07f") == ["+OUT_OF_LIMITS 1"]
     assert bench.cell.health.writes_refused == 1
     assert receiver.receive("00004040") == ["-OUT_OF_LIMITS 1"]

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gatewayd.core.definition import Direction, Fallback, FallbackKind
+from gatewayd.core.definition import Fallback, FallbackKind
 from gatewayd.links.canopen_node.pdo.transmit import MOVES, Schedule, TransmitEngine, TransmitSignal
 
 Bench = Any
@@ -24,7 +24,7 @@ class Sender:
         self.bench = bench
         self.engine = TransmitEngine(bench.cell, bench.send)
         if names:
-            self.engine.configure(1, bench.configuration(Direction.OUTPUT, names, **parameters))
+            self.engine.configure(1, bench.configuration(names, **parameters))
         self.engine.nmt(operational=True, now=T)
 
     def take(self) -> list[str]:
@@ -268,7 +268,7 @@ def guarded(guarded_bench: Bench) -> Bench:
 
 def test_pdo_stops_while_its_variable_may_not_be_read(guarded: Bench) -> None:
     sender = Sender(guarded, "out_int_0", event=0.1)
-    sender.engine.configure(2, guarded.configuration(Direction.OUTPUT, ["out_int_1"], number=2, can_id=0x285))
+    sender.engine.configure(2, guarded.configuration(["out_int_1"], number=2, can_id=0x285))
     sender.tick(0)
     guarded.cell.robot_lost("cut", T)
     assert sender.show(0.01, out_int_0=1, out_int_1=2) == int_frame(2, "285")
@@ -312,7 +312,7 @@ def test_pdo_that_is_stopped_from_the_start_sends_nothing(new_bench: Any) -> Non
 def test_pdo_that_becomes_valid_is_sent_with_the_next_tick(bench: Bench) -> None:
     sender = Sender(bench)
     assert sender.engine.next_deadline(T) == math.inf
-    sender.engine.configure(3, bench.configuration(Direction.OUTPUT, ["out_int_0"], number=3, can_id=0x385))
+    sender.engine.configure(3, bench.configuration(["out_int_0"], number=3, can_id=0x385))
     assert sender.engine.next_deadline(T) == T
     assert sender.tick(0) == int_frame(0, "385")
     assert sender.engine.next_deadline(T) == math.inf
@@ -331,7 +331,7 @@ def test_pdo_that_becomes_invalid_is_silent(bench: Bench) -> None:
 def test_inhibit_time_goes_on_over_a_change_of_parameters(bench: Bench) -> None:
     sender = Sender(bench, "out_int_0", inhibit=0.1)
     sender.take()
-    sender.engine.configure(1, bench.configuration(Direction.OUTPUT, ["out_int_0"], inhibit=0.1, event=1.0))
+    sender.engine.configure(1, bench.configuration(["out_int_0"], inhibit=0.1, event=1.0))
     assert sender.tick(0.01) == []
     assert sender.tick(0.1) == int_frame(0)
 
@@ -339,7 +339,7 @@ def test_inhibit_time_goes_on_over_a_change_of_parameters(bench: Bench) -> None:
 def test_transmission_type_can_change_while_operational(bench: Bench) -> None:
     sender = Sender(bench, "out_int_0")
     sender.take()
-    sender.engine.configure(1, bench.configuration(Direction.OUTPUT, ["out_int_0"], transmission=1))
+    sender.engine.configure(1, bench.configuration(["out_int_0"], transmission=1))
     assert sender.show(0.1, out_int_0=1) == []
     assert sender.sync() == int_frame(1)
 
