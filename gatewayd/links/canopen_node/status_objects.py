@@ -14,7 +14,7 @@ from gatewayd.canopen.dictionary import Abort, Access, Entry, Object, Pdo, array
 from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
-from gatewayd.core.status_layout import RELEASE, REQUEST, TABLES, StatusField, StatusTable
+from gatewayd.core.status_layout import RELEASE, REQUEST, TABLES, StatusTable
 from gatewayd.links.canopen_node.pdo.codec import Mapped
 from gatewayd.links.canopen_node.status_words import HEADER, MAX_ARRAY, TABLE_INDICES, WORD_TYPES
 from gatewayd.links.canopen_node.variables import ABORT_OF
@@ -63,25 +63,30 @@ class StatusObjects:
 
     def objects(self) -> Iterator[Object]:
         """5F00h and the tables that have entries."""
-        yield record(HEADER, "Status", (self._field(*item) for item in enumerate(status_fields(), 1)))
+        fields = enumerate(status_fields(), 1)
+        entries = (self._entry(number, field.name, field.offset, field.words) for number, field in fields)
+        yield record(HEADER, "Status", entries)
         for table in TABLES:
             names = self._names(table)
             for chunk, start in enumerate(range(0, len(names), MAX_ARRAY)):
                 title = f"Status {table.name}" + (f" {chunk + 1}" if chunk else "")
-                entries = self._cells(table, start, names[start : start + MAX_ARRAY])
+                entries = (
+                    self._entry(number, f"{table.name} {name}", table.offset + start + number - 1, 1)
+                    for number, name in enumerate(names[start : start + MAX_ARRAY], 1)
+                )
                 yield array(TABLE_INDICES[table.name] + chunk, title, entries)
 
-    def _field(self, subindex: int, field: StatusField) -> Entry:
-        writable = field.offset in (REQUEST, RELEASE)
+    def _entry(self, subindex: int, name: str, offset: int, words: int) -> Entry:
+        writable = offset in (REQUEST, RELEASE)
         return Entry(
             subindex,
-            field.name,
-            WORD_TYPES[field.words],
+            name,
+            WORD_TYPES[words],
             Access.RW if writable else Access.RO,
-            bytes(2 * field.words),
+            bytes(2 * words),
             pdo=Pdo.NONE if writable else Pdo.TRANSMIT,
-            source=partial(self._read, field.offset, field.words),
-            sink=partial(self._write, field.offset) if writable else None,
+            source=partial(self._read, offset, words),
+            sink=partial(self._write, offset) if writable else None,
         )
 
     def _names(self, table: StatusTable) -> Sequence[str]:
@@ -93,19 +98,6 @@ class StatusObjects:
             words = (variables[first : first + 16] for first in range(0, len(variables), 16))
             return [f"{word[0]}..{word[-1]}" for word in words]
         return variables
-
-    def _cells(self, table: StatusTable, start: int, names: Sequence[str]) -> Iterator[Entry]:
-        for number, name in enumerate(names, 1):
-            offset = table.offset + start + number - 1
-            yield Entry(
-                number,
-                f"{table.name} {name}",
-                CanType.UNSIGNED16,
-                Access.RO,
-                bytes(2),
-                pdo=Pdo.TRANSMIT,
-                source=partial(self._read, offset, 1),
-            )
 
     def _read(self, offset: int, words: int) -> bytes:
         # The block has its high word first and its high byte first, so that all bytes are reversed.

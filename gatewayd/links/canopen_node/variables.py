@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 import struct
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import groupby
 from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, Pdo, array, record, variable
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, Pdo, array
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Direction, Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
@@ -61,27 +61,15 @@ class VariableObjects:
         }
 
     def objects(self) -> Iterator[Object]:
-        """By index: arrays where all sub-indices are of one type, with the mapping's names as names of the entries."""
+        """Arrays by index, each of one type and direction, with the mapping's names as names of the entries."""
         placed = sorted(self._plan.objects, key=lambda item: (item.index, item.subindex))
         used: Counter[str] = Counter()
         for index, group in groupby(placed, key=lambda item: item.index):
             items = tuple(group)
-            name = self._name(items)
+            direction = self._cell.definition.variables[items[0].variable].direction
+            name = f"{direction.value.capitalize()} {items[0].type.name}"
             used[name] += 1
-            yield self._object(index, name if used[name] == 1 else f"{name} {used[name]}", items)
-
-    def _name(self, items: Iterable[ObjectPlan]) -> str:
-        variables = self._cell.definition.variables
-        directions = {variables[item.variable].direction.value.capitalize() for item in items}
-        types = sorted({item.type.name for item in items})
-        return " ".join((*sorted(directions), *types))
-
-    def _object(self, index: int, name: str, items: tuple[ObjectPlan, ...]) -> Object:
-        entries = [self._entry(item) for item in items]
-        if entries[0].subindex == 0:
-            return variable(index, entries[0])
-        make = array if len({entry.type for entry in entries}) == 1 else record
-        return make(index, name, entries)
+            yield array(index, name if used[name] == 1 else f"{name} {used[name]}", map(self._entry, items))
 
     def _entry(self, item: ObjectPlan) -> Entry:
         declared = self._cell.definition.variables[item.variable]

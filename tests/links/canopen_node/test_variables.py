@@ -181,21 +181,6 @@ def test_further_indices_of_a_type_are_numbered() -> None:
     assert [one.name for one in objects] == ["Input INTEGER32", "Input INTEGER32 2"]
 
 
-def test_an_index_of_several_types_is_a_record_and_one_of_subindex_0_a_variable() -> None:
-    mixed = (
-        ObjectPlan(START, 0x2100, 1, CanType.BOOLEAN),
-        ObjectPlan(PART, 0x2100, 2, CanType.INTEGER32),
-        ObjectPlan(CYCLES, 0x2101, 0, CanType.INTEGER32),
-    )
-    objects = list(
-        VariableObjects(
-            replace(PLAN, objects=mixed), Cell(DEFINITION), float, partial(Requester, None)
-        ).objects()
-    )
-    assert [one.code for one in objects] == [ObjectCode.RECORD, ObjectCode.VAR]
-    assert [one.name for one in objects] == ["Input BOOLEAN INTEGER32", "cycles"]
-
-
 @pytest.mark.parametrize(
     "index, access, pdo",
     [(0x2000, Access.RWW, Pdo.RECEIVE), (0x2460, Access.RO, Pdo.TRANSMIT)],

@@ -320,20 +320,14 @@ class PdoParameters:
 
 
 class PdoTable:
-    """The parameters of all PDOs of a node: those of the plan, and unused ones up to `least` in each direction.
+    """The parameters of all PDOs of a node: those of the plan, and unused ones up to `MIN_NUMBER` in each direction.
 
     `changed` is called for every PDO that is valid from the start, while the table is made, and of every change
     afterwards.
     """
 
     def __init__(
-        self,
-        plan: CanopenPlan,
-        variables: Sequence[Variable],
-        find: Find,
-        changed: Changed,
-        *,
-        least: int = MIN_NUMBER,
+        self, plan: CanopenPlan, variables: Sequence[Variable], find: Find, changed: Changed
     ) -> None:
         around = _Surroundings(
             objects={
@@ -350,7 +344,7 @@ class PdoTable:
             PdoParameters(planned.get(number) or _unused(direction, number), around)
             for direction in (Direction.INPUT, Direction.OUTPUT)
             for planned in [{pdo.number: pdo for pdo in plan.pdos if pdo.direction is direction}]
-            for number in range(1, max(least, *planned, 0) + 1)
+            for number in range(1, max(MIN_NUMBER, *planned, 0) + 1)
         )
         """RPDOs, then TPDOs, by number."""
         self.restore()

@@ -140,7 +140,7 @@ class Bench:
             return Mapped(None, next(one for one in CanType if one.code == entry.index))
         return Mapped(entry.variable, self.objects[entry.variable].type)
 
-    def table(self, *pdos: PdoPlan, least: int = 4) -> PdoTable:
+    def table(self, *pdos: PdoPlan) -> PdoTable:
         """The PDO table of a node, in a dictionary with the variables; fills `dictionary`."""
         plan = CanopenPlan(
             interface="virtual",
@@ -161,7 +161,6 @@ class Bench:
             self.variables,
             self._find,
             self._changed,
-            least=least,
         )
         self.dictionary = Dictionary([*table.objects(), *self._variable_objects()])
         return table

@@ -102,10 +102,11 @@ def test_spare_pdos_are_there_and_invalid(case: Case) -> None:
 
 
 def test_pdos_beyond_the_fourth_have_no_identifier_until_one_is_written(bench: Bench) -> None:
-    bench.table(bench.pdo(Direction.OUTPUT, 6, "out_real_0", cob_id=0x1B0), least=7)
+    seventh = bench.pdo(Direction.INPUT, 7, "in_real_0", cob_id=0x210)
+    bench.table(bench.pdo(Direction.OUTPUT, 6, "out_real_0", cob_id=0x1B0), seventh)
     assert bench.read(0x1804, 1) == INVALID | NO_RTR
     assert bench.read(0x1805, 1) == 0x1B0 | NO_RTR
-    assert bench.read(0x1406, 1) == INVALID
+    assert bench.read(0x1405, 1) == INVALID
     assert bench.configurations[Direction.OUTPUT, 6].can_id == 0x1B0
 
 
