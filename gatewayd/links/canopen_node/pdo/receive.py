@@ -137,7 +137,7 @@ class ReceiveEngine:
             by_can_id[can_id] = (*by_can_id.get(can_id, ()), pdo)
         self._by_can_id = by_can_id
         self._synchronous = tuple(pdo for pdo in self.pdos if pdo.configuration.is_synchronous)
-        immediate = {pdo.configuration.can_id for pdo in self.pdos if pdo not in self._synchronous}
+        immediate = {pdo.configuration.can_id for pdo in self.pdos if not pdo.configuration.is_synchronous}
         self.synchronous_ids = self.can_ids - immediate
         self._deadline = None
 

@@ -329,7 +329,7 @@ class TransmitEngine:
     def _judge(self, now: float) -> None:
         """Stop what may not be read now; start what may again, and what is new."""
         self._unreadable = self._cell.unreadable
-        fresh, self._fresh = self._fresh, []
+        fresh, self._fresh = set(self._fresh), []
         for pdo in self.pdos:
             was_stopped, pdo.is_stopped = pdo.is_stopped, not self._unreadable.isdisjoint(pdo.guarded)
             if pdo.is_stopped:
