@@ -10,7 +10,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any, Protocol
 
@@ -74,11 +74,8 @@ class Moment:
     """Seconds since 1970, UTC."""
 
 
-@dataclass(slots=True)
-class Cursor:
-    """How far somebody has read each cell's events."""
-
-    read: dict[str, int] = field(default_factory=dict)
+Cursor = dict[str, int]
+"""How far somebody has read the events of each cell, by its name."""
 
 
 class Api:
@@ -163,10 +160,10 @@ class Api:
         found: list[tuple[float, EventMessage]] = []
         for runtime in self._runtimes(query.get("cell")):
             ring, name = runtime.cell.events, runtime.cell.definition.name
-            read = cursor.read.get(name, ring.count)
+            read = cursor.get(name, ring.count)
             if read != ring.count:
                 found += _events(runtime, read if read < ring.count else 0, moment)
-            cursor.read[name] = ring.count
+            cursor[name] = ring.count
         return _in_order(found)
 
     def audit(self, query: Mapping[str, str], moment: Moment) -> Json:
