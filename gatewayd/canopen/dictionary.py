@@ -74,8 +74,6 @@ class Access(Enum):
     WO = "wo"
     RW = "rw"
     CONST = "const"
-    RWR = "rwr"
-    """Read and write, mappable into a TPDO."""
     RWW = "rww"
     """Read and write, mappable into an RPDO."""
 
@@ -87,7 +85,7 @@ class Access(Enum):
     @property
     def writable(self) -> bool:
         """Whether an SDO download is allowed."""
-        return self in (Access.WO, Access.RW, Access.RWR, Access.RWW)
+        return self not in (Access.RO, Access.CONST)
 
 
 class Pdo(Enum):

@@ -66,7 +66,7 @@ _MAX_REPLY = 32768
 
 
 def request(name: str, sequence: int) -> bytes:
-    """The request for one interface."""
+    """What the kernel is asked for an interface."""
     text = name.encode() + b"\0"
     attribute = _ATTRIBUTE.pack(_ATTRIBUTE.size + len(text), _IFLA_IFNAME) + text + bytes(-len(text) % 4)
     length = _HEADER.size + _LINK.size + len(attribute)

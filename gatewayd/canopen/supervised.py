@@ -21,6 +21,7 @@ LAG = 0.005
 _LAG_BITS = 1350
 """Bits that may go before it: ten frames. On slow buses they take longer than `LAG`."""
 _PASSIVE = BusState.PASSIVE
+"""A name of its own, because it is looked up for each frame that is sent."""
 
 
 class SupervisedBus(ABC):
