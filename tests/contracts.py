@@ -12,13 +12,14 @@ import json
 import logging
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import chdir
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 from unittest.mock import MagicMock
 
 import click
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 
 from gatewayd.cli import COMMANDS
 from gatewayd.cli import command as root_command
@@ -37,7 +38,7 @@ from gatewayd.links.registry import status_fields
 from gatewayd.logs.events import EventLog
 from gatewayd.logs.records import Format, configure
 from gatewayd.mapping.diagnostics import Diagnostic, Rule
-from gatewayd.mapping.loader import load_together
+from gatewayd.mapping.loader import load, load_together
 from gatewayd.mapping.rules import catalogue
 from gatewayd.mapping.schema import mapping_schema
 from gatewayd.report.schema import documented
@@ -144,34 +145,40 @@ def _form(schema: Mapping[str, Any], named: Mapping[str, Any]) -> object:
 MAPPINGS = [*sorted(ROOT.glob("mappings/*.yaml")), PACKAGE / "demo" / "demo.yaml"]
 
 
+FORMS = {
+    "text": ("show",),
+    "text, all": ("show", "--all"),
+    "csv": ("show", "--format", "csv"),
+    "json": ("show", "--format", "json"),
+    "markdown": ("show", "--format", "markdown"),
+}
+EXPORTS = ("eds", "dcf", "urscript")
+
+
 def mappings() -> object:
-    """What the shipped mappings come to: fingerprint, register list, data sheets (as hashes)."""
-    return {path.name: _exports(path) for path in MAPPINGS}
+    """What the shipped mappings come to: fingerprint, register list, exports (as hashes)."""
+    return {path.name: _mapping(str(path.relative_to(ROOT))) for path in MAPPINGS}
 
 
-def _exports(path: Path) -> dict[str, object]:
-    shown = json.loads(_output("show", "--format", "json", str(path)))
-    found: dict[str, object] = {
+def _mapping(file: str) -> dict[str, object]:
+    printed = {form: _printed(*arguments, file) for form, arguments in FORMS.items()}
+    shown = json.loads(printed["json"].stdout)
+    return {
         "fingerprint": shown["fingerprint"],
-        "show": {
-            form: _hash(_output("show", "--format", form, str(path))) for form in ("csv", "json", "markdown")
-        },
+        "show": {form: _hash(result) for form, result in printed.items()},
         "json": sorted(set(_paths(shown))),
+        **{form: _hash(_printed("export", form, file)) for form in EXPORTS},
     }
-    if shown["canopen"]:
-        found["eds"] = _hash(_output("export", "eds", str(path)))
-        found["dcf"] = _hash(_output("export", "dcf", str(path)))
-    return found
 
 
-def _output(*arguments: str) -> str:
-    result = CliRunner().invoke(root_command, [argument.removeprefix(f"{ROOT}/") for argument in arguments])
-    assert result.exit_code == 0, result.output
-    return result.stdout
+def _printed(*arguments: str) -> Result:
+    with chdir(ROOT):
+        return CliRunner(env={"COLUMNS": "140"}).invoke(root_command, arguments)
 
 
-def _hash(text: str) -> str:
-    return sha256(text.replace(f"{ROOT}/", "").encode()).hexdigest()[:16]
+def _hash(result: Result) -> str:
+    digest = sha256(result.output.encode()).hexdigest()[:16]
+    return digest if result.exit_code == 0 else f"exit code {result.exit_code}, {digest}"
 
 
 def _paths(value: object, path: str = "") -> Iterator[str]:
@@ -183,6 +190,20 @@ def _paths(value: object, path: str = "") -> Iterator[str]:
     elif isinstance(value, list):
         for inner in value:
             yield from _paths(inner, f"{path}[]")
+
+
+_DOCUMENTED = re.compile(r"```yaml\n(gatewayd: 1\n.*?)```", re.DOTALL)
+
+
+def documented_mappings() -> object:
+    """The fingerprint of every whole mapping in the documentation."""
+    found = {}
+    for page in sorted((ROOT / "docs").rglob("*.md")):
+        for number, text in enumerate(_DOCUMENTED.findall(page.read_text())):
+            plan = load(text.encode(), page.name).plan
+            if plan is not None:
+                found[f"{page.stem} {number}"] = f"{plan.cell.fingerprint:08X}"
+    return found
 
 
 # -- status block -----------------------------------------------------------------------------------------------------
@@ -467,6 +488,7 @@ CONTRACTS: Mapping[str, Callable[[], object]] = {
     "findings": findings,
     "language": language,
     "mappings": mappings,
+    "documented-mappings": documented_mappings,
     "status-block": status_block,
     "status-objects": status_objects,
     "numbers": numbers,
