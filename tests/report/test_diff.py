@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -57,6 +58,7 @@ variables:
 """
 
 
+@cache
 def plan(text: str) -> Plan:
     loaded = load(text.encode(), "cell.yaml")
     assert loaded.plan is not None, loaded.diagnostics

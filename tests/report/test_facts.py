@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
 from typing import Any
 
 import pytest
@@ -45,6 +46,7 @@ variables:
 """
 
 
+@cache
 def plan() -> Plan:
     loaded = load(TEXT.encode(), "cell.yaml")
     assert loaded.plan is not None, loaded.diagnostics

@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from typing import TypeVar
 from uuid import uuid4
 
@@ -61,6 +62,7 @@ def little(value: int, size: int) -> bytes:
     return value.to_bytes(size, "little", signed=value < 0)
 
 
+@cache
 def compiled(text: str = MAPPING) -> Plan:
     """The plan of a mapping without errors."""
     loaded = load(text.encode(), "dut.yaml")
