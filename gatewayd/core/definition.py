@@ -113,7 +113,7 @@ class Variable:
     """Greatest value the robot's type can hold; None for bits and reals."""
     limits: Limits | None = None
     on_stale: Fallback = Fallback()
-    """What the fieldbus sees when the robot stops telling (outputs)."""
+    """What the fieldbus sees when the robot stops reporting (outputs)."""
     on_release: Fallback = Fallback()
     """What the robot is given when the owner is lost (inputs)."""
     lock: int | None = None

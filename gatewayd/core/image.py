@@ -21,7 +21,7 @@ class Quality(IntEnum):
 
     GOOD = 0
     STALE = 1
-    """The robot has stopped telling, or cannot be reached."""
+    """The robot has stopped reporting, or cannot be reached."""
     UNAVAILABLE = 2
     """The controller does not have the field, or gave it to another client."""
     NEVER = 3
@@ -149,7 +149,7 @@ class ProcessImage:
             self.find_unreadable()
 
     def outputs_lost(self) -> None:
-        """The robot has stopped telling: outputs show their fallbacks until `outputs_stored`."""
+        """The robot has stopped reporting: outputs show their fallbacks until `outputs_stored`."""
         self._outputs_stored = False
         self._covered.clear()
         for index in self.outputs:

@@ -197,8 +197,8 @@ def _format(fields: Iterable[StatusField]) -> str:
     return found
 
 
-def _milliseconds(seconds: float, greatest: int) -> int:
-    return int(min(max(0.0, seconds * 1000), greatest))
+def _milliseconds(seconds: float, limit: int) -> int:
+    return int(min(max(0.0, seconds * 1000), limit))
 
 
 def _number(index: int | None) -> int:
