@@ -1,4 +1,7 @@
-"""What a unit says of itself: Read Device Identification, function 43 with MEI type 14 (V1.1b3, 6.21)."""
+"""What a unit says of itself.
+
+Read Device Identification, function 43 with MEI type 14 (V1.1b3, 6.21), and Report Server ID, function 17 (6.13).
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,10 @@ from enum import IntEnum
 from gatewayd import __version__
 from gatewayd.modbus.frames import MAX_PDU
 
-__all__ = ["FUNCTION", "MEI_TYPE", "Identification", "ObjectId", "ReadCode"]
+__all__ = ["FUNCTION", "MEI_TYPE", "REPORT_SERVER_ID", "Identification", "ObjectId", "ReadCode"]
 
 FUNCTION = 43
+REPORT_SERVER_ID = 17
 MEI_TYPE = 14
 
 _HEAD_SIZE = 7
@@ -17,6 +21,7 @@ _OBJECT_HEAD_SIZE = 2
 _MAX_OBJECT = MAX_PDU - _HEAD_SIZE - _OBJECT_HEAD_SIZE
 _REQUEST_SIZE = 4
 _MORE_FOLLOWS = 0xFF
+_RUNNING, _NOT_RUNNING = 0xFF, 0x00
 _CONFORMITY = 0x83
 """Extended identification, as a stream and object by object."""
 
@@ -79,6 +84,15 @@ class Identification:
         return self._stream(
             code, [(key, text) for key, text in self._objects.items() if first <= key <= last]
         )
+
+    def server_id(self, unit: int, *, running: bool) -> bytes:
+        """The answer to Report Server ID: the unit id, the run indicator, then product, version and cell as text."""
+        text = b" ".join(
+            self._objects[key] for key in (ObjectId.PRODUCT_CODE, ObjectId.REVISION, ObjectId.MODEL_NAME)
+        )
+        content = bytes((unit, _RUNNING if running else _NOT_RUNNING)) + text
+        content = content[: MAX_PDU - 2]
+        return bytes((REPORT_SERVER_ID, len(content))) + content
 
     def _stream(self, code: int, objects: list[tuple[int, bytes]]) -> bytes:
         body = bytearray()

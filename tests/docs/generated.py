@@ -28,12 +28,13 @@ from gatewayd.core.image import Quality
 from gatewayd.core.program import STATES
 from gatewayd.core.refusal import PRECEDENCE, Reason
 from gatewayd.core.status_layout import BASE, TABLES
-from gatewayd.links.modbus_server.functions import EXCEPTION_OF, ExceptionCode
+from gatewayd.links.modbus_server.functions import EXCEPTION_OF
 from gatewayd.links.registry import kinds, status_fields
 from gatewayd.logs.events import LEVELS
 from gatewayd.logs.records import LEVELS as LEVEL_NAMES
 from gatewayd.mapping.schema import mapping_schema
 from gatewayd.modbus.areas import Area
+from gatewayd.modbus.exceptions import ExceptionCode
 from gatewayd.report.schema import documented
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field, Series
 from gatewayd.web.histogram import BOUNDS
@@ -293,6 +294,7 @@ _EXCEPTIONS = {
     ExceptionCode.ILLEGAL_FUNCTION: "a function code that is not served",
     ExceptionCode.ILLEGAL_ADDRESS: "nothing is mapped there, or this peer may never write it",
     ExceptionCode.ILLEGAL_VALUE: "a malformed request, a value out of limits, or a part of a value",
+    ExceptionCode.DEVICE_FAILURE: "in place of 0B, where `robot_away: device_failure` says so",
     ExceptionCode.BUSY: "another writer owns it now: try again later",
     ExceptionCode.PATH_UNAVAILABLE: "the controller gave the register to another client, or does not have it",
     ExceptionCode.TARGET_FAILED: (
@@ -304,7 +306,7 @@ _EXCEPTIONS = {
 
 def exceptions() -> str:
     """The exception codes in use."""
-    rows = [(f"{code:02X}", code.name.lower().replace("_", " "), _EXCEPTIONS[code]) for code in ExceptionCode]
+    rows = [(f"{code:02X}", code.text, _EXCEPTIONS[code]) for code in ExceptionCode]
     return table(("code", "name", "when"), rows)
 
 

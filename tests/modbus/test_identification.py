@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from gatewayd import __version__
+from gatewayd.modbus.frames import MAX_PDU
 from gatewayd.modbus.identification import Identification, ReadCode
 
 CELL = "press-3"
@@ -85,3 +86,15 @@ def test_long_objects_are_told_in_several_answers(size: int) -> None:
         assert first not in found
     assert list(found) == [0, 1, 2, 3, 4, 5, 6, 0x80]
     assert found[5] == "x" * min(size, 244)
+
+
+def test_server_id_is_the_unit_the_indicator_and_a_text() -> None:
+    identification = Identification("press-3", 1)
+    text = f"gatewayd {__version__} press-3".encode()
+    assert identification.server_id(7, running=True) == bytes((17, 2 + len(text), 7, 0xFF)) + text
+    assert identification.server_id(7, running=False)[3] == 0
+
+
+def test_a_long_name_is_cut_to_what_a_frame_holds() -> None:
+    answer = Identification("x" * 500, 1).server_id(1, running=True)
+    assert (len(answer), answer[1]) == (MAX_PDU, MAX_PDU - 2)

@@ -101,7 +101,11 @@ SETTINGS = {
     "allow": ("1502'", "1502', allow: [127.0.0.0/8]"),
     "connections": ("1502'", "1502', connections: 5"),
     "idle_timeout": ("1502'", "1502', idle_timeout: 61s"),
+    "connections_per_peer": ("1502'", "1502', connections_per_peer: 5"),
+    "default_unit": ("1502'", "1502', default_unit: true"),
     "gaps": ("1502'", "1502', gaps: zero"),
+    "write_gaps": ("1502'", "1502', write_gaps: ignore"),
+    "robot_away": ("1502'", "1502', robot_away: busy"),
 }
 
 

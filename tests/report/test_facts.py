@@ -17,6 +17,7 @@ from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
+from gatewayd.modbus.exceptions import ExceptionCode
 from gatewayd.report import facts
 
 TEXT = """\
@@ -79,6 +80,7 @@ OF_LINKS: dict[str, Any] = {
     "sync": SyncPlan(producer=True),
     "rpdo_writer": 0,
     "sdo_writer": 0,
+    "robot_away": ExceptionCode.BUSY,
 }
 KNOWN = {
     "source", "fingerprint", "number", "name", "lock", "low", "high", "members", "kind", "cell", "shown", "shows_nan",

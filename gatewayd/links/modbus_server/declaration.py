@@ -50,8 +50,8 @@ class ModbusServer(LinkKind):
         return description(plan)
 
     def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
-        """Clients of another listener or unit connect anew."""
-        return ("listen", "unit")
+        """Clients of another listener or unit connect anew; those of the default unit would find another robot."""
+        return ("listen", "unit", "default_unit")
 
     def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
         """A unit always goes on; if it moves to another listener, its clients have to follow."""

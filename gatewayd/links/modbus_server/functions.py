@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Sequence
-from enum import IntEnum
 
 from gatewayd.core import status_layout
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Value
+from gatewayd.core.freshness import Source
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
@@ -28,20 +28,10 @@ from gatewayd.modbus.areas import (
     MAX_WRITE_REGISTERS,
     MAX_WRITE_WITH_READ,
 )
+from gatewayd.modbus.exceptions import ExceptionCode
 from gatewayd.modbus.identification import Identification
 
-__all__ = ["EXCEPTION_OF", "ExceptionCode", "Unit", "exception", "execute"]
-
-
-class ExceptionCode(IntEnum):
-    """Why a request is not answered with data (V1.1b3, 7)."""
-
-    ILLEGAL_FUNCTION = 0x01
-    ILLEGAL_ADDRESS = 0x02
-    ILLEGAL_VALUE = 0x03
-    BUSY = 0x06
-    PATH_UNAVAILABLE = 0x0A
-    TARGET_FAILED = 0x0B
+__all__ = ["EXCEPTION_OF", "Unit", "exception", "execute"]
 
 
 EXCEPTION_OF = {
@@ -62,12 +52,16 @@ EXCEPTION_OF = {
 class Unit:
     """One robot cell as a Modbus unit."""
 
-    def __init__(self, plan: ModbusPlan, cell: Cell) -> None:
+    def __init__(self, plan: ModbusPlan, cell: Cell, former: Unit | None = None) -> None:
+        """`former` had its number before: what is counted goes on."""
         self.plan = plan
         self.cell = cell
         self.image = RegisterImage(plan, cell)
         self.status = StatusBlock(cell, status_fields())
         self.identification = Identification(cell.definition.name, cell.definition.fingerprint)
+        self.exception_of = {**EXCEPTION_OF, Reason.ROBOT_LOST: plan.robot_away}
+        self.ignored: int = 0 if former is None else former.ignored
+        """Registers and bits with nothing mapped that accepted writes covered."""
 
     def close(self) -> None:
         """Follow the cell no longer."""
@@ -80,6 +74,7 @@ _Function = Callable[[Unit, Requester, bytes, float], Answer]
 _COIL_ON = 0xFF00
 _STATUS_END = status_layout.BASE + status_layout.LENGTH
 
+_WORD = struct.Struct(">H")
 _TWO_WORDS = struct.Struct(">HH")
 _MASK = struct.Struct(">HHH")
 _WRITE_MULTIPLE = struct.Struct(">HHB")
@@ -103,12 +98,12 @@ def exception(function: int, code: ExceptionCode) -> bytes:
 # -- reading ----------------------------------------------------------------------------------------------------------
 
 
-def _read_bits(table: BitTable, pdu: bytes) -> Answer:
+def _read_bits(unit: Unit, table: BitTable, pdu: bytes) -> Answer:
     address, count = _TWO_WORDS.unpack_from(pdu, 1)
     if not 1 <= count <= MAX_READ_BITS:
         return ExceptionCode.ILLEGAL_VALUE
     if table.readable.reach[address] < count:
-        return _unreadable(table.readable.mapped[address], count)
+        return _unreadable(unit, table.readable.mapped[address], count)
     bits = table.read(address, count)
     return bytes((pdu[0], len(bits))) + bits
 
@@ -117,22 +112,22 @@ def _read_registers(unit: Unit, table: RegisterTable, pdu: bytes, now: float) ->
     address, count = _TWO_WORDS.unpack_from(pdu, 1)
     if not 1 <= count <= MAX_READ_REGISTERS:
         return ExceptionCode.ILLEGAL_VALUE
-    refused = _refuse_registers(table, address, count)
+    refused = _refuse_registers(unit, table, address, count)
     if refused is not None:
         return refused
     return bytes((pdu[0], 2 * count)) + _registers(unit, table, address, count, now)
 
 
-def _refuse_registers(table: RegisterTable, address: int, count: int) -> ExceptionCode | None:
+def _refuse_registers(unit: Unit, table: RegisterTable, address: int, count: int) -> ExceptionCode | None:
     """Why these registers cannot be read, if they cannot."""
     if table.readable.reach[address] >= count or _of_status(address, count):
         return None
-    return _unreadable(table.readable.mapped[address], count)
+    return _unreadable(unit, table.readable.mapped[address], count)
 
 
-def _unreadable(mapped: int, count: int) -> ExceptionCode:
+def _unreadable(unit: Unit, mapped: int, count: int) -> ExceptionCode:
     """Mapped, but held back because the robot no longer sends; or not mapped at all."""
-    return ExceptionCode.TARGET_FAILED if mapped >= count else ExceptionCode.ILLEGAL_ADDRESS
+    return unit.plan.robot_away if mapped >= count else ExceptionCode.ILLEGAL_ADDRESS
 
 
 def _registers(unit: Unit, table: RegisterTable, address: int, count: int, now: float) -> bytes:
@@ -152,7 +147,7 @@ def _write_coil(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
     address, value = _TWO_WORDS.unpack_from(pdu, 1)
     if value not in {0, _COIL_ON}:
         return ExceptionCode.ILLEGAL_VALUE
-    return _apply(unit, requester, unit.image.coils.changes(address, [value == _COIL_ON]), now) or pdu
+    return _apply_coils(unit, requester, address, [value == _COIL_ON], now) or pdu
 
 
 def _write_register(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
@@ -166,7 +161,7 @@ def _write_coils(unit: Unit, requester: Requester, pdu: bytes, now: float) -> An
         return ExceptionCode.ILLEGAL_VALUE
     packed = int.from_bytes(pdu[6:], "little")
     bits = [bool(packed >> position & 1) for position in range(count)]
-    return _apply(unit, requester, unit.image.coils.changes(address, bits), now) or pdu[:5]
+    return _apply_coils(unit, requester, address, bits, now) or pdu[:5]
 
 
 def _write_multiple(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
@@ -182,7 +177,11 @@ def _mask_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
         present = int.from_bytes(unit.status.read(address - status_layout.BASE, 1, now), "big")
         word = (present & and_mask) | (or_mask & ~and_mask & 0xFFFF)
         return _write_status(unit, requester, address, [word], now) or pdu
-    return _apply(unit, requester, unit.image.holding.masked(address, and_mask, or_mask), now) or pdu
+    holding = unit.image.holding
+    refused = _apply(unit, requester, holding.masked(address, and_mask, or_mask), now)
+    if refused is None and unit.plan.ignore_gaps:
+        unit.ignored += holding.ignored(address, _WORD.pack(or_mask & ~and_mask & 0xFFFF))
+    return refused or pdu
 
 
 def _read_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
@@ -192,7 +191,7 @@ def _read_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
     if size != 2 * written or len(pdu) != 10 + size:
         return ExceptionCode.ILLEGAL_VALUE
     table = unit.image.holding
-    refused = _refuse_registers(table, first, count)
+    refused = _refuse_registers(unit, table, first, count)
     if refused is None:
         refused = _write_registers(unit, requester, address, pdu[10:], now)
     if refused is not None:
@@ -206,14 +205,26 @@ def _write_registers(
     if _of_status(address, len(data) // 2):
         words = struct.unpack(f">{len(data) // 2}H", data)
         return _write_status(unit, requester, address, words, now)
-    return _apply(unit, requester, unit.image.holding.changes(address, data), now)
+    refused = _apply(unit, requester, unit.image.holding.changes(address, data), now)
+    if refused is None and unit.plan.ignore_gaps:
+        unit.ignored += unit.image.holding.ignored(address, data)
+    return refused
+
+
+def _apply_coils(
+    unit: Unit, requester: Requester, address: int, bits: Sequence[bool], now: float
+) -> ExceptionCode | None:
+    refused = _apply(unit, requester, unit.image.coils.changes(address, bits), now)
+    if refused is None and unit.plan.ignore_gaps:
+        unit.ignored += unit.image.coils.ignored(address, len(bits))
+    return refused
 
 
 def _write_status(
     unit: Unit, requester: Requester, address: int, words: Sequence[int], now: float
 ) -> ExceptionCode | None:
     refusal = unit.status.write(requester, address - status_layout.BASE, words, now)
-    return EXCEPTION_OF[refusal.reason] if refusal is not None else None
+    return unit.exception_of[refusal.reason] if refusal is not None else None
 
 
 def _apply(
@@ -230,9 +241,24 @@ def _apply(
         refusal = Refusal(Reason.NOT_WRITABLE, variable)
     else:
         refusal = unit.cell.write(requester, changes, now)
-        return None if refusal is None else EXCEPTION_OF[refusal.reason]
+        return None if refusal is None else unit.exception_of[refusal.reason]
     unit.cell.refuse(requester, refusal, now, value)
-    return EXCEPTION_OF[refusal.reason]
+    return unit.exception_of[refusal.reason]
+
+
+# -- about the unit itself --------------------------------------------------------------------------------------------
+
+
+def _diagnose(_unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
+    """Return Query Data (V1.1b3, 6.8), which tools use as a sign of life; the others are for serial lines."""
+    if pdu[1:3] != _RETURN_QUERY_DATA:
+        return ExceptionCode.ILLEGAL_FUNCTION
+    return pdu
+
+
+def _report_server_id(unit: Unit, _requester: Requester, _pdu: bytes, _now: float) -> Answer:
+    running = unit.cell.freshness.state is Source.FRESH
+    return unit.identification.server_id(unit.plan.unit, running=running)
 
 
 def _identify(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Answer:
@@ -242,17 +268,20 @@ def _identify(unit: Unit, _requester: Requester, pdu: bytes, _now: float) -> Ans
     return ExceptionCode(answer) if isinstance(answer, int) else answer
 
 
+_RETURN_QUERY_DATA = bytes(2)
 _TWO_WORDS_ONLY = range(5, 6)
 _WITH_DATA = range(6, 254)
 _FUNCTIONS: dict[int, tuple[_Function, range]] = {
-    1: (lambda unit, _requester, pdu, _now: _read_bits(unit.image.coils, pdu), _TWO_WORDS_ONLY),
-    2: (lambda unit, _requester, pdu, _now: _read_bits(unit.image.discrete, pdu), _TWO_WORDS_ONLY),
+    1: (lambda unit, _requester, pdu, _now: _read_bits(unit, unit.image.coils, pdu), _TWO_WORDS_ONLY),
+    2: (lambda unit, _requester, pdu, _now: _read_bits(unit, unit.image.discrete, pdu), _TWO_WORDS_ONLY),
     3: (lambda unit, _, pdu, now: _read_registers(unit, unit.image.holding, pdu, now), _TWO_WORDS_ONLY),
     4: (lambda unit, _, pdu, now: _read_registers(unit, unit.image.input, pdu, now), _TWO_WORDS_ONLY),
     5: (_write_coil, _TWO_WORDS_ONLY),
     6: (_write_register, _TWO_WORDS_ONLY),
+    8: (_diagnose, range(3, 254, 2)),
     15: (_write_coils, _WITH_DATA),
     16: (_write_multiple, _WITH_DATA),
+    17: (_report_server_id, range(1, 2)),
     22: (_mask_write, range(7, 8)),
     23: (_read_write, range(10, 254)),
     identification.FUNCTION: (_identify, range(1, 254)),

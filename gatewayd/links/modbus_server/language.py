@@ -25,6 +25,7 @@ from gatewayd.mapping.reach import Reach, scaled
 from gatewayd.mapping.section import Section
 from gatewayd.modbus.areas import MAX_WRITE_BITS, MAX_WRITE_REGISTERS, Area
 from gatewayd.modbus.codec import TYPES, Codec
+from gatewayd.modbus.exceptions import ExceptionCode
 
 __all__ = ["LANGUAGE"]
 
@@ -141,6 +142,10 @@ class ModbusLanguage(LinkLanguage):
             connections=modbus.connections,
             idle_timeout=modbus.idle_timeout,
             fill_gaps=modbus.gaps == "zero",
+            ignore_gaps=modbus.write_gaps == "ignore",
+            connections_per_peer=modbus.connections_per_peer,
+            default_unit=modbus.default_unit,
+            robot_away=ExceptionCode[modbus.robot_away.upper()],
             placements=tuple(
                 Placement(placed.variable.index, placed.area, placed.address, placed.bit, placed.codec)
                 for placed in placements_of(cell)

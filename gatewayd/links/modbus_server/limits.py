@@ -38,6 +38,11 @@ def max_connections(plans: Iterable[ModbusPlan]) -> int:
     return max((plan.connections for plan in plans), default=0)
 
 
+def max_per_peer(plans: Iterable[ModbusPlan]) -> int:
+    """The greatest number of connections of one address."""
+    return max((plan.max_per_peer for plan in plans), default=0)
+
+
 def idle_timeout(plans: Collection[ModbusPlan]) -> float | None:
     """Seconds without a request after which a connection is closed; None: never."""
     timeouts = [plan.idle_timeout for plan in plans if plan.idle_timeout is not None]

@@ -8,6 +8,7 @@ from ipaddress import IPv4Network, IPv6Network
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import Codec
+from gatewayd.modbus.exceptions import ExceptionCode
 
 __all__ = ["Located", "ModbusPlan", "Network", "Placement", "network_text"]
 
@@ -78,7 +79,20 @@ class ModbusPlan(LinkPlan):
     connections: int
     idle_timeout: float | None
     fill_gaps: bool
-    """Unmapped registers between mapped ones read as 0 instead of answering exception 02."""
+    """Addresses with nothing mapped read 0 instead of answering exception 02."""
     placements: tuple[Placement, ...]
     writers: tuple[tuple[Network, int], ...]
     """Peer network -> writer, most specific first."""
+    ignore_gaps: bool = False
+    """What has nothing mapped is let pass in a write that meets anything mapped."""
+    connections_per_peer: int | None = None
+    """None: half of `connections`."""
+    default_unit: bool = False
+    """Whether it answers to the unit ids 0 and 255, though other cells share the listener."""
+    robot_away: ExceptionCode = ExceptionCode.TARGET_FAILED
+    """The answer to what cannot be done because the robot is away."""
+
+    @property
+    def max_per_peer(self) -> int:
+        """The greatest number of connections of one address."""
+        return self.connections_per_peer or max(1, self.connections // 2)

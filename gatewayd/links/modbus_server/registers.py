@@ -1,69 +1,31 @@
 """The four Modbus data tables of one unit: what its addresses hold, and what a write to them means.
 
 Registers lie in one `bytearray` of big-endian words per table, so that a read is a slice; coils and discrete inputs
-are packed eight to a byte in the order of the protocol. Whether a range may be read is one look at the number of
-readable addresses that follow its first one.
+are packed eight to a byte in the order of the protocol.
 """
 
 from __future__ import annotations
 
 import struct
-from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import Direction
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.status_layout import BASE
 from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
+from gatewayd.links.modbus_server.readable import ADDRESSES, Readable
 from gatewayd.links.modbus_server.runs import Run, bit_runs, number_runs, words_of_bits
 from gatewayd.modbus.areas import MAX_READ_BITS, MAX_READ_REGISTERS, Area
 from gatewayd.modbus.codec import Codec
 
-__all__ = ["BitTable", "Readable", "RegisterImage", "RegisterTable"]
+__all__ = ["GAPS", "BitTable", "RegisterImage", "RegisterTable"]
 
-_ADDRESSES = 65536
+GAPS = range(BASE)
+"""Addresses at which gaps may read 0 or be written to without effect; from there on is the status block."""
+_NO_GAPS = range(0)
 _WORD = struct.Struct(">H")
-
-
-class Readable:
-    """For every address, how many may be read from it on in one request.
-
-    `reach` is what counts now; `mapped` is what would count if no variable were held back.
-    """
-
-    __slots__ = ("_addresses", "_held_back", "_longest", "mapped", "reach")
-
-    def __init__(self, addresses: Iterable[int], longest: int) -> None:
-        self._addresses = sorted(set(addresses), reverse=True)
-        self._longest = longest
-        self._held_back: frozenset[int] = frozenset()
-        self.mapped = self._empty()
-        self._fill(self.mapped, frozenset())
-        self.reach = self.mapped[:]
-
-    def hold_back(self, addresses: frozenset[int]) -> None:
-        """Make every read that touches one of `addresses` fail, until the next call."""
-        if addresses == self._held_back:
-            return
-        self._held_back = addresses
-        # In place: connections keep a reference to it.
-        for address in self._addresses:
-            self.reach[address] = 0
-        self._fill(self.reach, addresses)
-
-    def _empty(self) -> bytearray | array[int]:
-        return bytearray(_ADDRESSES) if self._longest <= 0xFF else array("H", bytes(2 * _ADDRESSES))
-
-    def _fill(self, reach: bytearray | array[int], without: frozenset[int]) -> None:
-        follower, length = -1, 0
-        for address in self._addresses:
-            if address in without:
-                length = 0
-            else:
-                length = length + 1 if address + 1 == follower else 1
-                reach[address] = min(length, self._longest)
-            follower = address
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +38,12 @@ class _Number:
     writable: bool
     codec: Codec
 
-    def changes(self, data: bytes) -> list[Change] | None:
-        """None if the words mean nothing that the variable could hold."""
+    def changes(self, data: bytes) -> list[Change] | Reason:
+        """Refused if the words mean nothing that the variable could hold."""
         value = self.codec.decode(data)
-        return None if value is None else [Change(self.variable, value)]
+        return Reason.OUT_OF_LIMITS if value is None else [Change(self.variable, value)]
 
-    def masked(self, present: int, and_mask: int, or_mask: int) -> list[Change] | None:
+    def masked(self, present: int, and_mask: int, or_mask: int) -> list[Change] | Reason:
         word = (present & and_mask) | (or_mask & ~and_mask & 0xFFFF)
         return self.changes(_WORD.pack(word))
 
@@ -94,6 +56,9 @@ class _Bits:
     writable: bool
     bits: tuple[tuple[int, int, bool], ...]
     """Mask, variable, and whether it is implied where the whole register is written."""
+    unmapped: int
+    """Mask of the other bits."""
+    ignores_gaps: bool
 
     @property
     def words(self) -> int:
@@ -103,28 +68,35 @@ class _Bits:
     def variable(self) -> int:
         return self.bits[0][1]
 
-    def changes(self, data: bytes) -> list[Change] | None:
+    def changes(self, data: bytes) -> list[Change] | Reason:
+        """Refused where a 1 would be lost."""
         (word,) = _WORD.unpack(data)
+        if word & self.unmapped and not self.ignores_gaps:
+            return Reason.NO_SUCH_ADDRESS
         return [Change(variable, bool(word & mask), implied) for mask, variable, implied in self.bits]
 
-    def masked(self, _present: int, and_mask: int, or_mask: int) -> list[Change] | None:
+    def masked(self, _present: int, and_mask: int, or_mask: int) -> list[Change] | Reason:
+        """Refused where a 1 would be lost, and if it is for unmapped bits alone."""
+        selected = ~and_mask & 0xFFFF
+        lost = or_mask & selected & self.unmapped
+        if (lost and not self.ignores_gaps) or (selected and not selected & ~self.unmapped):
+            return Reason.NO_SUCH_ADDRESS
         return [
             Change(variable, bool(or_mask & mask))
             for mask, variable, _implied in self.bits
-            if not and_mask & mask
+            if selected & mask
         ]
 
 
 class _Table:
     """What may be read of a table."""
 
-    def __init__(self, placements: Sequence[Placement], longest: int, *, fill_gaps: bool) -> None:
+    def __init__(self, placements: Sequence[Placement], longest: int, gaps: range) -> None:
+        """`gaps`: where addresses with nothing mapped can be read."""
         self._addresses_of: dict[int, set[int]] = {}
         for placement in placements:
             self._addresses_of.setdefault(placement.variable, set()).update(placement.addresses)
-        mapped = set().union(*self._addresses_of.values())
-        gapless = range(min(mapped), max(mapped) + 1) if fill_gaps and mapped else mapped
-        self.readable = Readable(gapless, longest)
+        self.readable = Readable(set(gaps).union(*self._addresses_of.values()), longest)
 
     def hold_back(self, variables: frozenset[int]) -> None:
         """Let reads that touch one of `variables` fail."""
@@ -135,18 +107,25 @@ class _Table:
 class RegisterTable(_Table):
     """Holding registers or input registers."""
 
-    def __init__(self, placements: Sequence[Placement], cell: Cell, *, fill_gaps: bool) -> None:
-        super().__init__(placements, MAX_READ_REGISTERS, fill_gaps=fill_gaps)
-        self.image = bytearray(2 * _ADDRESSES)
+    def __init__(
+        self, placements: Sequence[Placement], cell: Cell, *, fill_gaps: bool, ignore_gaps: bool
+    ) -> None:
+        """`fill_gaps` for reading, `ignore_gaps` for writing: registers and bits with nothing mapped are let pass."""
+        # In both tables, whatever the mapping has there: clients are told to read the status block in either.
+        super().__init__(placements, MAX_READ_REGISTERS, GAPS if fill_gaps else _NO_GAPS)
+        self._ignored = GAPS if ignore_gaps else _NO_GAPS
+        self.image = bytearray(2 * ADDRESSES)
         """Big-endian words by address."""
         self._items: dict[int, _Number | _Bits] = {
-            item.address + word: item for item in _items(placements, cell) for word in range(item.words)
+            item.address + word: item
+            for item in _items(placements, cell, ignore_gaps=ignore_gaps)
+            for word in range(item.words)
         }
 
     def changes(self, address: int, data: bytes) -> list[Change] | Refusal:
         """What writing the big-endian words `data` from `address` on means for the cell.
 
-        Every register must be mapped and writable, and every variable covered whole.
+        Every register must be writable, and mapped unless gaps are ignored; every variable is covered whole.
         """
         end = address + len(data) // 2
         refusal = self._unwritable(range(address, end))
@@ -155,14 +134,17 @@ class RegisterTable(_Table):
         changes: list[Change] = []
         position = address
         while position < end:
-            item = self._items[position]
+            item = self._items.get(position)
+            if item is None:
+                position += 1
+                continue
             behind = item.address + item.words
             if position != item.address or behind > end:
                 return Refusal(Reason.PARTIAL_VALUE, item.variable)
             start = 2 * (position - address)
             meant = item.changes(data[start : start + 2 * item.words])
-            if meant is None:
-                return Refusal(Reason.OUT_OF_LIMITS, item.variable)
+            if isinstance(meant, Reason):
+                return _refusal(meant, item)
             changes += meant
             position = behind
         return changes
@@ -180,25 +162,41 @@ class RegisterTable(_Table):
             return Refusal(Reason.PARTIAL_VALUE, item.variable)
         (present,) = _WORD.unpack_from(self.image, 2 * address)
         meant = item.masked(present, and_mask, or_mask)
-        return Refusal(Reason.OUT_OF_LIMITS, item.variable) if meant is None else meant
+        return _refusal(meant, item) if isinstance(meant, Reason) else meant
+
+    def ignored(self, address: int, data: bytes) -> int:
+        """Registers, and ones of bits, that such a write covers without effect."""
+        count = 0
+        for position, (word,) in enumerate(_WORD.iter_unpack(data), address):
+            item = self._items.get(position)
+            if item is None:
+                count += 1
+            elif isinstance(item, _Bits):
+                count += (word & item.unmapped).bit_count()
+        return count
 
     def _unwritable(self, addresses: range) -> Refusal | None:
         read_only: Refusal | None = None
+        meets_any = False
         for address in addresses:
             item = self._items.get(address)
             if item is None:
-                return Refusal(Reason.NO_SUCH_ADDRESS)
+                if address not in self._ignored:
+                    return Refusal(Reason.NO_SUCH_ADDRESS)
+                continue
+            meets_any = True
             if not item.writable and read_only is None:
                 read_only = Refusal(Reason.NOT_WRITABLE, item.variable)
-        return read_only
+        return read_only if meets_any else Refusal(Reason.NO_SUCH_ADDRESS)
 
 
 class BitTable(_Table):
     """Coils or discrete inputs."""
 
-    def __init__(self, placements: Sequence[Placement], *, fill_gaps: bool) -> None:
-        super().__init__(placements, MAX_READ_BITS, fill_gaps=fill_gaps)
-        self.image = bytearray(_ADDRESSES // 8)
+    def __init__(self, placements: Sequence[Placement], *, fill_gaps: bool, ignore_gaps: bool) -> None:
+        super().__init__(placements, MAX_READ_BITS, GAPS if fill_gaps and placements else _NO_GAPS)
+        self._ignored = GAPS if ignore_gaps else _NO_GAPS
+        self.image = bytearray(ADDRESSES // 8)
         """Bits by address, the first one in the least significant bit of the first byte."""
         self._variables = {placement.address: placement.variable for placement in placements}
 
@@ -213,21 +211,28 @@ class BitTable(_Table):
         changes = []
         for position, bit in enumerate(bits, address):
             variable = self._variables.get(position)
-            if variable is None:
+            if variable is not None:
+                changes.append(Change(variable, bit))
+            elif position not in self._ignored:
                 return Refusal(Reason.NO_SUCH_ADDRESS)
-            changes.append(Change(variable, bit))
-        return changes
+        return changes or Refusal(Reason.NO_SUCH_ADDRESS)
+
+    def ignored(self, address: int, count: int) -> int:
+        """Bits that such a write covers without effect."""
+        return sum(position not in self._variables for position in range(address, address + count))
 
 
 class RegisterImage:
     """All four tables of one unit, kept up to date by the cell until `close`."""
 
     def __init__(self, plan: ModbusPlan, cell: Cell) -> None:
+        fill, ignore = plan.fill_gaps, plan.ignore_gaps
+
         def table(area: Area) -> RegisterTable:
-            return RegisterTable(_of(plan.placements, area), cell, fill_gaps=plan.fill_gaps)
+            return RegisterTable(_of(plan.placements, area), cell, fill_gaps=fill, ignore_gaps=ignore)
 
         def bits(area: Area) -> BitTable:
-            return BitTable(_of(plan.placements, area), fill_gaps=plan.fill_gaps)
+            return BitTable(_of(plan.placements, area), fill_gaps=fill, ignore_gaps=ignore)
 
         self.holding = table(Area.HOLDING)
         self.input = table(Area.INPUT)
@@ -275,7 +280,11 @@ def _of(placements: Iterable[Placement], area: Area) -> list[Placement]:
     return [placement for placement in placements if placement.area is area]
 
 
-def _items(placements: Sequence[Placement], cell: Cell) -> Iterator[_Number | _Bits]:
+def _refusal(reason: Reason, item: _Number | _Bits) -> Refusal:
+    return Refusal(reason, None if reason is Reason.NO_SUCH_ADDRESS else item.variable)
+
+
+def _items(placements: Sequence[Placement], cell: Cell, *, ignore_gaps: bool) -> Iterator[_Number | _Bits]:
     variables = cell.definition.variables
     packed: dict[int, list[tuple[int, int]]] = {}
     for placement in placements:
@@ -295,4 +304,6 @@ def _items(placements: Sequence[Placement], cell: Cell) -> Iterator[_Number | _B
                 (mask, variable, shared or variables[variable].lock is None)
                 for mask, variable in sorted(bits)
             ),
+            unmapped=0xFFFF & ~sum({mask for mask, _variable in bits}),
+            ignores_gaps=ignore_gaps,
         )

@@ -12,12 +12,13 @@ from gatewayd.mapping.scalars import Listen, ListenAddress, Networks, OptionalDu
 from gatewayd.mapping.section import Section
 from gatewayd.modbus.areas import AREA_NAMES, Area
 
-__all__ = ["Modbus", "ModbusPlaces", "ModbusWriter", "NumberType", "PlacementSpec", "WordOrder"]
+__all__ = ["Modbus", "ModbusPlaces", "ModbusWriter", "NumberType", "PlacementSpec", "RobotAway", "WordOrder"]
 
 NumberType = Literal[
     "bool", "bit", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"
 ]
 WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
+RobotAway = Literal["target_failed", "path_unavailable", "device_failure", "busy"]
 
 
 class Modbus(Section):
@@ -33,12 +34,32 @@ class Modbus(Section):
         default=(),
         description="addresses and networks that may connect; default: everybody who reaches the port",
     )
+    default_unit: bool = Field(
+        default=False,
+        description="answer to unit ids 0 and 255 too, where several cells share the listener; a sole cell always does",
+    )
     connections: Whole = Field(default=32, ge=1, le=1024, description="greatest number of connections")
+    connections_per_peer: Whole | None = Field(
+        default=None,
+        ge=1,
+        le=1024,
+        description="greatest number of connections of one address; default: half of `connections`",
+    )
     idle_timeout: OptionalDuration = Field(
         default=60.0, description="a connection without a request for so long is closed; none: never"
     )
     gaps: Literal["refuse", "zero"] = Field(
-        default="refuse", description="reading registers that nothing is mapped to: exception 02, or zeros"
+        default="refuse",
+        description="reading addresses below 60000 that nothing is mapped to: exception 02, or zeros",
+    )
+    write_gaps: Literal["refuse", "ignore"] = Field(
+        default="refuse",
+        description="registers and bits that nothing is mapped to, in a write that meets something mapped: "
+        "exception 02 to the whole write, or let them pass without effect",
+    )
+    robot_away: RobotAway = Field(
+        default="target_failed",
+        description="answer to reads and writes that fail because the robot is away: exception 0B, 0A, 04 or 06",
     )
     order: WordOrder = Field(
         default="ABCD", description="byte order of all variables that do not name their own"

@@ -13,9 +13,10 @@ from functools import cache
 from typing import Any
 
 from gatewayd.core.requester import Requester
-from gatewayd.links.modbus_server.functions import ExceptionCode, Unit, exception, execute
+from gatewayd.links.modbus_server.functions import Unit, exception, execute
 from gatewayd.loop import clock
 from gatewayd.modbus.areas import MAX_READ_REGISTERS
+from gatewayd.modbus.exceptions import ExceptionCode
 from gatewayd.modbus.frames import FrameBuffer, FramingError, encode, split
 
 __all__ = ["ModbusSession", "UnitAccess"]
@@ -54,10 +55,12 @@ class ModbusSession:
         self._reads: dict[int, tuple[Any, bytearray, tuple[bytes, ...], UnitAccess]] = {}
 
     def serve(self, accesses: Mapping[int, UnitAccess]) -> None:
-        """Answer for these units from now on. The only one also answers to 0 and 255."""
+        """Answer for these units from now on. The only one, or the one declared for it, also answers to 0 and 255."""
         self._accesses = dict(accesses)
-        if len(accesses) == 1:
-            self._accesses.update(dict.fromkeys(_THIS_DEVICE, *accesses.values()))
+        declared = [access for access in accesses.values() if access.unit.plan.default_unit]
+        default = declared if len(accesses) > 1 else list(accesses.values())
+        if len(default) == 1:
+            self._accesses.update(dict.fromkeys(_THIS_DEVICE, default[0]))
         self._reads = {}
         for unit, access in self._accesses.items():
             image = access.unit.image

@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
+from gatewayd import __version__
 from gatewayd.links.modbus_server.listener import ModbusListener
 
 Ask = Callable[..., Awaitable[str]]
@@ -68,7 +69,8 @@ WRITES = [
     ("06 000a", "86 03", "a register write cut short"),
     ("06 0000 0001", "06 00 00 00 01", "a register of bits, one's own changed"),
     ("06 0000 8003", "86 02", "a register of bits, with a bit that only another may write"),
-    ("06 0000 7ffd", "06 00 00 7f fd", "bits that are not mapped are ignored"),
+    ("06 0000 7ffd", "86 02", "ones in bits that are not mapped"),
+    ("10 0000 0001 02 0005", "90 02", "several registers, with a one in a bit that is not mapped"),
     ("06 0014 0001", "06 00 14 00 01", "a register of bits, with one that the robot sends left alone"),
     ("06 0014 0003", "86 02", "a register of bits, with one that the robot sends changed"),
     ("0f 0000 000a 02 ff03", "0f 00 00 00 0a", "coils"),
@@ -105,6 +107,10 @@ MASKS = [
     ("16 0000 fffe 0001", "16 00 00 ff fe 00 01", "one bit of a register"),
     ("16 0000 fffd 0002", "96 02", "a bit that only another may write"),
     ("16 0014 fffd 0002", "96 02", "a bit that the robot sends"),
+    ("16 0000 fffb 0004", "96 02", "a bit that is not mapped"),
+    ("16 0000 fffb 0000", "96 02", "a bit that is not mapped, and is 0 already"),
+    ("16 0000 fffa 0005", "96 02", "a one in a bit that is not mapped, beside one that is"),
+    ("16 0000 ffff ffff", "16 00 00 ff ff ff ff", "no bit"),
     ("16 000b 0000 0001", "96 03", "one register of two"),
     ("16 01f4 0000 0001", "96 02", "a register that the robot sends"),
     ("16 0001 0000 0001", "96 02", "a register that is not there"),
@@ -127,12 +133,22 @@ READ_WRITES = [
     ("17 ea60 0001 ea88 0001 02 0001", "17 02 00 01", "the status block on both sides"),
 ]
 
+SERVER_ID = bytes((2 + len(_text := f"gatewayd {__version__} press-3".encode()), 1, 0xFF)) + _text
+
 OTHERS = [
     *(
         (f"{function:02x}", f"{function | 0x80:02x} 01", f"function {function}")
-        for function in (0, 7, 11, 12, 17, 100)
+        for function in (0, 7, 11, 12, 100)
     ),
-    ("08 0000 1234", "88 01", "diagnostics"),
+    ("08 0000 1234", "08 00 00 12 34", "query data are returned"),
+    ("08 0000", "08 00 00", "no query data"),
+    ("08 0000 1234 5678 9abc", "08 00 00 12 34 56 78 9a bc", "much query data"),
+    ("08 0000 12", "88 03", "half a word of query data"),
+    ("08", "88 03", "diagnostics without a sub-function"),
+    ("08 0001 0000", "88 01", "restart communications"),
+    ("08 000b 0000", "88 01", "a counter of a serial line"),
+    ("11", "11 " + SERVER_ID.hex(" "), "the server and whether it runs"),
+    ("11 00", "91 03", "a question for the server with a byte too many"),
     ("14 07 06 0004 0001 0002", "94 01", "file records"),
     ("18 04de", "98 01", "a FIFO queue"),
     ("83 00", "83 01", "a function with the bit of an exception"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -13,6 +14,8 @@ from gatewayd.core.definition import Direction
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import EXCEPTION_OF, Unit, execute
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.modbus.exceptions import ExceptionCode
 
 PLC, HMI = 0, 1
 NOW = 1000.0
@@ -110,6 +113,51 @@ def test_reads_that_touch_what_the_robot_no_longer_tells_get_no_response(cell: C
     assert ask(unit, "03 012c 0005") == "83 02"
     assert ask(unit, "02 0028 0001") == "82 0b"
     assert ask(unit, "03 0064 0002") == "03 04 00 00 00 00"
+
+
+@pytest.mark.parametrize("away", [code for code in ExceptionCode if code > ExceptionCode.ILLEGAL_VALUE])
+def test_the_answer_to_a_robot_that_is_away_can_be_chosen(
+    cell: Cell, plan_of: Callable[..., ModbusPlan], away: ExceptionCode, index_of: IndexOf
+) -> None:
+    """Some SCADA drivers take 0B for the end of the whole device. All that fails for this one reason gets it."""
+    unit = Unit(replace(plan_of(), robot_away=away), cell)
+    cell.set_availability([index_of("part")], available=False, reason="in use", now=NOW)
+    assert ask(unit, "06 000a 0005") == "86 0a", "a register that somebody else holds is another matter"
+    cell.robot_lost("cable", NOW)
+    requests = (
+        "03 012c 0001",
+        "02 0028 0001",
+        "06 000b 0000",
+        "17 012c 0001 000a 0001 02 0007",
+        "05 0000 ff00",
+    )
+    code = f"{away:02x}"
+    expected = ["83 " + code, "82 " + code, "86 03", "97 " + code, "85 " + code]
+    assert [ask(unit, pdu) for pdu in requests] == expected
+    assert ask(unit, "03 0001 0001") == "83 02", "what is not mapped stays so"
+
+
+def test_what_gaps_swallow_is_counted_once_it_is_acknowledged(
+    cell: Cell, plan_of: Callable[..., ModbusPlan], index_of: IndexOf
+) -> None:
+    unit = Unit(replace(plan_of(), ignore_gaps=True), cell)
+    assert ask(unit, "10 0009 0002 04 0001 0005") == "10 00 09 00 02"
+    assert cell.image.values[index_of("part")] == 5
+    assert unit.ignored == 1
+    assert ask(unit, "16 0000 fffa 0005") == "16 00 00 ff fa 00 05"
+    assert unit.ignored == 2
+    assert ask(unit, "06 0001 0001") == "86 02", "nothing mapped"
+    assert ask(unit, "10 0009 0002 04 0001 0005", None) == "90 02", "not a writer"
+    assert ask(unit, "10 0009 0005 0a 0001 0005 0000 0000 7fff") == "90 03", "out of limits"
+    assert unit.ignored == 2
+    assert Unit(unit.plan, cell, unit).ignored == 2
+
+
+def test_a_server_whose_robot_is_away_does_not_run(cell: Cell, unit: Unit) -> None:
+    assert ask(unit, "11")[6:11] == "01 ff"
+    cell.robot_lost("cable", NOW)
+    assert ask(unit, "11")[6:11] == "01 00"
+    assert ask(unit, "08 0000 0001") == "08 00 00 00 01", "the gateway itself is there"
 
 
 def test_a_read_that_is_refused_keeps_its_request_from_writing(

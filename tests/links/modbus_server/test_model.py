@@ -112,6 +112,8 @@ class Requests(RuleBasedStateMachine):
             (written[WIDE],) = struct.unpack(
                 ">i", struct.pack(">HH", *words[WIDE - address : WIDE - address + 2])
             )
+        if address <= BITS < end and words[BITS - address] & ~0xF:
+            return None
         if address <= BITS < end:
             written |= {FIRST_BIT + bit: words[BITS - address] >> bit & 1 for bit in range(4)}
         return written
@@ -140,8 +142,10 @@ class Requests(RuleBasedStateMachine):
     @rule(writer=WRITERS, and_mask=st.integers(0, 65535), or_mask=st.integers(0, 65535))
     def mask_bits(self, writer: int | None, and_mask: int, or_mask: int) -> None:
         answer = self.ask(writer, struct.pack(">BHHH", 22, BITS, and_mask, or_mask))
-        written = {FIRST_BIT + bit: or_mask >> bit & 1 for bit in range(4) if not and_mask >> bit & 1}
-        assert (answer[0] == 22) is self.judge(writer, written)
+        selected = ~and_mask & 0xFFFF
+        written = {FIRST_BIT + bit: or_mask >> bit & 1 for bit in range(4) if selected >> bit & 1}
+        lost = or_mask & selected & ~0xF or (selected and not written)
+        assert (answer[0] == 22) is (not lost and self.judge(writer, written))
 
     @rule(writer=WRITERS, address=st.sampled_from(NUMBERS), value=st.integers(0, 1100))
     def write_and_read(self, writer: int | None, address: int, value: int) -> None:

@@ -11,7 +11,8 @@ import pytest
 from pymodbus.pdu import DecodePDU
 
 from gatewayd.core.requester import Requester
-from gatewayd.links.modbus_server.functions import ExceptionCode, Unit, execute
+from gatewayd.links.modbus_server.functions import Unit, execute
+from gatewayd.modbus.exceptions import ExceptionCode
 from tests.links.modbus_server.conftest import NOW, PLC
 
 MALFORMED = {

@@ -2,60 +2,59 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from gatewayd.core.cell import Cell, Change
-from gatewayd.core.definition import Direction
+from gatewayd.core.definition import Direction, ValueKind
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import Unit
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.links.modbus_server.registers import Readable, RegisterImage
-from gatewayd.modbus.areas import MAX_READ_BITS, MAX_READ_REGISTERS
+from gatewayd.links.modbus_server.registers import RegisterImage
+from gatewayd.modbus.areas import MAX_READ_BITS, MAX_READ_REGISTERS, Area
+from tests.links.modbus_server.conftest import Sketch, make_cell, make_plan
 
 IndexOf = Callable[[str], int]
 
 
-@given(
-    st.sets(st.integers(0, 65535) | st.integers(0, 300), max_size=300),
-    st.sets(st.integers(0, 300), max_size=50),
-    st.sampled_from([MAX_READ_REGISTERS, MAX_READ_BITS]),
-)
-def test_reach_is_the_number_of_readable_addresses_in_a_row(
-    mapped: set[int], held_back: set[int], longest: int
-) -> None:
-    readable = Readable(mapped, longest)
-    readable.hold_back(frozenset(held_back))
-    for address in {*mapped, *(address + 1 for address in mapped), 0, 65535} - {65536}:
-        for reach, there in ((readable.mapped, mapped), (readable.reach, mapped - held_back)):
-            length = 0
-            while address + length in there and length < longest:
-                length += 1
-            assert reach[address] == length
-
-
-def test_holding_back_happens_in_place() -> None:
-    """Connections keep a reference to the table."""
-    readable = Readable(range(10), MAX_READ_REGISTERS)
-    reach = readable.reach
-    readable.hold_back(frozenset({5}))
-    assert (reach[0], reach[5], reach[6]) == (5, 0, 4)
-    readable.hold_back(frozenset())
-    assert reach[0] == 10
-
-
 def test_gaps_can_read_as_zero(cell: Cell, plan_of: Callable[..., ModbusPlan]) -> None:
-    """Only between mapped addresses, and only for reading."""
+    """From 0 to 59999, so that a client may read in blocks of its own; only for reading."""
     image = RegisterImage(plan_of(fill_gaps=True), cell)
-    assert image.holding.readable.reach[18] == MAX_READ_REGISTERS
-    assert image.holding.readable.reach[501] == 1
-    assert image.holding.readable.reach[502] == 0
-    assert image.discrete.readable.reach[35] == 6
-    assert image.discrete.readable.reach[0] == 0
+    for table in (image.holding, image.input):
+        reach = table.readable.reach
+        assert (reach[0], reach[502], reach[59_875]) == (MAX_READ_REGISTERS,) * 3
+        assert (reach[59_876], reach[59_999], reach[60_000]) == (124, 1, 0)
+    for bits in (image.coils, image.discrete):
+        reach = bits.readable.reach
+        assert (reach[0], reach[58_000], reach[58_001], reach[60_000]) == (
+            MAX_READ_BITS,
+            MAX_READ_BITS,
+            1999,
+            0,
+        )
+        assert bits.read(50_000, 9) == bytes(2)
     assert image.holding.changes(18, bytes(2)) == Refusal(Reason.NO_SUCH_ADDRESS)
+    assert image.coils.changes(11, [False]) == Refusal(Reason.NO_SUCH_ADDRESS)
+
+
+def test_gaps_are_filled_where_a_client_has_something_to_read(
+    cell: Cell, plan_of: Callable[..., ModbusPlan]
+) -> None:
+    """The status block is in both tables of registers; coils and discrete inputs that nobody mapped stay absent."""
+    plan = plan_of(fill_gaps=True)
+    coils = tuple(placement for placement in plan.placements if placement.area is Area.COIL)
+    image = RegisterImage(replace(plan, placements=coils), cell)
+    tables = (image.holding, image.input, image.coils, image.discrete)
+    assert [table.readable.reach[0] > 0 for table in tables] == [True, True, True, False]
+
+
+def test_a_gap_that_is_filled_is_not_held_back(cell: Cell, plan_of: Callable[..., ModbusPlan]) -> None:
+    image = RegisterImage(plan_of(fill_gaps=True), cell)
+    cell.robot_lost("cable", 1001.0)
+    reach = image.holding.readable.reach
+    assert (reach[0], reach[290], reach[299], reach[300], reach[301]) == (125, 10, 1, 0, 125)
 
 
 def test_shows_what_the_robot_tells(unit: Unit, show: Callable[..., None]) -> None:
@@ -141,6 +140,71 @@ def test_bits_of_a_written_register_are_implied(unit: Unit, index_of: IndexOf) -
         Change(index_of("stop"), value=False, implied=True),
         Change(index_of("mode"), value=True, implied=True),
     ]
+
+
+@pytest.mark.parametrize("word", [0x0004, 0x4000, 0x8003 | 0x7FFC])
+def test_a_one_for_an_unmapped_bit_is_refused(unit: Unit, word: int) -> None:
+    """As a register or a coil without a variable is: it would be acknowledged and lost."""
+    assert unit.image.holding.changes(0, word.to_bytes(2, "big")) == Refusal(Reason.NO_SUCH_ADDRESS)
+
+
+@pytest.mark.parametrize(
+    "masks",
+    [(0xFFFB, 0x0004), (0xFFFA, 0x0005), (0xFFFB, 0x0000), (0x8003, 0x0000), (0x0000, 0xFFFF)],
+    ids=["unmapped", "a one beside a mapped one", "zero in unmapped", "all unmapped", "the whole register"],
+)
+def test_a_mask_that_would_be_lost_is_refused(unit: Unit, masks: tuple[int, int]) -> None:
+    assert unit.image.holding.masked(0, *masks) == Refusal(Reason.NO_SUCH_ADDRESS)
+
+
+def test_a_mask_may_clear_unmapped_bits_beside_mapped_ones(unit: Unit, index_of: IndexOf) -> None:
+    """They are 0 and stay so: nothing is lost."""
+    start, stop, mode = (index_of(name) for name in ("start", "stop", "mode"))
+    assert unit.image.holding.masked(0, 0x0000, 0x8001) == [
+        Change(start, value=True), Change(stop, value=False), Change(mode, value=True),
+    ]  # fmt: skip
+
+
+def test_gaps_can_be_written_without_effect(
+    cell: Cell, plan_of: Callable[..., ModbusPlan], index_of: IndexOf
+) -> None:
+    """For clients that write whole blocks; a write that meets nothing mapped is refused."""
+    image = RegisterImage(replace(plan_of(), ignore_gaps=True), cell)
+    holding, coils = image.holding, image.coils
+    assert holding.changes(9, bytes.fromhex("0001 0002")) == [Change(index_of("part"), 2)]
+    assert holding.changes(17, struct.pack(">4H", 0, 1, 2, 1)) == Refusal(
+        Reason.PARTIAL_VALUE, index_of("speed")
+    )
+    assert holding.changes(18, struct.pack(">3H", 1, 2, 1)) == [
+        Change(index_of("half"), value=True),
+        Change(index_of("other_half"), value=False, implied=True),
+    ]
+    assert holding.changes(0, bytes.fromhex("0005"))[0] == Change(index_of("start"), value=True, implied=True)  # type: ignore[index]  # a list
+    assert holding.masked(0, 0xFFFA, 0x0005) == [Change(index_of("start"), value=True)]
+    assert coils.changes(9, [True]) == [Change(index_of("coil_9"), value=True)]
+    assert coils.changes(10, [True, True])[1:] == []  # type: ignore[index]  # a list
+    nothing = Refusal(Reason.NO_SUCH_ADDRESS)
+    assert holding.changes(1, bytes(18)) == nothing
+    assert holding.masked(0, 0xFFFB, 0x0004) == nothing
+    assert holding.masked(1, 0, 0xFFFF) == nothing
+    assert coils.changes(11, [True] * 9) == nothing
+    assert holding.changes(99, bytes(6)) == Refusal(Reason.NOT_WRITABLE, index_of("int_0")), "not a gap"
+
+
+def test_the_status_block_is_no_gap(sketch: Sketch) -> None:
+    """A request or a release of a lock is carried out or refused, never let pass."""
+    sketch.number(sketch.input("last", ValueKind.INT), Area.HOLDING, 59_999, "uint16")
+    changed = make_cell(sketch)
+    image = RegisterImage(replace(make_plan(sketch), ignore_gaps=True), changed)
+    assert isinstance(image.holding.changes(59_998, bytes(4)), list)
+    assert image.holding.changes(59_999, bytes(4)) == Refusal(Reason.NO_SUCH_ADDRESS)
+
+
+def test_what_was_ignored_is_counted(cell: Cell, plan_of: Callable[..., ModbusPlan]) -> None:
+    image = RegisterImage(replace(plan_of(), ignore_gaps=True), cell)
+    assert image.holding.ignored(9, bytes.fromhex("0000 0002")) == 1
+    assert image.holding.ignored(0, bytes.fromhex("c00f 0000")) == 4, "three ones of bits and a register"
+    assert image.coils.ignored(8, 5) == 2
 
 
 def test_bits_selected_by_a_mask_are_meant(unit: Unit, index_of: IndexOf) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -155,6 +156,26 @@ def test_with_two_units_the_device_itself_is_not_known(unit: Unit) -> None:
     assert feed(session, stream("03 000a 0001", unit=0)) == bytes.fromhex("0001 0000 0003 00 83 0b")
     assert feed(session, stream("03 000a 0001", unit=255)) == bytes.fromhex("0001 0000 0003 ff 83 0b")
     assert feed(session, stream("03 000a 0001", unit=2)) == bytes.fromhex("0001 0000 0005 02 03 02 0000")
+
+
+@pytest.mark.parametrize(
+    "defaults, answers", [((False, True), True), ((True, True), False), ((False, False), False)]
+)
+def test_of_several_units_the_declared_one_is_the_device_itself(
+    cell: Cell, plan_of: Callable[..., ModbusPlan], defaults: tuple[bool, bool], answers: bool
+) -> None:
+    """If two are declared, which `check` refuses, neither is: nobody is to write to the wrong robot."""
+    units = [
+        Unit(replace(plan_of(number), default_unit=default), cell)
+        for number, default in enumerate(defaults, 1)
+    ]
+    session = ModbusSession()
+    session.serve({unit.plan.unit: UnitAccess(unit, Requester(PLC)) for unit in units})
+    for number in (0, 255):
+        server = feed(session, stream("11", unit=number))[7:]
+        assert (server[2] == 2) if answers else (server == bytes.fromhex("91 0b"))
+        quick = feed(session, stream("03 000a 0001", unit=number))[7:]
+        assert quick == bytes.fromhex("03 02 00 00" if answers else "83 0b")
 
 
 def test_a_request_is_a_sign_of_life_for_the_unit_it_is_for(

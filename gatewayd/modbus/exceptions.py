@@ -1,0 +1,24 @@
+"""Exception codes: why a request is not answered with data (Application Protocol V1.1b3, 7)."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["ExceptionCode"]
+
+
+class ExceptionCode(IntEnum):
+    """Those in use."""
+
+    ILLEGAL_FUNCTION = 0x01
+    ILLEGAL_ADDRESS = 0x02
+    ILLEGAL_VALUE = 0x03
+    DEVICE_FAILURE = 0x04
+    BUSY = 0x06
+    PATH_UNAVAILABLE = 0x0A
+    TARGET_FAILED = 0x0B
+
+    @property
+    def text(self) -> str:
+        """Its name in words: `illegal function`."""
+        return self.name.lower().replace("_", " ")
