@@ -196,6 +196,7 @@ IMPURE = {
     "control.endpoint": "has the socket",
     "control.server": "speaks HTTP",
     "links.canopen_node.runtime": "a link at work",
+    "links.canopen_node.store": "has the file, and a task that waits for it",
     "links.modbus_server.connection": "a protocol of asyncio",
     "links.modbus_server.listener": "has the sockets",
     "links.modbus_server.listeners": "opens listeners",

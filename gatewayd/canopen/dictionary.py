@@ -21,6 +21,7 @@ __all__ = [
     "Object",
     "ObjectCode",
     "Pdo",
+    "Pending",
     "array",
     "record",
     "variable",
@@ -65,6 +66,21 @@ class Abort(Exception):
     def __init__(self, code: AbortCode) -> None:
         super().__init__(f"{code:#010x} {code.name}")
         self.code = code
+
+
+class Pending:
+    """A download that was taken and is not done yet: its client is answered when it is."""
+
+    __slots__ = ("code", "done")
+
+    def __init__(self) -> None:
+        self.done = False
+        self.code: AbortCode | None = None
+        """Why it has failed, once it is done; None: it has not."""
+
+    def finish(self, code: AbortCode | None = None) -> None:
+        """It is done, or has failed."""
+        self.done, self.code = True, code
 
 
 class Access(Enum):
@@ -127,8 +143,8 @@ class Entry:
     """Called after a new value was stored."""
     source: Callable[[], bytes] | None = None
     """Makes the value when it is read, in place of `value`."""
-    sink: Callable[[bytes], None] | None = None
-    """Takes a written value in place of `value`; raises Abort to refuse it."""
+    sink: Callable[[bytes], Pending | None] | None = None
+    """Takes a written value in place of `value`, now or later; raises Abort to refuse it."""
     value: bytes = field(default=b"", init=False)
 
     def __post_init__(self) -> None:
@@ -166,7 +182,7 @@ class Entry:
         """The value as it is now."""
         return self.source() if self.source is not None else self.value
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes) -> Pending | None:
         """Check a value and store it, or hand it to the sink. Raises Abort."""
         size = self.type.size
         if size is not None:
@@ -174,13 +190,13 @@ class Entry:
                 raise Abort(AbortCode.TOO_LONG if len(data) > size else AbortCode.TOO_SHORT)
             self._check_range(data)
         if self.sink is not None:
-            self.sink(data)
-            return
+            return self.sink(data)
         if self.check is not None:
             self.check(data)
         self.value = data
         if self.changed is not None:
             self.changed()
+        return None
 
     def _check_range(self, data: bytes) -> None:
         if self.type is CanType.BOOLEAN and data[0] > 1:
@@ -236,14 +252,14 @@ class Dictionary:
             raise Abort(AbortCode.WRITE_ONLY)
         return entry.read()
 
-    def write(self, index: int, subindex: int, data: bytes) -> None:
-        """What an SDO download does. Raises Abort."""
+    def write(self, index: int, subindex: int, data: bytes) -> Pending | None:
+        """What an SDO download does; what it returns is answered when it is done. Raises Abort."""
         entry = self.entry(index, subindex)
         if not entry.access.writable:
             raise Abort(AbortCode.READ_ONLY)
         if self._permit is not None:
             self._permit(index)
-        entry.write(data)
+        return entry.write(data)
 
 
 def variable(index: int, entry: Entry) -> Object:

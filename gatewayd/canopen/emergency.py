@@ -2,8 +2,9 @@
 
 An error is active from `raise_error` until `clear`; raising it again says nothing new. The first message of an error
 has its code, the message 0000h says that the last active error has gone. Messages wait while the NMT state forbids
-EMCY and while the inhibit time runs; if more wait than `CAPACITY`, the oldest are lost, because the last ones say
-how things stand.
+EMCY, while the inhibit time runs, and after more of them than `BURST` and `RATE` allow: whoever makes an error come
+and go cannot fill the bus with it. Up to `IN_ORDER` wait as they came; of more than these only the newest of each
+error, and if more wait than `CAPACITY`, the oldest are lost, because the last ones say how things stand.
 """
 
 from __future__ import annotations
@@ -19,11 +20,28 @@ from gatewayd.canopen.cob_ids import BASIC_FRAME, INVALID, Function, is_assignab
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
+from gatewayd.loop.allowance import Allowance
 
-__all__ = ["CAPACITY", "HISTORY", "Emergency", "ErrorCode", "Register", "register_of"]
+__all__ = [
+    "BURST",
+    "CAPACITY",
+    "HISTORY",
+    "IN_ORDER",
+    "RATE",
+    "Emergency",
+    "ErrorCode",
+    "Register",
+    "register_of",
+]
 
 CAPACITY = 32
 """Messages that may wait."""
+IN_ORDER = 8
+"""Messages that wait before one of them is replaced by a newer one of its error."""
+BURST = 16
+"""Messages that may go out at once: more than one trouble of a cell has."""
+RATE = 10.0
+"""Messages a second after them, whatever 1015h says: 0.2 % of a bus of 500 kbit/s."""
 HISTORY = 8
 """Errors kept in 1003h."""
 
@@ -91,7 +109,8 @@ class Emergency:
         self._allowed = allowed
         self._active: dict[tuple[int, int], Register] = {}
         self._history: deque[int] = deque(maxlen=HISTORY)
-        self._waiting: deque[bytes] = deque(maxlen=CAPACITY)
+        self._waiting: deque[tuple[tuple[int, int], bytes]] = deque(maxlen=CAPACITY)
+        self._allowance = Allowance(BURST, RATE)
         self._not_before = -math.inf
         u32, default = CanType.UNSIGNED32, Function.EMCY + node
         self._cob_id = Entry.parameter(
@@ -136,7 +155,7 @@ class Emergency:
             return
         self._active[code, instance] = register_of(code)
         self._history.appendleft(code | int.from_bytes(data[:2], "little") << 16)
-        self._queue(code, data, now)
+        self._queue(code, data, now, instance)
 
     def clear(self, code: int, now: float, instance: int = 0) -> None:
         """An error has gone; does nothing if it was not active."""
@@ -164,24 +183,34 @@ class Emergency:
         self._history = former._history
         self._waiting = former._waiting
         self._not_before = former._not_before
+        self._allowance = former._allowance
 
     def tick(self, now: float) -> None:
         """Send what waits, if it may be sent now."""
         while self._waiting and self._allowed() and now >= self._not_before:
-            message = self._waiting.popleft()
             if self._cob_id.number & INVALID:
-                continue
+                self._waiting.clear()
+                return
+            if not self._allowance.take(now):
+                return
+            _, message = self._waiting.popleft()
             self._send(Frame(self._cob_id.number & BASIC_FRAME, message), Priority.EVENT)
             if self._inhibit.number:
                 self._not_before = now + self.inhibit
 
     def next_deadline(self, now: float) -> float:
         """When `tick` has something to do; a change of the NMT state makes it tick anyway."""
-        return self._not_before if self._waiting and self._allowed() else math.inf
+        if not self._waiting or not self._allowed():
+            return math.inf
+        return max(self._not_before, self._allowance.due(now))
 
-    def _queue(self, code: int, data: bytes, now: float) -> None:
+    def _queue(self, code: int, data: bytes, now: float, instance: int = 0) -> None:
         message = code.to_bytes(2, "little") + bytes([self.register]) + data[:5].ljust(5, b"\0")
-        self._waiting.append(message)
+        if len(self._waiting) >= IN_ORDER:
+            older = next((item for item in self._waiting if item[0] == (code, instance)), None)
+            if older is not None:
+                self._waiting.remove(older)
+        self._waiting.append(((code, instance), message))
         self.tick(now)
 
     def _count(self) -> bytes:

@@ -68,8 +68,9 @@ class LssSlave:
     """LSS of one node.
 
     `node` is the node-ID to begin with, 255 for none. `bit_rates`: what the link can switch to, the present rate
-    included. `configured(now)`: a node without node-ID has got one. `store(node, bit_rate)`: keep both; returns
-    whether that worked. `activate(bit_rate, delay, now)`: be silent for `delay` seconds, switch, be silent again.
+    included. `configured(now)`: a node without node-ID has got one. `store(node, bit_rate, answer)`: keep both, and
+    call `answer` with whether that worked, now or later. `activate(bit_rate, delay, now)`: be silent for `delay`
+    seconds, switch, be silent again.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class LssSlave:
         *,
         bit_rates: frozenset[int],
         configured: Callable[[float], None],
-        store: Callable[[int, int], bool],
+        store: Callable[[int, int, Callable[[bool], None]], None],
         activate: Callable[[int, float, float], None],
     ) -> None:
         self.pending_node = node
@@ -195,8 +196,11 @@ class LssSlave:
         self._activate(self.pending_bit_rate, int.from_bytes(data[1:3], "little") / 1000, now)
 
     def _store_configuration(self, data: bytes, now: float) -> None:
-        stored = self._store(self.pending_node, self.pending_bit_rate)
-        self._answer(bytes([Command.STORE, 0 if stored else 2]))
+        self._store(
+            self.pending_node,
+            self.pending_bit_rate,
+            lambda stored: self._answer(bytes([Command.STORE, 0 if stored else 2])),
+        )
 
     def _inquire_address(self, data: bytes, now: float) -> None:
         part = self._address[data[0] - Command.INQUIRE_VENDOR]

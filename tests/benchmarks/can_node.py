@@ -26,7 +26,7 @@ from gatewayd.links.canopen_node import runtime as link_module
 from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.runtime import CanLink
-from gatewayd.links.canopen_node.storage import Store
+from gatewayd.links.canopen_node.store import Store
 from gatewayd.mapping.loader import load
 
 __all__ = ["NODE"]

@@ -7,7 +7,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.canopen.dictionary import Abort, AbortCode
-from gatewayd.canopen.emergency import CAPACITY, HISTORY, Emergency, ErrorCode, Register, register_of
+from gatewayd.canopen.emergency import (
+    BURST,
+    CAPACITY,
+    HISTORY,
+    IN_ORDER,
+    RATE,
+    Emergency,
+    ErrorCode,
+    Register,
+    register_of,
+)
 from gatewayd.canopen.frame import Frame
 from tests.links.canopen_node.wire import Client, Wire
 
@@ -109,8 +119,40 @@ def test_a_full_queue_forgets_the_oldest_message_and_counts_it(errors: Errors) -
     errors.allowed = True
     errors.service.tick(0.0)
     frames = errors.wire.take()
-    assert len(frames) == CAPACITY
+    errors.service.tick((CAPACITY - BURST) / RATE)
+    assert len(frames) == BURST
     assert frames[0].data[:2] == b"\x03\x81"
+    assert len(errors.wire.take()) == CAPACITY - BURST
+
+
+def test_an_error_that_comes_and_goes_is_sent_at_a_rate_and_its_last_state_in_any_case(
+    errors: Errors,
+) -> None:
+    for number in range(200):
+        now = number / 1000
+        errors.service.tick(now)
+        errors.service.raise_error(ErrorCode.WRITE_HELD, now, b"\x01", instance=1)
+        errors.service.clear(ErrorCode.WRITE_HELD, now, instance=1)
+    assert len(errors.wire.take()) <= BURST + RATE * 0.2 + 1
+    while (due := errors.service.next_deadline(0.2)) < math.inf:
+        errors.service.tick(due)
+    frames = errors.wire.take()
+    assert len(frames) <= IN_ORDER
+    assert frames[-1].data == bytes(8)
+
+
+def test_of_one_error_only_the_newest_messages_wait(errors: Errors) -> None:
+    errors.allowed = False
+    errors.service.raise_error(ErrorCode.PASSIVE, 0.0)
+    for number in range(CAPACITY):
+        errors.service.raise_error(ErrorCode.HEARTBEAT, 0.0, bytes([number]), instance=5)
+        errors.service.clear(ErrorCode.HEARTBEAT, 0.0, instance=5)
+    errors.allowed = True
+    errors.service.clear(ErrorCode.PASSIVE, 0.0)
+    frames = errors.wire.take()
+    assert len(frames) <= IN_ORDER + 1
+    assert frames[0].data[:2] == b"\x20\x81"
+    assert frames[-1].data == bytes(8)
 
 
 @pytest.mark.parametrize("forget, left", [(False, 1), (True, 0)])
@@ -143,7 +185,7 @@ def test_register_is_0_exactly_when_nothing_is_active_and_the_bus_knows(
             active.discard(code)
         assert bool(errors.service.register) == bool(active)
     errors.allowed = True
-    errors.service.tick(0.0)
+    errors.service.tick(CAPACITY / RATE)
     frames = errors.wire.take()
     if frames:
         assert bool(frames[-1].data[2]) == bool(active)

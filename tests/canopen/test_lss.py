@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -37,9 +39,9 @@ class Slave:
     def _configured(self, now: float) -> None:
         self.booted += 1
 
-    def _store(self, node: int, bit_rate: int) -> bool:
+    def _store(self, node: int, bit_rate: int, answer: Callable[[bool], None]) -> None:
         self.stored.append((node, bit_rate))
-        return self.stores
+        answer(self.stores)
 
     @property
     def state(self) -> str:

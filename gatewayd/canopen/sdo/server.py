@@ -2,7 +2,8 @@
 
 What a frame does follows from the state of the transfer and from what the frame asks for, by the tables of `SdoServer`.
 A download reaches the dictionary once, when all of it is there and before it is confirmed; an upload takes the value
-once, when it begins.
+once, when it begins. What the dictionary cannot do at once (`Pending`) is confirmed when it is done; a client that
+begins another transfer meanwhile has given up the answer.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from enum import Enum
 from typing import ClassVar
 
 from gatewayd.canopen.cob_ids import Function
-from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary, Entry, Object, record
+from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary, Entry, Object, Pending, record
 from gatewayd.canopen.sdo import protocol
 from gatewayd.canopen.sdo.protocol import BLOCK_SEGMENTS, REQUESTS, Request
 from gatewayd.canopen.sdo.transfers import MAX_BLOCK_SEGMENTS, BlockDownload, BlockUpload, Download, Upload
@@ -24,6 +25,7 @@ __all__ = [
     "SLOWEST_FRAME",
     "SUB_BLOCK_TIMEOUT",
     "TIMEOUT",
+    "WRITE_TIMEOUT",
     "SdoServer",
     "SdoState",
     "server_parameter",
@@ -35,6 +37,8 @@ SUB_BLOCK_TIMEOUT = 0.25
 """Seconds without a segment after which an unfinished sub-block is acknowledged: its last segment was lost."""
 SLOWEST_FRAME = 0.0135
 """Seconds that a frame takes at 10 kbit/s, the slowest bit rate: a whole sub-block is longer than `TIMEOUT`."""
+WRITE_TIMEOUT = 5.0
+"""Seconds that a download may take which is not done at once; then it counts as failed."""
 LONGEST_DOWNLOAD = 4096
 """Bytes; far beyond the longest object."""
 
@@ -71,6 +75,7 @@ class SdoState(Enum):
     BLOCK_UPLOAD_START = "the start of a block upload"
     BLOCK_UPLOAD = "the acknowledgement of a sub-block"
     BLOCK_UPLOAD_END = "the end of a block upload"
+    WRITING = "the end of what a download has begun"
 
 
 Act = Callable[["SdoServer", bytes], list[bytes]]
@@ -95,6 +100,8 @@ class SdoServer:
         self._upload = Upload(b"")
         self._block_download = BlockDownload(self._download, checked=False)
         self._block_upload = BlockUpload(b"", MAX_BLOCK_SEGMENTS, checked=False)
+        self._pending = Pending()
+        self._confirmation = b""
 
     def receive(self, data: bytes, now: float) -> list[bytes]:
         """The answers to a frame of the client; frames that are not 8 bytes long are ignored."""
@@ -112,9 +119,11 @@ class SdoServer:
             return self._abort(abort.code)
 
     def tick(self, now: float) -> list[bytes]:
-        """What the client's silence leads to."""
+        """What the client's silence leads to, or the end of what it waits for."""
         if now < self.next_deadline(now):
             return []
+        if self.state is SdoState.WRITING:
+            return self._written()
         if self._block_download.pending:
             return self._acknowledge()
         return self._abort(AbortCode.TIMED_OUT)
@@ -123,6 +132,8 @@ class SdoServer:
         """When `tick` will have something to do; infinity without a transfer."""
         if self.state is SdoState.IDLE:
             return math.inf
+        if self.state is SdoState.WRITING:
+            return -math.inf if self._pending.done else self._heard + WRITE_TIMEOUT
         if self._block_download.pending:
             return self._heard + SUB_BLOCK_TIMEOUT
         return self._heard + TIMEOUT + self._block_upload.sent * SLOWEST_FRAME
@@ -151,11 +162,25 @@ class SdoServer:
         self.reset()
         return []
 
-    def _write(self, data: bytes) -> None:
+    def _write(self, data: bytes, confirmation: bytes) -> list[bytes]:
         """The download is whole: it is over, whatever the dictionary says."""
-        self.reset()
+        if self.state is not SdoState.IDLE:
+            self.reset()
         index, subindex = _MULTIPLEXER.unpack(self._multiplexer)
-        self._dictionary.write(index, subindex, data)
+        pending = self._dictionary.write(index, subindex, data)
+        if pending is None:
+            return [confirmation]
+        self.state, self._pending, self._confirmation = SdoState.WRITING, pending, confirmation
+        return self._written() if pending.done else []
+
+    def _written(self) -> list[bytes]:
+        """What was pending is done, has failed, or takes too long."""
+        code = self._pending.code if self._pending.done else AbortCode.TIMED_OUT
+        if code is not None:
+            return self._abort(code)
+        confirmation = self._confirmation
+        self.reset()
+        return [confirmation]
 
     # -- download ------------------------------------------------------------------------------------------------
 
@@ -165,11 +190,10 @@ class SdoServer:
         indicated = command & 0x01
         if command & 0x02:
             size = 4 - (command >> 2 & 3) if indicated else self._natural_size(index, subindex)
-            self._dictionary.write(index, subindex, data[4 : 4 + size])
-        else:
-            self._demand_writable(index, subindex)
-            self._download = Download(_SIZE.unpack(data)[0] if indicated else None, self._longest)
-            self.state = SdoState.DOWNLOAD
+            return self._write(data[4 : 4 + size], protocol.download_initiated(self._multiplexer))
+        self._demand_writable(index, subindex)
+        self._download = Download(_SIZE.unpack(data)[0] if indicated else None, self._longest)
+        self.state = SdoState.DOWNLOAD
         return [protocol.download_initiated(self._multiplexer)]
 
     def _natural_size(self, index: int, subindex: int) -> int:
@@ -187,9 +211,8 @@ class SdoServer:
             raise Abort(AbortCode.TOGGLE)
         download.toggle ^= _TOGGLE
         download.add(data[1 : _FRAME - (command >> 1 & 7)])
-        if command & 0x01:
-            self._write(download.whole())
-        return [protocol.download_segment_taken(toggle)]
+        confirmation = protocol.download_segment_taken(toggle)
+        return self._write(download.whole(), confirmation) if command & 0x01 else [confirmation]
 
     # -- upload --------------------------------------------------------------------------------------------------
 
@@ -233,8 +256,8 @@ class SdoServer:
         return [self._block_download.acknowledge()]
 
     def _end_block_download(self, data: bytes) -> list[bytes]:
-        self._write(self._block_download.whole(data[0] >> 2 & 7, *_CRC.unpack(data)))
-        return [protocol.BLOCK_DOWNLOAD_ENDED]
+        whole = self._block_download.whole(data[0] >> 2 & 7, *_CRC.unpack(data))
+        return self._write(whole, protocol.BLOCK_DOWNLOAD_ENDED)
 
     # -- block upload --------------------------------------------------------------------------------------------
 

@@ -19,7 +19,7 @@ from gatewayd.core.definition import CellDefinition
 from gatewayd.links.canopen_node.bus_load import BIT_RATES
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.plan import CanopenPlan
-from gatewayd.links.canopen_node.storage import Store
+from gatewayd.links.canopen_node.store import Store
 
 __all__ = ["Sheet", "dcf_text", "eds_text", "objects_of", "sheet_of"]
 

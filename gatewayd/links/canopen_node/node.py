@@ -39,7 +39,8 @@ from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.promise import Promises
 from gatewayd.links.canopen_node.robot_errors import RobotErrors
 from gatewayd.links.canopen_node.status_objects import StatusObjects
-from gatewayd.links.canopen_node.storage import Parameters, Store
+from gatewayd.links.canopen_node.storage import Parameters
+from gatewayd.links.canopen_node.store import Store
 from gatewayd.links.canopen_node.variables import VariableObjects
 from gatewayd.links.registry import status_fields
 
@@ -92,6 +93,8 @@ class Node:
             ready=lambda: self.nmt.state is not NmtState.OPERATIONAL,
             report=self._observer.report,
             failed=self._store_failed,
+            ended=self._observer.deadline_changed,
+            clock=self._clock,
         )
         node = self.parameters.node
         identity = Identity.of(cell.definition.fingerprint)
@@ -475,5 +478,5 @@ class Node:
         self.transmit.on_sync(counter, now, late=self._waiting.seconds > 0)
         self.receive_pdos.on_sync(now)
 
-    def _store_lss(self, node: int, bit_rate: int) -> bool:
-        return self.parameters.save_lss(node, bit_rate if bit_rate != self.plan.bitrate else None)
+    def _store_lss(self, node: int, bit_rate: int, answer: Callable[[bool], None]) -> None:
+        self.parameters.save_lss(node, bit_rate if bit_rate != self.plan.bitrate else None, answer)

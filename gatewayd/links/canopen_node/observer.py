@@ -19,6 +19,9 @@ class Observer:
     def nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
         """The NMT state is another one now."""
 
+    def deadline_changed(self) -> None:
+        """Something that took its time has ended: `Node.next_deadline` is another one now."""
+
     def report(self, text: str) -> None:
         """Something for the log."""
 

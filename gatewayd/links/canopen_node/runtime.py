@@ -27,7 +27,7 @@ from gatewayd.links.canopen_node.declaration import BUS_STATES, NMT_STATES
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
 from gatewayd.links.canopen_node.plan import CanopenPlan
-from gatewayd.links.canopen_node.storage import JsonStore, Store
+from gatewayd.links.canopen_node.store import BackgroundStore, Store
 from gatewayd.links.contract import Context, Level, Link, LinkHealth, LinkRuntime
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
@@ -227,6 +227,10 @@ class CanLink(Link, Observer):
         if self._bus is not None:
             self._bus.set_filters(self.node.cob_ids(), self.node.remote_ids())
 
+    def deadline_changed(self) -> None:
+        """What the node waited for is there."""
+        self._schedule(clock.now())
+
     def nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
         """The node is in another NMT state."""
         self._cell.health.words["nmt_state"] = new
@@ -402,7 +406,7 @@ class CanopenRuntime(LinkRuntime):
     def make(self, plan: LinkPlan, cell: Cell, context: Context) -> CanLink:
         """A node, which boots when its link runs."""
         assert isinstance(plan, CanopenPlan)
-        return CanLink(plan, cell, JsonStore(context.state / f"{cell.definition.name}.canopen.json"))
+        return CanLink(plan, cell, BackgroundStore(context.state / f"{cell.definition.name}.canopen.json"))
 
 
 RUNTIME = CanopenRuntime()

@@ -1,4 +1,4 @@
-"""Parameters that survive a restart: 1010h and 1011h, and the file behind them (CiA 301, 7.5.2.13 and .14).
+"""Parameters that survive a restart: 1010h and 1011h (CiA 301, 7.5.2.13 and .14).
 
 What is saved is what differs from the mapping, so that a changed mapping is not hidden by what was once equal to it.
 Saved values come back after every reset, each one only if its entry still exists with that length. The parameters of
@@ -6,28 +6,38 @@ PDOs and of manufacturer objects mean something only together with the layout th
 only under the same one (`layout_of`). What is not taken over is reported and stays in the file until the next save.
 
 LSS keeps its node-ID in the same file. It holds while the mapping names the node-ID that it replaced.
+
+Who saves waits for the disk, and nobody else does: a client is answered when its save has ended. A save that comes
+while another one is written is refused, and so are more of them than `SAVES` and `SAVES_PER_SECOND` allow, which would
+wear out the disk. A reset in between has what is being written already.
 """
 
 from __future__ import annotations
 
-import json
-import os
 import zlib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, Object, Pdo, array
+from gatewayd.canopen.dictionary import (
+    Abort,
+    AbortCode,
+    Access,
+    Dictionary,
+    Entry,
+    Object,
+    Pdo,
+    Pending,
+    array,
+)
 from gatewayd.canopen.nmt import NmtCommand
 from gatewayd.links.canopen_node.status_words import HEADER
+from gatewayd.links.canopen_node.store import Kept, Key, LssSettings, Saved, Store, StoreError
+from gatewayd.loop.allowance import Allowance
 
-__all__ = ["JsonStore", "LssSettings", "Parameters", "Saved", "Store", "StoreError", "layout_of"]
+__all__ = ["SAVES", "SAVES_PER_SECOND", "Parameters", "layout_of"]
 
-FORMAT = 1
-"""Version of the file."""
 ALL = range(0x1000, 0x1_0000)
 _COMMUNICATION = range(0x1000, 0x2000)
 GROUPS: Mapping[int, tuple[str, range]] = {
@@ -40,91 +50,14 @@ GROUPS: Mapping[int, tuple[str, range]] = {
 _PDOS = range(0x1400, 0x1C00)
 _MAPPINGS = range(0x1A00, 0x1C00)
 _BOUND_TO_LAYOUT = (_PDOS, range(0x2000, 0x1_0000))
+SAVES = 8
+"""Saves at once: a master may save and restore each group by itself."""
+SAVES_PER_SECOND = 0.5
+"""Saves a second after them."""
 _SAVE = b"save"
 _LOAD = b"load"
 _ON_COMMAND = 1
 """Capability: saves and restores on command, never by itself."""
-
-Key = tuple[int, int]
-"""Index and sub-index."""
-
-
-class StoreError(Exception):
-    """The file cannot be read or written; the text names it and says why."""
-
-
-@dataclass(frozen=True, slots=True)
-class LssSettings:
-    """What an LSS master has stored."""
-
-    node: int
-    replaces: int
-    """Node-ID that the mapping had then."""
-    bitrate: int | None = None
-    """Bits per second; None: that of the mapping."""
-
-
-@dataclass(frozen=True, slots=True)
-class Saved:
-    """The content of a store."""
-
-    layout: int = 0
-    values: Mapping[Key, bytes] = field(default_factory=dict)
-    lss: LssSettings | None = None
-
-
-class Store:
-    """Keeps one node's `Saved`; this one no longer than the process lives."""
-
-    def __init__(self) -> None:
-        self._saved = Saved()
-
-    def load(self) -> Saved:
-        """What was saved last; empty if nothing was. Raises StoreError."""
-        return self._saved
-
-    def save(self, saved: Saved) -> None:
-        """Keep it, whole or not at all. Raises StoreError."""
-        self._saved = saved
-
-
-class JsonStore(Store):
-    """A JSON file, replaced as a whole. Saving waits for the disk, which is why no node saves while OPERATIONAL."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def load(self) -> Saved:
-        """The file's content; empty if there is no file."""
-        try:
-            text = self.path.read_text(encoding="ascii")
-        except FileNotFoundError:
-            return Saved()
-        except (OSError, UnicodeError) as error:
-            raise StoreError(f"{self.path}: cannot be read: {error}") from None
-        try:
-            return _decode(json.loads(text))
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            raise StoreError(
-                f"{self.path}: is damaged ({error!r}): delete it, or save the parameters again"
-            ) from None
-
-    def save(self, saved: Saved) -> None:
-        """Write beside the file, wait for the disk, then take its place."""
-        beside = self.path.with_name(self.path.name + ".new")
-        try:
-            with beside.open("w", encoding="ascii") as file:
-                file.write(json.dumps(_encode(saved), indent=1) + "\n")
-                file.flush()
-                os.fsync(file.fileno())
-            beside.replace(self.path)
-            directory = os.open(self.path.parent, os.O_RDONLY)
-            try:
-                os.fsync(directory)
-            finally:
-                os.close(directory)
-        except OSError as error:
-            raise StoreError(f"{self.path}: cannot be written: {error}") from None
 
 
 def layout_of(dictionary: Iterable[Object], node: int, values: Mapping[Key, bytes] | None = None) -> int:
@@ -152,7 +85,8 @@ class Parameters:
     """1010h, 1011h and the power-on values of all entries. Reads the store when it is made.
 
     `node` is the node-ID of the mapping. `ready()` says whether the node may wait for a disk now; `report(text)` is
-    called for what could not be taken over, `failed(whether)` when reading the store failed or a save put that right.
+    called for what could not be taken over, `failed(whether)` when reading the store failed or a save put that right,
+    `ended()` when a save that was begun has ended. `clock()`: the moment of the request that is being served.
     """
 
     def __init__(
@@ -163,8 +97,14 @@ class Parameters:
         ready: Callable[[], bool],
         report: Callable[[str], None],
         failed: Callable[[bool], None],
+        ended: Callable[[], None],
+        clock: Callable[[], float],
     ) -> None:
         self._store = store
+        self._ended = ended
+        self._clock = clock
+        self._allowance = Allowance(SAVES, SAVES_PER_SECOND)
+        self._is_refusing = False
         self._ready = ready
         self._report = report
         self._failed = failed
@@ -172,6 +112,8 @@ class Parameters:
         self._dictionary: Dictionary | None = None
         self._layout = 0
         self._saved = self._load()
+        self._coming: Saved | None = None
+        """What is being written."""
         self._node = self.lss.node if self.lss is not None else node
 
     @property
@@ -210,22 +152,23 @@ class Parameters:
         Defaults follow `node` before. Those of PDOs are their table's own affair, which has to have followed already.
         """
         assert self._dictionary is not None
+        values = (self._coming or self._saved).values
         indices = _COMMUNICATION if command is NmtCommand.RESET_COMMUNICATION else ALL
         for item in self._dictionary:
             for entry in item.entries:
                 if entry.plus_node and item.index not in _PDOS:
                     entry.default = _rebased(entry, self._node, node)
                 if item.index in indices:
-                    entry.value = self._saved.values.get((item.index, entry.subindex), entry.default)
+                    entry.value = values.get((item.index, entry.subindex), entry.default)
         self._node = node
 
-    def save_lss(self, node: int, bitrate: int | None) -> bool:
-        """Keep what an LSS master stores; whether that succeeded."""
-        try:
-            self._replace(replace(self._saved, lss=LssSettings(node, self._planned, bitrate)))
-        except StoreError:
-            return False
-        return True
+    def save_lss(self, node: int, bitrate: int | None, answer: Callable[[bool], None]) -> None:
+        """Keep what an LSS master stores, and answer whether that succeeded."""
+        if not self._may_save():
+            answer(False)
+            return
+        saved = replace(self._saved, lss=LssSettings(node, self._planned, bitrate))
+        self._replace(saved, lambda error: answer(error is None))
 
     def _load(self) -> Saved:
         try:
@@ -243,7 +186,7 @@ class Parameters:
         )
         return replace(saved, lss=None)
 
-    def _entries(self, verb: str, act: Callable[[range, bytes], None]) -> Iterable[Entry]:
+    def _entries(self, verb: str, act: Callable[[range, bytes], Pending]) -> Iterable[Entry]:
         for number, (name, indices) in GROUPS.items():
             yield Entry(
                 number,
@@ -254,7 +197,7 @@ class Parameters:
                 sink=partial(act, indices),
             )
 
-    def _save(self, indices: range, signature: bytes) -> None:
+    def _save(self, indices: range, signature: bytes) -> Pending:
         """Keep what differs from the defaults now."""
         assert self._dictionary is not None
         self._permit(signature, _SAVE)
@@ -266,8 +209,9 @@ class Parameters:
                     for entry in item.entries
                     if entry.stored and entry.value != entry.default
                 )
-        self._commit(values)
-        self._report_stored(values, "parameters were stored that are not the mapping's")
+        return self._commit(
+            values, lambda: self._report_stored(values, "parameters were stored that are not the mapping's")
+        )
 
     def _report_stored(self, values: Mapping[Key, bytes], what: str) -> None:
         assert self._dictionary is not None
@@ -279,32 +223,51 @@ class Parameters:
         if found:
             self._report(f"{what}: {', '.join(found)}")
 
-    def _restore(self, indices: range, signature: bytes) -> None:
+    def _restore(self, indices: range, signature: bytes) -> Pending:
         """Forget what was saved; the present values stay until the next reset."""
         self._permit(signature, _LOAD)
-        self._commit({key: value for key, value in self._saved.values.items() if key[0] not in indices})
+        left = {key: value for key, value in self._saved.values.items() if key[0] not in indices}
+        return self._commit(left, lambda: None)
 
     def _permit(self, signature: bytes, expected: bytes) -> None:
         if signature != expected:
             raise Abort(AbortCode.CANNOT_STORE)
-        if not self._ready():
+        if not self._ready() or not self._may_save():
             raise Abort(AbortCode.DEVICE_STATE)
 
-    def _commit(self, values: Mapping[Key, bytes]) -> None:
-        try:
-            self._layout = layout_of(self._dictionary or (), self._node, values)
-            self._replace(replace(self._saved, values=values, layout=self._layout))
-        except StoreError:
-            raise Abort(AbortCode.HARDWARE) from None
+    def _may_save(self) -> bool:
+        """Whether the disk can take one more; reported once until it can."""
+        may = not self._store.busy and self._allowance.take(self._clock())
+        if not may and not self._is_refusing:
+            self._report("a master saves parameters faster than they are written: refused (0800 0022h)")
+        self._is_refusing = not may
+        return may
 
-    def _replace(self, saved: Saved) -> None:
-        try:
-            self._store.save(saved)
-        except StoreError as error:
-            self._report(str(error))
-            raise
-        self._saved = saved
-        self._failed(False)
+    def _commit(self, values: Mapping[Key, bytes], succeeded: Callable[[], None]) -> Pending:
+        pending = Pending()
+        self._layout = layout_of(self._dictionary or (), self._node, values)
+
+        def kept(error: StoreError | None) -> None:
+            pending.finish(None if error is None else AbortCode.HARDWARE)
+            if error is None:
+                succeeded()
+
+        self._replace(replace(self._saved, values=values, layout=self._layout), kept)
+        return pending
+
+    def _replace(self, saved: Saved, kept: Kept) -> None:
+        def ended(error: StoreError | None) -> None:
+            self._coming = None
+            if error is None:
+                self._saved = saved
+                self._failed(False)
+            else:
+                self._report(str(error))
+            kept(error)
+            self._ended()
+
+        self._coming = saved
+        self._store.keep(saved, ended)
 
     def _fits(self, key: Key, value: bytes) -> bool:
         assert self._dictionary is not None
@@ -333,31 +296,3 @@ def _maps_status_table(item: tuple[Key, bytes]) -> bool:
 def _rebased(entry: Entry, old: int, new: int) -> bytes:
     size = len(entry.default)
     return (int.from_bytes(entry.default, "little") - old + new).to_bytes(size, "little")
-
-
-def _encode(saved: Saved) -> dict[str, Any]:
-    lss = saved.lss
-    content: dict[str, Any] = {
-        "layout": saved.layout,
-        "values": {
-            f"{index:04x}:{sub:02x}": value.hex() for (index, sub), value in sorted(saved.values.items())
-        },
-        "lss": None if lss is None else asdict(lss),
-    }
-    return {"format": FORMAT, "checksum": _checksum(content), **content}
-
-
-def _decode(document: dict[str, Any]) -> Saved:
-    content = {key: document[key] for key in ("layout", "values", "lss")}
-    if document["format"] != FORMAT or document["checksum"] != _checksum(content):
-        raise ValueError("wrong format or checksum")
-    values = {}
-    for key, value in content["values"].items():
-        index, _, sub = key.partition(":")
-        values[int(index, 16), int(sub, 16)] = bytes.fromhex(value)
-    lss = content["lss"]
-    return Saved(content["layout"], values, None if lss is None else LssSettings(**lss))
-
-
-def _checksum(content: Mapping[str, Any]) -> int:
-    return zlib.crc32(json.dumps(content, sort_keys=True).encode())

@@ -11,12 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, variable
+from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, Pending, variable
 from gatewayd.canopen.sdo.server import (
     LONGEST_DOWNLOAD,
     SLOWEST_FRAME,
     SUB_BLOCK_TIMEOUT,
     TIMEOUT,
+    WRITE_TIMEOUT,
     SdoServer,
     SdoState,
     server_parameter,
@@ -588,3 +589,70 @@ def test_cob_ids_follow_the_node_id_and_cannot_be_changed() -> None:
     with pytest.raises(Abort) as caught:
         objects.write(0x1200, 1, (0x620).to_bytes(4, "little"))
     assert caught.value.code is AbortCode.READ_ONLY
+
+
+# -- what takes its time ----------------------------------------------------------------------------------------------
+
+
+class Slow:
+    """2007h, whose writes end when the test says so, and its server."""
+
+    def __init__(self) -> None:
+        self.pending = Pending()
+        entry = Entry(0, "Slow", CanType.UNSIGNED32, Access.WO, sink=lambda _data: self.pending)
+        word = Entry(0, "Word", CanType.UNSIGNED32, Access.RW, b"\1\2\3\4")
+        self.server = SdoServer(Dictionary([variable(0x2006, word), variable(0x2007, entry)]))
+
+    def answers(self, now: float) -> str:
+        return " ".join(frame.hex() for frame in self.server.tick(now))
+
+
+@pytest.mark.parametrize(
+    "code, answer",
+    [(None, "6007200000000000"), (AbortCode.HARDWARE, abort("072000", AbortCode.HARDWARE))],
+)
+def test_a_write_that_takes_its_time_is_answered_when_it_is_done(code: AbortCode | None, answer: str) -> None:
+    slow = Slow()
+    assert ask(slow.server, "23 07 20 00 01 02 03 04", 1.0) == ""
+    assert slow.server.next_deadline(1.0) == 1.0 + WRITE_TIMEOUT
+    assert slow.answers(2.0) == ""
+    slow.pending.finish(code)
+    assert slow.server.next_deadline(2.0) == -math.inf
+    assert slow.answers(2.0) == answer
+    assert slow.server.state is SdoState.IDLE
+
+
+def test_one_that_is_done_at_once_is_answered_at_once() -> None:
+    slow = Slow()
+    slow.pending.finish(AbortCode.HARDWARE)
+    assert ask(slow.server, "23 07 20 00 01 02 03 04") == abort("072000", AbortCode.HARDWARE)
+
+
+def test_one_that_takes_too_long_is_aborted() -> None:
+    slow = Slow()
+    ask(slow.server, "23 07 20 00 01 02 03 04")
+    assert slow.answers(WRITE_TIMEOUT) == abort("072000", AbortCode.TIMED_OUT)
+    slow.pending.finish()
+    assert slow.answers(WRITE_TIMEOUT) == ""
+
+
+def test_a_client_that_goes_on_has_given_up_the_answer() -> None:
+    slow = Slow()
+    ask(slow.server, "23 07 20 00 01 02 03 04")
+    assert ask(slow.server, "40 06 20 00") == "4306200001020304"
+    slow.pending.finish()
+    assert slow.answers(0.0) == ""
+
+
+def test_segments_and_blocks_are_confirmed_late_as_well() -> None:
+    slow = Slow()
+    ask(slow.server, "21 07 20 00 04")
+    assert ask(slow.server, "07 01 02 03 04") == ""
+    slow.pending.finish()
+    assert slow.answers(0.0) == "2000000000000000"
+    slow.pending = Pending()
+    ask(slow.server, "c2 07 20 00 04")
+    ask(slow.server, "81 01 02 03 04")
+    assert ask(slow.server, block_end(b"\1\2\3\4").hex()) == ""
+    slow.pending.finish()
+    assert slow.answers(0.0) == "a100000000000000"

@@ -34,7 +34,7 @@ from gatewayd.links.canopen_node.plan import (
     canopen_of,
 )
 from gatewayd.links.canopen_node.status_words import HEADER
-from gatewayd.links.canopen_node.storage import Saved, Store
+from gatewayd.links.canopen_node.store import Saved, Store
 from gatewayd.mapping.loader import load
 from tests.links.canopen_node.wire import Wire
 

@@ -24,7 +24,7 @@ from gatewayd.links.canopen_node import runtime as link_module
 from gatewayd.links.canopen_node.declaration import KIND
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import LOSS_INTERVAL, CanLink
-from gatewayd.links.canopen_node.storage import Store
+from gatewayd.links.canopen_node.store import Store
 from gatewayd.links.contract import Level
 from gatewayd.loop import clock
 from tests.links.canopen_node.conformance.bench import compiled

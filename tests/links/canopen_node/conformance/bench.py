@@ -26,7 +26,7 @@ from gatewayd.core.definition import Direction, Value
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import CanLink
-from gatewayd.links.canopen_node.storage import Store
+from gatewayd.links.canopen_node.store import Store
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 
