@@ -36,7 +36,8 @@ LAYERS: dict[str, set[str]] = {
     "loop": {"loop"},
     "core": {"core"},
     "rtde": {"loop", "report.format", "rtde"},
-    "modbus": {"core.definition", "modbus"},
+    "encoding": {"core.definition", "encoding"},
+    "modbus": {"core.definition", "encoding", "modbus"},
     "canopen": {"canopen", "core.definition", "loop"},
     "simulator": {"report.format", "rtde", "simulator"},
     "mapping": {
@@ -63,7 +64,7 @@ LAYERS: dict[str, set[str]] = {
     },
     "links.robot": {*LINK, "links.robot", "rtde"},
     "links.modbus_server": {*LINK, "links.modbus_server", "modbus"},
-    "links.canopen_node": {*LINK, "canopen", "links.canopen_node"},
+    "links.canopen_node": {*LINK, "canopen", "encoding", "links.canopen_node"},
     "report": {"core", "links.contract", "links.registry", "mapping", "report"},
     "report.format": set(),
     "report.layout": set(),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from gatewayd.core.definition import OPERATOR, Value, Variable, Writer
 from gatewayd.core.image import ProcessImage
-from gatewayd.core.limits import has_no_limits, within
+from gatewayd.core.limits import window, within
 from gatewayd.core.ownership import MOVES, Act, LockTable, Move, Standing
 from gatewayd.core.refusal import PRECEDENCE, Reason, Refusal
 from gatewayd.core.requester import Requester
@@ -54,7 +54,7 @@ class Admission:
         self._ownership = ownership
         self._image = image
         self._locks = tuple(variable.lock for variable in variables)
-        self._unlimited = tuple(has_no_limits(variable) for variable in variables)
+        self._windows = tuple(map(window, variables))
         self._sole = tuple(len(lock.owners) == 1 for lock in ownership.locks)
 
     def judge(self, requester: Requester, changes: Sequence[Change], *, adopted: bool) -> Verdict:
@@ -114,7 +114,7 @@ class Admission:
 
         What `_judge` would come to as well, change by change, in a quarter of the time.
         """
-        locks, unlimited, variables = self._locks, self._unlimited, self._variables
+        locks, windows, variables = self._locks, self._windows, self._variables
         owners, available = self._ownership.owners, self._image.available
         verdict = Verdict()
         values, moves = verdict.values, verdict.moves
@@ -123,9 +123,13 @@ class Admission:
             lock = locks[index]
             if lock is None or owners[lock] != writer or not available[index]:
                 return None
-            value = change.value if unlimited[index] else within(variables[index], change.value)
-            if value is None:
-                return None
+            value = change.value
+            low, high = windows[index]
+            if not low <= value <= high:
+                allowed = within(variables[index], value)
+                if allowed is None:
+                    return None
+                value = allowed
             values.append((index, value))
             moves[lock] = Move.RENEW
         return verdict

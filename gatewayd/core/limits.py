@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from gatewayd.core.definition import Limits, Value, ValueKind, Variable
 
-__all__ = ["has_no_limits", "within"]
+__all__ = ["window", "within"]
+
+_NOTHING: Final = (math.inf, -math.inf)
 
 
-def has_no_limits(variable: Variable) -> bool:
-    """Whether `within` lets every value pass as it is."""
-    return variable.limits is None and (variable.low is None or variable.high is None)
+def window(variable: Variable) -> tuple[float, float]:
+    """Between which values `within` lets every value of the variable's kind pass as it is."""
+    if variable.low is not None and variable.high is not None:
+        return _NOTHING
+    limits = variable.limits
+    return (-math.inf, math.inf) if limits is None else (limits.low, limits.high)
 
 
 def within(variable: Variable, value: Value) -> Value | None:

@@ -7,6 +7,8 @@
 Encoding saturates: a value beyond the register type becomes the nearest number that the type holds, NaN
 becomes 0 in an integer. A float32 beyond its range becomes the greatest finite one; infinities stay what they
 are in reals. Halves round to even. A `bool` register is written 0 or 1, and every number but 0 reads as true.
+
+Decoding gives a declared limit for the raw number nearest to it (`gatewayd.encoding.limits`).
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from struct import Struct
 from typing import Final, TypeAlias
 
 from gatewayd.core.definition import Value, ValueKind
+from gatewayd.encoding.limits import Ends, LimitReader, Meaning, ends_of, read_limits
 
 __all__ = ["ORDERS", "TYPES", "Codec", "NumberFormat", "make_codec"]
 
@@ -84,6 +87,8 @@ class Codec:
 
     Runs of neighbours that have one may be packed by one big-endian `struct`, values as they are.
     """
+    ends: Ends
+    """Least and greatest value that `decode` gives exactly; None: they need no care."""
     encode: Callable[[Value], bytes] = field(compare=False, repr=False)
     """Value in the robot's unit -> `2 * words` register bytes as they go over the wire. Never raises for numbers."""
     decode: Callable[[Buffer], Value | None] = field(compare=False, repr=False)
@@ -100,7 +105,8 @@ class Codec:
 
     def __reduce__(self) -> tuple[Callable[..., Codec], tuple[object, ...]]:
         """Between processes it travels as what it was made of: its functions cannot."""
-        return _compiled, (self.type, self.order, self.kind, (self.scale, self.offset), self.struct_code)
+        form, linear = (self.type, self.order), (self.scale, self.offset)
+        return _compiled, (form, self.kind, linear, self.struct_code, self.ends)
 
 
 def make_codec(
@@ -112,8 +118,9 @@ def make_codec(
     offset: float = 0.0,
     low: float | None = None,
     high: float | None = None,
+    limits: tuple[float, float] | None = None,
 ) -> Codec:
-    """Compile a codec for a robot value of `kind` between `low` and `high` (None: unknown).
+    """Compile a codec for a robot value of `kind` between `low` and `high` (None: unknown), written within `limits`.
 
     Raises KeyError for an unknown type or order and ValueError for a scale that cannot be undone.
     """
@@ -121,21 +128,31 @@ def make_codec(
     if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0:
         raise ValueError(f"scale {scale} and offset {offset} cannot be undone")
     merged = scale == 1 and offset == 0 and order == "ABCD" and _is_lossless(number, kind, low, high)
-    return _compiled(type_name, order, kind, (scale, offset), number.code if merged else None)
+    ends = _NO_ENDS if type_name == "bool" else ends_of(kind, limits, low, high)
+    return _compiled((type_name, order), kind, (scale, offset), number.code if merged else None, ends)
+
+
+_NO_ENDS: Final[Ends] = (None, None)
 
 
 @lru_cache(maxsize=4096)
 def _compiled(
-    type_name: str, order: str, kind: ValueKind, linear: tuple[float, float], struct_code: str | None
+    form: tuple[str, str], kind: ValueKind, linear: tuple[float, float], struct_code: str | None, ends: Ends
 ) -> Codec:
-    number, (scale, offset) = TYPES[type_name], linear
+    (type_name, order), (scale, offset) = form, linear
+    number = TYPES[type_name]
     byte_order, swapped = ORDERS[order]
     layout = Struct(byte_order + number.code)
     pack, unpack = _swapping(layout) if swapped else (layout.pack, layout.unpack)
     plain = scale == 1 and offset == 0
     encode = _plain_encoder(number, pack, kind) if plain else _encoder(number, pack, scale, offset)
-    decode = _plain_decoder(number, unpack, kind) if plain else _decoder(unpack, scale, offset, kind)
-    return Codec(type_name, order, scale, offset, kind, number.words, struct_code, encode, decode)
+    reader = read_limits(ends, number.code, _meaning(number, scale, offset, kind), scale, offset)
+    if reader is not None:
+        decode = _limited_decoder(unpack, scale, offset, kind, reader)
+    else:
+        ends = _NO_ENDS
+        decode = _plain_decoder(number, unpack, kind) if plain else _decoder(unpack, scale, offset, kind)
+    return Codec(type_name, order, scale, offset, kind, number.words, struct_code, ends, encode, decode)
 
 
 def _is_lossless(number: NumberFormat, kind: ValueKind, low: float | None, high: float | None) -> bool:
@@ -205,27 +222,62 @@ def _real_packer(number: NumberFormat, pack: Pack) -> Pack:
     return encode
 
 
-def _plain_decoder(number: NumberFormat, unpack: Unpack, kind: ValueKind) -> Callable[[Buffer], Value | None]:
-    if kind is ValueKind.BOOL:
-        return lambda data: bool(unpack(data)[0])
-    if number.name == "bool":
-        truth: tuple[Value, Value] = (0, 1) if kind is ValueKind.INT else (0.0, 1.0)
-        return lambda data: truth[unpack(data)[0] != 0]
-    if kind is ValueKind.FLOAT:
+Decode: TypeAlias = "Callable[[Buffer], Value | None]"
+
+
+def _plain_decoder(number: NumberFormat, unpack: Unpack, kind: ValueKind) -> Decode:
+    if kind is ValueKind.FLOAT and number.name != "bool":
         return lambda data: float(unpack(data)[0])
-    if number.is_real:
-        return lambda data: _whole(unpack(data)[0])
-    return lambda data: unpack(data)[0]
+    if kind is ValueKind.INT and not number.is_real and number.name != "bool":
+        return lambda data: unpack(data)[0]
+    meaning = _meaning(number, 1.0, 0.0, kind)
+    return lambda data: meaning(unpack(data)[0])
 
 
-def _decoder(
-    unpack: Unpack, scale: float, offset: float, kind: ValueKind
-) -> Callable[[Buffer], Value | None]:
+def _decoder(unpack: Unpack, scale: float, offset: float, kind: ValueKind) -> Decode:
     if kind is ValueKind.FLOAT:
         return lambda data: unpack(data)[0] * scale + offset
     if kind is ValueKind.BOOL:
         return lambda data: unpack(data)[0] * scale + offset != 0
     return lambda data: _whole(unpack(data)[0] * scale + offset)
+
+
+def _limited_decoder(
+    unpack: Unpack, scale: float, offset: float, kind: ValueKind, reader: LimitReader
+) -> Decode:
+    """Decode with care at the limits; between them a comparison is all that it costs."""
+    below, above, read, meaning = reader.below, reader.above, reader.read, reader.meaning
+
+    def decode_real(data: Buffer) -> Value | None:
+        (raw,) = unpack(data)
+        return raw * scale + offset if below < raw < above else read(raw)
+
+    def decode(data: Buffer) -> Value | None:
+        (raw,) = unpack(data)
+        return meaning(raw) if below < raw < above else read(raw)
+
+    return decode_real if kind is ValueKind.FLOAT else decode
+
+
+def _meaning(number: NumberFormat, scale: float, offset: float, kind: ValueKind) -> Meaning:
+    """What a raw number is in the robot's unit."""
+    if number.name == "bool" and scale == 1 and offset == 0:
+        truth = _TRUTH[kind]
+        return lambda raw: truth[raw != 0]
+    if kind is ValueKind.BOOL:
+        return lambda raw: raw * scale + offset != 0
+    if kind is ValueKind.FLOAT:
+        return lambda raw: raw * scale + offset
+    if scale == 1 and offset == 0:
+        return _whole
+    return lambda raw: _whole(raw * scale + offset)
+
+
+_TRUTH: Final[dict[ValueKind, tuple[Value, Value]]] = {
+    ValueKind.BOOL: (False, True),
+    ValueKind.INT: (0, 1),
+    ValueKind.FLOAT: (0.0, 1.0),
+}
 
 
 def _whole(value: float) -> int | None:

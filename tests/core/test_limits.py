@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.core.definition import Direction, Limits, Value, ValueKind, Variable
-from gatewayd.core.limits import within
+from gatewayd.core.limits import window, within
 
 LOW, HIGH = -(2.0**31), 2.0**31 - 1
 
@@ -72,3 +72,16 @@ def test_limits_without_an_integer_between_them_refuse_all() -> None:
     nothing = integer(Limits(0.2, 0.8, clamp=True))
     assert within(nothing, 0) is None
     assert within(nothing, 1) is None
+
+
+@given(
+    st.sampled_from(
+        [integer(), real(), integer(Limits(0, 10)), real(Limits(0, 10)), real(Limits(0, 10, clamp=True))]
+    ),
+    st.floats() | st.integers(-20, 20),
+)
+def test_what_lies_in_the_window_passes_as_it_is(variable: Variable, value: Value) -> None:
+    """So that the usual write need not ask."""
+    low, high = window(variable)
+    if low <= value <= high:
+        assert within(variable, value) is value

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Final
 
-from gatewayd.core.definition import ValueKind
+from gatewayd.core.definition import Direction, ValueKind
 from gatewayd.links.modbus_server.plan import Located
 from gatewayd.links.modbus_server.sections import Modbus, ModbusPlaces, PlacementSpec
 from gatewayd.mapping.diagnostics import Position
@@ -131,9 +131,15 @@ def _placement(
     problem = _bit_problem(variable, spec) if single else _number_problem(spec, type_name)
     codec = None
     if not single and problem is None:
-        low, high = variable.low, variable.high
         codec = make_codec(
-            type_name, order, kind=variable.kind, scale=scale, offset=offset, low=low, high=high
+            type_name,
+            order,
+            kind=variable.kind,
+            scale=scale,
+            offset=offset,
+            low=variable.low,
+            high=variable.high,
+            limits=variable.spec.limits if variable.direction is Direction.INPUT else None,
         )
     if problem is None and address + (codec.words if codec is not None else 1) > 0x10000:
         problem = PlacementProblem.BEYOND_END

@@ -1,0 +1,75 @@
+"""Values and addresses of mapping files as a client meets them: from the text to the answer."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+from gatewayd.core.cell import Cell
+from gatewayd.core.requester import Requester
+from gatewayd.links.modbus_server.functions import Unit, execute
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.mapping.loader import load
+
+ROOT = Path(__file__).parents[3]
+PLC = Requester(0)
+NOW = 1.0
+
+HEAD = """\
+gatewayd: 1
+cell: press-3
+robot: {host: 127.0.0.10}
+writers:
+  plc: {modbus: 127.0.0.2, timeout: 1s}
+"""
+SECTION = "modbus: {listen: '127.0.0.1:1502'}\n"
+
+
+class Plant:
+    """A mapping with its robot connected, and a PLC that asks."""
+
+    def __init__(self, text: str, writer: str = "plc") -> None:
+        loaded = load(text.encode(), "cell.yaml")
+        assert loaded.plan is not None, [finding.message for finding in loaded.diagnostics]
+        self.cell = Cell(loaded.plan.cell)
+        inputs = self.cell.image.inputs
+        self.cell.robot_connected(0.0)
+        self.cell.adopt({index: self.cell.image.values[index] for index in inputs}, 0.0)
+        self.unit = Unit(loaded.plan.the(ModbusPlan), self.cell)
+        names = [one.name for one in loaded.plan.cell.writers]
+        self._requester = Requester(names.index(writer))
+
+    def ask(self, pdu: bytes) -> bytes:
+        return execute(self.unit, self._requester, pdu, NOW)
+
+    def write(self, address: int, *words: int) -> int:
+        """Function 16: 16, or the exception code."""
+        head = struct.pack(">BHHB", 16, address, len(words), 2 * len(words))
+        answer = self.ask(head + struct.pack(f">{len(words)}H", *words))
+        return answer[1] if answer[0] & 0x80 else answer[0]
+
+    def read(self, address: int, count: int = 1) -> tuple[int, ...]:
+        """Function 3: the words."""
+        answer = self.ask(struct.pack(">BHH", 3, address, count))
+        assert answer[0] == 3, answer.hex()
+        return struct.unpack(f">{count}H", answer[2:])
+
+    def value(self, name: str) -> object:
+        found = [variable.name for variable in self.cell.definition.variables]
+        return self.cell.image.values[found.index(name)]
+
+
+def real(value: float) -> tuple[int, int]:
+    """The two registers of an IEC 61131-3 REAL."""
+    high, low = struct.unpack(">HH", struct.pack(">f", value))
+    return high, low
+
+
+def test_a_set_point_on_its_maximum_reaches_the_robot_as_the_limit() -> None:
+    """The shipped `offset` takes a REAL of 0.05, and the robot gets 0.05: not 03, and not 0.05000000074."""
+    plant = Plant((ROOT / "mappings" / "two-plcs.yaml").read_text(), "cell_plc")
+    words = [word for value in (0.05, -0.05, 0.0125) for word in real(value)]
+    assert plant.write(0, 1, 0, 1000, *words) == 16
+    assert [plant.value(f"offset[{n}]") for n in range(3)] == [0.05, -0.05, 0.012500000186264515]
+    assert plant.read(3, 6) == tuple(words)
+    assert plant.write(0, 1, 0, 1000, words[0], words[1] + 1, *words[2:]) == 3
