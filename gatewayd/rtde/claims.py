@@ -252,7 +252,7 @@ class Claims:
         return SetupInputs(self._queue[0].asking)
 
     def answer(self, reply: InputsSetup) -> None:
-        """Take the answer to the last request."""
+        """Take the answer to the last request. One with another number of types than was asked for is a refusal."""
         if not self._asked:
             msg = "the controller answered an input setup that was not asked for"
             raise HandshakeError(msg)
@@ -261,11 +261,13 @@ class Claims:
             self._asked = False
             self._split(group)
             return
-        types, refused = sort_types(group.asking, reply.types)
         self._asked = False
-        if reply.recipe and not refused:
+        is_whole = len(reply.types) == len(group.asking)
+        types, refused = sort_types(group.asking, reply.types) if is_whole else ([], {})
+        if reply.recipe and is_whole and not refused:
             self._hold(group, InputRecipe(group.key, reply.recipe, Recipe(group.asking, types)))
             return
+        self._used += not is_whole  # the controller may have given it an id
         if not refused:
             refused = dict.fromkeys(
                 (name for name in group.asking if name not in group.names_held()), REFUSED

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from typing import TYPE_CHECKING, Generic, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Generic, NoReturn, TypeVar, cast
 
 from gatewayd.rtde import payloads
 from gatewayd.rtde.messages import (
@@ -19,6 +19,7 @@ from gatewayd.rtde.messages import (
     ProtocolVersionReply,
     RequestProtocolVersion,
 )
+from gatewayd.rtde.strange import Oddity, StrangePackage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -35,7 +36,7 @@ _MOST_REQUESTS = 16
 
 
 class ProtocolError(Exception):
-    """Bytes that are not RTDE: what was wrong, and where."""
+    """Bytes that cannot be cut into packages, or values that are not of their recipe: what was wrong, and where."""
 
     def __init__(self, reason: str, offset: int, data: bytes = b"", *, within: str = "stream") -> None:
         shown = data[:_SHOWN].hex(" ") + (" ..." if len(data) > _SHOWN else "")
@@ -79,12 +80,22 @@ class _Endpoint(Generic[_Received, _Sent]):
         """Bytes kept for an unfinished package: always less than MAX_PACKAGE once an iterator is exhausted."""
         return len(self._rest)
 
-    def receive(self, data: bytes) -> Iterator[_Received]:
-        """The messages that `data` completes, in order.
+    @property
+    def unfinished(self) -> str:
+        """What is kept for an unfinished package, for people; empty if nothing is."""
+        if len(self._rest) < _HEADER.size:
+            return ""
+        size, kind = _HEADER.unpack_from(self._rest)
+        known = PackageType(kind).name if kind in self._decoders else f"unknown type {kind}"
+        return f"{len(self._rest)} of {size} bytes of {known}: {bytes(self._rest[:_SHOWN]).hex(' ')}"
+
+    def receive(self, data: bytes) -> Iterator[_Received | StrangePackage]:
+        """The messages that `data` completes, in order; a package that is odd, whatever it is, comes as strange.
 
         Exhaust the iterator before the next call. A message is decoded when it is asked for, so that an answer sent
-        while iterating (an accepted protocol version) already governs the next one. Raises ProtocolError at the first
-        package that is none; from then on every call raises it again and takes nothing in.
+        while iterating (an accepted protocol version) already governs the next one. A strange package that can be read
+        all the same is followed by its message. Raises ProtocolError where a header cannot be one, because the stream
+        is cut wrongly then; from then on every call raises it again and takes nothing in.
         """
         if self._error is not None:
             raise self._error
@@ -97,16 +108,15 @@ class _Endpoint(Generic[_Received, _Sent]):
             rest.clear()
         return self._messages(data)
 
-    def _messages(self, data: bytes) -> Iterator[_Received]:
+    def _messages(self, data: bytes) -> Iterator[_Received | StrangePackage]:
         position = 0
         end = len(data)
         self._needed = _HEADER.size
         try:
             while end - position >= _HEADER.size:
                 size, kind = _HEADER.unpack_from(data, position)
-                decoder = self._decoders.get(kind)
-                if decoder is None or size < _HEADER.size:
-                    self._reject_header(size, kind, data, position)
+                if size < _HEADER.size:
+                    self._reject(size, position, data[position : position + _HEADER.size])
                 if end - position < size:
                     self._needed = size
                     break
@@ -115,16 +125,27 @@ class _Endpoint(Generic[_Received, _Sent]):
                 if kind == _DATA and self._data_id and size > _HEADER.size:
                     yield DataPackage(data[start + 3], data[start + 4 : position])
                     continue
-                try:
-                    message = decoder(data[start + _HEADER.size : position])
-                except payloads.MalformedPayloadError as error:
-                    self._reject(f"{PackageType(kind).name} with {error}", start, data[start:position])
-                self._note(message)
-                yield message
+                yield from self._decoded(kind, data[start:position])
         finally:
             if self._error is None:
                 self._consumed += position
                 self._rest += data[position:]
+
+    def _decoded(self, kind: int, package: bytes) -> Iterator[_Received | StrangePackage]:
+        decoder = self._decoders.get(kind)
+        if decoder is None:
+            yield StrangePackage(Oddity.UNKNOWN_TYPE, kind, f"unknown package type {kind}", package[:_SHOWN])
+            return
+        try:
+            message = decoder(package[_HEADER.size :])
+        except payloads.MalformedPayloadError as error:
+            reason = f"{PackageType(kind).name} with {error}"
+            yield StrangePackage(Oddity.LAYOUT, kind, reason, package[:_SHOWN])
+            if error.read_as is None:
+                return
+            message = cast("_Received", error.read_as)
+        self._note(message)
+        yield message
 
     def send(self, message: _Sent) -> bytes:
         """The package of `message` in the version spoken. ValueError for what does not fit into one."""
@@ -152,15 +173,9 @@ class _Endpoint(Generic[_Received, _Sent]):
         self._decoders: Mapping[int, Callable[[bytes], _Received]] = self._tables[version > 1]
         self._data_id = version >= self._ids_since
 
-    def _reject_header(self, size: int, kind: int, data: bytes, position: int) -> NoReturn:
-        if size < _HEADER.size:
-            reason = f"package size {size} is less than its own header of {_HEADER.size} bytes"
-        else:
-            reason = f"unknown package type {kind}"
-        self._reject(reason, position, data[position : position + max(size, _HEADER.size)])
-
-    def _reject(self, reason: str, position: int, package: bytes) -> NoReturn:
-        self._error = ProtocolError(reason, self._consumed + position, package)
+    def _reject(self, size: int, position: int, header: bytes) -> NoReturn:
+        reason = f"package size {size} is less than its own header of {_HEADER.size} bytes"
+        self._error = ProtocolError(reason, self._consumed + position, header)
         raise self._error from None
 
 

@@ -13,16 +13,20 @@ from gatewayd.rtde.codec import ClientProtocol, ProtocolError
 from gatewayd.rtde.lists import ListOutcome
 from gatewayd.rtde.loss import Loss, LossReason, connection_failure
 from gatewayd.rtde.messages import (
+    ANSWER_TYPES,
     ControllerMessage,
     DataPackage,
     ExecutableMessage,
+    PackageType,
+    Pause,
     TextLevel,
     TextMessage,
 )
-from gatewayd.rtde.negotiation import Negotiation, Notice
+from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice
 from gatewayd.rtde.pace import Pace, Statistics
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import TIMESTAMP, ClientSettings, Session
+from gatewayd.rtde.strange import Oddity, StrangePackage
 from gatewayd.rtde.types import DataType
 
 __all__ = ["ClientHandler", "Connection"]
@@ -57,6 +61,9 @@ class ClientHandler(Protocol):
 
     def text(self, message: TextMessage) -> None:
         """The controller has sent a text."""
+
+    def strange(self, package: StrangePackage) -> None:
+        """A package could not be taken as it came; the first of its oddity and type that the client has met."""
 
     def probed(self, delay: float) -> None:
         """A probe was answered `delay` seconds after it was sent; infinity: it was not, within the handshake's time."""
@@ -98,6 +105,9 @@ class Connection(asyncio.Protocol):
         self._patience = settings.first_data_timeout
         self._heard = 0.0
         self._measured = 0.0
+        self._was_paused = False
+        self._passed_over: StrangePackage | None = None
+        """The last strange package, if no data came since."""
 
     @property
     def lists(self) -> ListOutcome:
@@ -205,29 +215,40 @@ class Connection(asyncio.Protocol):
                         self._take(message)
                     if self._negotiation.delivering:
                         packages.append(message)
-                    continue
-                # What came before an answer was sent before it: it is no reading of what the answer brings.
-                failure = self._deliver(packages, now)
-                if failure is not None:
-                    break
-                self._take(message)
+                elif isinstance(message, StrangePackage):
+                    self._pass_over(message)
+                else:
+                    # What came before an answer was sent before it: it is no reading of what the answer brings.
+                    self._deliver(packages, now)
+                    self._take(message)
         except ProtocolError as error:
             failure = error
-        failure = self._deliver(packages, now) or failure
+        self._deliver(packages, now)
         if failure is not None:
             self._fail(LossReason.PROTOCOL, f"what the controller sent is not RTDE: {failure}")
+
+    def _pass_over(self, package: StrangePackage) -> None:
+        self._passed_over = package
+        if self._statistics.strange.count(package):
+            self._handler.strange(package)
 
     def _take(self, message: ControllerMessage) -> None:
         if isinstance(message, TextMessage):
             self._complained |= self._negotiation.awaits_long_list and message.level <= TextLevel.ERROR
             self._handler.text(message)
             return
-        self._measure_round_trip(message)
         try:
             step = self._negotiation.handle(message)
         except HandshakeError as error:
             self._fail(LossReason.HANDSHAKE, str(error))
             return
+        if step.strange:
+            self._pass_over(StrangePackage(Oddity.UNEXPECTED, ANSWER_TYPES[type(message)], step.strange))
+        if step.taken:
+            self._measure_round_trip(message)
+            self._follow(step)
+
+    def _follow(self, step: NextStep) -> None:
         if step.send is not None:
             self._request(step.send)
         elif self._negotiation.reading:
@@ -246,18 +267,23 @@ class Connection(asyncio.Protocol):
             self._round_trip = max(self._round_trip, self._loop.time() - self._asked_at)
             self._asked_at = None
 
-    def _deliver(self, packages: list[DataPackage], now: float) -> ProtocolError | None:
-        """Hand on the newest package, if there is any, and count them all."""
+    def _deliver(self, packages: list[DataPackage], now: float) -> None:
+        """Hand on the newest package that is of the agreed recipe, if there is any, and count them all."""
         pace = self._pace
         if pace is None or not packages or self.done.done():
-            return None
+            return
+        recipe, size = self._negotiation.outputs_id, self._outputs.size
+        agreed = [one for one in packages if one.recipe == recipe and len(one.payload) == size]
+        if len(agreed) < len(packages):
+            self._pass_over_data(packages, recipe, size)
+        packages.clear()
+        if not agreed:
+            return
         self._heard = now
+        self._passed_over = None
         self._patience = max(self._settings.data_timeout, _PERIODS_OF_PATIENCE * self._period)
-        (*older, newest), packages[:] = packages, ()
-        try:
-            values = self._outputs.unpack(newest.payload)
-        except ProtocolError as error:
-            return error
+        (*older, newest) = agreed
+        values = self._outputs.unpack(newest.payload)
         for package in older:
             self._statistics.overtaken += 1
             if self._clocked and len(package.payload) >= _TIMESTAMP.size:
@@ -268,9 +294,19 @@ class Connection(asyncio.Protocol):
                 f"the controller's clock went from {last} s to {values[0]} s: its RTDE service has restarted"
             )
             self._fail(LossReason.RESTARTED, text)
-            return None
+            return
         self._handler.values(values, now)
-        return None
+
+    def _pass_over_data(self, packages: Iterable[DataPackage], recipe: int | None, size: int) -> None:
+        for package in packages:
+            length = len(package.payload)
+            if package.recipe != recipe:
+                reason = f"data package of recipe {package.recipe} where {recipe} was agreed"
+            elif length != size:
+                reason = f"data package with {length} bytes of values where the recipe has {size}"
+            else:
+                continue
+            self._pass_over(StrangePackage(Oddity.RECIPE, PackageType.DATA_PACKAGE, reason))
 
     def _started(self) -> None:
         now = self._loop.time()
@@ -286,9 +322,19 @@ class Connection(asyncio.Protocol):
 
     def _inputs_changed(self) -> None:
         self._heard = self._loop.time()
+        self._resume_pace()
         self.session = self._negotiation.session(self._round_trip)
         self._schedule_retry()
         self._handler.inputs_changed(self.session)
+
+    def _resumed(self) -> None:
+        self._resume_pace()
+        self._pause_answered()
+
+    def _resume_pace(self) -> None:
+        if self._was_paused and self._pace is not None:
+            self._was_paused = False
+            self._pace.resume()
 
     def _pause_answered(self) -> None:
         self._heard = self._loop.time()
@@ -311,7 +357,7 @@ class Connection(asyncio.Protocol):
         Notice.STARTED: _started,
         Notice.INPUTS_CHANGED: _inputs_changed,
         Notice.PAUSED: _pause_answered,
-        Notice.RESUMED: _pause_answered,
+        Notice.RESUMED: _resumed,
         Notice.PROBED: _probe_answered,
     }
 
@@ -329,6 +375,7 @@ class Connection(asyncio.Protocol):
 
     def _request(self, message: ExecutableMessage) -> None:
         self._write(message)
+        self._was_paused |= isinstance(message, Pause)
         self._asked_at = self._loop.time()
         self._await(self._settings.handshake_timeout)
 
@@ -354,12 +401,22 @@ class Connection(asyncio.Protocol):
 
     def _unanswered(self) -> None:
         if self._negotiation.reading:
-            self._fail(LossReason.SILENT, _silence(self._patience, first=self.session is None))
+            self._fall_silent(self._patience, first=self.session is None)
             return
-        what = self._negotiation.awaited
-        self._fail(
-            LossReason.UNANSWERED, f"{what} did not come within {self._settings.handshake_timeout:g} s"
-        )
+        what, limit = self._negotiation.awaited, self._settings.handshake_timeout
+        self._fail(LossReason.UNANSWERED, f"{what} did not come within {limit:g} s{self._instead()}")
+
+    def _fall_silent(self, seconds: float, *, first: bool) -> None:
+        instead = self._instead()
+        if not instead and first:
+            instead = ": is the robot powered and its safety set-up confirmed?"
+        self._fail(LossReason.SILENT, f"no data from the controller for {seconds:.1f} s{instead}")
+
+    def _instead(self) -> str:
+        """What came in place of what was due, in words."""
+        if self._codec.unfinished:
+            return f"; what it sent stops at {self._codec.unfinished}"
+        return f"; it sent {self._passed_over} instead" if self._passed_over is not None else ""
 
     def gap(self) -> None:
         """The process stood still until now: what the controller sent meanwhile is still to be read."""
@@ -371,7 +428,7 @@ class Connection(asyncio.Protocol):
         silence = now - self._heard
         if self._negotiation.running and silence > self._patience:
             first = self._pace is None or self._pace.timestamp is None
-            self._fail(LossReason.SILENT, _silence(silence, first=first))
+            self._fall_silent(silence, first=first)
             return
         if self._pace is not None and now - self._measured >= _MEASURE_EVERY:
             self._pace.measure(now)
@@ -421,8 +478,3 @@ class Connection(asyncio.Protocol):
             if handle is not None:
                 handle.cancel()
         self._pause_answered()
-
-
-def _silence(seconds: float, *, first: bool) -> str:
-    hint = ": is the robot powered and its safety set-up confirmed?" if first else ""
-    return f"no data from the controller for {seconds:.1f} s{hint}"

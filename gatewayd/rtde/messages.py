@@ -6,10 +6,12 @@ turns it into a package and back.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
 __all__ = [
+    "ANSWER_TYPES",
     "ERROR_WORDS",
     "IN_USE",
     "NOT_FOUND",
@@ -193,3 +195,12 @@ ControllerMessage = (
     | PauseReply
 )
 """What a controller sends and a client receives."""
+ANSWER_TYPES: Mapping[type, PackageType] = {
+    ProtocolVersionReply: PackageType.REQUEST_PROTOCOL_VERSION,
+    ControllerVersion: PackageType.GET_URCONTROL_VERSION,
+    OutputsSetup: PackageType.SETUP_OUTPUTS,
+    InputsSetup: PackageType.SETUP_INPUTS,
+    StartReply: PackageType.START,
+    PauseReply: PackageType.PAUSE,
+}
+"""Answers of a controller -> type of their packages."""

@@ -65,6 +65,10 @@ class NextStep(NamedTuple):
 
     send: messages.ExecutableMessage | None = None
     event: Notice | None = None
+    strange: str = ""
+    """What is odd about the message, if anything is."""
+    taken: bool = True
+    """Whether the message was an answer to what is awaited; else nothing has changed."""
 
 
 _NOTHING = NextStep()
@@ -89,6 +93,8 @@ class Negotiation:
         self._run = wishes.running
         self._version = 1
         self._asked: tuple[str, ...] = ()
+        self.outputs_id: int | None = None
+        """The recipe id of data packages, as the controller last gave it; None in version 1."""
         self._outputs: Recipe | None = None
         """The working recipe while the controller has it."""
         self._agreed: Recipe | None = None
@@ -122,7 +128,8 @@ class Negotiation:
     @property
     def awaited(self) -> str:
         """The answer that is due, in words."""
-        return (State.INPUTS if self.state in _AT_REST else self.state).value
+        claiming = self.state in _AT_REST and self.claims.asked
+        return (State.INPUTS if claiming else self.state).value
 
     @property
     def awaits_long_list(self) -> bool:
@@ -135,13 +142,13 @@ class Negotiation:
         return messages.RequestProtocolVersion(2)
 
     def handle(self, message: messages.ControllerMessage) -> NextStep:
-        """Take an answer; a data package out of season is no matter."""
+        """Take an answer; one that nobody awaits, and a data package out of season, change nothing."""
         action = self._TABLE.get((self.state, type(message)))
         if action is not None:
             return action(self, message)
         if isinstance(message, messages.DataPackage):
             return _NOTHING
-        raise self._misplaced(message)
+        return self._misplaced(message)
 
     def retry_claims(self) -> messages.ExecutableMessage | None:
         """Ask again for inputs that were in use, if any are and no answer is due."""
@@ -286,6 +293,7 @@ class Negotiation:
         if reply.recipe == 0:
             raise HandshakeError("the controller refused the output recipe without naming a field")
         self.took_long_list |= is_long(names)
+        self.outputs_id = reply.recipe
         self._outputs = self._agreed or Recipe(names, types)
         self._reading.agree(self._outputs)
         if self._agreed is None:
@@ -300,13 +308,13 @@ class Negotiation:
         return self._advance()
 
     def _inputs_answered(self, reply: messages.InputsSetup) -> NextStep:
-        self._take_claim(reply)
-        return self._advance()
+        strange = self._take_claim(reply)
+        return self._advance()._replace(strange=strange)
 
     def _started(self, message: messages.StartReply | messages.DataPackage) -> NextStep:
         if isinstance(message, messages.DataPackage):
             assert self._outputs is not None
-            if len(message.payload) != self._outputs.size:
+            if not self._is_of(message, self._outputs):
                 return _NOTHING
         elif not message.accepted:
             return self._start_refused()
@@ -341,6 +349,7 @@ class Negotiation:
             raise HandshakeError(
                 "the controller refused the output recipe of a reading without naming a field"
             )
+        self.outputs_id = reply.recipe
         self._reading.expect(Recipe(self._asked, types))
         return self._go(State.READING_START, messages.Start())
 
@@ -351,7 +360,7 @@ class Negotiation:
         return self._go(State.READING, None)
 
     def _read(self, package: messages.DataPackage) -> NextStep:
-        if not self._reading.take(package.payload):
+        if package.recipe != self.outputs_id or not self._reading.take(package.payload):
             return _NOTHING
         return self._go(State.READING_PAUSE, messages.Pause())
 
@@ -361,8 +370,10 @@ class Negotiation:
     # while there is a session
 
     def _more_inputs_answered(self, reply: messages.InputsSetup) -> NextStep:
-        self._take_claim(reply)
-        return self._settle()
+        if not self.claims.asked:
+            return self._misplaced(reply)
+        strange = self._take_claim(reply)
+        return self._settle()._replace(strange=strange)
 
     def _settle(self, event: Notice | None = None) -> NextStep:
         """Go on with claims; when there are no more, read what is new, or report the change."""
@@ -384,8 +395,9 @@ class Negotiation:
         return self._settle(event)
 
     def _started_late(self, message: messages.StartReply) -> NextStep:
+        """The answer to a start that data had proved already."""
         if not message.accepted:
-            raise HandshakeError("the controller refused to start the output")
+            return NextStep(strange="a refused start of the output that runs", taken=False)
         return _NOTHING
 
     def _paused(self, _: messages.PauseReply) -> NextStep:
@@ -395,14 +407,17 @@ class Negotiation:
 
     def _probed(self, version: messages.ControllerVersion) -> NextStep:
         if not self._probes:
-            raise self._misplaced(version)
+            return self._misplaced(version)
         self._probes -= 1
         return _NOTHING if self._probes else NextStep(None, Notice.PROBED)
 
-    def _take_claim(self, reply: messages.InputsSetup) -> None:
+    def _take_claim(self, reply: messages.InputsSetup) -> str:
+        """Take the answer; returns what is odd about it."""
         asked = self.claims.asked
         self.claims.answer(reply)
         self.took_long_list |= bool(reply.recipe) and is_long(asked)
+        given = len(reply.types)
+        return f"{given} types for {len(asked)} inputs" if given != len(asked) else ""
 
     def _go(
         self, state: State, send: messages.ExecutableMessage | None, event: Notice | None = None
@@ -410,10 +425,11 @@ class Negotiation:
         self.state = state
         return NextStep(send, event)
 
-    def _misplaced(self, message: messages.ControllerMessage) -> HandshakeError:
-        return HandshakeError(
-            f"the controller sent {type(message).__name__} while {self.state.value} was awaited"
-        )
+    def _misplaced(self, message: messages.ControllerMessage) -> NextStep:
+        return NextStep(strange=f"{type(message).__name__} while {self.awaited} was awaited", taken=False)
+
+    def _is_of(self, package: messages.DataPackage, recipe: Recipe) -> bool:
+        return package.recipe == self.outputs_id and len(package.payload) == recipe.size
 
     def _unavailable(self) -> tuple[Unavailable, ...]:
         left_out = self._reading.left_out

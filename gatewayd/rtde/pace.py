@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from gatewayd.rtde.strange import StrangeCounts
 
 __all__ = ["Pace", "Statistics"]
 
 _LONGEST_GAP = 3600.0
 """Seconds between packages beyond which the timestamp is not believed; a connection does not live so long silent."""
+_PAUSE = 0.1
+_PAUSE_PERIODS = 5.5
+"""A controller that skips is too busy for some packages; one that stays away for longer than both of these pauses."""
 
 
 @dataclass(slots=True)
@@ -19,7 +24,9 @@ class Statistics:
     packages: int = 0
     """Data packages received."""
     skipped: int = 0
-    """Packages that the controller did not send, by the gaps between timestamps."""
+    """Packages that the controller did not send, by the gaps between timestamps; pauses have none."""
+    pauses: int = 0
+    """Gaps between timestamps that are too long for that: the controller sent nothing at all for a while."""
     late: int = 0
     """Packages that came more than a period later after their predecessor than their timestamps say."""
     overtaken: int = 0
@@ -30,6 +37,8 @@ class Statistics:
     """Packages per second, measured lately."""
     progress: int = 0
     """Moves several times a second while the client works, whatever the controller does."""
+    strange: StrangeCounts = field(default_factory=StrangeCounts)
+    """Packages that could not be taken as they came."""
 
 
 class Pace:
@@ -43,6 +52,8 @@ class Pace:
         self._arrival = now
         self._window_start = now
         self._window_packages = 0
+        self._resumed = False
+        self._pause = max(_PAUSE, _PAUSE_PERIODS * period)
         statistics.frequency = 0.0
 
     def package(self, timestamp: float, now: float) -> bool:
@@ -57,11 +68,19 @@ class Pace:
         elapsed = timestamp - last
         if not 0.0 <= elapsed <= _LONGEST_GAP:
             return False
-        if elapsed > 1.5 * self._period:
-            statistics.skipped += round(elapsed / self._period) - 1
+        resumed, self._resumed = self._resumed, False
+        if elapsed > 1.5 * self._period and not resumed:
+            if elapsed > self._pause:
+                statistics.pauses += 1
+            else:
+                statistics.skipped += round(elapsed / self._period) - 1
         if now - arrival - elapsed > self._period:
             statistics.late += 1
         return True
+
+    def resume(self) -> None:
+        """The output was paused by us and goes on: nothing is missing before the next package."""
+        self._resumed = True
 
     def measure(self, now: float) -> None:
         """Close the present window of the frequency measurement; call every second or so."""

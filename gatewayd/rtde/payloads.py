@@ -34,25 +34,37 @@ _UINT16 = struct.Struct(">H")
 _VERSION = struct.Struct(">4I")
 _DOUBLE = struct.Struct(">d")
 _MAX_TEXT = 0xFF
-_MIN_TEXT = 3
+_LEVELS = frozenset(messages.TextLevel)
+_CONTROLS = frozenset(range(32)) - frozenset(b"\t\n\r")
+"""Bytes that no text has, but the lengths and levels of version 2."""
 
-_Message = TypeVar("_Message")
+_Message = TypeVar("_Message", bound="ControllerMessage | ExecutableMessage")
 
 
 class MalformedPayloadError(Exception):
-    """A payload that does not fit its layout; the codec adds where it stood."""
+    """A payload that does not fit its layout; `read_as` is the message that it makes all the same, if it makes one."""
 
-
-def _expect(payload: bytes, size: int) -> None:
-    if len(payload) != size:
-        msg = f"payload of {len(payload)} bytes where {size} belong"
-        raise MalformedPayloadError(msg)
+    def __init__(self, reason: str, read_as: ControllerMessage | ExecutableMessage | None = None) -> None:
+        super().__init__(reason)
+        self.read_as = read_as
 
 
 def _at_least(payload: bytes, size: int) -> None:
     if len(payload) < size:
         msg = f"payload of {len(payload)} bytes where at least {size} belong"
         raise MalformedPayloadError(msg)
+
+
+def _fixed(size: int, decode: Callable[[bytes], _Message]) -> Callable[[bytes], _Message]:
+    """Decoder of a payload of fixed size; newer software may append to it: what is known of a longer one is read."""
+
+    def decode_fixed(payload: bytes) -> _Message:
+        if len(payload) == size:
+            return decode(payload)
+        msg = f"payload of {len(payload)} bytes where {size} belong"
+        raise MalformedPayloadError(msg, decode(payload[:size]) if len(payload) > size else None)
+
+    return decode_fixed
 
 
 def _text(data: bytes) -> str:
@@ -73,16 +85,25 @@ def _joined(names: tuple[str, ...]) -> bytes:
 
 
 def _decode_text(payload: bytes) -> TextMessage:
-    _at_least(payload, _MIN_TEXT)
-    end = 1 + payload[0]
+    end = 1 + payload[0] if payload else 0
     if end >= len(payload):
-        msg = f"message length {payload[0]} reaches beyond the package"
-        raise MalformedPayloadError(msg)
+        msg = f"message length {end - 1} reaches beyond the package" if payload else "no payload"
+        raise MalformedPayloadError(msg, _as_v1(payload))
     level = end + 1 + payload[end]
-    if level + 1 != len(payload):
+    if level >= len(payload):
         msg = f"source length {payload[end]} does not fit the package"
-        raise MalformedPayloadError(msg)
-    return TextMessage(_text(payload[1:end]), _text(payload[end + 1 : level]), payload[level])
+        raise MalformedPayloadError(msg, _as_v1(payload))
+    text = TextMessage(_text(payload[1:end]), _text(payload[end + 1 : level]), payload[level])
+    if level + 1 != len(payload):
+        msg = f"{len(payload) - level - 1} bytes behind the level"
+        raise MalformedPayloadError(msg, _as_v1(payload) or text)
+    return text
+
+
+def _as_v1(payload: bytes) -> TextMessage | None:
+    """A text that came in the layout of version 1 although version 2 was agreed; None if it cannot be one."""
+    can_be = payload and payload[0] in _LEVELS and _CONTROLS.isdisjoint(payload[1:])
+    return _decode_text_v1(payload) if can_be else None
 
 
 def _decode_text_v1(payload: bytes) -> TextMessage:
@@ -90,19 +111,9 @@ def _decode_text_v1(payload: bytes) -> TextMessage:
     return TextMessage(_text(payload[1:]), "", payload[0])
 
 
-def _decode_controller_version(payload: bytes) -> messages.ControllerVersion:
-    _expect(payload, _VERSION.size)
-    return messages.ControllerVersion(*_VERSION.unpack(payload))
-
-
 def _decode_data(payload: bytes) -> messages.DataPackage:
     _at_least(payload, 1)
     return messages.DataPackage(payload[0], payload[1:])
-
-
-def _decode_request_version(payload: bytes) -> messages.RequestProtocolVersion:
-    _expect(payload, _UINT16.size)
-    return messages.RequestProtocolVersion(*_UINT16.unpack(payload))
 
 
 def _decode_setup_outputs(payload: bytes) -> messages.SetupOutputs:
@@ -111,10 +122,11 @@ def _decode_setup_outputs(payload: bytes) -> messages.SetupOutputs:
 
 
 def _setup_reply(reply: Callable[[int, tuple[str, ...]], _Message]) -> Callable[[bytes], _Message]:
-    """Decoder of a recipe id and a list of types."""
+    """Decoder of a recipe id and a list of types; without the id it is a refusal."""
 
     def decode(payload: bytes) -> _Message:
-        _at_least(payload, 1)
+        if not payload:
+            raise MalformedPayloadError("no recipe id", reply(0, ()))
         return reply(payload[0], _names(payload[1:]))
 
     return decode
@@ -122,27 +134,25 @@ def _setup_reply(reply: Callable[[int, tuple[str, ...]], _Message]) -> Callable[
 
 def _acceptance(reply: Callable[[bool], _Message]) -> Callable[[bytes], _Message]:
     """Decoder of one byte that accepts or refuses."""
-
-    def decode(payload: bytes) -> _Message:
-        _expect(payload, 1)
-        return reply(payload[0] != 0)
-
-    return decode
+    return _fixed(1, lambda payload: reply(payload[0] != 0))
 
 
 def _bare(request: _Message) -> Callable[[bytes], _Message]:
     """Decoder of a request without a payload."""
+    return _fixed(0, lambda _: request)
 
-    def decode(payload: bytes) -> _Message:
-        _expect(payload, 0)
-        return request
 
-    return decode
+_controller_version = _fixed(
+    _VERSION.size, lambda payload: messages.ControllerVersion(*_VERSION.unpack(payload))
+)
+_request_version = _fixed(
+    _UINT16.size, lambda payload: messages.RequestProtocolVersion(*_UINT16.unpack(payload))
+)
 
 
 FROM_CONTROLLER: ControllerDecoders = {
     PackageType.REQUEST_PROTOCOL_VERSION: _acceptance(messages.ProtocolVersionReply),
-    PackageType.GET_URCONTROL_VERSION: _decode_controller_version,
+    PackageType.GET_URCONTROL_VERSION: _controller_version,
     PackageType.TEXT_MESSAGE: _decode_text,
     PackageType.DATA_PACKAGE: _decode_data,
     PackageType.SETUP_OUTPUTS: _setup_reply(messages.OutputsSetup),
@@ -159,7 +169,7 @@ FROM_CONTROLLER_V1: ControllerDecoders = {
 }
 """The same in protocol version 1."""
 FROM_EXECUTABLE: ExecutableDecoders = {
-    PackageType.REQUEST_PROTOCOL_VERSION: _decode_request_version,
+    PackageType.REQUEST_PROTOCOL_VERSION: _request_version,
     PackageType.GET_URCONTROL_VERSION: _bare(messages.GetControllerVersion()),
     PackageType.TEXT_MESSAGE: _decode_text,
     PackageType.DATA_PACKAGE: _decode_data,

@@ -13,6 +13,7 @@
     drop-at STEP[:NUMBER]|off    close the next connection that gets there, see --drop-at
     drop-clients                 cut every connection; ok COUNT
     text MESSAGE                 text message (warning) to every client
+    raw HEX                      these bytes, whatever they are, to every client: `raw 000352`
     restart                      boot again: connections, registers and timestamp from the beginning
     clients                      ok COUNT
     quit                         stop the simulator
@@ -60,6 +61,7 @@ class Control:
             "drop-at": self._drop_at,
             "drop-clients": lambda _: str(simulator.drop_clients()),
             "text": simulator.say,
+            "raw": lambda rest: simulator.raw(bytes.fromhex(rest)),
             "restart": lambda _: simulator.restart(),
             "clients": lambda _: str(simulator.clients),
             "quit": self._quit,

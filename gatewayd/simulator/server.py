@@ -57,7 +57,7 @@ class SimulatedController:
         self.refused = 0
         """Connections turned away because there were too many."""
         self.malformed = 0
-        """Connections closed for bytes that are not RTDE."""
+        """Connections closed for bytes that are no packages."""
         self.overflowed = 0
         """Connections closed because the client did not read."""
         self._most = connections
@@ -144,6 +144,11 @@ class SimulatedController:
         """Send a text message (a warning) to every client."""
         for connection in self._connections.values():
             connection.say(message)
+
+    def raw(self, data: bytes) -> None:
+        """Send these bytes, whatever they are, to every client."""
+        for connection in self._connections.values():
+            connection.raw(data)
 
     def get(self, field: str) -> tuple[Scalar, ...] | Scalar:
         """A field's value now: a number, or a tuple for a vector. KeyError if there is no such field."""
@@ -273,6 +278,10 @@ class _Connection(asyncio.Protocol):
     def say(self, message: str) -> None:
         """Send a text message."""
         self._write(self._session.text(message))
+
+    def raw(self, data: bytes) -> None:
+        """Send bytes as they are."""
+        self._write(data)
 
     def read(self, *, on: bool) -> None:
         """Take in what the client sends, or leave it in the socket."""

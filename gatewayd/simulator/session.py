@@ -1,7 +1,8 @@
 """One client's connection, as the controller sees it: packages in, packages out. No sockets, no clock.
 
 What the guides leave open is decided as in the public clients' experience: inputs need no START, a second output
-recipe replaces the first at once, whatever cannot be understood is answered with a text message and ignored.
+recipe replaces the first at once, what is not laid out as its type says is complained of in a text message, and a type
+that the controller does not know is met with silence.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from gatewayd.rtde import messages
 from gatewayd.rtde.claims import MAX_RECIPES, OLD_LIST_LIMIT, is_long, list_size
 from gatewayd.rtde.codec import MAX_PACKAGE, ControllerProtocol, ProtocolError
 from gatewayd.rtde.recipe import Recipe
+from gatewayd.rtde.strange import Oddity, StrangeCounts, StrangePackage
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import DroppedError, FaultStep, LongLists
@@ -69,6 +71,7 @@ class SimulatorSession:
         self._view: RecipeView | None = None
         self._period = 1
         self._started = False
+        self._strange = StrangeCounts()
         self._steps: Counter[FaultStep] = Counter()
         self._out: list[bytes] = []
 
@@ -85,12 +88,15 @@ class SimulatorSession:
         return self._protocol.send(messages.TextMessage(message, SOURCE, messages.TextLevel.WARNING))
 
     def receive(self, data: bytes) -> bytes:
-        """The answers to `data`, in order. Raises ProtocolError for bytes that are not RTDE, DroppedError for a fault.
+        """The answers to `data`, in order. ProtocolError for bytes that are no packages, DroppedError for a fault.
 
         What was answered before the offending bytes is lost with the connection, as on a real controller.
         """
         for message in self._protocol.receive(data):
-            self._handle(message)
+            if isinstance(message, StrangePackage):
+                self._pass_over(message)
+            else:
+                self._handle(message)
         out = b"".join(self._out)
         self._out.clear()
         return out
@@ -114,6 +120,12 @@ class SimulatorSession:
         if self._controller.faults.drops(step, self._steps[step]):
             message = f"fault at {step.value}:{self._steps[step]}"
             raise DroppedError(message)
+
+    def _pass_over(self, package: StrangePackage) -> None:
+        if package.oddity is not Oddity.UNKNOWN_TYPE:
+            self._complain(package.reason)
+        elif self._strange.count(package):
+            _log.info("%s: %s, not answered", self, package.reason)
 
     def _handle(self, message: messages.ExecutableMessage) -> None:
         step = _STEPS.get(type(message))

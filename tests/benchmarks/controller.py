@@ -30,6 +30,7 @@ from gatewayd.rtde.messages import (
     StartReply,
 )
 from gatewayd.rtde.recipe import Recipe, Scalar
+from gatewayd.rtde.strange import StrangePackage
 from gatewayd.rtde.types import DataType
 
 __all__ = ["Controller"]
@@ -56,7 +57,8 @@ class _Session:
         """Answer what the client asks; the values of its data packages."""
         return [values for message in self.protocol.receive(data) for values in self._handle(message)]
 
-    def _handle(self, message: ExecutableMessage) -> list[Values]:
+    def _handle(self, message: ExecutableMessage | StrangePackage) -> list[Values]:
+        assert not isinstance(message, StrangePackage)
         if isinstance(message, DataPackage):
             recipe = self.inputs[(message.recipe or 1) - 1]
             values = recipe.unpack(message.payload)

@@ -17,6 +17,7 @@ from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.loss import Loss
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import ClientSettings, Session
+from gatewayd.rtde.strange import StrangePackage
 from gatewayd.rtde.types import DataType
 
 Connected = Callable[..., AbstractAsyncContextManager[tuple[client.RtdeClient, "Notebook"]]]
@@ -209,6 +210,7 @@ class Controller:
         with suppress(ConnectionError):
             while data := await reader.read(65536):
                 for message in peer.protocol.receive(data):
+                    assert not isinstance(message, StrangePackage)
                     peer.answer(message)
                 if self.script.stop_reading:
                     await self._shutting.wait()
@@ -225,6 +227,7 @@ class Notebook:
         self.losses: list[Loss] = []
         self.texts: list[messages.TextMessage] = []
         self.delays: list[float] = []
+        self.strange_packages: list[StrangePackage] = []
         self.packages: list[tuple[Scalar, ...]] = []
         self.calls: list[str] = []
         """Names of the calls about sessions, packages and inputs, in their order."""
@@ -249,6 +252,9 @@ class Notebook:
 
     def text(self, message: messages.TextMessage) -> None:
         self.texts.append(message)
+
+    def strange(self, package: StrangePackage) -> None:
+        self.strange_packages.append(package)
 
     def probed(self, delay: float) -> None:
         self.delays.append(delay)

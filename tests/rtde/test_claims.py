@@ -15,7 +15,7 @@ from gatewayd.rtde.claims import (
     sort_types,
 )
 from gatewayd.rtde.fields import INPUTS
-from gatewayd.rtde.messages import IN_USE, NOT_FOUND, InputsSetup
+from gatewayd.rtde.messages import IN_USE, NOT_FOUND, InputsSetup, SetupInputs
 from gatewayd.rtde.types import DataType
 
 REGISTERS = tuple(f"input_int_register_{number}" for number in range(6))
@@ -263,11 +263,15 @@ def test_joins_leave_ids_for_inputs_that_become_free() -> None:
 
 
 @pytest.mark.parametrize("words", [(), ("INT32",), ("INT32",) * 3])
-def test_answers_must_have_a_type_for_each_name(words: tuple[str, ...]) -> None:
+def test_an_answer_without_a_type_for_each_name_is_a_refusal_and_asked_again(words: tuple[str, ...]) -> None:
     claims = Claims(REGISTERS[:2])
     claims.request()
-    with pytest.raises(HandshakeError, match=f"{len(words)} types for 2 fields"):
-        claims.answer(InputsSetup(1, words))
+    claims.answer(InputsSetup(1, words))
+    assert claims.refused == dict.fromkeys(REGISTERS[:2], REFUSED)
+    assert not claims.recipes
+    assert claims.request() is None
+    claims.retry()
+    assert claims.request() == SetupInputs(tuple(REGISTERS[:2]))
 
 
 def test_an_answer_that_nobody_asked_for_is_an_error() -> None:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from gatewayd.rtde import messages
 from gatewayd.rtde.codec import MAX_PACKAGE, ClientProtocol, ControllerProtocol, ProtocolError
+from gatewayd.rtde.strange import Oddity
 
 bytes_of_ids = st.integers(0, 255)
 names = st.lists(st.text("abcdefghijklmnopqrstuvwxyz_0123456789", min_size=1, max_size=20), max_size=40).map(
@@ -219,25 +220,77 @@ def test_a_size_less_than_the_header_is_refused(size: int) -> None:
         list(client.receive(bytes((0, size, 85)) * 4))
 
 
-@pytest.mark.parametrize("kind", [0, 82, 255])
-def test_an_unknown_type_is_refused_before_its_body_arrives(kind: int) -> None:
+GOOD = messages.StartReply(True)
+ODD = [
+    ("0003 52", Oddity.UNKNOWN_TYPE, 82, "unknown package type 82", ()),
+    ("0009 00 010203040506", Oddity.UNKNOWN_TYPE, 0, "unknown package type 0", ()),
+    ("0005 53 0101", Oddity.LAYOUT, 83, "START with payload of 2 bytes where 1 belong", (GOOD,)),
+    ("0003 53", Oddity.LAYOUT, 83, "START with payload of 0 bytes where 1 belong", ()),
+    (
+        "0014 76 00000005 0000000c 00000000 0000044d 00",
+        Oddity.LAYOUT,
+        118,
+        "GET_URCONTROL_VERSION with payload of 17 bytes where 16 belong",
+        (messages.ControllerVersion(5, 12, 0, 1101),),
+    ),
+    (
+        "000a 4d 03 6c6567616379",
+        Oddity.LAYOUT,
+        77,
+        "TEXT_MESSAGE with source length 97 does not fit the package",
+        (messages.TextMessage("legacy", "", 3),),
+    ),
+    (
+        "0009 4d 01 61 01 62 02 ff",
+        Oddity.LAYOUT,
+        77,
+        "TEXT_MESSAGE with 1 bytes behind the level",
+        (messages.TextMessage("a", "b", 2),),
+    ),
+    ("0007 4d ff 61 61 61", Oddity.LAYOUT, 77, "TEXT_MESSAGE with message length 255 reaches", ()),
+    ("0003 49", Oddity.LAYOUT, 73, "SETUP_INPUTS with no recipe id", (messages.InputsSetup(0, ()),)),
+    ("0003 55", Oddity.LAYOUT, 85, "DATA_PACKAGE with payload of 0 bytes where at least 1 belong", ()),
+]
+
+
+@pytest.mark.parametrize("data, oddity, kind, words, read_as", ODD, ids=[one[0] for one in ODD])
+def test_an_odd_package_is_passed_over_or_read_and_the_next_one_is_a_package(
+    data: str, oddity: Oddity, kind: int, words: str, read_as: Sequence[messages.ControllerMessage]
+) -> None:
+    client, controller = speaking(2)
+    good, odd = controller.send(GOOD), bytes.fromhex(data)
+    for cuts in ((), (len(good) + 2,), (len(good) + 3, len(good) + len(odd))):
+        before, strange, *heard, after = receive_all(client.receive, pieces(good + odd + good, cuts))
+        assert (before, after) == (GOOD, GOOD)
+        assert (strange.oddity, strange.type, strange.data) == (oddity, kind, odd[:16])
+        assert strange.reason.startswith(words)
+        assert heard == list(read_as)
+    assert client.buffered == 0
+
+
+def test_what_is_kept_of_an_unfinished_package_can_be_shown() -> None:
     client, _ = speaking(2)
-    with pytest.raises(ProtocolError, match=f"unknown package type {kind}"):
-        list(client.receive(bytes((0xFF, 0xFF, kind))))
+    assert not list(client.receive(b"SS"))
+    assert client.unfinished == ""
+    assert not list(client.receive(b"H-2.0"))
+    assert client.unfinished == "7 of 21331 bytes of unknown type 72: 53 53 48 2d 32 2e 30"
+    other, _ = speaking(2)
+    assert not list(other.receive(bytes.fromhex("0008 55 01")))
+    assert other.unfinished == "4 of 8 bytes of DATA_PACKAGE: 00 08 55 01"
 
 
 def test_messages_before_an_error_are_delivered_and_the_error_names_reason_place_and_bytes() -> None:
     client, controller = ClientProtocol(), ControllerProtocol()
-    heard: list[messages.ControllerMessage] = []
-    good = controller.send(messages.StartReply(True))
+    heard: list[object] = []
+    good = controller.send(GOOD)
     list(client.receive(good))
     with pytest.raises(ProtocolError) as caught:
-        heard.extend(client.receive(good + bytes.fromhex("0005 53 0101") + good))
-    assert heard == [messages.StartReply(True)]
+        heard.extend(client.receive(good + bytes.fromhex("0002 53 0101") + good))
+    assert heard == [GOOD]
     assert caught.value.offset == 2 * len(good)
-    assert caught.value.data == bytes.fromhex("0005 53 0101")
+    assert caught.value.data == bytes.fromhex("0002 53")
     assert str(caught.value) == (
-        "START with payload of 2 bytes where 1 belong, at byte 8 of the stream: 00 05 53 01 01"
+        "package size 2 is less than its own header of 3 bytes, at byte 8 of the stream: 00 02 53"
     )
 
 

@@ -12,7 +12,8 @@ from gatewayd.rtde import messages
 from gatewayd.rtde.client import RtdeClient
 from gatewayd.rtde.loss import LossReason
 from gatewayd.rtde.session import ClientSettings
-from tests.rtde.conftest import send
+from gatewayd.rtde.strange import Oddity
+from tests.rtde.conftest import E_SERIES, send
 
 if TYPE_CHECKING:
     from tests.rtde.conftest import Connected, Controller
@@ -147,26 +148,140 @@ async def test_the_boot_restart_of_a_controller_is_only_a_new_connection(
         assert "its RTDE service has restarted" in seen.losses[0].text
 
 
-@pytest.mark.parametrize(
-    "garbage, words",
-    [
-        (bytes(4), "package size 0 is less"),
-        (b"\x00\x05\xff\x00\x00", "unknown package type 255"),
-        (b"\x00\x05\x55\x01\x00", "1 bytes of values where the recipe has 8"),
-    ],
-    ids=["size", "type", "length"],
-)
-async def test_bytes_that_are_not_rtde_end_the_connection(
-    garbage: bytes, words: str, controller: Controller, connected: Connected, until: Until
+async def test_bytes_that_cannot_be_cut_into_packages_end_the_connection(
+    controller: Controller, connected: Connected, until: Until
 ) -> None:
     async with connected() as (_, seen):
         await until(lambda: seen.packages)
         controller.peer.stop()
-        controller.peer.writer.write(garbage)
+        controller.peer.writer.write(bytes(4))
         await until(lambda: seen.losses)
         assert seen.losses[0].reason is LossReason.PROTOCOL
-        assert words in seen.losses[0].text
+        assert "package size 0 is less" in seen.losses[0].text
         await until(lambda: len(seen.sessions) == 2)
+
+
+ODD = {
+    "unknown type": (b"\x00\x05\xff\x00\x00", Oddity.UNKNOWN_TYPE, "unknown package type 255"),
+    "properties": (b"\x00\x03\x52", Oddity.UNKNOWN_TYPE, "unknown package type 82"),
+    "data too short": (b"\x00\x05\x55\x01\x00", Oddity.RECIPE, "data package with 1 bytes of values where"),
+    "data too long": (
+        b"\x00\x0d\x55\x01" + bytes(9),
+        Oddity.RECIPE,
+        "data package with 9 bytes of values where",
+    ),
+    "data of another recipe": (b"\x00\x0c\x55\x02" + bytes(8), Oddity.RECIPE, "recipe 2 where 1 was agreed"),
+    "data without a recipe": (b"\x00\x03\x55", Oddity.LAYOUT, "DATA_PACKAGE with payload of 0 bytes"),
+    "trailing byte": (b"\x00\x05\x53\x01\x00", Oddity.LAYOUT, "START with payload of 2 bytes where 1 belong"),
+    "text of version 1": (b"\x00\x0a\x4d\x03legacy", Oddity.LAYOUT, "TEXT_MESSAGE with source length 97"),
+    "pause": (b"\x00\x04\x50\x01", Oddity.UNEXPECTED, "PauseReply while data was awaited"),
+    "inputs": (b"\x00\x08\x49\x01BOOL", Oddity.UNEXPECTED, "InputsSetup while data was awaited"),
+    "outputs": (b"\x00\x08\x4f\x01BOOL", Oddity.UNEXPECTED, "OutputsSetup while data was awaited"),
+    "version": (b"\x00\x04\x56\x01", Oddity.UNEXPECTED, "ProtocolVersionReply while data was awaited"),
+    "refusal": (b"\x00\x04\x53\x00", Oddity.UNEXPECTED, "a refused start of the output that runs"),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+async def test_an_odd_package_is_counted_reported_once_and_ends_no_session(
+    name: str, controller: Controller, connected: Connected, until: Until
+) -> None:
+    odd, oddity, words = ODD[name]
+    async with connected() as (client, seen):
+        await until(lambda: seen.packages)
+        for count in (1, 2, 3):
+            controller.peer.writer.write(odd)
+            await until(lambda: client.statistics.strange.by_oddity[oddity] == count)  # noqa: B023
+        packages = len(seen.packages)
+        await until(lambda: len(seen.packages) > packages + 10)
+        (reported,) = seen.strange_packages
+        assert reported.oddity is oddity
+        assert words in reported.reason
+        assert client.statistics.strange.total == 3
+        assert (len(seen.sessions), seen.losses) == (1, [])
+        assert all(len(values) == 1 and values[0] >= 100.0 for values in seen.packages)
+
+
+async def test_a_text_in_the_layout_of_version_1_is_a_text_all_the_same(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected() as (_, seen):
+        await until(lambda: seen.packages)
+        controller.peer.writer.write(b"\x00\x0a\x4d\x02caf\xe9!!")
+        await until(lambda: seen.texts)
+        assert seen.texts == [messages.TextMessage("caf\\xe9!!", "", 2)]
+
+
+async def test_odd_packages_amid_the_set_up_and_answers_with_more_behind_them_do_no_harm(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    def spoil(package: bytes) -> bytes:
+        kind = package[2]
+        odd = b"\x00\x04\x52\x00" + b"\x00\x04\x50\x01" + b"\x00\x05\x99\x00\x00"
+        if kind in (messages.PackageType.DATA_PACKAGE, messages.PackageType.SETUP_INPUTS, 79):
+            return odd + package
+        return odd + (len(package) + 2).to_bytes(2) + package[2:] + b"\x00\x00"
+
+    controller.script.spoil = spoil
+    async with connected(inputs=("input_int_register_0",)) as (client, seen):
+        await until(lambda: len(seen.packages) > 10)
+        assert (len(seen.sessions), seen.losses) == (1, [])
+        assert client.session is not None
+        assert client.session.controller == E_SERIES
+        assert {one.oddity for one in seen.strange_packages} == {
+            Oddity.UNKNOWN_TYPE,
+            Oddity.LAYOUT,
+            Oddity.UNEXPECTED,
+        }
+
+
+async def test_a_flood_of_odd_packages_is_no_data_and_the_loss_says_what_came_instead(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected(data_timeout=0.1) as (_, seen):
+        await until(lambda: seen.packages)
+        controller.peer.stop()
+        while not seen.losses:
+            controller.peer.writer.write(b"\x00\x0c\x55\x07" + bytes(8))
+            await asyncio.sleep(0.002)
+        assert seen.losses[0].reason is LossReason.SILENT
+        assert "data package of recipe 7 where 1 was agreed" in seen.losses[0].text
+        assert len(seen.strange_packages) == 1
+
+
+async def test_who_speaks_another_protocol_is_shown(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.spoil = lambda _: b"SSH-2.0-OpenSSH_9.2\r\n"
+    async with connected(handshake_timeout=0.1) as (_, seen):
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.UNANSWERED
+        assert "21 of 21331 bytes of unknown type 72: 53 53 48 2d" in seen.losses[0].text
+
+
+async def test_what_the_controller_does_not_send_while_we_pause_it_is_not_skipped(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected() as (client, seen):
+        await until(lambda: seen.packages)
+        await client.pause()
+        controller.peer.step += 250
+        await client.resume()
+        packages = len(seen.packages)
+        await until(lambda: len(seen.packages) > packages + 10)
+        assert (client.statistics.skipped, client.statistics.pauses) == (0, 0)
+        assert not seen.losses
+
+
+async def test_a_controller_that_stands_still_pauses_once(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    async with connected() as (client, seen):
+        await until(lambda: seen.packages)
+        controller.peer.step += 250
+        await until(lambda: client.statistics.pauses)
+        assert (client.statistics.skipped, client.statistics.pauses) == (0, 1)
+        assert not seen.losses
 
 
 async def test_what_came_before_an_error_is_still_handed_on(

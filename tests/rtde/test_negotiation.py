@@ -33,7 +33,7 @@ def talk(wishes: Wishes, replies: Sequence[m.ControllerMessage]) -> tuple[Negoti
 
 def test_the_whole_way_in_version_2() -> None:
     negotiation, steps = talk(WISHES, TO_RUNNING)
-    assert steps == [
+    assert [step[:2] for step in steps] == [
         (m.RequestProtocolVersion(2), None),
         (m.GetControllerVersion(), None),
         (m.SetupOutputs(("timestamp", "output_int_register_0", "input_int_register_0"), 500.0), None),
@@ -138,8 +138,8 @@ def test_claimed_later_the_session_has_the_new_recipe() -> None:
     assert negotiation.retry_claims() == m.SetupInputs(("input_int_register_0",))
     assert negotiation.waiting
     assert negotiation.retry_claims() is None
-    assert negotiation.handle(DATA) == (None, None)
-    assert negotiation.handle(m.InputsSetup(1, ("INT32",))) == (None, Notice.INPUTS_CHANGED)
+    assert negotiation.handle(DATA)[:2] == (None, None)
+    assert negotiation.handle(m.InputsSetup(1, ("INT32",)))[:2] == (None, Notice.INPUTS_CHANGED)
     assert negotiation.session().inputs["registers"].id == 1
     assert negotiation.session().unavailable == ()
     assert before.inputs == {}
@@ -149,18 +149,17 @@ def test_claimed_later_the_session_has_the_new_recipe() -> None:
 def test_retried_in_vain_nothing_is_told() -> None:
     negotiation, _ = talk(WISHES, (*TO_INPUTS, m.InputsSetup(0, ("IN_USE",)), m.StartReply(True)))
     negotiation.retry_claims()
-    assert negotiation.handle(m.InputsSetup(0, ("IN_USE",))) == (None, None)
+    assert negotiation.handle(m.InputsSetup(0, ("IN_USE",)))[:2] == (None, None)
 
 
 def test_data_is_as_good_as_the_answer_to_a_start() -> None:
     negotiation, steps = talk(WISHES, (*TO_START, DATA))
-    assert steps[-1] == (None, Notice.STARTED)
-    assert negotiation.handle(m.StartReply(True)) == (None, None)
+    assert steps[-1][:2] == (None, Notice.STARTED)
+    assert negotiation.handle(m.StartReply(True))[:2] == (None, None)
 
 
-@pytest.mark.parametrize("replies", [TO_START, (*TO_START, DATA)], ids=["first", "after data"])
-def test_a_refused_start_ends_the_talk(replies: Sequence[m.ControllerMessage]) -> None:
-    negotiation, _ = talk(WISHES, replies)
+def test_a_refused_start_ends_the_talk() -> None:
+    negotiation, _ = talk(WISHES, TO_START)
     with pytest.raises(HandshakeError, match="refused to start"):
         negotiation.handle(m.StartReply(False))
 
@@ -172,9 +171,6 @@ def test_a_refused_start_ends_the_talk(replies: Sequence[m.ControllerMessage]) -
         ((*TO_OUTPUTS, m.OutputsSetup(0, ("NOT_FOUND",) * 3)), "none of the wanted outputs"),
         ((*TO_OUTPUTS, m.OutputsSetup(0, ("DOUBLE", "INT32", "INT32"))), "without naming a field"),
         ((*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",))), "1 types for 3 fields"),
-        ((m.StartReply(True),), "StartReply while the answer to protocol version 2 was awaited"),
-        ((*TO_RUNNING, E_SERIES), "ControllerVersion while data was awaited"),
-        ((*TO_RUNNING, m.InputsSetup(1, ())), "not asked for"),
     ],
 )
 def test_what_ends_the_talk(replies: Sequence[m.ControllerMessage], words: str) -> None:
@@ -182,44 +178,86 @@ def test_what_ends_the_talk(replies: Sequence[m.ControllerMessage], words: str) 
         talk(WISHES, replies)
 
 
+@pytest.mark.parametrize(
+    "replies, answer, words",
+    [
+        ((), m.StartReply(True), "StartReply while the answer to protocol version 2 was awaited"),
+        (TO_OUTPUTS, m.PauseReply(True), "PauseReply while the answer to the output recipe was awaited"),
+        (TO_RUNNING, E_SERIES, "ControllerVersion while data was awaited"),
+        (TO_RUNNING, m.InputsSetup(1, ()), "InputsSetup while data was awaited"),
+        (TO_RUNNING, m.ProtocolVersionReply(True), "ProtocolVersionReply while data was awaited"),
+        (TO_RUNNING, m.OutputsSetup(1, ("DOUBLE",)), "OutputsSetup while data was awaited"),
+        ((*TO_START, DATA), m.StartReply(False), "a refused start of the output that runs"),
+    ],
+)
+def test_an_answer_that_nobody_awaits_changes_nothing(
+    replies: Sequence[m.ControllerMessage], answer: m.ControllerMessage, words: str
+) -> None:
+    negotiation, _ = talk(WISHES, replies)
+    state, waiting = negotiation.state, negotiation.waiting
+    assert negotiation.handle(answer) == NextStep(strange=words, taken=False)
+    assert (negotiation.state, negotiation.waiting) == (state, waiting)
+
+
+@pytest.mark.parametrize("words", [(), ("INT32",) * 2])
+def test_a_claim_answered_with_too_many_or_no_types_is_refused_and_asked_again(
+    words: tuple[str, ...],
+) -> None:
+    negotiation, steps = talk(WISHES, (*TO_INPUTS, m.InputsSetup(1, words)))
+    assert steps[-1] == NextStep(m.Start(), strange=f"{len(words)} types for 1 inputs")
+    negotiation.handle(m.StartReply(True))
+    assert [(one.field, one.word) for one in negotiation.session().unavailable] == [
+        ("input_int_register_0", "REFUSED")
+    ]
+    assert negotiation.retry_claims() == m.SetupInputs(("input_int_register_0",))
+    assert negotiation.handle(m.InputsSetup(2, ("INT32",))).event is Notice.INPUTS_CHANGED
+
+
+@pytest.mark.parametrize("package", [m.DataPackage(2, bytes(16)), m.DataPackage(1, bytes(17))])
+def test_only_data_of_the_agreed_recipe_proves_a_start(package: m.DataPackage) -> None:
+    negotiation, steps = talk(WISHES, (*TO_START, package))
+    assert steps[-1] == NextStep()
+    assert not negotiation.running
+
+
 @pytest.mark.parametrize("replies", [(), TO_OUTPUTS, TO_INPUTS, TO_RUNNING], ids=len)
 def test_data_out_of_season_does_no_harm(replies: Sequence[m.ControllerMessage]) -> None:
     negotiation, _ = talk(WISHES, replies)
     state = negotiation.state
-    assert negotiation.handle(DATA) == (None, None)
+    assert negotiation.handle(DATA)[:2] == (None, None)
     assert negotiation.state is state
 
 
 def test_pause_and_resume() -> None:
     negotiation, _ = talk(WISHES, TO_RUNNING)
     assert negotiation.pause() == m.Pause()
-    assert negotiation.handle(DATA) == (None, None)
-    assert negotiation.handle(m.PauseReply(True)) == (None, Notice.PAUSED)
+    assert negotiation.handle(DATA)[:2] == (None, None)
+    assert negotiation.handle(m.PauseReply(True))[:2] == (None, Notice.PAUSED)
     assert negotiation.pause() is None
     assert not negotiation.running
     assert negotiation.resume() == m.Start()
-    assert negotiation.handle(m.StartReply(True)) == (None, Notice.RESUMED)
+    assert negotiation.handle(m.StartReply(True))[:2] == (None, Notice.RESUMED)
     assert negotiation.running
 
 
 def test_a_pause_during_the_set_up_is_kept() -> None:
     negotiation, _ = talk(WISHES, TO_INPUTS)
     assert negotiation.pause() is None
-    assert negotiation.handle(m.InputsSetup(1, ("INT32",))) == (None, Notice.STARTED)
+    assert negotiation.handle(m.InputsSetup(1, ("INT32",)))[:2] == (None, Notice.STARTED)
     assert negotiation.state is State.PAUSED
 
 
 def test_a_pause_while_starting_and_a_resume_while_pausing_are_kept() -> None:
     negotiation, _ = talk(WISHES, TO_START)
     assert negotiation.pause() is None
-    assert negotiation.handle(m.StartReply(True)) == (m.Pause(), Notice.STARTED)
+    assert negotiation.handle(m.StartReply(True))[:2] == (m.Pause(), Notice.STARTED)
     assert negotiation.resume() is None
-    assert negotiation.handle(m.PauseReply(True)) == (m.Start(), Notice.PAUSED)
+    assert negotiation.handle(m.PauseReply(True))[:2] == (m.Start(), Notice.PAUSED)
 
 
 def test_a_session_can_begin_paused() -> None:
     negotiation, steps = talk(Wishes(running=False), (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",))))
-    assert steps[-1] == (None, Notice.STARTED)
+    assert steps[-1][:2] == (None, Notice.STARTED)
     assert negotiation.state is State.PAUSED
 
 

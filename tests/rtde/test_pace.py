@@ -26,10 +26,38 @@ def test_regular_packages_are_neither_skipped_nor_late(pace: Pace, statistics: S
     assert (statistics.packages, statistics.skipped, statistics.late) == (1000, 0, 0)
 
 
-@pytest.mark.parametrize("gap", [2, 3, 50])
+@pytest.mark.parametrize("gap", [2, 3, 12])
 def test_gaps_between_timestamps_are_skipped_packages(gap: int, pace: Pace, statistics: Statistics) -> None:
     assert pace.package(40.0 + gap * 0.008, gap * 0.008)
     assert (statistics.skipped, statistics.late) == (gap - 1, 0)
+
+
+@pytest.mark.parametrize("gap", [13, 50, 250])
+def test_a_controller_that_sends_nothing_for_a_while_pauses_and_skips_no_packages(
+    gap: int, pace: Pace, statistics: Statistics
+) -> None:
+    assert pace.package(40.0 + gap * 0.008, gap * 0.008)
+    assert (statistics.skipped, statistics.pauses, statistics.late) == (0, 1, 0)
+    assert pace.package(40.0 + (gap + 2) * 0.008, (gap + 2) * 0.008)
+    assert (statistics.skipped, statistics.pauses) == (1, 1)
+
+
+@pytest.mark.parametrize("gap", [2, 250])
+def test_what_was_not_sent_because_we_paused_the_output_is_not_missing(
+    gap: int, pace: Pace, statistics: Statistics
+) -> None:
+    pace.resume()
+    assert pace.package(40.0 + gap * 0.008, gap * 0.008)
+    assert (statistics.skipped, statistics.pauses) == (0, 0)
+    assert pace.package(40.0 + (gap + 3) * 0.008, (gap + 3) * 0.008)
+    assert (statistics.skipped, statistics.pauses) == (2, 0)
+
+
+def test_a_slow_rate_skips_several_packages_before_it_is_a_pause(statistics: Statistics) -> None:
+    slow = Pace(0.1, statistics, 0.0)
+    for timestamp in (40.0, 40.5, 41.1):
+        assert slow.package(timestamp, timestamp - 40.0)
+    assert (statistics.skipped, statistics.pauses) == (4, 1)
 
 
 def test_a_package_held_up_on_the_way_is_late_once(pace: Pace, statistics: Statistics) -> None:

@@ -29,6 +29,7 @@ from gatewayd.rtde.messages import (
     StartReply,
 )
 from gatewayd.rtde.recipe import Recipe, Scalar
+from gatewayd.rtde.strange import StrangePackage
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.server import SimulatedController
@@ -68,7 +69,9 @@ class Client:
             data = await asyncio.wait_for(self.reader.read(65536), PATIENCE)
             if not data:
                 raise EOFError
-            self._messages.extend(self.protocol.receive(data))
+            for received in self.protocol.receive(data):
+                assert not isinstance(received, StrangePackage)
+                self._messages.append(received)
 
     async def ended(self) -> None:
         """Returns when the controller has closed the connection; TimeoutError if it does not."""

@@ -25,6 +25,8 @@ def control(simulator: SimulatedController) -> Control:
         ("clients", "ok 0"),
         ("  drop-clients  ", "ok 0"),
         ("text hello there", "ok"),
+        ("raw 00 03 52", "ok"),
+        ("raw 0x52", "error non-hexadecimal number found in fromhex() arg at position 1"),
         ("freeze on", "ok"),
         ("creep on", "ok"),
         ("delay 0.5", "ok"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 import socket
 import struct
@@ -95,6 +96,31 @@ async def test_malformed_bytes_cost_only_their_own_connection(
         await good.package()
     assert simulator.malformed == 1
     assert "package size 0 is less than its own header" in caplog.text
+
+
+async def test_a_type_that_it_does_not_know_is_met_with_silence_and_logged_once(
+    simulator: SimulatedController, client: type[Client], caplog: pytest.LogCaptureFixture
+) -> None:
+    """READ_PROPERTIES (82) is unknown to controllers before 5.27: they say nothing."""
+    caplog.set_level(logging.INFO)
+    async with client(simulator.port) as one:
+        for _ in range(3):
+            one.writer.write(b"\x00\x03\x52")
+        await one.stream("timestamp")
+        await one.package()
+    assert caplog.text.count("unknown package type 82, not answered") == 1
+    assert simulator.malformed == 0
+
+
+async def test_bytes_as_they_are_go_to_every_client(
+    simulator: SimulatedController, client: type[Client]
+) -> None:
+    async with client(simulator.port) as one, client(simulator.port) as other:
+        await one.negotiate()
+        await other.negotiate()
+        simulator.raw(bytes.fromhex("0008 4d 02 6869 00 01"))
+        for each in (one, other):
+            assert (await each.receive(TextMessage)).message == "hi"
 
 
 async def test_too_many_clients_are_turned_away(client: type[Client]) -> None:

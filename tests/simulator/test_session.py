@@ -29,6 +29,7 @@ from gatewayd.rtde.messages import (
     TextLevel,
     TextMessage,
 )
+from gatewayd.rtde.strange import StrangePackage
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import DropAt, DroppedError, Faults, FaultStep, LongLists
 from gatewayd.simulator.session import SimulatorSession
@@ -48,11 +49,18 @@ class Peer:
 
     def ask(self, *messages: ExecutableMessage) -> list[ControllerMessage]:
         data = b"".join(map(self.protocol.send, messages))
-        return list(self.protocol.receive(self.session.receive(data)))
+        return self.answers(self.session.receive(data))
 
     def cycle(self) -> list[ControllerMessage]:
         self.controller.advance()
-        return list(self.protocol.receive(self.session.package()))
+        return self.answers(self.session.package())
+
+    def answers(self, data: bytes) -> list[ControllerMessage]:
+        answers: list[ControllerMessage] = []
+        for message in self.protocol.receive(data):
+            assert not isinstance(message, StrangePackage)
+            answers.append(message)
+        return answers
 
 
 @pytest.fixture
@@ -247,6 +255,16 @@ def test_a_list_beyond_2048_bytes_is_complained_of() -> None:
     names = MANY
     assert text(peer.ask(SetupInputs(names))) == "list of 2235 bytes is longer than 2048"
     assert peer.ask(SetupInputs(names[:80]))[0] == InputsSetup(1, ("INT32",) * 48 + ("DOUBLE",) * 32)
+
+
+def test_what_is_not_laid_out_as_its_type_says_is_complained_of_and_costs_no_connection() -> None:
+    peer = Peer(Controller())
+    peer.ask(SetupOutputs(("timestamp",), 0.0))
+    short, long = bytes.fromhex("0004 4f 00"), bytes.fromhex("0004 53 00")
+    assert text(peer.answers(peer.session.receive(short))).startswith("SETUP_OUTPUTS with payload of 1 bytes")
+    complaint, started = peer.answers(peer.session.receive(long))
+    assert text([complaint]) == "START with payload of 1 bytes where 0 belong"
+    assert started == StartReply(accepted=True)
 
 
 def test_a_greeting_comes_in_version_1_layout() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
-from gatewayd.links.contract import Description, LinkKind, Names
+from gatewayd.links.contract import Description, LinkKind, LinkMetric, Names
 from gatewayd.links.robot.companions import all_inputs, all_outputs
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
 from gatewayd.mapping.plan import LinkPlan
@@ -27,7 +27,10 @@ class RobotKind(LinkKind):
         "age": "seconds since the last package that reported anything new, or null",
         "frequency": "packages per second, measured",
         "packages": "packages received",
-        "skipped": "packages that the controller left out",
+        "skipped": "packages that the controller left out, being busy",
+        "pauses": "times that the controller sent nothing for so long that it is no skipping; its clock went on",
+        "strange": "packages that could not be taken as they came, by what is odd about them: `unknown type`, "
+        "`layout`, `recipe` (data of another one), `unexpected` (an answer to nothing)",
         "late": "packages that came late",
         "sessions": "sessions with the controller; the first one is no reconnect",
         "mismatches": "inputs whose read-back differed from what was written",
@@ -37,6 +40,20 @@ class RobotKind(LinkKind):
         "adoption": "seconds until adopted inputs without an owner fall back; 0: none will",
         "watchdog": "whether the robot's watchdog is fed, or null without one",
     }
+
+    metrics = (
+        LinkMetric(
+            "gatewayd_robot_pauses_total",
+            "pauses",
+            "times the controller sent nothing while its clock went on",
+        ),
+        LinkMetric(
+            "gatewayd_robot_strange_packages_total",
+            "strange",
+            "packages of the controller that could not be taken as they came, by what is odd about them",
+            label="oddity",
+        ),
+    )
 
     def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
         """The session goes on where its settings and claimed inputs are the same, and all outputs are subscribed."""

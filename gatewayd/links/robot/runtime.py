@@ -33,6 +33,7 @@ from gatewayd.rtde.client import RtdeClient
 from gatewayd.rtde.loss import Loss, LossReason
 from gatewayd.rtde.messages import TextMessage
 from gatewayd.rtde.session import ClientSettings, Session
+from gatewayd.rtde.strange import StrangePackage
 
 __all__ = ["LAST_WORDS", "LOSS_INTERVAL", "RUNTIME", "RobotLink"]
 
@@ -100,7 +101,14 @@ class RobotLink(SourceLink):
         """The session; how fresh what it brings is, the cell knows."""
         where = address(self._plan.host, self._plan.port)
         trouble = self._loss_reported[0].removeprefix(f"{where}: ")
-        figures = {"address": where, "trouble": trouble, "watchdog": self._watchdog_fed()}
+        statistics = self._client.statistics
+        figures: dict[str, object] = {
+            "address": where,
+            "trouble": trouble,
+            "watchdog": self._watchdog_fed(),
+            "pauses": statistics.pauses,
+            "strange": {oddity.value: count for oddity, count in statistics.strange.by_oddity.items()},
+        }
         if self._client.session is not None:
             return LinkHealth("Robot", Level.GOOD, "connected", where, figures=figures)
         problems = (trouble,) if trouble else ()
@@ -301,6 +309,17 @@ class RobotLink(SourceLink):
                 text=message.message,
                 source=message.source or None,
                 level=message.level,
+            ),
+        )
+
+    def strange(self, package: StrangePackage) -> None:
+        """A package could not be taken as it came; the session goes on, and further ones like it are only counted."""
+        log.warning(
+            "strange package",
+            extra=fields(
+                cell=self._cell.definition.name,
+                kind=package.oddity.value,
+                reason=str(package),
             ),
         )
 

@@ -300,6 +300,19 @@ async def test_the_same_failure_is_told_once(
         await until(lambda: rig.cell.accepts_writes)
 
 
+async def test_a_package_that_cannot_be_taken_is_counted_and_logged_once(
+    rigged: Rigged, until: Until, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with rigged() as rig:
+        await until(lambda: rig.cell.accepts_writes)
+        for count in (1, 2, 3):
+            rig.robot.raw(bytes.fromhex("0004 52 00"))
+            await until(lambda: rig.link.health().figures["strange"]["unknown type"] == count)  # type: ignore[index]  # noqa: B023
+        lines = [record for record in caplog.records if record.message == "strange package"]
+        assert [line.fields["reason"] for line in lines] == ["unknown package type 82: 00 04 52 00"]  # type: ignore[attr-defined]
+        assert rig.cell.health.sessions == 1
+
+
 async def test_what_is_due_is_sent_before_the_end(rigged: Rigged, until: Until) -> None:
     async with rigged() as rig:
         await until(lambda: rig.cell.accepts_writes)
