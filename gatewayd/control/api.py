@@ -9,27 +9,41 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from gatewayd import __version__
+from gatewayd.control.names import NamePattern
 from gatewayd.control.views import (
     Declarations,
     cell_view,
     event_view,
     lock_view,
     record_view,
+    variable_state,
     variable_view,
 )
 from gatewayd.core.definition import Value, ValueKind
+from gatewayd.core.events import Event, EventKind, EventRing
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.loop.share import LoopShare
 from gatewayd.report.schema import EventMessage, Json, LockStatus, Status, VersionInfo
 from gatewayd.report.verdict import ServedCell
 from gatewayd.service.audit import Audit, Record, utc
 
-__all__ = ["API_VERSION", "MAX_FORCE", "STALE_ACT", "Api", "ApiError", "Cursor", "Gateway", "Moment"]
+__all__ = [
+    "API_VERSION",
+    "MAX_FORCE",
+    "NEWS",
+    "STALE_ACT",
+    "Api",
+    "ApiError",
+    "Cursor",
+    "Gateway",
+    "Moment",
+    "Work",
+]
 
 API_VERSION = 1
 STALE_ACT = 0.5
@@ -37,8 +51,14 @@ STALE_ACT = 0.5
 MAX_FORCE = 24 * 3600.0
 """Seconds that a force may last at most; it can be renewed."""
 _MAX_VALUE = sys.float_info.max
+_KINDS_OF_EVENTS = tuple(kind.value for kind in EventKind)
+_Item = TypeVar("_Item")
 _MAX_ANSWER = 1000
 """Events or records in one answer."""
+NEWS = 100
+"""Events of one cell that a follower gets at one time; the rest comes with the next look."""
+Work = Generator[None, None, Json]
+"""An answer in the making: it pauses after each short step. Its values are of one moment, however long it takes."""
 
 
 class ApiError(Exception):
@@ -96,6 +116,8 @@ class Api:
         self._audit = audit
         self._notes = notes
         self._declarations = Declarations()
+        self.share = LoopShare()
+        """Of the loop's time, for answers."""
 
     # -- questions -----------------------------------------------------------------------------------------------
 
@@ -103,10 +125,12 @@ class Api:
         """Versions of the interface and of the program."""
         return VersionInfo(api=API_VERSION, version=__version__, pid=os.getpid())
 
-    def status(self, moment: Moment) -> Status:
+    def status(self, moment: Moment) -> Generator[None, None, Status]:
         """Everything at a glance."""
-        runtimes = self._gateway.runtimes
-        cells = [cell_view(runtime, self._declarations.of(runtime.plan), moment.now) for runtime in runtimes]
+        runtimes, cells = self._gateway.runtimes, []
+        for runtime in runtimes:
+            cells.append(cell_view(runtime, self._declarations.of(runtime.plan), moment.now))
+            yield
         troubles = [*self._notes(), *self._gateway.troubles()]
         troubles += [f"{cell['name']}: {problem}" for cell in cells for problem in cell["problems"]]
         started = min((runtime.cell.health.started for runtime in runtimes), default=math.inf)
@@ -119,61 +143,84 @@ class Api:
             cells=cells,
         )
 
-    def variables(self, query: Mapping[str, str], moment: Moment) -> Json:
+    def variables(self, query: Mapping[str, str], moment: Moment) -> Work:
         """All variables; `cell` and `name` (with * and ?) choose some."""
-        pattern = query.get("name", "*")
-        return {
-            "time": utc(moment.wall),
-            "variables": [
-                self._view(runtime, index, moment)
-                for runtime in self._runtimes(query.get("cell"))
-                for index, variable in enumerate(runtime.cell.definition.variables)
-                if fnmatchcase(variable.name, pattern) or variable.name == pattern
-            ],
-        }
+        wanted = []
+        for runtime in self._runtimes(query.get("cell")):
+            indices = yield from _named(runtime, query.get("name"))
+            states = [variable_state(runtime.cell, index, moment.now) for index in indices]
+            wanted.append((self._declarations.of(runtime.plan).variables, indices, states))
+        found: list[Json] = []
+        for declared, indices, states in wanted:
+            for index, state in zip(indices, states, strict=True):
+                found.append(variable_view(declared[index], state))
+                yield
+        return {"time": utc(moment.wall), "variables": found}
 
-    def locks(self, query: Mapping[str, str], moment: Moment) -> Json:
+    def locks(self, query: Mapping[str, str], moment: Moment) -> Work:
         """All locks; `cell` chooses those of one cell."""
-        return {
-            "time": utc(moment.wall),
-            "locks": [
-                lock_view(runtime.cell, index, moment.now)
-                for runtime in self._runtimes(query.get("cell"))
-                for index in range(len(runtime.cell.definition.locks))
-            ],
-        }
+        found = []
+        for runtime in self._runtimes(query.get("cell")):
+            for index in range(len(runtime.cell.definition.locks)):
+                found.append(lock_view(runtime.cell, index, moment.now))
+                yield
+        return {"time": utc(moment.wall), "locks": found}
 
-    def events(self, query: Mapping[str, str], moment: Moment) -> Json:
-        """The last events, oldest first; `cell`, `limit` (100), and `after` with a sequence number of that cell."""
+    def events(self, query: Mapping[str, str], moment: Moment) -> Work:
+        """The last events, oldest first; `cell`, `kind`, `limit` (100), and `after` with a number of that cell."""
         limit, after = _count(query, "limit", 100), _count(query, "after", 0, most=2**53)
         runtimes = self._runtimes(query.get("cell"))
         if after and len(runtimes) > 1:
             raise ApiError(400, "bad_query", "`after` counts the events of one cell: say which with `cell`")
-        found = _in_order(numbered for runtime in runtimes for numbered in _events(runtime, after, moment))
-        return {"time": utc(moment.wall), "events": found[max(0, len(found) - limit) :]}
+        latest = sorted(
+            (event.time, number, name, event)
+            for name, runtime in enumerate(runtimes)
+            for number, event in _latest(runtime.cell.events, after, query.get("kind"), limit)
+        )
+        found = []
+        for _time, number, name, event in _last(latest, limit):
+            found.append(event_view(runtimes[name].cell, number, event, moment.now, moment.wall))
+            yield
+        return {"time": utc(moment.wall), "events": found}
 
     def new_events(self, cursor: Cursor, query: Mapping[str, str], moment: Moment) -> list[EventMessage]:
-        """What happened since the cursor was used last, and move it. A fresh cursor begins now.
+        """What happened since the cursor was used last, `NEWS` events of each cell at most, and move it.
 
-        The ring is the only buffer: who asks too seldom misses what it has forgotten, and sees it by `seq`.
+        A fresh cursor begins now. The ring is the only buffer: who asks too seldom misses what it has forgotten, and
+        sees it by `seq`.
         """
         found: list[tuple[float, EventMessage]] = []
         for runtime in self._runtimes(query.get("cell")):
             ring, name = runtime.cell.events, runtime.cell.definition.name
             read = cursor.get(name, ring.count)
             if read != ring.count:
-                found += _events(runtime, read if read < ring.count else 0, moment)
-            cursor[name] = ring.count
-        return _in_order(found)
+                news = ring.since(read if read < ring.count else 0)[:NEWS]
+                read = news[-1][0] if news else ring.count
+                found += [
+                    (event.time, event_view(runtime.cell, number, event, moment.now, moment.wall))
+                    for number, event in news
+                ]
+            cursor[name] = read
+        return [event for _, event in sorted(found, key=lambda timed: (timed[0], timed[1]["seq"]))]
 
-    def audit(self, query: Mapping[str, str], moment: Moment) -> Json:
+    def has_news(self, cursor: Cursor, query: Mapping[str, str]) -> bool:
+        """Whether `new_events` would find any. Cheap."""
+        runtimes = self._runtimes(query.get("cell"))
+        return any(
+            cursor.get(runtime.cell.definition.name) != runtime.cell.events.count for runtime in runtimes
+        )
+
+    def audit(self, query: Mapping[str, str], moment: Moment) -> Work:
         """The last records, oldest first; `cell`, `variable`, `writer` and `limit` (100) choose some."""
         limit = _count(query, "limit", 100)
         if "cell" in query:
             self._runtimes(query["cell"])
-        found = [record for record in self._audit if _is_wanted(record, query)]
-        latest = found[max(0, len(found) - limit) :]
-        return {"time": utc(moment.wall), "records": [record_view(record) for record in latest]}
+        wanted = [record for record in self._audit if _is_wanted(record, query)]
+        found = []
+        for record in _last(wanted, limit):
+            found.append(record_view(record))
+            yield
+        return {"time": utc(moment.wall), "records": found}
 
     # -- acts of the local operator ------------------------------------------------------------------------------
 
@@ -234,7 +281,7 @@ class Api:
 
     def _view(self, runtime: ServedCell, index: int, moment: Moment) -> Json:
         declared = self._declarations.of(runtime.plan).variables[index]
-        return variable_view(declared, runtime.cell, index, moment.now)
+        return variable_view(declared, variable_state(runtime.cell, index, moment.now))
 
     def _variable(self, name: str, body: Mapping[str, Any]) -> tuple[ServedCell, int]:
         found = [
@@ -282,16 +329,33 @@ def _only(found: list[tuple[ServedCell, int]], what: str, name: str) -> tuple[Se
     return found[0]
 
 
-def _events(runtime: ServedCell, after: int, moment: Moment) -> Iterator[tuple[float, EventMessage]]:
-    """The events that the ring still has, with sequence numbers beyond `after`."""
-    ring, cell = runtime.cell.events, runtime.cell
-    for seq, event in enumerate(ring, ring.count - len(ring) + 1):
-        if seq > after:
-            yield event.time, event_view(cell, seq, event, moment.now, moment.wall)
+def _named(runtime: ServedCell, pattern: str | None) -> Generator[None, None, Sequence[int]]:
+    """The variables whose names fit; `*` and `?` are wildcards."""
+    variables = runtime.cell.definition.variables
+    if pattern is None:
+        return range(len(variables))
+    try:
+        wanted = NamePattern(pattern)
+    except ValueError as error:
+        raise ApiError(400, "bad_query", f"`name` {error}") from None
+    found = []
+    for index, variable in enumerate(variables):
+        if wanted.fits(variable.name):
+            found.append(index)
+        yield
+    return found
 
 
-def _in_order(found: Iterable[tuple[float, EventMessage]]) -> list[EventMessage]:
-    return [event for _, event in sorted(found, key=lambda timed: (timed[0], timed[1]["seq"]))]
+def _latest(ring: EventRing, after: int, kind: str | None, limit: int) -> Sequence[tuple[int, Event]]:
+    if kind is None:
+        return ring.since(after, limit)
+    if kind not in _KINDS_OF_EVENTS:
+        raise ApiError(400, "bad_query", f"`kind` must be one of: {', '.join(_KINDS_OF_EVENTS)}")
+    return _last([kept for kept in ring.since(after) if kept[1].kind.value == kind], limit)
+
+
+def _last(found: Sequence[_Item], limit: int) -> Sequence[_Item]:
+    return found[max(0, len(found) - limit) :]
 
 
 def _is_wanted(record: Record, query: Mapping[str, str]) -> bool:

@@ -9,21 +9,23 @@ import pwd
 import socket
 import struct
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
 from contextlib import asynccontextmanager, suppress
 from functools import lru_cache
 from typing import Any
 
 from aiohttp import web
+from aiohttp.typedefs import Middleware
 
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
+from gatewayd.loop.share import Busy, LoopShare, in_one_step
 from gatewayd.loop.threads import in_daemon_thread
 from gatewayd.report.printable import json_text
 
-__all__ = ["ALIVE_PERIOD", "FOLLOWERS", "MAX_BODY", "application", "serving"]
+__all__ = ["ALIVE_PERIOD", "FOLLOWERS", "MAX_BODY", "application", "asker", "serving"]
 
 MAX_BODY = 64 * 1024
 """Bytes of a request's body."""
@@ -43,15 +45,15 @@ log = logging.getLogger("gatewayd.control")
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 _Act = Callable[[str, Mapping[str, Any], str, Moment], Mapping[str, object]]
-_Question = Callable[[Mapping[str, str], Moment], Mapping[str, object]]
+_Question = Callable[[Mapping[str, str], Moment], Generator[None, None, Mapping[str, object]]]
 
 
 @asynccontextmanager
 async def serving(listening: socket.socket, api: Api, reload: Reload | None) -> AsyncIterator[None]:
     """Serve on the socket while the context lasts."""
-    runner = web.AppRunner(
-        application(api, reload), access_log=None, handle_signals=False, shutdown_timeout=0.1
-    )
+    served = application(api, reload)
+    served.middlewares.insert(0, _in_turn(api.share))
+    runner = web.AppRunner(served, access_log=None, handle_signals=False, shutdown_timeout=0.1)
     await runner.setup()
     try:
         await web.SockSite(runner, listening).start()
@@ -65,7 +67,7 @@ def application(api: Api, reload: Reload | None) -> web.Application:
     routes = _Routes(api, reload)
     found = web.Application(client_max_size=MAX_BODY, middlewares=[routes.guard])
     questions: dict[str, _Question] = {
-        "version": lambda _query, _moment: api.version(),
+        "version": lambda _query, _moment: in_one_step(api.version),
         "status": lambda _query, moment: api.status(moment),
         "variables": api.variables,
         "locks": api.locks,
@@ -103,6 +105,8 @@ class _Routes:
             return await handler(request)
         except ApiError as error:
             return _error(error)
+        except Busy:
+            return _error(_BUSY)
         except web.HTTPException as error:
             return _error(_HTTP_ERRORS.get(error.status) or ApiError(error.status, "http", error.reason))
         except ConnectionError:
@@ -115,9 +119,18 @@ class _Routes:
 
     def answer(self, question: _Question) -> _Handler:
         async def handle(request: web.Request) -> web.StreamResponse:
-            return _json(question(request.query, _moment()))
+            return await self._answer(request, question)
 
         return handle
+
+    async def _answer(self, request: web.Request, question: _Question) -> web.StreamResponse:
+        query = dict(request.query)
+
+        def work() -> Generator[None, None, str]:
+            return (yield from _text_of((yield from question(query, _moment()))))
+
+        subject = request.path, tuple(sorted(query.items()))
+        return _response(await self._api.share.done_once(subject, asker(request), work))
 
     def act(self, act: _Act) -> _Handler:
         async def handle(request: web.Request) -> web.StreamResponse:
@@ -144,36 +157,47 @@ class _Routes:
     async def events(self, request: web.Request) -> web.StreamResponse:
         follow = request.query.get("follow")
         if follow is None or follow in ("0", "false"):
-            return _json(self._api.events(request.query, _moment()))
+            return await self._answer(request, self._api.events)
         if self._followers >= FOLLOWERS:
             raise ApiError(503, "busy", f"{FOLLOWERS} follow the events already")
-        moment, cursor = _moment(), Cursor()
-        limited = {"limit": "0"} | dict(request.query)
-        former = self._api.events(limited, moment)["events"]
-        self._api.new_events(cursor, request.query, moment)
         self._followers += 1
         try:
-            return await self._follow(request, cursor, former)
+            cursor, limited = Cursor(), {"limit": "0"} | dict(request.query)
+
+            def begin() -> Generator[None, None, str]:
+                former = yield from self._api.events(limited, _moment())
+                self._api.new_events(cursor, request.query, _moment())
+                return "".join(map(_line, former["events"]))
+
+            return await self._follow(request, cursor, await self._api.share.done(asker(request), begin()))
         finally:
             self._followers -= 1
 
-    async def _follow(
-        self, request: web.Request, cursor: Cursor, found: Sequence[Mapping[str, object]]
-    ) -> web.StreamResponse:
+    async def _follow(self, request: web.Request, cursor: Cursor, lines: str) -> web.StreamResponse:
         response = web.StreamResponse(
             headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"}
         )
         await response.prepare(request)
         sent_at = clock.now()
+
+        def news() -> Generator[None, None, str]:
+            found = []
+            for event in self._api.new_events(cursor, request.query, _moment()):
+                found.append(_line(event))
+                yield
+            return "".join(found)
+
         # A follower that is gone, or that leaves too much unread, gets nothing more.
-        with suppress(ConnectionError, TimeoutError):
+        with suppress(ConnectionError, TimeoutError, Busy):
             while True:
-                if found or clock.now() - sent_at >= ALIVE_PERIOD:
+                if lines or clock.now() - sent_at >= ALIVE_PERIOD:
                     sent_at = clock.now()
                     async with asyncio.timeout(_WRITE_TIME):
-                        await response.write("".join(map(_line, found)).encode() or b"\n")
+                        await response.write(lines.encode() or b"\n")
                 await asyncio.sleep(_FOLLOW_PERIOD)
-                found = self._api.new_events(cursor, request.query, _moment())
+                lines = ""
+                if self._api.has_news(cursor, request.query):
+                    lines = await self._api.share.done(asker(request), news())
         return response
 
 
@@ -184,17 +208,63 @@ _HTTP_ERRORS = {
 }
 
 
+_BUSY = ApiError(503, "busy", "too many ask at once: ask again, and more seldom")
+
+
+def asker(request: web.Request) -> str:
+    """Who gets turns: the address of a peer on the network; all that use the control socket are one."""
+    return request.remote or "control socket"
+
+
+def _in_turn(share: LoopShare) -> Middleware:
+    """Whoever asks waits for his turn. Whoever acts does not: it costs little, and somebody may need it now."""
+
+    @web.middleware
+    async def in_turn(request: web.Request, handler: _Handler) -> web.StreamResponse:
+        if request.method != "POST":
+            try:
+                await share.request(asker(request))
+            except Busy:
+                return _error(_BUSY)
+        return await handler(request)
+
+    return in_turn
+
+
 def _moment() -> Moment:
     return Moment(clock.now(), time.time())
 
 
 def _line(event: Mapping[str, object]) -> str:
-    return json_text(json.dumps(event, ensure_ascii=False, separators=(",", ":"))) + "\n"
+    return _compact(event) + "\n"
+
+
+def _compact(value: object) -> str:
+    return json_text(json.dumps(value, ensure_ascii=False, separators=(",", ":")))
+
+
+def _text_of(answer: Mapping[str, object]) -> Generator[None, None, str]:
+    """The same as `_line`, one element of its lists in each step."""
+    members = []
+    for name, value in answer.items():
+        if isinstance(value, list):
+            elements = []
+            for element in value:
+                elements.append(_compact(element))
+                yield
+            members.append(f'"{name}":[{",".join(elements)}]')
+        else:
+            members.append(f'"{name}":{_compact(value)}')
+    return "{" + ",".join(members) + "}\n"
 
 
 def _json(value: Mapping[str, object], status: int = 200) -> web.Response:
+    return _response(_line(value), status)
+
+
+def _response(text: str, status: int = 200) -> web.Response:
     headers = {"Cache-Control": "no-store"}
-    return web.Response(text=_line(value), status=status, content_type="application/json", headers=headers)
+    return web.Response(text=text, status=status, content_type="application/json", headers=headers)
 
 
 def _error(error: ApiError) -> web.Response:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import OPERATOR, Direction, Fallback, FallbackKind
+from gatewayd.core.definition import OPERATOR, Direction, Fallback, FallbackKind, Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality
 from gatewayd.links.contract import Description
@@ -37,14 +37,18 @@ from gatewayd.service.audit import Record, plain_value, utc
 __all__ = [
     "Declarations",
     "Declared",
+    "VariableState",
     "cell_view",
     "declare",
     "event_view",
     "lock_view",
     "record_view",
+    "variable_state",
     "variable_view",
 ]
 
+VariableState = tuple[Value, Quality, float, str | None, float | None, tuple[Value, float] | None]
+"""Value, quality and age, the owner and its lease, the forced value and its time left; None: there is none."""
 _QUALITIES = tuple(quality.name.lower() for quality in Quality)
 
 
@@ -183,21 +187,34 @@ def _source(cell: Cell, now: float) -> Json:
     }
 
 
-def variable_view(declared: Json, cell: Cell, index: int, now: float) -> Json:
-    """One variable: what is `declared` of it, and how it is now."""
+def variable_state(cell: Cell, index: int, now: float) -> VariableState:
+    """How one variable is at this moment: all that changes. Cheap, so that a list of all is of one moment."""
     lock = cell.definition.variables[index].lock
     owner = cell.ownership.owners[lock] if lock is not None else None
     force = cell.forcing.forces.get(index)
+    return (
+        cell.image.values[index],
+        cell.image.quality[index],
+        cell.image.age(index, now),
+        None if owner is None else cell.definition.writer_name(owner),
+        None if lock is None or owner is None else cell.ownership.remaining(lock, now),
+        None if force is None else (force.value, force.until - now),
+    )
+
+
+def variable_view(declared: Json, state: VariableState) -> Json:
+    """One variable: what is `declared` of it, and how it is."""
+    value, quality, age, owner, lease, force = state
     # A literal, not a call of the type: this is asked for every variable of a full image, again and again.
     found: VariableStatus = {
-        "value": plain_value(cell.image.values[index]),
-        "quality": _QUALITIES[cell.image.quality[index]],
-        "age": _seconds(cell.image.age(index, now)),
-        "owner": None if owner is None else cell.definition.writer_name(owner),
-        "lease": None if lock is None or owner is None else _seconds(cell.ownership.remaining(lock, now)),
+        "value": plain_value(value),
+        "quality": _QUALITIES[quality],
+        "age": _seconds(age),
+        "owner": owner,
+        "lease": None if lease is None else _seconds(lease),
         "forced": None
         if force is None
-        else {"value": plain_value(force.value), "remaining": _seconds(force.until - now)},
+        else {"value": plain_value(force[0]), "remaining": _seconds(force[1])},
     }
     return {**declared, **found}
 

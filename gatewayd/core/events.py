@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
 
 from gatewayd.core.definition import Value
+from gatewayd.core.history import History
 from gatewayd.core.match import Match, at
 from gatewayd.core.refusal import Reason
 
 __all__ = ["CAPACITY", "Event", "EventKind", "EventRing", "translated"]
 
 CAPACITY = 1000
-"""Events kept; older ones are forgotten."""
+"""Last events kept, whatever their kinds; of each kind older ones are kept beside them (`core.history`)."""
 
 
 class EventKind(Enum):
@@ -66,31 +66,43 @@ class Event:
 
 
 class EventRing:
-    """The last `CAPACITY` events, oldest first when iterated."""
+    """The last `capacity` events, and more of each kind, so that what is frequent does not drive out what is rare.
+
+    Oldest first when iterated.
+    """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
-        self._events: deque[Event] = deque(maxlen=capacity)
-        self.count = 0
-        """Events since the start, the forgotten ones included."""
+        self._history = History[Event](capacity)
+        self.latest: dict[EventKind, Event] = {}
+        """The last event of each kind."""
         self.listeners: list[Callable[[Event], None]] = []
+
+    @property
+    def count(self) -> int:
+        """Events since the start, the forgotten ones included: the number of the last one."""
+        return self._history.count
 
     def append(self, event: Event) -> None:
         """Keep the event and call the listeners."""
-        self._events.append(event)
-        self.count += 1
+        self._history.append(event.kind, event.time, event)
+        self.latest[event.kind] = event
         for listener in self.listeners:
             listener(event)
 
+    def since(self, number: int, most: int | None = None) -> list[tuple[int, Event]]:
+        """Events with greater numbers, `most` of them at most: the last ones, each with its number."""
+        return self._history.since(number, most)
+
     def succeed(self, former: EventRing, match: Match) -> None:
         """Go on with the events of `former`; nobody hears them again."""
-        self._events.extend(translated(event, match) for event in former)
-        self.count = former.count
+        self._history.succeed(former._history, lambda event: translated(event, match))
+        self.latest = {kind: translated(event, match) for kind, event in former.latest.items()}
 
     def __iter__(self) -> Iterator[Event]:
-        return iter(self._events)
+        return iter(self._history)
 
     def __len__(self) -> int:
-        return len(self._events)
+        return len(self._history)
 
 
 def translated(event: Event, match: Match) -> Event:

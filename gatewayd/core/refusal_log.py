@@ -10,8 +10,10 @@ from gatewayd.core.events import Event, translated
 from gatewayd.core.match import Match, at
 from gatewayd.core.refusal import Reason, Refusal
 
-__all__ = ["REFUSAL_INTERVAL", "LastRefusal", "RefusalLog"]
+__all__ = ["MAX_PEERS", "REFUSAL_INTERVAL", "LastRefusal", "RefusalLog"]
 
+MAX_PEERS = 64
+"""Hosts without a writer whose refusals are told apart."""
 REFUSAL_INTERVAL = 10.0
 """Seconds in which equal refusals are counted instead of reported again: a PLC may retry a hundred times a second."""
 
@@ -45,17 +47,32 @@ class _Reported:
     last: Event | None = None
 
 
+_Key = tuple[int | None, str, int | None, Reason | None]
+
+
 class RefusalLog:
-    """Refusals are equal if writer, variable and reason are. Each reported event stands for `1 + repeats` refusals."""
+    """Refusals are equal if writer, host of the peer, variable and reason are.
+
+    Each reported event stands for `1 + repeats` refusals, all of which it is true for. Where more than `MAX_PEERS`
+    undeclared hosts are refused within one interval, those of further ones are counted together, under no address.
+    """
 
     def __init__(self, report: Callable[[Event], None]) -> None:
         self._report = report
-        self._reported: dict[tuple[int | None, int | None, Reason | None], _Reported] = {}
+        self._reported: dict[_Key, _Reported] = {}
+        self._peers: set[str] = set()
+        """Undeclared hosts in `_reported`."""
         self._next = math.inf
 
     def add(self, event: Event) -> None:
         """A request was refused: report it, or count it if an equal one was reported within the interval."""
-        key = (event.writer, event.variable, event.reason)
+        host = _host(event.peer)
+        if host and host not in self._peers:
+            if len(self._peers) < MAX_PEERS:
+                self._peers.add(host)
+            else:
+                host, event = "", replace(event, peer="", detail="one of many peers")
+        key = (event.writer, host, event.variable, event.reason)
         reported = self._reported.get(key)
         if reported is not None and event.time - reported.time < REFUSAL_INTERVAL:
             reported.pending += 1
@@ -78,19 +95,26 @@ class RefusalLog:
             detail = f"the last {now - reported.last.time:.1f} s ago"
             self._report(replace(reported.last, time=now, repeats=reported.pending - 1, detail=detail))
             self._reported[key] = _Reported(now)
+        self._peers = {host for _, host, _, _ in self._reported if host}
         self._next = min(
             (reported.time + REFUSAL_INTERVAL for reported in self._reported.values()), default=math.inf
         )
 
     def succeed(self, former: RefusalLog, match: Match) -> None:
         """Go on counting what `former` counts; of what is gone, report what was only counted."""
-        for (writer, variable, reason), reported in former._reported.items():
+        for (writer, host, variable, reason), reported in former._reported.items():
             if (writer is None or writer in match.writers) and (
                 variable is None or variable in match.variables
             ):
-                key = at(match.writers, writer), at(match.variables, variable), reason
+                key = at(match.writers, writer), host, at(match.variables, variable), reason
                 reported.last = translated(reported.last, match) if reported.last is not None else None
                 self._reported[key] = reported
             elif reported.last is not None:
                 self._report(translated(replace(reported.last, repeats=reported.pending - 1), match))
+        self._peers = set(former._peers)
         self._next = former._next
+
+
+def _host(peer: str) -> str:
+    """The peer's address without the port, which is another one for each connection."""
+    return peer.rpartition(":")[0] or peer

@@ -198,12 +198,8 @@ def _good(cell: Cell) -> str:
 
 
 def _recent(cell: Cell, kind: EventKind, now: float) -> str:
-    for event in reversed(list(cell.events)):
-        if now - event.time > RECENT:
-            return ""
-        if event.kind is kind:
-            return event.detail
-    return ""
+    event = cell.events.latest.get(kind)
+    return "" if event is None or now - event.time > RECENT else event.detail
 
 
 # -- writers -----------------------------------------------------------------------------------------------------

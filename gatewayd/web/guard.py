@@ -16,8 +16,10 @@ from aiohttp import web
 from aiohttp.typedefs import Middleware
 from aiohttp.web_protocol import RequestHandler
 
+from gatewayd.control.server import asker
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
+from gatewayd.loop.share import Busy, LoopShare
 
 __all__ = ["HEADERS", "MAX_BODY", "MAX_CONNECTIONS", "PATIENCE", "Doors", "is_local_name", "middleware"]
 
@@ -108,8 +110,10 @@ def is_local_name(host: str) -> bool:
     return True
 
 
-def middleware(token: str | None, doors: Callable[[], Doors | None], *, local_only: bool) -> Middleware:
-    """Asks for the token, answers errors in one line, adds `HEADERS`.
+def middleware(
+    token: str | None, doors: Callable[[], Doors | None], share: LoopShare, *, local_only: bool
+) -> Middleware:
+    """Asks for the token, has who reads wait for his turn, answers errors in one line, adds `HEADERS`.
 
     With `local_only` the Host header has to be local: a page from elsewhere in a browser on this machine could
     otherwise read along under its own name (DNS rebinding).
@@ -118,7 +122,12 @@ def middleware(token: str | None, doors: Callable[[], Doors | None], *, local_on
     @web.middleware
     async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
         refusal = _refusal(request, token, local_only=local_only)
-        response = _plain(*refusal) if refusal is not None else await _answer(request, handler)
+        try:
+            if refusal is not None or request.method in _READING:
+                await share.request(asker(request))
+            response = _plain(*refusal) if refusal is not None else await _answer(request, handler)
+        except Busy:
+            response = _plain(503, "too many ask at once: ask again, and more seldom")
         for name, value in HEADERS.items():
             response.headers.setdefault(name, value)
         entrance = doors()
@@ -151,6 +160,8 @@ async def _answer(request: web.Request, handler: Handler) -> web.StreamResponse:
         if "Allow" in error.headers:
             response.headers["Allow"] = error.headers["Allow"]
         return response
+    except Busy:
+        raise
     except Exception:
         log.exception("a request could not be answered", extra=fields(path=request.path))
         return _plain(500, "internal error, see the log of the gateway")

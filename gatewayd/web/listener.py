@@ -10,14 +10,18 @@ import gzip
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from importlib.resources import files
+from typing import TypeVar
 
 from aiohttp import web
 
 from gatewayd import __version__
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import Reload
-from gatewayd.control.server import application
+from gatewayd.control.server import application, asker
 from gatewayd.loop import clock
+from gatewayd.loop.share import LoopShare, in_one_step
+from gatewayd.loop.threads import in_daemon_thread
+from gatewayd.mapping.plan import Plan
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.web import view
 from gatewayd.web.guard import MAX_BODY, MAX_CONNECTIONS, Doors, is_local_name, middleware
@@ -41,6 +45,8 @@ PAGE = {
 _WORTH_PACKING = 2048
 _CLOSING_TIME = 0.5
 
+_Result = TypeVar("_Result")
+
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
@@ -63,7 +69,9 @@ class StatusListener:
         self._probes = probes
         self._exposition = Exposition(probes, __version__)
         self._doors: Doors | None = None
-        guard = middleware(token, lambda: self._doors, local_only=_is_loopback(host))
+        self._share = api[0].share if api is not None else LoopShare()
+        self._layouts: dict[str, tuple[Plan, bytes]] = {}
+        guard = middleware(token, lambda: self._doors, self._share, local_only=_is_loopback(host))
         self._app = web.Application(middlewares=[guard], client_max_size=MAX_BODY)
         self._app.add_routes(self._routes())
         if api is not None:
@@ -118,26 +126,49 @@ class StatusListener:
         healthy, answer = health(self._probes.late)
         return _json(answer, status=200 if healthy else 503)
 
-    async def _readyz(self, _request: web.Request) -> web.Response:
+    async def _readyz(self, request: web.Request) -> web.Response:
         probes = self._probes
-        ready, answer = readiness(probes.verdicts(clock.now()), probes.late, probes.troubles())
+        ready, answer = await self._done(
+            request, lambda: readiness(probes.verdicts(clock.now()), probes.late, probes.troubles())
+        )
         return _json(answer, status=200 if ready else 503)
 
     async def _metrics(self, request: web.Request) -> web.Response:
-        return _packed(request, self._exposition.text(), {"Content-Type": CONTENT_TYPE})
+        body = await self._share.done_once("/metrics", asker(request), self._exposition.text)
+        return await _packed(request, body, {"Content-Type": CONTENT_TYPE})
 
-    async def _overview(self, _request: web.Request) -> web.Response:
-        return _json(view.overview(self._probes.daemon, __version__))
+    async def _overview(self, request: web.Request) -> web.Response:
+        body = await self._done(
+            request, lambda: view.as_json(view.overview(self._probes.daemon, __version__))
+        )
+        return web.Response(body=body, content_type="application/json")
 
     async def _layout(self, request: web.Request) -> web.Response:
-        body = view.as_json(view.layout(self._runtime(request)))
-        return _packed(request, body, {"Content-Type": "application/json"})
+        body = await self._done(request, lambda: self._layout_of(self._runtime(request)))
+        return await _packed(request, body, {"Content-Type": "application/json"})
+
+    def _layout_of(self, runtime: CellRuntime) -> bytes:
+        """Made once for each mapping: for a thousand variables it takes as long as many answers."""
+        name = runtime.cell.definition.name
+        plan, body = self._layouts.get(name, (None, b""))
+        if plan is not runtime.plan:
+            body = view.as_json(view.layout(runtime))
+            self._layouts[name] = runtime.plan, body
+        return body
 
     async def _state(self, request: web.Request) -> web.Response:
-        runtime = self._runtime(request)
         text = request.query.get("since", "0")
         since = int(text) if text.isascii() and text.isdigit() and len(text) < 16 else 0
-        return _json(view.state(runtime, self._probes, since, clock.now()))
+
+        def state() -> bytes:
+            return view.as_json(view.state(self._runtime(request), self._probes, since, clock.now()))
+
+        return web.Response(body=await self._done(request, state, since), content_type="application/json")
+
+    async def _done(self, request: web.Request, work: Callable[[], _Result], what: object = None) -> _Result:
+        """The result of a short work, in its turn, once for all who ask for the same meanwhile."""
+        subject = request.path, what
+        return await self._share.done_once(subject, asker(request), lambda: in_one_step(work))
 
     def _runtime(self, request: web.Request) -> CellRuntime:
         name = request.match_info["cell"]
@@ -151,10 +182,11 @@ def _json(document: object, status: int = 200) -> web.Response:
     return web.Response(body=view.as_json(document), status=status, content_type="application/json")
 
 
-def _packed(request: web.Request, body: bytes, headers: dict[str, str]) -> web.Response:
-    """What is large and seldom asked for is packed for those who can unpack it."""
+async def _packed(request: web.Request, body: bytes, headers: dict[str, str]) -> web.Response:
+    """What is large and seldom asked for is packed for those who can unpack it, by a thread."""
     if len(body) >= _WORTH_PACKING and "gzip" in request.headers.get("Accept-Encoding", ""):
-        body, headers = gzip.compress(body, 1), {**headers, "Content-Encoding": "gzip"}
+        body = await in_daemon_thread(lambda: gzip.compress(body, 1), "packing")
+        headers = {**headers, "Content-Encoding": "gzip"}
     return web.Response(body=body, headers=headers)
 
 
@@ -163,7 +195,7 @@ def _file(name: str, content_type: str) -> Handler:
     headers = {"Content-Type": f"{content_type}; charset=utf-8", "Cache-Control": "no-cache"}
 
     async def handle(request: web.Request) -> web.Response:
-        return _packed(request, body, headers)
+        return await _packed(request, body, headers)
 
     return handle
 

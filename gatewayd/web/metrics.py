@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
@@ -198,6 +198,8 @@ LINK_LABEL = "link"
 """Behind all others, the name of a link that is not called as its kind: a cell may have several of that."""
 _Samples = dict[tuple[str, ...], float]
 """Values of labels -> value."""
+_SamplesOf = defaultdict[str, _Samples]
+_HistogramsOf = defaultdict[str, dict[tuple[str, ...], Histogram]]
 
 
 class Exposition:
@@ -206,33 +208,33 @@ class Exposition:
     def __init__(self, probes: Probes, version: str) -> None:
         self._probes = probes
         self._version = version
-        self._registry = CollectorRegistry(auto_describe=False)
-        self._registry.register(self)
-        ProcessCollector(registry=self._registry)
+        self._process = ProcessCollector(registry=None)
 
-    def text(self) -> bytes:
-        """Everything at this moment, in `CONTENT_TYPE`."""
-        return generate_latest(self._registry)
-
-    def describe(self) -> Iterator[Metric]:
-        """Called when registering: names only."""
+    def text(self) -> Generator[None, None, bytes]:
+        """Everything at this moment, in `CONTENT_TYPE`; it pauses after each cell and each metric."""
+        samples, histograms = yield from self._read(clock.now())
+        found = []
         for info in METRICS:
-            yield _histogram(info, {}) if info.kind is MetricKind.HISTOGRAM else _family(info, {})
+            if info.kind is MetricKind.HISTOGRAM:
+                found.append(_lines(_histogram(info, histograms[info.name])))
+            elif samples[info.name]:
+                found.append(_lines(_family(info, samples[info.name])))
+            yield
+        return b"".join((*found, *map(_lines, self._process.collect())))
 
-    def collect(self) -> Iterator[Metric]:
-        """Called for each `text`."""
-        now = clock.now()
+    def _read(self, now: float) -> Generator[None, None, tuple[_SamplesOf, _HistogramsOf]]:
         daemon, probes = self._probes.daemon, self._probes
         troubles = probes.troubles()
         ready, _ = readiness(probes.verdicts(now), probes.late, troubles)
-        samples: defaultdict[str, _Samples] = defaultdict(dict)
+        samples: _SamplesOf = defaultdict(dict)
         samples["gatewayd_info"] = {(self._version,): 1}
         samples["gatewayd_ready"] = {(): ready}
         samples["gatewayd_parts_hanging"] = {(): len(probes.late)}
         samples["gatewayd_troubles"] = {(): len(troubles)}
-        histograms: defaultdict[str, dict[tuple[str, ...], Histogram]] = defaultdict(dict)
+        histograms: _HistogramsOf = defaultdict(dict)
         histograms["gatewayd_loop_lag_seconds"] = {(): probes.lag}
         for runtime in daemon.runtimes:
+            yield
             name, probe = runtime.cell.definition.name, probes.of(runtime.cell)
             moment = _Moment(runtime.cell, probe, now)
             for metric in _OF_CELLS:
@@ -242,11 +244,22 @@ class Exposition:
                 samples[link_metric] |= found
             histograms["gatewayd_package_to_image_seconds"][name,] = probe.package_to_image
             histograms["gatewayd_write_to_package_seconds"][name,] = probe.write_to_package
-        for info in METRICS:
-            if info.kind is MetricKind.HISTOGRAM:
-                yield _histogram(info, histograms[info.name])
-            elif samples[info.name]:
-                yield _family(info, samples[info.name])
+        return samples, histograms
+
+
+class _Alone(CollectorRegistry):
+    """A registry of one metric: the library writes what a registry has in one go."""
+
+    def __init__(self, metric: Metric) -> None:
+        super().__init__(auto_describe=False)
+        self._metric = metric
+
+    def collect(self) -> Iterator[Metric]:
+        yield self._metric
+
+
+def _lines(metric: Metric) -> bytes:
+    return generate_latest(_Alone(metric))
 
 
 def _samples(first: str, value: _Value, *last: str) -> _Samples:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 from collections import Counter
 from collections.abc import Callable, Iterable
-from itertools import islice
 
 from gatewayd.core.cell import Cell, Written
 from gatewayd.core.definition import Direction
@@ -62,9 +61,7 @@ class CellProbe:
 
     def _catch_up(self, ring: EventRing) -> None:
         """A ring that is younger than what was counted is a new one."""
-        missed = ring.count - self._counted if ring.count >= self._counted else ring.count
-        self._counted = ring.count - missed
-        for event in islice(ring, max(0, len(ring) - missed), None):
+        for _number, event in ring.since(self._counted if ring.count >= self._counted else 0):
             self._event(event)
         self._counted = ring.count
 

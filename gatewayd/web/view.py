@@ -14,7 +14,7 @@ from typing import Any
 from gatewayd.control.views import Declared, declare
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Lock
-from gatewayd.core.events import Event, EventKind
+from gatewayd.core.events import CAPACITY, Event, EventKind
 from gatewayd.core.image import Quality
 from gatewayd.links.registry import kinds
 from gatewayd.report.event_text import EventRecord
@@ -169,12 +169,12 @@ def _milliseconds(seconds: float) -> int | None:
 
 def _events(cell: Cell, since: int, now: float) -> list[dict[str, object]]:
     ring = cell.events
-    new = min(ring.count - since if 0 <= since <= ring.count else ring.count, len(ring))
     wall = time.time() - now
-    latest = islice(enumerate(ring, ring.count - len(ring) + 1), len(ring) - new, None)
-    runs = [list(run) for _, run in groupby(latest, _act)]
+    latest = ring.since(since if 0 <= since <= ring.count else 0, CAPACITY)
+    newest = (list(run) for _, run in groupby(reversed(latest), _act))
     return [
-        _event(run[0][1], cell, run[-1][0], wall + run[0][1].time, len(run) - 1) for run in runs[-EVENTS:]
+        _event(run[-1][1], cell, run[0][0], wall + run[-1][1].time, len(run) - 1)
+        for run in reversed(list(islice(newest, EVENTS)))
     ]
 
 

@@ -13,6 +13,7 @@ from gatewayd.core.cell import Cell, Change
 from gatewayd.core.requester import Requester
 from gatewayd.service.audit import Audit
 from tests.control.served import CYCLES, SPEED, FixedGateway, Served, at, bring_up, plan
+from tests.works import finished
 
 
 @pytest.fixture
@@ -25,7 +26,9 @@ def served() -> Served:
 def glimpse(served: Served, now: float = 1.0) -> Glimpse:
     api = Api(FixedGateway([served]), Audit())
     return Glimpse(
-        api.status(at(now)), api.variables({}, at(now))["variables"], api.events({}, at(now))["events"]
+        finished(api.status(at(now))),
+        finished(api.variables({}, at(now)))["variables"],
+        finished(api.events({}, at(now)))["events"],
     )
 
 

@@ -6,14 +6,15 @@ from typing import Any
 
 import pytest
 
-from gatewayd.control.api import Api, ApiError, Cursor
+from gatewayd.control.api import NEWS, Api, ApiError, Cursor
 from gatewayd.core.cell import Cell, Change
 from gatewayd.core.definition import OPERATOR
-from gatewayd.core.events import EventKind
+from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
 from gatewayd.service.audit import Audit
-from tests.control.served import LIMIT, SPEED, FixedGateway, Served, at, bring_up, plan
+from tests.control.served import LIMIT, PATH, SPEED, FixedGateway, Served, at, bring_up, plan
+from tests.works import finished
 
 PLC = 0
 BY = "by anna"
@@ -29,48 +30,60 @@ def refused(status: int, code: str, act: Any, *args: Any) -> str:
 
 class TestStatus:
     def test_is_healthy_only_if_the_gateway_itself_is(self, api: Api, gateway: FixedGateway) -> None:
-        assert api.status(at(0.1))["healthy"]
+        assert finished(api.status(at(0.1)))["healthy"]
         gateway.wrong = ["not listening on 127.0.0.1:1502"]
-        status = api.status(at(0.1))
+        status = finished(api.status(at(0.1)))
         assert not status["healthy"]
         assert status["problems"] == ["not listening on 127.0.0.1:1502"]
 
     def test_names_the_cell_of_a_problem(self, api: Api, press: Served) -> None:
         press.cell.robot_lost("gone", 1.0)
-        assert api.status(at(2.0))["problems"] == ["press: robot not connected for 2 s"]
+        assert finished(api.status(at(2.0)))["problems"] == ["press: robot not connected for 2 s"]
 
     def test_tells_standing_notes(self, gateway: FixedGateway, audit: Audit) -> None:
         api = Api(gateway, audit, lambda: ["1 mapping file not served, see the log"])
-        assert not api.status(at(0.1))["healthy"]
+        assert not finished(api.status(at(0.1)))["healthy"]
 
     def test_needs_no_cell(self, audit: Audit) -> None:
-        status = Api(FixedGateway([]), audit).status(at(5.0))
+        status = finished(Api(FixedGateway([]), audit).status(at(5.0)))
         assert (status["cells"], status["uptime"]) == ([], 0.0)
 
 
 class TestQuestions:
     def test_names_may_have_wildcards(self, api: Api) -> None:
-        names = [one["name"] for one in api.variables({"name": "tcp*"}, at(1.0))["variables"]]
+        names = [one["name"] for one in finished(api.variables({"name": "tcp*"}, at(1.0)))["variables"]]
         assert names == [f"tcp[{n}]" for n in range(6)]
 
     def test_a_name_with_brackets_means_itself(self, api: Api) -> None:
-        names = [one["name"] for one in api.variables({"name": "tcp[3]"}, at(1.0))["variables"]]
+        names = [one["name"] for one in finished(api.variables({"name": "tcp[3]"}, at(1.0)))["variables"]]
         assert names == ["tcp[3]"]
 
+    def test_a_pattern_is_bounded(self, api: Api) -> None:
+        message = refused(400, "bad_query", lambda: finished(api.variables({"name": "*" * 4096}, at(1.0))))
+        assert message == "`name` has 4096 characters, at most 128 are allowed"
+
+    def test_a_list_is_of_one_moment_however_long_it_takes(self, api: Api, press: Served) -> None:
+        assert press.cell.write(Requester(PLC), [Change(SPEED, 1.0), Change(PATH, 1)], 1.0) is None
+        work = api.variables({}, at(1.0))
+        next(work)
+        assert press.cell.write(Requester(PLC), [Change(SPEED, 2.0), Change(PATH, 2)], 1.1) is None
+        found = {one["name"]: one["value"] for one in finished(work)["variables"]}
+        assert (found["speed"], found["path"]) == (1.0, 1)
+
     def test_an_unknown_cell_names_the_known(self, api: Api) -> None:
-        message = refused(404, "no_such_cell", api.variables, {"cell": "pres"}, at(1.0))
+        message = refused(404, "no_such_cell", lambda: finished(api.variables({"cell": "pres"}, at(1.0))))
         assert message == "there is no cell pres; there is press"
 
     def test_a_reloaded_mapping_is_seen(self, api: Api, press: Served) -> None:
-        assert api.variables({"name": "cycles"}, at(1.0))["variables"]
+        assert finished(api.variables({"name": "cycles"}, at(1.0)))["variables"]
         press.plan = plan(extra="parts")
         press.cell = Cell(press.plan.cell)
-        assert not api.variables({"name": "cycles"}, at(1.0))["variables"]
-        assert api.variables({"name": "parts"}, at(1.0))["variables"]
+        assert not finished(api.variables({"name": "cycles"}, at(1.0)))["variables"]
+        assert finished(api.variables({"name": "parts"}, at(1.0)))["variables"]
 
     def test_locks(self, api: Api, press: Served) -> None:
         assert press.cell.write(Requester(PLC), [Change(SPEED, 1.0)], 1.0) is None
-        locks = {one["name"]: one for one in api.locks({}, at(1.5))["locks"]}
+        locks = {one["name"]: one for one in finished(api.locks({}, at(1.5)))["locks"]}
         assert locks["motion"] == {
             "cell": "press",
             "name": "motion",
@@ -86,16 +99,18 @@ class TestQuestions:
     def test_the_audit_is_filtered_and_limited(self, api: Api, press: Served) -> None:
         for turn in range(5):
             assert press.cell.write(Requester(PLC), [Change(LIMIT, float(turn + 1))], turn * 10.0) is None
-        records = api.audit({"variable": "limit", "writer": "plc", "limit": "2"}, at(50.0))["records"]
+        records = finished(api.audit({"variable": "limit", "writer": "plc", "limit": "2"}, at(50.0)))[
+            "records"
+        ]
         assert [(one["old"], one["new"]) for one in records] == [(3.0, 4.0), (4.0, 5.0)]
-        assert api.audit({"limit": "0"}, at(50.0))["records"] == []
-        assert api.audit({"writer": "hmi"}, at(50.0))["records"] == []
+        assert finished(api.audit({"limit": "0"}, at(50.0)))["records"] == []
+        assert finished(api.audit({"writer": "hmi"}, at(50.0)))["records"] == []
 
 
 class TestEvents:
     def test_the_last_ones_oldest_first_with_wall_clock(self, api: Api, press: Served) -> None:
         press.cell.robot_lost("gone", 5.0)
-        events = api.events({"limit": "2"}, at(9.0))["events"]
+        events = finished(api.events({"limit": "2"}, at(9.0)))["events"]
         count = press.cell.events.count
         assert [(one["seq"], one["event"]) for one in events] == [
             (count - 1, "robot values fresh"),
@@ -103,15 +118,24 @@ class TestEvents:
         ]
         assert events[-1]["time"] == "2027-01-15T08:00:05.000Z"
 
+    def test_one_kind_whatever_else_happened(self, api: Api, press: Served) -> None:
+        press.cell.robot_lost("gone", 5.0)
+        for _ in range(5000):
+            press.cell.events.append(Event(6.0, EventKind.ACQUIRED, lock=0, writer=PLC))
+        (lost,) = finished(api.events({"kind": "robot lost"}, at(9.0)))["events"]
+        assert lost["text"] == "robot lost: gone"
+        message = refused(400, "bad_query", lambda: finished(api.events({"kind": "lost"}, at(9.0))))
+        assert message.startswith("`kind` must be one of: robot connected, robot lost, ")
+
     def test_after_a_number(self, api: Api, press: Served) -> None:
         count = press.cell.events.count
         press.cell.robot_lost("gone", 5.0)
-        events = api.events({"after": str(count), "cell": "press"}, at(9.0))["events"]
+        events = finished(api.events({"after": str(count), "cell": "press"}, at(9.0)))["events"]
         assert events[0]["seq"] == count + 1
 
     @pytest.mark.parametrize("limit", ["-1", "x", "1001", "1.5", "٣", "9" * 5000])
     def test_a_bad_number_is_refused(self, api: Api, limit: str) -> None:
-        refused(400, "bad_query", api.events, {"limit": limit}, at(1.0))
+        refused(400, "bad_query", lambda: finished(api.events({"limit": limit}, at(1.0))))
 
     def test_a_cursor_tells_each_event_once(self, api: Api, press: Served) -> None:
         cursor = Cursor()
@@ -119,6 +143,19 @@ class TestEvents:
         press.cell.robot_lost("gone", 2.0)
         assert api.new_events(cursor, {}, at(2.0))[0]["event"] == "robot lost"
         assert api.new_events(cursor, {}, at(3.0)) == []
+
+    def test_a_follower_gets_what_is_much_in_parts(self, api: Api, press: Served) -> None:
+        cursor = Cursor()
+        api.new_events(cursor, {}, at(1.0))
+        for number in range(NEWS + 5):
+            press.cell.events.append(Event(2.0, EventKind.FRESH, detail=str(number)))
+        assert api.has_news(cursor, {})
+        found = [api.new_events(cursor, {}, at(3.0)) for _ in range(3)]
+        assert [len(part) for part in found] == [NEWS, 5, 0]
+        assert [one["detail"] for part in found for one in part] == [
+            str(number) for number in range(NEWS + 5)
+        ]
+        assert not api.has_news(cursor, {})
 
     def test_a_cursor_survives_a_reload(self, api: Api, press: Served) -> None:
         cursor = Cursor()
@@ -223,10 +260,10 @@ class TestSeveralCells:
         assert api.take("start", {"cell": "weld"}, BY, at(1.0))["cell"] == "weld"
 
     def test_after_needs_the_cell(self, api: Api) -> None:
-        refused(400, "bad_query", api.events, {"after": "1"}, at(1.0))
+        refused(400, "bad_query", lambda: finished(api.events({"after": "1"}, at(1.0))))
 
     def test_events_of_all_by_time(self, api: Api) -> None:
-        cells = {one["cell"] for one in api.events({}, at(1.0))["events"]}
+        cells = {one["cell"] for one in finished(api.events({}, at(1.0)))["events"]}
         assert cells == {"press", "weld"}
 
     @pytest.mark.parametrize("cell", [1, None, ["x"]])

@@ -17,6 +17,7 @@ from gatewayd.control import server
 from gatewayd.control.api import Api
 from gatewayd.control.client import Client, ControlError
 from gatewayd.control.endpoint import bind
+from gatewayd.loop.share import Busy, LoopShare
 from gatewayd.service.audit import Audit
 from tests.control.served import CYCLES, LIMIT, FixedGateway, Served
 
@@ -115,6 +116,18 @@ async def refused(act: Callable[[], object]) -> tuple[int, str]:
 @pytest.mark.parametrize("route", ["status", "variables", "locks", "events", "audit", "version"])
 async def test_every_question_has_an_answer(client: Client, route: str) -> None:
     assert await get(client, f"/v1/{route}")
+
+
+async def test_questions_wait_for_their_turn_and_acts_do_not(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def full(*_arguments: object) -> None:
+        raise Busy
+
+    monkeypatch.setattr(LoopShare, "request", full)
+    for route in ("status", "variables", "locks", "events", "audit", "version"):
+        assert await refused(lambda route=route: client.get(f"/v1/{route}")) == (503, "busy")  # type: ignore[misc]
+    assert await asyncio.to_thread(client.post, "/v1/variables/cycles/force", {"value": 7, "for": 5})
 
 
 async def test_a_force_says_who_did_it(client: Client, press: Served) -> None:

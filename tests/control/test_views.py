@@ -23,13 +23,14 @@ from gatewayd.report.summary import summary
 from gatewayd.report.verdict import verdict_of
 from gatewayd.service.cell_runtime import CellRuntime
 from tests.control.served import CYCLES, LIMIT, SPEED, Served, at
+from tests.works import finished
 
 PLC, HMI = 0, 1
 
 
 def test_the_status_has_the_documented_fields(api: Api, press: Served) -> None:
     assert press.cell.write(Requester(PLC), [Change(LIMIT, 999.0)], 0.5) is not None
-    status = api.status(at(1.0))
+    status = finished(api.status(at(1.0)))
     (cell,) = status["cells"]
     assert status.keys() == documented()["status"].keys()
     assert cell.keys() == documented()["cell"].keys()
@@ -42,9 +43,10 @@ def test_the_status_has_the_documented_fields(api: Api, press: Served) -> None:
 
 def test_variables_and_locks_have_the_documented_fields(api: Api) -> None:
     assert all(
-        one.keys() == documented()["variable"].keys() for one in api.variables({}, at(1.0))["variables"]
+        one.keys() == documented()["variable"].keys()
+        for one in finished(api.variables({}, at(1.0)))["variables"]
     )
-    assert all(one.keys() == documented()["lock"].keys() for one in api.locks({}, at(1.0))["locks"])
+    assert all(one.keys() == documented()["lock"].keys() for one in finished(api.locks({}, at(1.0)))["locks"])
 
 
 def test_events_and_records_have_documented_fields_only(api: Api, press: Served) -> None:
@@ -54,8 +56,8 @@ def test_events_and_records_have_documented_fields_only(api: Api, press: Served)
     assert cell.operator.force(CYCLES, 5, 1.2, 2.0, "by anna") is None
     cell.operator.take_lock(2, 1.3, detail="by anna")
     cell.robot_lost("gone", 1.4)
-    events = api.events({}, at(2.0))["events"]
-    records = api.audit({}, at(2.0))["records"]
+    events = finished(api.events({}, at(2.0)))["events"]
+    records = finished(api.audit({}, at(2.0)))["records"]
     assert len(events) > 6
     for told, fields, always in ((events, documented()["event"], 4), (records, documented()["audit"], 4)):
         for one in told:
@@ -73,22 +75,22 @@ def test_events_records_and_the_last_refusal_are_told_in_the_same_words(api: Api
         ("operator forced speed to 2 (by anna)", True),
         ("plc wrote limit = 999 N: refused, value out of limits, 0..150", True),
     ]
-    for told in (api.events({}, at(2.0))["events"], api.audit({}, at(2.0))["records"]):
+    for told in (finished(api.events({}, at(2.0)))["events"], finished(api.audit({}, at(2.0)))["records"]):
         assert [(one["text"], one["bad"]) for one in told][-2:] == same
-    records = api.audit({"writer": "plc", "variable": "speed"}, at(2.0))["records"]
+    records = finished(api.audit({"writer": "plc", "variable": "speed"}, at(2.0)))["records"]
     assert [(one["text"], one["bad"]) for one in records] == [("plc wrote speed: 0 -> 1", False)]
-    last = api.status(at(2.0))["cells"][0]["last_refusal"]
+    last = finished(api.status(at(2.0)))["cells"][0]["last_refusal"]
     assert last["text"] == "plc wrote limit: refused, value out of limits, 0..150"
 
 
 def test_a_variable_tells_both_places_and_its_owner(api: Api, press: Served) -> None:
     assert press.cell.write(Requester(PLC), [Change(SPEED, 1.5)], 1.0) is None
-    (speed,) = api.variables({"name": "speed"}, at(1.5))["variables"]
+    (speed,) = finished(api.variables({"name": "speed"}, at(1.5)))["variables"]
     assert speed["robot"] == "input_double_register_1"
     assert speed["modbus"] == [{"area": "holding", "address": 24, "bit": None, "notation": "400025"}]
     assert (speed["value"], speed["quality"], speed["age"]) == (1.5, "good", 0.5)
     assert (speed["lock"], speed["owner"], speed["lease"], speed["fallback"]) == ("motion", "plc", 1.5, 0.5)
-    (cycles,) = api.variables({"name": "cycles"}, at(1.5))["variables"]
+    (cycles,) = finished(api.variables({"name": "cycles"}, at(1.5)))["variables"]
     assert [place["notation"] for place in cycles["modbus"]] == ["400101", "300008"]
     assert (cycles["lock"], cycles["owner"], cycles["fallback"]) == (None, None, "exception")
 
@@ -97,20 +99,20 @@ def test_a_variable_tells_both_places_and_its_owner(api: Api, press: Served) -> 
     "name, robot, notation",
     [
         ("start", "input_bit_register_33", "400001.1"),
-        ("tcp[[]2]", "actual_TCP_pose[2]", "400209"),
+        ("tcp[2]", "actual_TCP_pose[2]", "400209"),
         ("door", "actual_digital_input_bits.3", "100065"),
     ],
 )
 def test_the_robots_side_is_named_as_the_mapping_names_it(
     api: Api, name: str, robot: str, notation: str
 ) -> None:
-    (found,) = api.variables({"name": name}, at(1.0))["variables"]
+    (found,) = finished(api.variables({"name": name}, at(1.0)))["variables"]
     assert (found["robot"], found["modbus"][0]["notation"]) == (robot, notation)
 
 
 def test_a_force_is_told_with_what_is_left_of_it(api: Api, press: Served) -> None:
     assert press.cell.operator.force(CYCLES, 7, 1.0, 11.0) is None
-    (found,) = api.variables({"name": "cycles"}, at(4.0))["variables"]
+    (found,) = finished(api.variables({"name": "cycles"}, at(4.0)))["variables"]
     assert (found["value"], found["quality"], found["age"]) == (7, "forced", 3.0)
     assert found["forced"] == {"value": 7, "remaining": 7.0}
 
@@ -131,7 +133,7 @@ class TestProblems:
         """Cause and remedy."""
         press.cell.robot_lost("gone", 1.0)
         press.without_session("connection refused: the robot is booting")
-        (cell,) = api.status(at(8.0))["cells"]
+        (cell,) = finished(api.status(at(8.0)))["cells"]
         assert cell["problems"] == ["robot not connected for 8 s: connection refused: the robot is booting"]
 
     def test_inputs_that_are_not_adopted(self, press: Served) -> None:
@@ -168,10 +170,10 @@ def _texts(value: object) -> list[object]:
 def test_odd_reals_are_still_json(api: Api, press: Served, odd: float) -> None:
     assert press.cell.write(Requester(PLC), [Change(SPEED, odd)], 1.0) is None
     answers: list[Mapping[str, Any]] = [
-        api.status(at(1.0)),
-        api.variables({}, at(1.0)),
-        api.events({}, at(1.0)),
-        api.audit({}, at(1.0)),
+        finished(api.status(at(1.0))),
+        finished(api.variables({}, at(1.0))),
+        finished(api.events({}, at(1.0))),
+        finished(api.audit({}, at(1.0))),
     ]
     assert str(odd) in _texts(json.loads(json.dumps(answers, allow_nan=False)))
 
@@ -209,7 +211,7 @@ def test_a_bus_that_does_not_carry_is_a_problem(tmp_path: Path) -> None:
 
 
 def test_every_link_is_told_in_words(api: Api) -> None:
-    robot, modbus = api.status(at(0.0))["cells"][0]["links"]
+    robot, modbus = finished(api.status(at(0.0)))["cells"][0]["links"]
     assert robot.keys() == documented()["link"].keys()
     assert (robot["name"], robot["address"], robot["words"]) == (
         "robot",

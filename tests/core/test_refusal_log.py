@@ -2,11 +2,13 @@ from __future__ import annotations
 
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
-from gatewayd.core.refusal_log import REFUSAL_INTERVAL, RefusalLog
+from gatewayd.core.refusal_log import MAX_PEERS, REFUSAL_INTERVAL, RefusalLog
 
 
-def refusal(time: float, variable: int = 0, writer: int | None = 0, reason: Reason = Reason.HELD) -> Event:
-    return Event(time, EventKind.REFUSED, variable=variable, writer=writer, reason=reason)
+def refusal(
+    time: float, variable: int = 0, writer: int | None = 0, reason: Reason = Reason.HELD, peer: str = ""
+) -> Event:
+    return Event(time, EventKind.REFUSED, variable=variable, writer=writer, reason=reason, peer=peer)
 
 
 def test_the_first_is_told_at_once_and_equal_ones_are_counted() -> None:
@@ -68,3 +70,31 @@ def test_nothing_is_remembered_of_what_is_over() -> None:
         log.add(refusal(0.0, variable=variable))
     log.tick(REFUSAL_INTERVAL)
     assert not log._reported
+
+
+def test_refusals_of_one_peer_are_never_told_of_another() -> None:
+    told: list[Event] = []
+    log = RefusalLog(told.append)
+    for step in range(10):
+        for host in ("192.168.1.30", "192.168.1.31", "[fe80::1]"):
+            log.add(refusal(step * 0.1, writer=None, peer=f"{host}:{50_000 + step}"))
+    log.tick(REFUSAL_INTERVAL)
+    assert [(event.peer.rpartition(":")[0], 1 + event.repeats) for event in told] == [
+        ("192.168.1.30", 1), ("192.168.1.31", 1), ("[fe80::1]", 1),
+        ("192.168.1.30", 9), ("192.168.1.31", 9), ("[fe80::1]", 9),
+    ]  # fmt: skip
+
+
+def test_peers_are_told_apart_up_to_a_bound_and_those_beyond_it_have_no_address() -> None:
+    told: list[Event] = []
+    log = RefusalLog(told.append)
+    for number in range(1000):
+        log.add(refusal(0.0, writer=None, peer=f"[2001:db8::{number:x}]:502"))
+    log.tick(REFUSAL_INTERVAL)
+    assert sum(1 + event.repeats for event in told) == 1000
+    assert len({event.peer for event in told if event.peer}) == MAX_PEERS
+    assert {event.peer for event in told[MAX_PEERS:]} == {""}
+    log.add(refusal(2 * REFUSAL_INTERVAL, writer=None, peer="192.168.1.30:502"))
+    log.tick(4 * REFUSAL_INTERVAL)
+    log.add(refusal(5 * REFUSAL_INTERVAL, writer=None, peer="192.168.1.30:502"))
+    assert told[-1].peer == "192.168.1.30:502"

@@ -16,6 +16,7 @@ from gatewayd.core.requester import Requester
 from gatewayd.loop import clock
 from gatewayd.report.verdict import ServedCell
 from gatewayd.service.operator import JUST_NOW, OperatorAccess, Standstill
+from tests.works import finished
 
 
 class Gateway:
@@ -72,11 +73,11 @@ async def test_a_file_that_cannot_be_written_makes_the_gateway_unhealthy_and_not
     access = OperatorAccess(gateway, None, tmp_path / "missing" / "audit.jsonl")
     assert gateway.cell.write(Requester(0), [Change(0, 7)], 1.0) is None
     moment = Moment(1.0, 2.0)
-    await until(lambda: not access.api.status(moment)["healthy"])
-    assert access.api.status(moment)["problems"] == [
+    await until(lambda: not finished(access.api.status(moment))["healthy"])
+    assert finished(access.api.status(moment))["problems"] == [
         "the audit file cannot be written: No such file or directory"
     ]
-    assert access.api.audit({}, moment)["records"][-1]["new"] == 7
+    assert finished(access.api.audit({}, moment))["records"][-1]["new"] == 7
 
 
 async def test_the_socket_comes_and_goes(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 import aiohttp
 import pytest
 
+from gatewayd.loop.share import Busy, LoopShare
 from gatewayd.web import guard
 from gatewayd.web.guard import HEADERS, is_local_name
 from gatewayd.web.listener import StatusListener
@@ -49,6 +50,42 @@ async def test_changing_anything_needs_the_token(
 ) -> None:
     found = await ask(session, "POST", "/api/v1/locks/spare/take", **given)
     assert found[0] == status
+
+
+READ = ["/", "/app.js", "/healthz", "/readyz", "/metrics", "/page/cells", "/page/cells/press"]
+READ += ["/page/cells/press/state", "/nothing"]
+READ += [f"/api/v1/{name}" for name in ("version", "status", "variables", "locks", "events", "audit", "nothing")]
+LONG = [path for path in READ if path not in ("/", "/app.js", "/healthz", "/nothing", "/api/v1/nothing")]
+
+
+async def full(*_arguments: object) -> None:
+    raise Busy
+
+
+@pytest.mark.parametrize("path", READ)
+async def test_whoever_reads_waits_for_his_turn(
+    session: aiohttp.ClientSession, monkeypatch: pytest.MonkeyPatch, path: str
+) -> None:
+    monkeypatch.setattr(LoopShare, "request", full)
+    status, text, _ = await ask(session, "GET", path)
+    assert (status, text) == (503, "too many ask at once: ask again, and more seldom\n")
+
+
+@pytest.mark.parametrize("path", LONG)
+async def test_what_takes_time_is_done_in_turns(
+    session: aiohttp.ClientSession, monkeypatch: pytest.MonkeyPatch, path: str
+) -> None:
+    monkeypatch.setattr(LoopShare, "done", full)
+    assert (await ask(session, "GET", path))[0] == 503
+
+
+async def test_a_wrong_token_waits_too_and_the_right_one_for_nobody(
+    session: aiohttp.ClientSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(LoopShare, "request", full)
+    path = "/api/v1/locks/spare/take"
+    assert (await ask(session, "POST", path, Authorization="Bearer wrong"))[0] == 503
+    assert (await ask(session, "POST", path, Authorization=f"Bearer {TOKEN}"))[0] == 200
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE"])

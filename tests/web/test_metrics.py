@@ -19,6 +19,7 @@ from gatewayd.service.daemon import Daemon
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS, Exposition, MetricKind
 from gatewayd.web.probes import Probes
 from tests.web.press import MAPPING
+from tests.works import finished
 
 Samples = dict[str, dict[tuple[tuple[str, str], ...], float]]
 
@@ -27,7 +28,7 @@ ONLY_WITH_CAN = {"gatewayd_can_bus_state", "gatewayd_can_total"}
 
 def read(probes: Probes) -> Samples:
     found: Samples = {}
-    for family in text_string_to_metric_families(Exposition(probes, "1.2.3").text().decode()):
+    for family in text_string_to_metric_families(finished(Exposition(probes, "1.2.3").text()).decode()):
         for sample in family.samples:
             found.setdefault(sample.name, {})[tuple(sorted(sample.labels.items()))] = sample.value
     return found
@@ -123,7 +124,7 @@ def test_a_listener_that_cells_share_is_told_once(tmp_path: Path) -> None:
     plans = [load(text.encode(), "a.yaml").plan for text in files]
     daemon = Daemon([plan for plan in plans if plan is not None], tmp_path)
     assert len(daemon.runtimes) == 2
-    text = Exposition(Probes(daemon), "1").text().decode()
+    text = finished(Exposition(Probes(daemon), "1").text()).decode()
     assert text.count("gatewayd_modbus_up{") == 1
 
 
@@ -136,7 +137,7 @@ def test_troubles_are_counted(daemon: Daemon) -> None:
 def test_what_the_robot_holds_how_late_it_is_and_gaps(probes: Probes, cell: Cell) -> None:
     health = cell.health
     health.lag, health.differing, health.unadopted, health.adoption, health.gaps = 0.25, 1, 2, 8.0, 3
-    text = Exposition(probes, "1").text().decode()
+    text = finished(Exposition(probes, "1").text()).decode()
     for line in (
         'gatewayd_lag_seconds{cell="press"} 0.25',
         'gatewayd_differing{cell="press"} 1.0',

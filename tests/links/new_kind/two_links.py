@@ -19,6 +19,7 @@ from gatewayd.service.daemon import Daemon
 from gatewayd.web.metrics import Exposition
 from gatewayd.web.probes import Probes
 from gatewayd.web.view import layout
+from tests.works import finished
 
 
 def looks(daemon: Daemon) -> dict[str, object]:
@@ -27,7 +28,7 @@ def looks(daemon: Daemon) -> dict[str, object]:
     declared = declare(runtime.plan)
     page = layout(runtime)
     variable = page["variables"][0]  # type: ignore[index]
-    metrics = Exposition(Probes(daemon), "").text().decode().splitlines()
+    metrics = finished(Exposition(Probes(daemon), "").text()).decode().splitlines()
     return {
         "status": cell_view(runtime, declared, clock.now()),
         "variable": declared.variables[0],
