@@ -42,7 +42,7 @@ class Master:
         return wait_for(lambda: self.state == state, f"NMT state {state}")
 
     def output(self, key: str) -> Any:
-        """A mapped object as its TPDO told it last."""
+        """A mapped object as its TPDO sent it last."""
         return self.ask("outputs")["values"][key]
 
     def emergency(self, code: int) -> tuple[int, int, str]:

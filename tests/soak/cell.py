@@ -34,7 +34,7 @@ NAME = "cell"
 FIRST, SECOND, MASTER = "first", "second", "master"
 """The writers: two PLCs, and a CANopen master."""
 ECHOES = 4
-"""Variables that tell what a writer wrote, as it came back from the robot."""
+"""Variables that show what a writer wrote, as it came back from the robot."""
 HELD = "input_int_register_3"
 """Field that a robot program may hold for itself."""
 FIRST_FIELD, SECOND_FIELD = "input_int_register_0", "input_int_register_1"

@@ -116,8 +116,10 @@ class Rig:
         lost = sorted(entry.time for entry in noted if entry.outcome == NOT_CONNECTED)
         for name in WRITERS:
             for field in FIELDS_OF[name]:
-                mine = [one for one in entries(journal(self.directory, name)) if one.field == field]
-                accepted = sorted(one.time for one in noted if one.field == field and one.outcome == 0)
+                mine = [entry for entry in entries(journal(self.directory, name)) if entry.field == field]
+                accepted = sorted(
+                    entry.time for entry in noted if entry.field == field and entry.outcome == 0
+                )
                 found += unheard(
                     field,
                     self.witness.changes[field],
