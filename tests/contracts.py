@@ -46,8 +46,6 @@ from gatewayd.web.listener import StatusListener
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS
 from tests.sources import MODULES, PACKAGE, ROOT, every_node, nodes
 
-__all__ = ["CONTRACTS", "GOLDEN", "as_text", "texts"]
-
 GOLDEN = ROOT / "tests" / "golden" / "contracts"
 
 

@@ -20,8 +20,6 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
 
-__all__ = ["CAPACITY", "HISTORY", "Emergency", "ErrorCode", "Register", "register_of"]
-
 CAPACITY = 32
 """Messages that may wait."""
 HISTORY = 8

@@ -23,8 +23,6 @@ from gatewayd.loop import clock
 from gatewayd.loop.threads import in_daemon_thread
 from gatewayd.report.printable import json_text
 
-__all__ = ["ALIVE_PERIOD", "FOLLOWERS", "MAX_BODY", "application", "serving"]
-
 MAX_BODY = 64 * 1024
 """Bytes of a request's body."""
 REQUESTS = 64

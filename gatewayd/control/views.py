@@ -34,17 +34,6 @@ from gatewayd.report.schema import (
 from gatewayd.report.verdict import CellVerdict, PicturePart, ServedCell, verdict_of
 from gatewayd.service.audit import Record, plain_value, utc
 
-__all__ = [
-    "Declarations",
-    "Declared",
-    "cell_view",
-    "declare",
-    "event_view",
-    "lock_view",
-    "record_view",
-    "variable_view",
-]
-
 _QUALITIES = tuple(quality.name.lower() for quality in Quality)
 
 

@@ -11,8 +11,6 @@ from gatewayd.core.definition import Value
 from gatewayd.core.match import Match, at
 from gatewayd.core.refusal import Reason
 
-__all__ = ["CAPACITY", "Event", "EventKind", "EventRing", "translated"]
-
 CAPACITY = 1000
 """Events kept; older ones are forgotten."""
 

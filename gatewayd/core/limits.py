@@ -6,8 +6,6 @@ import math
 
 from gatewayd.core.definition import Limits, Value, ValueKind, Variable
 
-__all__ = ["has_no_limits", "within"]
-
 
 def has_no_limits(variable: Variable) -> bool:
     """Whether `within` lets every value pass as it is."""

@@ -10,8 +10,6 @@ from gatewayd.core.events import Event, translated
 from gatewayd.core.match import Match, at
 from gatewayd.core.refusal import Reason, Refusal
 
-__all__ = ["REFUSAL_INTERVAL", "LastRefusal", "RefusalLog"]
-
 REFUSAL_INTERVAL = 10.0
 """Seconds in which equal refusals are counted instead of reported again: a PLC may retry a hundred times a second."""
 

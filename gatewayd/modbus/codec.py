@@ -20,8 +20,6 @@ from typing import Final, TypeAlias
 
 from gatewayd.core.definition import Value, ValueKind
 
-__all__ = ["ORDERS", "TYPES", "Codec", "NumberFormat", "make_codec"]
-
 Buffer: TypeAlias = bytes | bytearray | memoryview
 
 ORDERS: Final = {"ABCD": (">", False), "CDAB": ("<", True), "BADC": (">", True), "DCBA": ("<", False)}

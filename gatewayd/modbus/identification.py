@@ -7,8 +7,6 @@ from enum import IntEnum
 from gatewayd import __version__
 from gatewayd.modbus.frames import MAX_PDU
 
-__all__ = ["FUNCTION", "MEI_TYPE", "Identification", "ObjectId", "ReadCode"]
-
 FUNCTION = 43
 MEI_TYPE = 14
 

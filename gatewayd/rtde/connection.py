@@ -25,8 +25,6 @@ from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import TIMESTAMP, ClientSettings, Session
 from gatewayd.rtde.types import DataType
 
-__all__ = ["ClientHandler", "Connection"]
-
 _TIMESTAMP = struct.Struct(">d")
 _FIRST_CLAIM_RETRY = 0.1
 _MEASURE_EVERY = 1.0

@@ -9,30 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = [
-    "ERROR_WORDS",
-    "IN_USE",
-    "NOT_FOUND",
-    "ControllerMessage",
-    "ControllerVersion",
-    "DataPackage",
-    "ExecutableMessage",
-    "GetControllerVersion",
-    "InputsSetup",
-    "OutputsSetup",
-    "PackageType",
-    "Pause",
-    "PauseReply",
-    "ProtocolVersionReply",
-    "RequestProtocolVersion",
-    "SetupInputs",
-    "SetupOutputs",
-    "Start",
-    "StartReply",
-    "TextLevel",
-    "TextMessage",
-]
-
 NOT_FOUND = "NOT_FOUND"
 """In place of a type: the controller does not have the field."""
 IN_USE = "IN_USE"

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["Pace", "Statistics"]
-
 _LONGEST_GAP = 3600.0
 """Seconds between packages beyond which the timestamp is not believed; a connection does not live so long silent."""
 

@@ -28,8 +28,6 @@ from gatewayd.links.canopen_node.variables import ABORT_OF
 from gatewayd.links.registry import status_fields
 from gatewayd.mapping.loader import load
 
-__all__ = ["PARTS", "table"]
-
 _NODE = Path(__file__).parents[2] / "gatewayd" / "links" / "canopen_node"
 
 

@@ -41,8 +41,6 @@ from gatewayd.web.metrics import METRICS, PROCESS_METRICS
 from tests.docs import canopen
 from tests.docs.canopen import table
 
-__all__ = ["DOCS", "PARTS", "ROOT", "pages", "renewed"]
-
 ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"
 HELP_WIDTH = 100

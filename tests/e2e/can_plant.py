@@ -11,8 +11,6 @@ from typing import Any
 from tests.e2e.plant import Plant
 from tests.e2e.processes import HOST, Process, free_port, wait_for
 
-__all__ = ["NODE", "Master", "start_bus", "start_master"]
-
 NODE = 16
 
 

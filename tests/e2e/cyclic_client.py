@@ -10,8 +10,6 @@ import time
 
 from tests.e2e.plc import Plc
 
-__all__ = ["CYCLE"]
-
 CYCLE = 0.02
 
 

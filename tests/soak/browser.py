@@ -16,8 +16,6 @@ import threading
 import time
 from contextlib import suppress
 
-__all__ = ["COMPLAINT"]
-
 COMPLAINT = "unexpected:"
 """Begins each line about an answer that should not be."""
 _GONE = (OSError, http.client.HTTPException)

@@ -11,25 +11,6 @@ from tests.e2e.plc import HMI, LINE, PLC
 from tests.e2e.processes import HOST
 from tests.soak.client import SHARED, SHARED_FIELD
 
-__all__ = [
-    "ECHOES",
-    "FIELDS",
-    "FIELDS_OF",
-    "FIRST",
-    "HELD",
-    "MASTER",
-    "MASTER_FIELDS",
-    "MOMENT",
-    "NAME",
-    "NODE",
-    "SECOND",
-    "STALE_AFTER",
-    "VARIANTS",
-    "command",
-    "journal",
-    "mapping",
-]
-
 NAME = "cell"
 FIRST, SECOND, MASTER = "first", "second", "master"
 """The writers: two PLCs, and a CANopen master."""

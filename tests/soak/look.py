@@ -10,8 +10,6 @@ from typing import Any
 from gatewayd.control.client import Client, ControlError, NoDaemon
 from tests.e2e.processes import HOST
 
-__all__ = ["Look", "descriptors", "threads", "torn"]
-
 _TIMEOUT = 2.0
 
 

@@ -19,8 +19,6 @@ import can
 
 from tests.soak.journal import Journal
 
-__all__ = ["HEARTBEAT", "NMT", "OPERATIONAL", "RPDO", "TPDO"]
-
 NMT, TPDO, RPDO, HEARTBEAT = 0x000, 0x180, 0x200, 0x700
 """COB-IDs of the predefined connection set, less the node-ID."""
 OPERATIONAL = 5

@@ -18,8 +18,6 @@ from tests.soak.look import Look
 from tests.soak.starvation import Starvation
 from tests.soak.truth import NOT_CONNECTED, Record, misheld, unheard
 
-__all__ = ["PATIENCE", "WRITERS", "Rig"]
-
 PATIENCE = 15.0
 WRITERS = tuple(FIELDS_OF)
 _CLIENTS = (*WRITERS, "poller", "browser")

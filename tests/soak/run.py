@@ -15,8 +15,6 @@ from tests.soak.look import descriptors, threads, torn
 from tests.soak.rig import PATIENCE, WRITERS, Rig
 from tests.soak.verdict import Measured, Sample
 
-__all__ = ["PAUSES", "kinds", "soak"]
-
 PAUSES = {"real": (5.0, 30.0), "fast": (0.0, 0.3)}
 """Seconds between two faults."""
 _WARM_UP = 1.0

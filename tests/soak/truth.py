@@ -13,8 +13,6 @@ from dataclasses import dataclass, field
 from tests.e2e.witness import Change
 from tests.soak.journal import SENT, Entry
 
-__all__ = ["FALLBACK", "LATELY", "NOT_CONNECTED", "Period", "Record", "Stop", "misheld", "unheard"]
-
 FALLBACK = 0
 """What every input of the cell declares for `on_release`."""
 LATELY = 2.0

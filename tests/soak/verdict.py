@@ -8,8 +8,6 @@ from statistics import linear_regression, median
 
 from tests.benchmarks.report import Table
 
-__all__ = ["MEMORY_BOUND", "THREADS_BOUND", "Measured", "Sample"]
-
 MEMORY_BOUND = 8 * 1024
 """Kilobytes by which memory may grow from the second quarter of the run to the last."""
 THREADS_BOUND = 4

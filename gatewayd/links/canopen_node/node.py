@@ -43,8 +43,6 @@ from gatewayd.links.canopen_node.storage import Parameters, Store
 from gatewayd.links.canopen_node.variables import VariableObjects
 from gatewayd.links.registry import status_fields
 
-__all__ = ["Node"]
-
 SDO_LENGTH: Final = 8
 """Bytes of every SDO frame."""
 

@@ -24,8 +24,6 @@ from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, En
 from gatewayd.canopen.nmt import NmtCommand
 from gatewayd.links.canopen_node.status_words import HEADER
 
-__all__ = ["JsonStore", "LssSettings", "Parameters", "Saved", "Store", "StoreError", "layout_of"]
-
 FORMAT = 1
 """Version of the file."""
 ALL = range(0x1000, 0x1_0000)

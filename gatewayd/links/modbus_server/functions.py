@@ -12,7 +12,8 @@ from collections.abc import Callable, Sequence
 from enum import IntEnum
 
 from gatewayd.core import status_layout
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Value
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
@@ -29,8 +30,6 @@ from gatewayd.modbus.areas import (
     MAX_WRITE_WITH_READ,
 )
 from gatewayd.modbus.identification import Identification
-
-__all__ = ["EXCEPTION_OF", "ExceptionCode", "Unit", "exception", "execute"]
 
 
 class ExceptionCode(IntEnum):

@@ -9,8 +9,6 @@ from gatewayd.mapping.plan import LinkPlan
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import Codec
 
-__all__ = ["Located", "ModbusPlan", "Network", "Placement", "network_text"]
-
 Network = IPv4Network | IPv6Network
 
 

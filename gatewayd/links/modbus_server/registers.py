@@ -12,15 +12,14 @@ from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
 from gatewayd.links.modbus_server.runs import Run, bit_runs, number_runs, words_of_bits
 from gatewayd.modbus.areas import MAX_READ_BITS, MAX_READ_REGISTERS, Area
 from gatewayd.modbus.codec import Codec
-
-__all__ = ["BitTable", "Readable", "RegisterImage", "RegisterTable"]
 
 _ADDRESSES = 65536
 _WORD = struct.Struct(">H")
