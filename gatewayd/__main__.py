@@ -13,8 +13,6 @@ from typing import NoReturn
 
 from gatewayd.service.signals import SIGNALS
 
-__all__ = ["main"]
-
 INTERNAL_ERROR = 70
 """Exit code of a defect of gatewayd itself (EX_SOFTWARE of sysexits.h)."""
 INTERRUPTED = 130

@@ -46,8 +46,6 @@ from gatewayd.web.listener import StatusListener
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS
 from tests.sources import MODULES, PACKAGE, ROOT, every_node, nodes
 
-__all__ = ["CONTRACTS", "GOLDEN", "as_text", "texts"]
-
 GOLDEN = ROOT / "tests" / "golden" / "contracts"
 
 
@@ -69,7 +67,9 @@ def rule_home(rule: Rule) -> Path:
 
 def findings() -> object:
     """What `check` says of each rule's bad examples."""
-    return {rule.id: [_finding(one) for one in _check_bad(rule)] for rule in catalogue.complete()}
+    return {
+        rule.id: [_finding(diagnostic) for diagnostic in _check_bad(rule)] for rule in catalogue.complete()
+    }
 
 
 def _check_bad(rule: Rule) -> Iterator[Diagnostic]:
@@ -79,7 +79,7 @@ def _check_bad(rule: Rule) -> Iterator[Diagnostic]:
 
 
 def _finding(found: Diagnostic) -> list[str | None]:
-    related = [f"{one.position}: {one.message}" for one in found.related]
+    related = [f"{place.position}: {place.message}" for place in found.related]
     return [found.rule.id, str(found.position), found.message, found.hint, *related]
 
 
@@ -102,12 +102,10 @@ def _keys(section: Mapping[str, Any], named: Mapping[str, Any], path: str) -> It
             },
         )
         for choice in inner.get("anyOf", [inner]):
-            yield from _inner_keys(_resolved(choice, named), named, here)
+            yield from _eachs(_resolved(choice, named), named, here)
 
 
-def _inner_keys(
-    choice: Mapping[str, Any], named: Mapping[str, Any], path: str
-) -> Iterator[tuple[str, object]]:
+def _eachs(choice: Mapping[str, Any], named: Mapping[str, Any], path: str) -> Iterator[tuple[str, object]]:
     yield from _keys(choice, named, path)
     for value in choice.get("patternProperties", {}).values():
         yield from _keys(_resolved(value, named), named, f"{path}.*")
@@ -130,7 +128,7 @@ def _form(schema: Mapping[str, Any], named: Mapping[str, Any]) -> object:
     found: dict[str, object] = {}
     for key, value in schema.items():
         if key == "anyOf":
-            found[key] = sorted((_form(one, named) for one in value), key=json.dumps)
+            found[key] = sorted((_form(choice, named) for choice in value), key=json.dumps)
         elif key == "items":
             found[key] = _form(value, named)
         elif key == "patternProperties":
@@ -306,7 +304,7 @@ def numbers() -> object:
 
 def metrics() -> object:
     """What /metrics has."""
-    found: dict[str, object] = {one.name: [one.kind.value, *one.labels] for one in METRICS}
+    found: dict[str, object] = {metric.name: [metric.kind.value, *metric.labels] for metric in METRICS}
     return found | dict.fromkeys(PROCESS_METRICS, "process")
 
 
@@ -336,15 +334,15 @@ def commands() -> object:
         assert command is not None
         found[name] = command
         if isinstance(command, click.Group):
-            inner = {one: command.get_command(context, one) for one in command.list_commands(context)}
-            found |= {f"{name} {one}": made for one, made in inner.items() if made is not None}
+            inner = {each: command.get_command(context, each) for each in command.list_commands(context)}
+            found |= {f"{name} {each}": made for each, made in inner.items() if made is not None}
     return {f"gatewayd {name}".strip(): _command(command) for name, command in found.items()}
 
 
 def _command(command: click.Command) -> object:
     epilog = (command.epilog or "").partition("Exit codes:\n")[2]
     return {
-        "parameters": [_parameter(one) for one in command.params],
+        "parameters": [_parameter(parameter) for parameter in command.params],
         "exit codes": re.findall(r"^ +(\d+) +\S", epilog, re.MULTILINE),
     }
 

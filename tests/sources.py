@@ -8,8 +8,6 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-__all__ = ["MODULES", "PACKAGE", "ROOT", "every_node", "nodes", "tree"]
-
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "gatewayd"
 

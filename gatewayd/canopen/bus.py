@@ -8,8 +8,6 @@ from typing import Protocol
 from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.frame import Frame
 
-__all__ = ["DRAIN", "BusError", "BusHandler", "BusState"]
-
 DRAIN = 64
 """Most frames that a driver reads before the loop has its turn."""
 

@@ -10,8 +10,6 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Entry, Object, variable
 from gatewayd.canopen.frame import Frame
 
-__all__ = ["CONSUMER", "EPOCH", "TimeConsumer", "time_of_day"]
-
 CONSUMER = 0x8000_0000
 """Bit 31 of 1012h: this node hears TIME."""
 EPOCH = datetime(1984, 1, 1, tzinfo=UTC)

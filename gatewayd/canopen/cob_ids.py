@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["BASIC_FRAME", "INVALID", "Function", "is_assignable", "is_restricted", "predefined_pdo"]
-
 BASIC_FRAME = 0x7FF
 """Mask of an 11-bit identifier."""
 INVALID = 0x8000_0000

@@ -5,9 +5,6 @@ from __future__ import annotations
 import struct
 from enum import Enum
 
-__all__ = ["CanType"]
-
-
 Value = bool | int | float
 """What a numeric type holds."""
 

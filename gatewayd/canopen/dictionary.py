@@ -12,21 +12,6 @@ from enum import Enum, IntEnum
 
 from gatewayd.canopen.datatypes import CanType
 
-__all__ = [
-    "Abort",
-    "AbortCode",
-    "Access",
-    "Dictionary",
-    "Entry",
-    "Object",
-    "ObjectCode",
-    "Pdo",
-    "Pending",
-    "array",
-    "record",
-    "variable",
-]
-
 
 class AbortCode(IntEnum):
     """SDO abort codes (CiA 301, 7.2.4.3.17)."""

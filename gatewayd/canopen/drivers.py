@@ -6,8 +6,6 @@ from gatewayd.canopen.bus import BusHandler
 from gatewayd.canopen.socketcan import SocketCanBus
 from gatewayd.canopen.supervised import SupervisedBus
 
-__all__ = ["make_bus"]
-
 
 def make_bus(interface: str, channel: str, bitrate: int, handler: BusHandler) -> SupervisedBus:
     """The driver for an interface of python-can, not opened yet; `socketcan` has one of our own.

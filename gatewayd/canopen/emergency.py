@@ -22,18 +22,6 @@ from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object,
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.loop.allowance import Allowance
 
-__all__ = [
-    "BURST",
-    "CAPACITY",
-    "HISTORY",
-    "IN_ORDER",
-    "RATE",
-    "Emergency",
-    "ErrorCode",
-    "Register",
-    "register_of",
-]
-
 CAPACITY = 32
 """Messages that may wait."""
 IN_ORDER = 8

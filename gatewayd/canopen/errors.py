@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntFlag
 
-__all__ = ["ControllerFlags", "ErrorClass", "ErrorFrame", "Violation", "decode"]
-
 
 class ErrorClass(IntFlag):
     """What an error frame is about; bits of its identifier."""

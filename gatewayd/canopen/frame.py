@@ -6,8 +6,6 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple
 
-__all__ = ["Frame", "Priority", "Send"]
-
 
 class Frame(NamedTuple):
     """One frame. Its length code is the length of `data`, or `length` for a remote frame."""

@@ -7,8 +7,6 @@ from typing import Final
 
 from gatewayd.canopen.dictionary import Abort, AbortCode
 
-__all__ = ["LATE_PARAMETER", "Waiting", "spared"]
-
 LATE_PARAMETER: Final = 0.5
 """Seconds that a download of a parameter may have waited while the process stood still."""
 

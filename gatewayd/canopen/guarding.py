@@ -11,8 +11,6 @@ from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.gap import spared
 from gatewayd.canopen.nmt import NmtSlave, NmtState
 
-__all__ = ["TOGGLE", "NodeGuarding"]
-
 TOGGLE = 0x80
 """Bit of the answer that changes with every request."""
 

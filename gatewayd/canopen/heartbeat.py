@@ -15,8 +15,6 @@ from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.gap import spared
 from gatewayd.canopen.nmt import NmtSlave, NmtState
 
-__all__ = ["MIN_CONSUMERS", "WATCH", "Consumer", "HeartbeatConsumer", "HeartbeatProducer", "Seen", "Watch"]
-
 MIN_CONSUMERS = 8
 """Entries of 1016h, or more if the mapping names more nodes."""
 

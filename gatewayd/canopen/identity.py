@@ -11,16 +11,6 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, record, variable
 from gatewayd.canopen.nmt import NmtCommand, NmtState
 
-__all__ = [
-    "PRODUCT_CODE",
-    "REACTIONS",
-    "VENDOR_ID",
-    "ErrorBehaviour",
-    "Identity",
-    "identity_objects",
-    "revision",
-]
-
 VENDOR_ID = 0
 """No vendor-ID was assigned by CiA: 0 says so. Nobody else's is used."""
 PRODUCT_CODE = 0x4757_4401

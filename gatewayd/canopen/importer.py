@@ -11,8 +11,6 @@ from canopen.objectdictionary import ODVariable
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Entry, Object, ObjectCode, Pdo
 
-__all__ = ["differences"]
-
 
 class _Sheet(StringIO):
     """An open file: the importer looks at the name."""

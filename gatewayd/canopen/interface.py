@@ -16,8 +16,6 @@ from itertools import count
 
 from gatewayd.canopen.bus import BusError
 
-__all__ = ["ControllerState", "Interface", "InterfaceReader", "parse", "request"]
-
 
 class ControllerState(IntEnum):
     """CAN_STATE_* of linux/can/netlink.h."""

@@ -16,8 +16,6 @@ from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.identity import Identity
 from gatewayd.canopen.nmt import UNCONFIGURED
 
-__all__ = ["BIT_RATES", "Command", "LssSlave", "LssState"]
-
 BIT_RATES = (1_000_000, 800_000, 500_000, 250_000, 125_000, None, 50_000, 20_000, 10_000)
 """Bits per second by index of the CiA bit timing table; index 5 is reserved."""
 _CONFIRM = 0x80

@@ -8,8 +8,6 @@ from enum import Enum, IntEnum
 from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.frame import Frame, Priority, Send
 
-__all__ = ["ALLOWED", "TRANSITIONS", "UNCONFIGURED", "NmtCommand", "NmtSlave", "NmtState", "Service"]
-
 UNCONFIGURED = 255
 """Node-ID of a node that has none yet: LSS alone is active (CiA 305)."""
 

@@ -31,8 +31,6 @@ from gatewayd.canopen.supervision import LOOK, BusSignal
 from gatewayd.loop import clock
 from gatewayd.loop.threads import in_daemon_thread
 
-__all__ = ["ASK", "ASK_LIMIT", "PythonCanBus"]
-
 ASK = 0.001
 """Seconds between two questions to an interface without a file descriptor, while frames come."""
 ASK_LIMIT = 0.008

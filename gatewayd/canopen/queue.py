@@ -17,17 +17,6 @@ from collections.abc import Callable
 
 from gatewayd.canopen.frame import Frame, Priority
 
-__all__ = [
-    "EVENT_CAPACITY",
-    "NEWEST_CAPACITY",
-    "ORDERED_CAPACITY",
-    "PATIENCE",
-    "STUCK",
-    "Renew",
-    "TransmitQueue",
-    "Transmitter",
-]
-
 ORDERED_CAPACITY = 256
 """ORDERED frames that may wait: a whole SDO block (127 segments) and what comes up meanwhile."""
 EVENT_CAPACITY = 64

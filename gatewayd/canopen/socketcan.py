@@ -20,8 +20,6 @@ from gatewayd.canopen.supervised import SupervisedBus
 from gatewayd.canopen.supervision import FAILURES, LOOK, BusSignal
 from gatewayd.loop import clock
 
-__all__ = ["RECEIVE_BUFFER", "SEND_BUFFER", "SocketCanBus", "filters", "pack", "seen"]
-
 CATCH_UP_FRAMES = 16_384
 """Most frames that are read in one go after the process stood still: more than any receive buffer holds."""
 RECEIVE_BUFFER = 2 << 20

@@ -12,8 +12,6 @@ from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.supervision import BusSignal, Supervisor, signal_of_error
 from gatewayd.loop import clock
 
-__all__ = ["LAG", "ROOM_RETRY", "SupervisedBus"]
-
 ROOM_RETRY = 0.001
 """Seconds to wait for room that nothing announces."""
 LAG = 0.005

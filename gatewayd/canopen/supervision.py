@@ -14,17 +14,6 @@ from types import MappingProxyType
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.errors import ControllerFlags, ErrorClass, ErrorFrame
 
-__all__ = [
-    "FAILURES",
-    "LOOK",
-    "RETRY",
-    "RETRY_LIMIT",
-    "TRANSITIONS",
-    "BusSignal",
-    "Supervisor",
-    "signal_of_error",
-]
-
 LOOK = 0.1
 """Seconds between two looks at the interface."""
 RETRY = 0.1

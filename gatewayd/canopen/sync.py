@@ -11,8 +11,6 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Entry, Object, variable
 from gatewayd.canopen.frame import Frame, Priority, Send
 
-__all__ = ["MAX_COUNTER", "MIN_PERIOD", "PRODUCER", "SyncPlan", "SyncService"]
-
 PRODUCER = 0x4000_0000
 """Bit 30 of 1005h: this node sends SYNC."""
 _DO_NOT_CARE = 0x8000_0000

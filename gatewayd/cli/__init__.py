@@ -9,8 +9,6 @@ from click.shell_completion import CompletionItem
 
 from gatewayd import __version__
 
-__all__ = ["COMMANDS", "command"]
-
 COMMANDS = {
     "demo": "Simulator, gateway, a PLC and a CANopen master in one terminal.",
     "check": "Find every mistake of mapping files, without a robot.",

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from gatewayd.mapping.compiled import Unreadable
     from gatewayd.report.findings import CheckOutcome
 
-__all__ = ["command"]
-
 CLEAN, FOUND, UNREADABLE = 0, 1, 2
 """Exit codes."""
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import click
 from click.shell_completion import get_completion_class
 
-__all__ = ["command"]
-
 INSTRUCTIONS = {
     "bash": "gatewayd completion bash > ~/.local/share/bash-completion/completions/gatewayd",
     "zsh": 'gatewayd completion zsh > "${fpath[1]}/_gatewayd"',

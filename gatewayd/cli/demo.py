@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from gatewayd.demo.scene import Scene
 
-__all__ = ["FRAME", "UNATTENDED", "command"]
-
 UNATTENDED = 20.0
 """Seconds a demonstration lasts that nobody can see or end, because stdout is no terminal."""
 FRAME = 0.25

@@ -6,8 +6,6 @@ import click
 
 from gatewayd.cli.files import format_option, load_file
 
-__all__ = ["command"]
-
 SAME, DIFFERENT, UNREADABLE = 0, 1, 2
 """Exit codes."""
 

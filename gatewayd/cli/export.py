@@ -12,8 +12,6 @@ from gatewayd.report.printable import printable
 if TYPE_CHECKING:
     from gatewayd.links.exports import Export
 
-__all__ = ["command"]
-
 BROKEN, UNREADABLE = 1, 2
 """Exit codes."""
 STDOUT = "-"

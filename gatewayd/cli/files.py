@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from gatewayd.mapping.loader import Loaded
     from gatewayd.mapping.plan import Plan
 
-__all__ = ["STDIN", "format_option", "load_file", "load_plan", "name_of", "read_file", "reason_of"]
-
 STDIN = "-"
 """The file name that stands for standard input."""
 _BROKEN, _UNREADABLE = 1, 2

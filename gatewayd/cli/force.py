@@ -17,8 +17,6 @@ from gatewayd.cli.remote import (
 if TYPE_CHECKING:
     from gatewayd.control.client import Client
 
-__all__ = ["command"]
-
 _TRUTHS = {"true": True, "on": True, "false": False, "off": False}
 
 

@@ -20,8 +20,6 @@ from gatewayd.cli.remote import (
 if TYPE_CHECKING:
     from gatewayd.control.client import Client
 
-__all__ = ["command"]
-
 
 @click.group(
     name="locks",

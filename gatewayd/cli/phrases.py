@@ -9,8 +9,6 @@ from typing import Any
 from gatewayd.links.registry import kinds
 from gatewayd.report.format import age
 
-__all__ = ["clock", "owner", "places", "quality"]
-
 
 def owner(variable: Mapping[str, Any]) -> str:
     """`plc, 4.2 s left`; `robot` for outputs."""

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from gatewayd.control.client import Client
 
-__all__ = ["PATIENCE", "command"]
-
 PATIENCE = 60.0
 """Seconds for the answer: many large files take a while on a small machine."""
 

@@ -18,23 +18,6 @@ from gatewayd.report.printable import json_text, printable, printable_answer
 if TYPE_CHECKING:
     from gatewayd.control.client import Client
 
-__all__ = [
-    "DURATION",
-    "REFUSED",
-    "UNREACHABLE",
-    "Duration",
-    "RemoteError",
-    "Unreachable",
-    "cell_option",
-    "complete_locks",
-    "complete_variables",
-    "echo_json",
-    "json_option",
-    "on_gateway",
-    "readable",
-    "refusals",
-]
-
 REFUSED, UNREACHABLE = 1, 2
 """Exit codes."""
 _COMPLETION_PATIENCE = 0.5

@@ -13,8 +13,6 @@ import click
 if TYPE_CHECKING:
     from gatewayd.web.settings import Settings
 
-__all__ = ["command"]
-
 
 @click.command(
     name="run",

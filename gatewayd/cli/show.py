@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from gatewayd.mapping.plan import Plan
     from gatewayd.report.layout import ReportTable, Row
 
-__all__ = ["command"]
-
 PIPE_WIDTH = 120
 """Columns of the table where neither a terminal nor COLUMNS says how wide it is."""
 

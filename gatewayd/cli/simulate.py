@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from gatewayd.simulator.controller import Controller
     from gatewayd.simulator.program import ProgramRule
 
-__all__ = ["command"]
-
 CANNOT_SERVE = 1
 SAFETY_TEXT = "SafetySetup has not been confirmed yet, therefore no data will be send yet"
 _PROBABILITY = click.FloatRange(0, 1)

@@ -12,8 +12,6 @@ from gatewayd.cli.remote import cell_option, echo_json, json_option, on_gateway,
 if TYPE_CHECKING:
     from gatewayd.control.client import Client
 
-__all__ = ["DEGRADED", "command"]
-
 DEGRADED = 1
 """Exit code when something is wrong."""
 _EVENTS = 5

@@ -11,8 +11,6 @@ from gatewayd.cli.remote import cell_option, complete_variables, on_gateway, rea
 if TYPE_CHECKING:
     from gatewayd.control.client import Client
 
-__all__ = ["command"]
-
 
 @click.command(
     name="unforce",

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from gatewayd.cli.watching import Glimpse, View
     from gatewayd.control.client import Client
 
-__all__ = ["command", "keys"]
-
 _EVENTS = 4
 _SEQUENCES = {
     "\x1b[A": "up", "\x1b[B": "down", "\x1b[5~": "pgup", "\x1b[6~": "pgdn", "\x1b[H": "home", "\x1b[F": "end",

@@ -16,8 +16,6 @@ from gatewayd.cli import phrases
 from gatewayd.report.format import age, value
 from gatewayd.report.words import LEVEL_COLOURS, QUALITY_COLOURS, SOURCE_LEVELS, quality, source
 
-__all__ = ["KEYS", "Glimpse", "Show", "View", "chosen", "plain", "press", "screen", "settled"]
-
 Answer = Mapping[str, Any]
 
 KEYS = "q quit   / filter   Esc clear   d direction   b only bad   space pause   ↑↓ PgUp PgDn scroll"

@@ -32,19 +32,6 @@ from gatewayd.report.schema import EventMessage, Json, LockStatus, Status, Versi
 from gatewayd.report.verdict import ServedCell
 from gatewayd.service.audit import Audit, Record, utc
 
-__all__ = [
-    "API_VERSION",
-    "MAX_FORCE",
-    "NEWS",
-    "STALE_ACT",
-    "Api",
-    "ApiError",
-    "Cursor",
-    "Gateway",
-    "Moment",
-    "Work",
-]
-
 API_VERSION = 1
 STALE_ACT = 0.5
 """Seconds that an act of the operator may have waited while the gateway stood still."""

@@ -15,8 +15,6 @@ from urllib.parse import quote, urlencode
 
 from gatewayd.control.paths import SYSTEM_SOCKET, candidates
 
-__all__ = ["Client", "ControlError", "NoDaemon", "find_socket", "segment"]
-
 _PATIENCE = 10.0
 """Seconds for an answer; a gateway that takes longer hangs."""
 _FOLLOW_PATIENCE = 30.0

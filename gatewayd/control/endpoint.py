@@ -21,8 +21,6 @@ from gatewayd.control.api import Api
 from gatewayd.logs.records import fields
 from gatewayd.loop.retry import reason_of, until_done
 
-__all__ = ["MODE", "RETRY_PERIOD", "Endpoint", "Reload", "Reloaded", "SocketTaken", "bind"]
-
 MODE = 0o660
 """Permissions of the socket: its owner and its group may do everything."""
 RETRY_PERIOD = 2.0

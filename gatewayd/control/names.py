@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 
-__all__ = ["MAX_PATTERN", "NamePattern"]
-
 MAX_PATTERN = 128
 """Characters of a pattern: twice the longest name of a variable."""
 

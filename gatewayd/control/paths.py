@@ -6,8 +6,6 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-__all__ = ["SYSTEM_SOCKET", "VARIABLE", "candidates", "default_socket"]
-
 VARIABLE = "GATEWAYD_CONTROL"
 """Environment variable that names the socket, for the daemon and for the commands that talk to it."""
 SYSTEM_SOCKET = Path("/run/gatewayd/control.sock")

@@ -25,8 +25,6 @@ from gatewayd.loop.share import Busy, LoopShare, in_one_step
 from gatewayd.loop.threads import in_daemon_thread
 from gatewayd.report.printable import json_text
 
-__all__ = ["ALIVE_PERIOD", "FOLLOWERS", "MAX_BODY", "application", "asker", "serving"]
-
 MAX_BODY = 64 * 1024
 """Bytes of a request's body."""
 REQUESTS = 64

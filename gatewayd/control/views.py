@@ -34,19 +34,6 @@ from gatewayd.report.schema import (
 from gatewayd.report.verdict import CellVerdict, PicturePart, ServedCell, verdict_of
 from gatewayd.service.audit import Record, plain_value, utc
 
-__all__ = [
-    "Declarations",
-    "Declared",
-    "VariableState",
-    "cell_view",
-    "declare",
-    "event_view",
-    "lock_view",
-    "record_view",
-    "variable_state",
-    "variable_view",
-]
-
 VariableState = tuple[Value, Quality, float, str | None, float | None, tuple[Value, float] | None]
 """Value, quality and age, the owner and its lease, the forced value and its time left; None: there is none."""
 _QUALITIES = tuple(quality.name.lower() for quality in Quality)

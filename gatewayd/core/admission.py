@@ -13,8 +13,6 @@ from gatewayd.core.refusal import PRECEDENCE, Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.core.supervision import patience
 
-__all__ = ["Admission", "Change", "Verdict"]
-
 
 @dataclass(frozen=True, slots=True)
 class Change:

@@ -14,8 +14,6 @@ from enum import Enum
 from gatewayd.core.definition import FallbackKind
 from gatewayd.core.image import ProcessImage
 
-__all__ = ["Adoption", "AdoptionStep", "adopted", "named", "would_fall_back"]
-
 _NAMED = 8
 """Variables that an event names one by one."""
 

@@ -32,8 +32,6 @@ from gatewayd.core.refusal_log import LastRefusal, RefusalLog
 from gatewayd.core.requester import Requester
 from gatewayd.core.supervision import WriterTable
 
-__all__ = ["HEARTBEAT_PERIOD", "Cell", "Change", "Written"]
-
 HEARTBEAT_PERIOD = 0.1
 """Seconds between two counts of the heartbeat."""
 NOTABLE_GAP = 0.5

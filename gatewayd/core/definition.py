@@ -9,20 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
-__all__ = [
-    "OPERATOR",
-    "CellDefinition",
-    "Direction",
-    "Fallback",
-    "FallbackKind",
-    "Limits",
-    "Lock",
-    "Value",
-    "ValueKind",
-    "Variable",
-    "Writer",
-]
-
 OPERATOR = 254
 """Writer index of the local operator, who is in no mapping and ranks above every owner. People see 255.
 

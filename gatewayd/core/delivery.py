@@ -16,8 +16,6 @@ from gatewayd.core.health import Health
 from gatewayd.core.image import ProcessImage, Quality
 from gatewayd.core.refusal_log import REFUSAL_INTERVAL
 
-__all__ = ["Delivery"]
-
 
 class Delivery:
     """The inputs of one cell by variable index. It brings the health figures about them up to date."""

@@ -11,8 +11,6 @@ from gatewayd.core.history import History
 from gatewayd.core.match import Match, at
 from gatewayd.core.refusal import Reason
 
-__all__ = ["CAPACITY", "Event", "EventKind", "EventRing", "translated"]
-
 CAPACITY = 1000
 """Last events kept, whatever their kinds; of each kind older ones are kept beside them (`core.history`)."""
 

@@ -12,8 +12,6 @@ from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import ProcessImage
 from gatewayd.core.ownership import LockTable
 
-__all__ = ["Fallbacks"]
-
 _NOT_READABLE = "the robot does not say what it holds"
 
 

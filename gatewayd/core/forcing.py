@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from gatewayd.core.definition import Direction, Value
 from gatewayd.core.image import ProcessImage, Quality
 
-__all__ = ["Force", "Forcing"]
-
 
 @dataclass(frozen=True, slots=True)
 class Force:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from enum import Enum, IntEnum
 
-__all__ = ["TRANSITIONS", "Freshness", "Source", "SourceSignal"]
-
 
 class Source(IntEnum):
     """State of the robot as a source of values. The numbers stand in the status block: never renumber."""

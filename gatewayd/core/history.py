@@ -9,8 +9,6 @@ from heapq import merge
 from itertools import islice, takewhile
 from typing import Generic, TypeVar
 
-__all__ = ["OF_KIND", "SPACED", "SPACING", "History"]
-
 OF_KIND = 100
 """Former entries of each kind that are kept beside the last ones of all kinds."""
 SPACED = 100

@@ -13,8 +13,6 @@ from enum import IntEnum
 
 from gatewayd.core.definition import Direction, FallbackKind, Value, Variable
 
-__all__ = ["ProcessImage", "Quality"]
-
 
 class Quality(IntEnum):
     """How far a value can be trusted. The numbers stand in the status block: never renumber."""

@@ -16,8 +16,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["DRIFT", "PROBE_INTERVAL", "Lag"]
-
 DRIFT = 500e-6
 """Seconds per second by which one clock may be slower than the other. Crystals differ by less than a fifth of it; a
 clock that a time service adjusts may use up the rest."""

@@ -7,8 +7,6 @@ from typing import Final
 
 from gatewayd.core.definition import Limits, Value, ValueKind, Variable
 
-__all__ = ["window", "within"]
-
 _NOTHING: Final = (math.inf, -math.inf)
 
 

@@ -16,8 +16,6 @@ from gatewayd.core.ownership import LockTable, Move
 from gatewayd.core.requester import Requester
 from gatewayd.core.supervision import WriterTable
 
-__all__ = ["Locking"]
-
 
 @dataclass(slots=True, eq=False)
 class Locking:

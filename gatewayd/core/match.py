@@ -10,8 +10,6 @@ from collections.abc import Iterator, Mapping
 
 from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, Lock, Variable
 
-__all__ = ["Match", "at"]
-
 
 class Match:
     """Indices of what goes on from one definition to the next: old -> new."""

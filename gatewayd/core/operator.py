@@ -22,8 +22,6 @@ from gatewayd.core.ownership import LockTable
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import LOCAL_OPERATOR, Requester
 
-__all__ = ["Operator"]
-
 
 @dataclass(slots=True, eq=False)
 class Operator:

@@ -13,8 +13,6 @@ from enum import Enum, IntEnum
 
 from gatewayd.core.definition import OPERATOR, Lock
 
-__all__ = ["MOVES", "Act", "LockTable", "Move", "Standing"]
-
 
 class Standing(Enum):
     """How a writer stands to a lock at this moment."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["STATES", "is_running"]
-
 STATES: dict[int, tuple[str, bool]] = {
     0: ("stopping", False),
     1: ("stopped", False),

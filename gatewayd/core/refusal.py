@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = ["PRECEDENCE", "Reason", "Refusal"]
-
 
 class Reason(IntEnum):
     """The numbers stand in the status block: never renumber, only append."""

@@ -10,8 +10,6 @@ from gatewayd.core.events import Event, translated
 from gatewayd.core.match import Match, at
 from gatewayd.core.refusal import Reason, Refusal
 
-__all__ = ["MAX_PEERS", "REFUSAL_INTERVAL", "LastRefusal", "RefusalLog"]
-
 MAX_PEERS = 64
 """Hosts without a writer whose refusals are told apart."""
 REFUSAL_INTERVAL = 10.0

@@ -7,8 +7,6 @@ from itertools import count
 
 from gatewayd.core.definition import OPERATOR
 
-__all__ = ["LOCAL_OPERATOR", "Requester", "new_connection"]
-
 
 @dataclass(frozen=True, slots=True)
 class Requester:

@@ -28,8 +28,6 @@ from gatewayd.core.status_layout import (
     StatusField,
 )
 
-__all__ = ["StatusBlock"]
-
 _U16 = 0xFFFF
 _U32 = 0xFFFF_FFFF
 _CODES = {1: "H", 2: "I"}

@@ -11,22 +11,6 @@ from gatewayd.core.image import Quality
 from gatewayd.core.program import STATES
 from gatewayd.core.refusal import Reason
 
-__all__ = [
-    "BASE",
-    "FIELDS",
-    "HEADER_WORDS",
-    "LAYOUT_VERSION",
-    "LENGTH",
-    "MAX_VARIABLES",
-    "MAX_WRITERS",
-    "RELEASE",
-    "RELEASE_ALL",
-    "REQUEST",
-    "TABLES",
-    "StatusField",
-    "StatusTable",
-]
-
 LAYOUT_VERSION = 1
 BASE = 60000
 """Protocol address of the first word, in holding and in input registers."""

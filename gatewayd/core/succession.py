@@ -13,8 +13,6 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, FallbackKind
 from gatewayd.core.match import Match
 
-__all__ = ["Succession", "succeed"]
-
 
 @dataclass(frozen=True, slots=True)
 class Succession:

@@ -7,8 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from gatewayd.core.definition import OPERATOR, Lock, Writer
 
-__all__ = ["DEFAULT_PATIENCE", "WriterTable", "patience"]
-
 DEFAULT_PATIENCE = 0.5
 """Seconds for which a request may have waited where nothing declares how long its writer may be silent."""
 

@@ -18,22 +18,6 @@ import can
 
 from gatewayd.loop import clock
 
-__all__ = [
-    "CHECKS",
-    "EMERGENCY",
-    "FEEDS",
-    "HEARTBEAT",
-    "INTEGERS",
-    "MEASURED",
-    "NODE",
-    "OPERATIONAL",
-    "SET_FEED",
-    "SIGNALS",
-    "SILENCE",
-    "Feeder",
-    "Master",
-]
-
 NODE = 16
 """Node-ID of the gateway."""
 EMERGENCY = 0x080 + NODE

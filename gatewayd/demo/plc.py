@@ -16,19 +16,6 @@ from enum import Enum
 from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
-__all__ = [
-    "CHECKS_PER_HANDSHAKE",
-    "FORCE_SHARE",
-    "SLOW_FEED",
-    "TRANSITIONS",
-    "Answers",
-    "Order",
-    "Phase",
-    "Plc",
-    "Program",
-    "Signal",
-]
-
 SCAN = 0.05
 """Seconds from one scan to the next."""
 FORCE_SHARE = 0.9

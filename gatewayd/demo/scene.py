@@ -24,8 +24,6 @@ from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import parse
 from gatewayd.simulator.server import SimulatedController
 
-__all__ = ["CHANNEL", "HOST", "LINE", "MAPPING", "PLC_ADDRESS", "PORT", "Scene", "free_port", "mapping"]
-
 HOST = "127.0.0.1"
 PORT = 1502
 """The gateway's port, if it is free."""

@@ -21,16 +21,6 @@ from gatewayd.report.format import age, value
 from gatewayd.report.layout import Row
 from gatewayd.report.words import SOURCES
 
-__all__ = [
-    "PDO_REFUSAL_SHOWN",
-    "REFUSAL_SHOWN",
-    "Line",
-    "ShownEvent",
-    "Snapshot",
-    "describe",
-    "snapshot",
-]
-
 REFUSAL_SHOWN = 5.0
 """Seconds for which a refusal of a Modbus client stands beside its variable."""
 PDO_REFUSAL_SHOWN = 1.5

@@ -6,8 +6,6 @@ from gatewayd.demo.master import CHECKS
 from gatewayd.demo.plc import CHECKS_PER_HANDSHAKE
 from gatewayd.demo.scene import Scene
 
-__all__ = ["summary"]
-
 _LONG_ENOUGH = 3
 """Handshakes within which the CANopen side must have come to work."""
 

@@ -12,8 +12,6 @@ from rich.text import Text
 from gatewayd.demo.snapshot import Line, Snapshot
 from gatewayd.report.words import QUALITY_COLOURS
 
-__all__ = ["Poke", "commands", "plain", "screen"]
-
 Poke = tuple[str, str]
 """What a command shows, and the command."""
 

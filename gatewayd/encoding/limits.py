@@ -20,8 +20,6 @@ from typing import Final, TypeAlias
 
 from gatewayd.core.definition import Value, ValueKind
 
-__all__ = ["Ends", "LimitReader", "Meaning", "ends_of", "read_limits"]
-
 Meaning: TypeAlias = Callable[[float], Value | None]
 """What a raw number is in the robot's unit; None: nothing."""
 Ends: TypeAlias = tuple[float | None, float | None]

@@ -24,23 +24,6 @@ if TYPE_CHECKING:
     from gatewayd.core.status_layout import StatusField
     from gatewayd.mapping.plan import LinkPlan, Plan
 
-__all__ = [
-    "Context",
-    "Description",
-    "Level",
-    "Link",
-    "LinkHealth",
-    "LinkKind",
-    "LinkMetric",
-    "LinkRuntime",
-    "Names",
-    "Place",
-    "PrepareError",
-    "Prepared",
-    "SharedPart",
-    "SourceLink",
-]
-
 # -- declaration -------------------------------------------------------------------------------------------------
 
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["Export", "ExportError"]
-
 
 class ExportError(Exception):
     """There is nothing to write, or it must not be written; the text says why."""

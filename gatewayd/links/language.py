@@ -18,8 +18,6 @@ from gatewayd.mapping.plan import LinkPlan
 from gatewayd.mapping.reach import Reach
 from gatewayd.mapping.section import Section
 
-__all__ = ["DefiningLanguage", "LinkLanguage", "WriterName"]
-
 
 @dataclass(frozen=True, slots=True)
 class WriterName:

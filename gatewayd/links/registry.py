@@ -15,19 +15,6 @@ if TYPE_CHECKING:
     from gatewayd.links.language import DefiningLanguage, LinkLanguage
     from gatewayd.links.tables import LinkTables
 
-__all__ = [
-    "LINK_KINDS",
-    "definer",
-    "exports",
-    "kind_of",
-    "kinds",
-    "language_of",
-    "languages",
-    "runtime_of",
-    "status_fields",
-    "tables",
-]
-
 LINK_KINDS = (
     "gatewayd.links.robot",
     "gatewayd.links.modbus_server",

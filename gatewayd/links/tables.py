@@ -12,8 +12,6 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.layout import Column, ReportTable, Row, plain, span
 
-__all__ = ["LinkTables"]
-
 
 class LinkTables:
     """One kind's columns and tables. A cell and a plan are those of a mapping without errors."""

@@ -17,8 +17,6 @@ from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
 from gatewayd.logs.records import fields
 
-__all__ = ["LEVELS", "EventLog"]
-
 LEVELS = {
     EventKind.ROBOT_LOST: logging.WARNING,
     EventKind.STALE: logging.WARNING,

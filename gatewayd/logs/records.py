@@ -21,8 +21,6 @@ from typing import Protocol
 
 from gatewayd.report.printable import printable
 
-__all__ = ["Format", "Stream", "configure", "fields"]
-
 
 class Stream(Protocol):
     """What lines are written to."""

@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from gatewayd.logs.records import fields
 from gatewayd.loop.lines import LineThread
 
-__all__ = ["CAPACITY", "LogStream"]
-
 CAPACITY = 10_000
 """Lines that may wait for the reader."""
 

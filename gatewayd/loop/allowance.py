@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["Allowance"]
-
 
 class Allowance:
     """At most `burst` times at once, and `rate` times a second over a long time."""

@@ -25,8 +25,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["GAP", "ClockedLoop", "Gap", "judged_now", "now", "on_gap", "overdue", "raw"]
-
 GAP = 0.05
 """Seconds beyond what the loop wanted to sleep after which the process counts as having stood still."""
 _MOST_GAPS = 3

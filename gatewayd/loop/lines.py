@@ -6,8 +6,6 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 
-__all__ = ["LineThread"]
-
 
 class LineThread:
     """A bounded queue, emptied by a thread of its own. `put` never waits and never raises.

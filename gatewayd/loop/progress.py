@@ -8,8 +8,6 @@ from typing import TypeVar
 
 from gatewayd.loop import clock
 
-__all__ = ["GRACE", "STEP", "wait_with_progress"]
-
 STEP = 0.25
 """Seconds between two signs of progress of a part, whatever it waits for."""
 GRACE = 1.0

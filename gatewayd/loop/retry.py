@@ -9,8 +9,6 @@ from typing import TypeVar
 
 from gatewayd.loop.progress import wait_with_progress
 
-__all__ = ["Failure", "keep_running", "reason_of", "until_done"]
-
 _Result = TypeVar("_Result")
 
 

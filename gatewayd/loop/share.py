@@ -17,8 +17,6 @@ from typing import TYPE_CHECKING, TypeVar, cast
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
-__all__ = ["BURST", "OVERHEAD", "PIECE", "SHARE", "WAITING", "Busy", "LoopShare", "in_one_step"]
-
 SHARE = 0.1
 """Of the loop's time, the most that all pieces together take."""
 PIECE = 0.001

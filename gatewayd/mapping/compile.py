@@ -32,8 +32,6 @@ from gatewayd.mapping.model import WriterSpec
 from gatewayd.mapping.plan import Plan
 from gatewayd.mapping.shown import Shown, shown_of
 
-__all__ = ["compile_plan", "fingerprint"]
-
 _CASTS: Final[dict[ValueKind, Callable[[Value], Value]]] = {
     ValueKind.BOOL: bool,
     ValueKind.INT: round,

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from gatewayd.mapping.diagnostics import Diagnostic, Severity
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["PATTERN", "Compiled", "CompiledFile", "Unreadable"]
-
 PATTERN = "*.yaml"
 """The mapping files of a directory."""
 

@@ -9,21 +9,6 @@ from enum import Enum
 from importlib.resources import files
 from typing import TypeVar
 
-__all__ = [
-    "FAMILIES",
-    "RETIRED",
-    "Diagnostic",
-    "Position",
-    "Related",
-    "RetiredRule",
-    "Rule",
-    "Severity",
-    "all_rules",
-    "declare",
-    "retired_rule_of",
-    "rule_of",
-]
-
 FAMILIES = {
     1: "syntax and numbers",
     2: "Modbus",

@@ -14,8 +14,6 @@ from gatewayd.mapping.model import Group, VariableSpec, WriterSpec
 from gatewayd.mapping.section import Section
 from gatewayd.mapping.source import Items, MappingText, Node, Table
 
-__all__ = ["Document", "Part", "Step", "walk"]
-
 S_co = TypeVar("S_co", bound=Section, covariant=True)
 Other = TypeVar("Other", bound=Section)
 Step: TypeAlias = str | int

@@ -22,8 +22,6 @@ from gatewayd.mapping.expanded import (
 )
 from gatewayd.mapping.model import ANY, Group, VariableSpec
 
-__all__ = ["SHARED_LEASE", "expand"]
-
 SHARED_LEASE: Final = 5.0
 """Seconds of lease where several writers may own and the file says nothing."""
 _MANY: Final = 2048

@@ -15,17 +15,6 @@ from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.model import Group, VariableSpec
 
-__all__ = [
-    "CellSettings",
-    "Defined",
-    "ExpandedCell",
-    "ExpandedLink",
-    "ExpandedLock",
-    "ExpandedVariable",
-    "UndefinedError",
-    "Unresolved",
-]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Defined:

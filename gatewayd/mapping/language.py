@@ -18,8 +18,6 @@ from gatewayd.mapping.scalars import CellName, Name, refuse
 from gatewayd.mapping.section import Section
 from gatewayd.report.wording import alternatives
 
-__all__ = ["FILE", "VARIABLE", "WRITER"]
-
 
 def _known(writer: WriterSpec) -> WriterSpec:
     if not any(language.knows(writer) for language in languages()):

@@ -18,8 +18,6 @@ from gatewayd.mapping.reader import read_document
 from gatewayd.mapping.rules.run import check_cell, check_plant
 from gatewayd.mapping.source import MAX_BYTES, parse
 
-__all__ = ["Loaded", "load", "load_together", "read_bytes"]
-
 
 @dataclass(frozen=True, slots=True)
 class Loaded(CompiledFile):

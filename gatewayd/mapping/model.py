@@ -17,8 +17,6 @@ from gatewayd.core.definition import Fallback
 from gatewayd.mapping.scalars import Name, Names, OptionalDuration, OutputPolicy, Real, ReleasePolicy
 from gatewayd.mapping.section import Section
 
-__all__ = ["ANY", "FORMAT_VERSION", "Group", "VariablePolicy", "VariableSpec", "WriterSpec"]
-
 FORMAT_VERSION = 1
 """Version of the mapping language that this module describes."""
 ANY = "any"

@@ -12,8 +12,6 @@ from typing import ClassVar, TypeVar
 
 from gatewayd.core.definition import CellDefinition
 
-__all__ = ["LinkPlan", "Plan"]
-
 
 class LinkPlan:
     """One link of a cell, compiled: a frozen dataclass of the link's own that fits into a pickle.

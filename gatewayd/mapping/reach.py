@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
-__all__ = ["Reach", "scaled"]
-
 _HALF: Final = Fraction(1, 2)
 
 

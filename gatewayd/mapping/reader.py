@@ -24,8 +24,6 @@ from gatewayd.mapping.scalars import CellName, Name
 from gatewayd.mapping.section import Section
 from gatewayd.mapping.source import Items, MappingText, Node, Scalar, Table, TableEntry, shown
 
-__all__ = ["read_document"]
-
 S = TypeVar("S", bound=Section)
 Found = TypeVar("Found")
 

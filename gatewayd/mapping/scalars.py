@@ -23,30 +23,6 @@ from gatewayd.mapping.diagnostics import Rule
 from gatewayd.mapping.source import RealNumber, WholeNumber
 from gatewayd.report.format import address as address_text
 
-__all__ = [
-    "OPTIONAL_DURATION_SCHEMA",
-    "CellName",
-    "Duration",
-    "Host",
-    "Listen",
-    "ListenAddress",
-    "Name",
-    "Names",
-    "Network",
-    "Networks",
-    "OptionalDuration",
-    "OutputPolicy",
-    "Real",
-    "ReleasePolicy",
-    "Whole",
-    "one_or_many",
-    "optional_duration",
-    "refuse",
-    "scalar",
-    "span",
-    "written",
-]
-
 _DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?")
 _NUMBER_LIKE = re.compile(r"[-+]?[0-9.][0-9a-fA-FxXoO_.,:+-]*")
 _DURATION = re.compile(r"([0-9]+(?:\.[0-9]+)?)[ ]?(ms|s|min|h)")

@@ -12,8 +12,6 @@ from typing import Any, Final
 
 from gatewayd.mapping.language import FILE
 
-__all__ = ["mapping_schema", "schema_text"]
-
 _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 

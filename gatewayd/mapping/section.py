@@ -6,8 +6,6 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
-__all__ = ["Section"]
-
 S = TypeVar("S", bound="Section")
 
 

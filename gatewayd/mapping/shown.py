@@ -12,8 +12,6 @@ from gatewayd.links.registry import languages
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.reach import Reach
 
-__all__ = ["Shown", "shown_of"]
-
 
 @dataclass(frozen=True, slots=True)
 class Shown:

@@ -28,21 +28,6 @@ from ruamel.yaml.reader import ReaderError
 from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule
 
-__all__ = [
-    "MAX_BYTES",
-    "MAX_DEPTH",
-    "Items",
-    "MappingText",
-    "Node",
-    "RealNumber",
-    "Scalar",
-    "Table",
-    "TableEntry",
-    "WholeNumber",
-    "parse",
-    "shown",
-]
-
 MAX_BYTES: Final = 1 << 20
 """Greatest size of a mapping file."""
 MAX_DEPTH: Final = 16

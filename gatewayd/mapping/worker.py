@@ -12,8 +12,6 @@ from pathlib import Path
 from gatewayd.mapping.compiled import Compiled, CompiledFile, Unreadable
 from gatewayd.mapping.loader import load_together, read_bytes
 
-__all__ = ["compile_files", "main"]
-
 
 def compile_files(names: Iterable[str]) -> Compiled:
     """Read, check and compile; the files are to run in one process. Never raises, whatever is named."""

@@ -5,16 +5,6 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final
 
-__all__ = [
-    "AREA_NAMES",
-    "MAX_READ_BITS",
-    "MAX_READ_REGISTERS",
-    "MAX_WRITE_BITS",
-    "MAX_WRITE_REGISTERS",
-    "MAX_WRITE_WITH_READ",
-    "Area",
-]
-
 # Application Protocol V1.1b3, 6.1, 6.3, 6.11, 6.12 and 6.17.
 MAX_READ_BITS: Final = 2000
 MAX_READ_REGISTERS: Final = 125

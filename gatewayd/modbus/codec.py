@@ -23,8 +23,6 @@ from typing import Final, TypeAlias
 from gatewayd.core.definition import Value, ValueKind
 from gatewayd.encoding.limits import Ends, LimitReader, Meaning, ends_of, read_limits
 
-__all__ = ["ORDERS", "TYPES", "Codec", "NumberFormat", "make_codec"]
-
 Buffer: TypeAlias = bytes | bytearray | memoryview
 
 ORDERS: Final = {"ABCD": (">", False), "CDAB": ("<", True), "BADC": (">", True), "DCBA": ("<", False)}

@@ -8,18 +8,6 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-__all__ = [
-    "BUFFER_SIZE",
-    "HEADER_SIZE",
-    "MAX_FRAME",
-    "MAX_PDU",
-    "FrameBuffer",
-    "FramingError",
-    "ModbusFrame",
-    "encode",
-    "split",
-]
-
 HEADER_SIZE = 7
 """Bytes before the PDU."""
 MAX_PDU = 253

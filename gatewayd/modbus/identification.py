@@ -10,8 +10,6 @@ from enum import IntEnum
 from gatewayd import __version__
 from gatewayd.modbus.frames import MAX_PDU
 
-__all__ = ["FUNCTION", "MEI_TYPE", "REPORT_SERVER_ID", "Identification", "ObjectId", "ReadCode"]
-
 FUNCTION = 43
 REPORT_SERVER_ID = 17
 MEI_TYPE = 14

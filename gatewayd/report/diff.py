@@ -22,18 +22,6 @@ from gatewayd.report.printable import json_document, printable
 from gatewayd.report.weakening import weakened
 from gatewayd.report.wording import family, names_and_more
 
-__all__ = [
-    "MAX_GONE",
-    "ChangeKind",
-    "Changes",
-    "Detail",
-    "Difference",
-    "as_json",
-    "as_text",
-    "compare",
-    "objections",
-]
-
 MAX_GONE = 0.3
 """Part of the variables that may disappear unasked: more looks like the wrong file."""
 

@@ -14,8 +14,6 @@ from gatewayd.core.refusal import Reason
 from gatewayd.report.format import value
 from gatewayd.report.printable import printable
 
-__all__ = ["ACCEPTED", "BAD", "GATEWAY", "UNDECLARED", "UNDECLARED_PEER", "EventRecord"]
-
 ACCEPTED = "write accepted"
 """What happened when a write was accepted; the core has no event for it."""
 UNDECLARED, GATEWAY = "undeclared", "gateway"

@@ -15,8 +15,6 @@ from gatewayd.links.registry import kind_of, kinds
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.format import exact, seconds
 
-__all__ = ["FOR_PEOPLE", "Facts", "described", "groups", "links", "robot_name", "variables", "writers"]
-
 Facts = Mapping[str, str]
 """Name of a fact -> what the plan says; what stands at "nothing" is missing."""
 

@@ -8,8 +8,6 @@ from gatewayd.mapping.compiled import Unreadable
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Severity
 from gatewayd.report.printable import json_document, printable
 
-__all__ = ["CheckOutcome", "as_github", "as_json", "as_text"]
-
 _BOLD, _RED, _YELLOW, _DIM, _PLAIN = "\x1b[1m", "\x1b[31m", "\x1b[33m", "\x1b[2m", "\x1b[0m"
 _TINT = {Severity.ERROR: _RED, Severity.WARNING: _YELLOW}
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-__all__ = ["address", "age", "counted", "exact", "listed", "seconds", "span", "value"]
-
 _DIGITS = 3
 
 

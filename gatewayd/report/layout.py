@@ -6,8 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["Column", "ReportTable", "Row", "Text", "arranged", "plain", "span"]
-
 Text = str | tuple[str, str]
 """A text, or a text and its style on a screen."""
 

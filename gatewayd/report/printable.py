@@ -13,8 +13,6 @@ import json
 import re
 from typing import Any
 
-__all__ = ["MAX_LENGTH", "json_document", "json_text", "printable", "printable_answer"]
-
 MAX_LENGTH = 4000
 """Characters of one text; what is longer is cut and says so. All variables of a full image in a line are shorter."""
 

@@ -12,22 +12,6 @@ from typing import Annotated, Any, NotRequired, TypedDict, get_origin, get_type_
 
 from gatewayd.links.registry import kinds
 
-__all__ = [
-    "AuditRecord",
-    "CellStatus",
-    "EventMessage",
-    "Json",
-    "LinkStatus",
-    "LockStatus",
-    "RefusalStatus",
-    "Status",
-    "VariableDeclaration",
-    "VariableStatus",
-    "VersionInfo",
-    "WriterStatus",
-    "documented",
-]
-
 Json = dict[str, Any]
 
 

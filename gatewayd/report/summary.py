@@ -12,8 +12,6 @@ from gatewayd.core.freshness import Source
 from gatewayd.report.format import counted
 from gatewayd.report.verdict import CellVerdict
 
-__all__ = ["MAX_LIST", "summary"]
-
 MAX_LIST = 4
 """Cells reported one by one; of more, only those with problems, and the others as a number."""
 

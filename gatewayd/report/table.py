@@ -18,19 +18,6 @@ from gatewayd.report.layout import Column, Row, arranged, plain
 from gatewayd.report.printable import json_document, printable
 from gatewayd.report.wording import number
 
-__all__ = [
-    "as_csv",
-    "as_json",
-    "as_markdown",
-    "by_line",
-    "columns",
-    "formula",
-    "limits",
-    "lost",
-    "policy",
-    "rows",
-]
-
 _COLUMNS: Final = tuple(
     Column(name)
     for name in (

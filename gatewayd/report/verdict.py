@@ -21,8 +21,6 @@ from gatewayd.mapping.plan import Plan
 from gatewayd.report.format import counted, listed, span
 from gatewayd.report.words import SOURCE_LEVELS, SOURCES
 
-__all__ = ["RECENT", "CellVerdict", "PicturePart", "ServedCell", "gateway_part", "judge", "verdict_of"]
-
 RECENT = 10.0
 """Seconds for which a refusal or a differing read-back colours its part."""
 _LISTED = 3

@@ -11,8 +11,6 @@ from collections.abc import Iterator
 
 from gatewayd.core.definition import CellDefinition, Direction, Lock, Variable, Writer
 
-__all__ = ["weakened"]
-
 
 def weakened(old: CellDefinition, new: CellDefinition) -> Iterator[str]:
     """Each promise that would be weaker, in words; parts are matched by name. What is removed promises nothing."""

@@ -5,17 +5,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 
-__all__ = [
-    "alternatives",
-    "cob",
-    "did_you_mean",
-    "family",
-    "names_and_more",
-    "number",
-    "one_and_more",
-    "seconds",
-]
-
 
 def number(value: float) -> str:
     """A number as people write it: without `.0`, without digits that mean nothing."""

@@ -6,8 +6,6 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.links.contract import Level
 
-__all__ = ["LEVEL_COLOURS", "QUALITY_COLOURS", "SOURCES", "SOURCE_LEVELS", "quality", "source"]
-
 SOURCES = {
     Source.LOST: "not connected",
     Source.WAITING: "connected, but it sends no data yet",

@@ -11,8 +11,6 @@ from gatewayd.rtde.fields import BITS_PER_WORD, INPUTS, OUTPUTS
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-__all__ = ["bit_word", "is_fieldbus_range", "likely_holders", "suggest"]
-
 _WORDS = {
     "input": ("input_bit_registers0_to_31", "input_bit_registers32_to_63"),
     "output": ("output_bit_registers0_to_31", "output_bit_registers32_to_63"),

@@ -21,21 +21,6 @@ from gatewayd.rtde.messages import ERROR_WORDS, IN_USE, InputsSetup, SetupInputs
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
 
-__all__ = [
-    "MAX_RECIPES",
-    "OLD_LIST_LIMIT",
-    "REFUSED",
-    "REGISTERS_KEY",
-    "WATCHDOG_KEY",
-    "Claims",
-    "HandshakeError",
-    "InputRecipe",
-    "is_long",
-    "list_size",
-    "recipe_key",
-    "sort_types",
-]
-
 REGISTERS_KEY = "registers"
 """Key of the recipe that holds every general purpose register."""
 WATCHDOG_KEY = "watchdog"

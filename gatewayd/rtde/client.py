@@ -24,8 +24,6 @@ from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.resolve import resolve
 from gatewayd.rtde.session import ClientSettings, Session
 
-__all__ = ["RtdeClient"]
-
 _KEEPALIVE = (("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCNT", 3))
 
 

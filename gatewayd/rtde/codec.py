@@ -24,8 +24,6 @@ from gatewayd.rtde.strange import Oddity, StrangePackage
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-__all__ = ["MAX_PACKAGE", "ClientProtocol", "ControllerProtocol", "ProtocolError"]
-
 MAX_PACKAGE = 0xFFFF
 """Largest package, header included: what its size field can say."""
 

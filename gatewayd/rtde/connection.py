@@ -29,8 +29,6 @@ from gatewayd.rtde.session import TIMESTAMP, ClientSettings, Session
 from gatewayd.rtde.strange import Oddity, StrangePackage
 from gatewayd.rtde.types import DataType
 
-__all__ = ["ClientHandler", "Connection"]
-
 _TIMESTAMP = struct.Struct(">d")
 _FIRST_CLAIM_RETRY = 0.1
 _MEASURE_EVERY = 1.0

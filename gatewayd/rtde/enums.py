@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["JointMode", "ProgramState", "RobotMode", "SafetyStatus", "TimeScaleSource"]
-
 
 class RobotMode(IntEnum):
     """`robot_mode`."""

@@ -20,18 +20,6 @@ from gatewayd.rtde.types import DataType
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-__all__ = [
-    "BITS_PER_WORD",
-    "INPUTS",
-    "OUTPUTS",
-    "REGISTERS",
-    "Field",
-    "RegisterFamily",
-    "Series",
-    "Since",
-    "SoftwareVersion",
-]
-
 BITS_PER_WORD = 32
 """Bits of `input_bit_registers0_to_31` and its like."""
 

@@ -14,8 +14,6 @@ from typing import NamedTuple
 
 from gatewayd.rtde.messages import ControllerVersion
 
-__all__ = ["ListMemory", "ListOutcome"]
-
 _FAILURES = 2
 
 

@@ -7,8 +7,6 @@ import socket
 from dataclasses import dataclass
 from enum import Enum
 
-__all__ = ["Loss", "LossReason", "connect_failure", "connection_failure"]
-
 
 class LossReason(Enum):
     """Kinds of loss, stable names for logs."""

@@ -10,31 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = [
-    "ANSWER_TYPES",
-    "ERROR_WORDS",
-    "IN_USE",
-    "NOT_FOUND",
-    "ControllerMessage",
-    "ControllerVersion",
-    "DataPackage",
-    "ExecutableMessage",
-    "GetControllerVersion",
-    "InputsSetup",
-    "OutputsSetup",
-    "PackageType",
-    "Pause",
-    "PauseReply",
-    "ProtocolVersionReply",
-    "RequestProtocolVersion",
-    "SetupInputs",
-    "SetupOutputs",
-    "Start",
-    "StartReply",
-    "TextLevel",
-    "TextMessage",
-]
-
 NOT_FOUND = "NOT_FOUND"
 """In place of a type: the controller does not have the field."""
 IN_USE = "IN_USE"

@@ -23,8 +23,6 @@ from gatewayd.rtde.reading import Reading
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.session import TOO_LONG, Session, Unavailable, Wishes, input_hint, output_hint
 
-__all__ = ["Negotiation", "NextStep", "Notice", "State"]
-
 _RATE_V1 = 125
 _RATE_UNKNOWN = {True: 500, False: 125}
 _NEW_HARDWARE = 5

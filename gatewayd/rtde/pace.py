@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 
 from gatewayd.rtde.strange import StrangeCounts
 
-__all__ = ["Pace", "Statistics"]
-
 _LONGEST_GAP = 3600.0
 """Seconds between packages beyond which the timestamp is not believed; a connection does not live so long silent."""
 _PAUSE = 0.1

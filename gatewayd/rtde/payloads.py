@@ -20,16 +20,6 @@ if TYPE_CHECKING:
     ControllerDecoders = Mapping[int, Callable[[bytes], ControllerMessage]]
     ExecutableDecoders = Mapping[int, Callable[[bytes], ExecutableMessage]]
 
-__all__ = [
-    "FROM_CONTROLLER",
-    "FROM_CONTROLLER_V1",
-    "FROM_EXECUTABLE",
-    "FROM_EXECUTABLE_V1",
-    "MalformedPayloadError",
-    "encode_controller",
-    "encode_executable",
-]
-
 _UINT16 = struct.Struct(">H")
 _VERSION = struct.Struct(">4I")
 _DOUBLE = struct.Struct(">d")

@@ -15,8 +15,6 @@ from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import Wishes
 from gatewayd.rtde.types import DataType
 
-__all__ = ["Reading", "fitting"]
-
 
 def fitting(names: Iterable[str], limit: int = OLD_LIST_LIMIT) -> tuple[str, ...]:
     """Those of `names` that a list of `limit` bytes has room for, first come, first served."""

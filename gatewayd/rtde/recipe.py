@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
     from gatewayd.rtde.types import DataType
 
-__all__ = ["Recipe", "Scalar"]
-
 Scalar = bool | int | float
 """One element of a value: bool for BOOL, int for the integer types, float for DOUBLE and its vectors."""
 

@@ -8,8 +8,6 @@ from functools import partial
 
 from gatewayd.loop.threads import in_daemon_thread
 
-__all__ = ["SocketAddress", "resolve"]
-
 SocketAddress = tuple[
     socket.AddressFamily,
     socket.SocketKind,

@@ -13,17 +13,6 @@ from gatewayd.rtde.messages import IN_USE, NOT_FOUND, ControllerVersion
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.types import DEFAULT_PORT
 
-__all__ = [
-    "TIMESTAMP",
-    "TOO_LONG",
-    "ClientSettings",
-    "Session",
-    "Unavailable",
-    "Wishes",
-    "input_hint",
-    "output_hint",
-]
-
 TIMESTAMP = "timestamp"
 """The output that is always subscribed, first: it shows skipped and late packages, and a restarted controller."""
 TOO_LONG = "TOO_LONG"

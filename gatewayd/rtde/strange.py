@@ -9,8 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-__all__ = ["Oddity", "StrangeCounts", "StrangePackage"]
-
 _MOST_REPORTED = 64
 
 

@@ -6,8 +6,6 @@ import struct
 from collections.abc import Mapping
 from enum import Enum
 
-__all__ = ["DEFAULT_PORT", "INTEGER_RANGES", "DataType"]
-
 DEFAULT_PORT = 30004
 """TCP port of the RTDE interface."""
 

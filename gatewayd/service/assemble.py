@@ -22,8 +22,6 @@ from gatewayd.service.systemd import Notifier
 from gatewayd.service.watchdog import ManagerReporter
 from gatewayd.web.launch import serve
 
-__all__ = ["QUIET", "SignalActions", "control_socket", "run"]
-
 QUIET = 10.0
 """Seconds for which further signals of a kind that is ignored are not logged."""
 

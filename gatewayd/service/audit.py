@@ -25,8 +25,6 @@ from gatewayd.loop import clock
 from gatewayd.report.event_text import ACCEPTED, EventRecord
 from gatewayd.report.printable import json_text
 
-__all__ = ["CAPACITY", "KINDS", "MERGED", "Audit", "Record", "plain_value", "utc"]
-
 CAPACITY = 2000
 """Records kept in memory, of all cells together."""
 MERGED = 1.0

@@ -18,8 +18,6 @@ from gatewayd.logs.records import fields
 from gatewayd.loop.lines import LineThread
 from gatewayd.loop.retry import Failure, reason_of
 
-__all__ = ["KEPT", "MAX_SIZE", "QUEUE", "RETRY", "AuditFile"]
-
 MAX_SIZE = 16 * 1024 * 1024
 """Bytes after which the file becomes FILE.1, FILE.1 becomes FILE.2 and so on."""
 KEPT = 5

@@ -14,8 +14,6 @@ from gatewayd.links.registry import kind_of, runtime_of
 from gatewayd.logs.events import EventLog
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["CellRuntime"]
-
 
 class CellRuntime:
     """One cell with its links, while it is served. A reload puts other ones in their place."""

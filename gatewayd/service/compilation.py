@@ -22,8 +22,6 @@ from typing import Self
 import gatewayd
 from gatewayd.mapping.compiled import Compiled
 
-__all__ = ["LIMIT", "Compilation", "CompilationError"]
-
 LIMIT = 20.0
 """Seconds that all files together may take; hundreds take two."""
 

@@ -23,8 +23,6 @@ from gatewayd.mapping.plan import Plan
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.shared_parts import AllPrepared, SharedParts
 
-__all__ = ["CLOSING_TIME", "RETRY_PERIOD", "TICK", "Daemon"]
-
 TICK = 0.02
 """Seconds between two looks at leases, time-outs and staleness."""
 RETRY_PERIOD = 2.0

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-__all__ = ["PATIENCE", "Liveness", "Progressed"]
-
 PATIENCE = 1.0
 """Seconds for which a part may stand still before it is reported to hang: several steps, and less than the watchdog
 waits, so that the journal has its name before the process is ended."""

@@ -13,8 +13,6 @@ from gatewayd.service.options import Options
 from gatewayd.service.signals import SIGNALS, name_of
 from gatewayd.service.startup import Startup, load_plans
 
-__all__ = ["DEFECT", "NOTHING_TO_RUN", "STOPPED", "UNREADABLE", "main"]
-
 STOPPED = 0
 NOTHING_TO_RUN = 1
 UNREADABLE = 2

@@ -19,8 +19,6 @@ from gatewayd.service.audit_file import AuditFile
 from gatewayd.service.daemon import RETRY_PERIOD
 from gatewayd.service.watchdog import Watched
 
-__all__ = ["JUST_NOW", "Operated", "OperatorAccess", "Standstill"]
-
 JUST_NOW = 0.1
 """Seconds after the process stood still in which what waited meanwhile is served."""
 

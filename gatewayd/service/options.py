@@ -8,8 +8,6 @@ from pathlib import Path
 
 from gatewayd.web.settings import Settings
 
-__all__ = ["Options"]
-
 
 @dataclass(frozen=True, slots=True)
 class Options:

@@ -26,8 +26,6 @@ from gatewayd.service.compilation import Compilation, CompilationError
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.startup import log_findings, mapping_files
 
-__all__ = ["ReloadOutcome", "Reloader", "Result"]
-
 SETTLING_TIME = 0.5
 """Seconds for which a swap waits for a link that is about to know more, a robot's that has just claimed registers."""
 _SHOWN = 3

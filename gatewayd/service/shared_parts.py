@@ -11,8 +11,6 @@ from gatewayd.links.registry import runtime_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.service.cell_runtime import CellRuntime
 
-__all__ = ["AllPrepared", "SharedParts"]
-
 
 class AllPrepared:
     """What all parts have ready."""

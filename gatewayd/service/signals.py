@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     import asyncio
     from collections.abc import Callable
 
-__all__ = ["FORCED", "SIGNALS", "TABLE", "Effect", "Signals", "effect_of", "name_of"]
-
 FORCED = 130
 """Exit code after a second signal that asks for the end."""
 

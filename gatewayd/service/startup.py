@@ -14,8 +14,6 @@ from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.plan import Plan
 from gatewayd.service.compilation import Compilation
 
-__all__ = ["Startup", "load_plans", "log_findings", "mapping_files", "state_directory"]
-
 log = logging.getLogger("gatewayd.startup")
 
 

@@ -12,8 +12,6 @@ from contextlib import suppress
 
 from gatewayd.report.printable import printable
 
-__all__ = ["LONGEST_STATUS", "Notifier"]
-
 LONGEST_STATUS = 1000
 """Characters of a status; what is longer is cut."""
 

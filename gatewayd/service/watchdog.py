@@ -20,8 +20,6 @@ from gatewayd.report.verdict import verdict_of
 from gatewayd.service.liveness import Liveness, Progressed
 from gatewayd.service.systemd import Notifier
 
-__all__ = ["PERIOD", "STATUS_PERIOD", "ManagerReporter", "Watched"]
-
 PERIOD = 0.5
 """Seconds between two looks; a quarter of the watchdog's time where that is less."""
 STATUS_PERIOD = 5.0

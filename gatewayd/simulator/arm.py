@@ -11,19 +11,6 @@ import math
 from functools import lru_cache
 from typing import NamedTuple
 
-__all__ = [
-    "ELBOW",
-    "FLANGE",
-    "ControllerMoment",
-    "Frames",
-    "Vector",
-    "acceleration",
-    "frames",
-    "joints",
-    "pose",
-    "twist",
-]
-
 Vector = tuple[float, ...]
 _Triple = tuple[float, float, float]
 _Matrix = tuple[_Triple, _Triple, _Triple]

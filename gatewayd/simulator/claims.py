@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
 
-__all__ = ["ControllerClaims"]
-
 
 class ControllerClaims:
     """The claims of one controller."""

@@ -33,8 +33,6 @@ from gatewayd.simulator.faults import DropAt
 from gatewayd.simulator.server import SimulatedController
 from gatewayd.simulator.store import Scalar
 
-__all__ = ["Control"]
-
 _Command = Callable[[str], str | Awaitable[None] | None]
 _WORDS = {"true": True, "false": False, "on": True, "off": False}
 

@@ -19,8 +19,6 @@ from gatewayd.simulator.program import ProgramRule
 from gatewayd.simulator.signals import CYCLE_FIELDS, INITIAL, SIGNALS
 from gatewayd.simulator.store import FieldStore, Scalar
 
-__all__ = ["DEFAULT_UPTIME", "DEFAULT_VERSIONS", "INTERNAL", "Controller"]
-
 DEFAULT_VERSIONS = {
     Series.CB3: SoftwareVersion(3, 15, 8),
     Series.E: SoftwareVersion(5, 12, 0),

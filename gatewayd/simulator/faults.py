@@ -14,17 +14,6 @@ from typing import NamedTuple
 from gatewayd.rtde.catalogue import is_fieldbus_range
 from gatewayd.rtde.fields import INPUTS
 
-__all__ = [
-    "ADAPTERS",
-    "ADAPTER_FIELDS",
-    "DropAt",
-    "DroppedError",
-    "FaultStep",
-    "Faults",
-    "LongLists",
-    "Mangler",
-]
-
 ADAPTERS = {"profinet": "PROFINET adapter", "ethernet-ip": "EtherNet/IP adapter"}
 """Fieldbus adapters of the controller that act as an RTDE client inside it, and how the log names them."""
 

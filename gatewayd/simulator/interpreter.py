@@ -14,8 +14,6 @@ from gatewayd.simulator.program import FieldReference, ProgramRule, RuleOperatio
 from gatewayd.simulator.signals import CYCLE_FIELDS
 from gatewayd.simulator.store import FieldStore, Scalar, fitting
 
-__all__ = ["Interpreter"]
-
 _Read = Callable[[], Scalar]
 _Write = Callable[[Scalar], None]
 _Copy = tuple[slice, slice]

@@ -7,8 +7,6 @@ from collections import deque
 
 from gatewayd.simulator.faults import Faults
 
-__all__ = ["OutgoingLine"]
-
 
 class OutgoingLine:
     """Hands bytes to a transport in their order; `faults.delay` counts when they are written."""

@@ -12,8 +12,6 @@ from collections.abc import Callable, Iterable, Mapping
 from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.simulator.store import FieldStore
 
-__all__ = ["Effect", "effects"]
-
 Effect = Callable[[FieldStore], None]
 """Makes the outputs follow the inputs that the store now holds."""
 

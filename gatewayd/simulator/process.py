@@ -14,8 +14,6 @@ from gatewayd.report.format import address
 from gatewayd.simulator.control import Control
 from gatewayd.simulator.server import SimulatedController
 
-__all__ = ["serve"]
-
 _LONGEST_LINE = 65536
 
 

@@ -30,8 +30,6 @@ from enum import Enum
 from gatewayd.rtde.catalogue import bit_word
 from gatewayd.rtde.fields import BITS_PER_WORD
 
-__all__ = ["DEMO", "FieldReference", "ProgramError", "ProgramRule", "RuleOperation", "parse"]
-
 DEMO = """\
 output_bit_registers0_to_31 = input_bit_registers0_to_31
 output_bit_registers32_to_63 = input_bit_registers32_to_63

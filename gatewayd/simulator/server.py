@@ -20,8 +20,6 @@ from gatewayd.simulator.line import OutgoingLine
 from gatewayd.simulator.session import SimulatorSession
 from gatewayd.simulator.store import Scalar
 
-__all__ = ["MAKE_UP", "MAX_CONNECTIONS", "SimulatedController"]
-
 MAKE_UP = 25
 """Cycles of lateness that are made up for."""
 MAX_CONNECTIONS = 16

@@ -23,8 +23,6 @@ from gatewayd.simulator.faults import DroppedError, FaultStep, LongLists
 from gatewayd.simulator.masks import Effect, effects
 from gatewayd.simulator.store import FieldStore, RecipeView
 
-__all__ = ["SOURCE", "SimulatorSession"]
-
 SOURCE = "URControl"
 """Source of the controller's text messages."""
 

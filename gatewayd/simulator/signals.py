@@ -24,8 +24,6 @@ from gatewayd.simulator.arm import (
     twist,
 )
 
-__all__ = ["CYCLE_FIELDS", "INITIAL", "SIGNALS", "Signal"]
-
 Signal = Callable[[ControllerMoment], Vector]
 """The elements of a field's value at a moment; a scalar has one."""
 

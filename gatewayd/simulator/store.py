@@ -17,8 +17,6 @@ from gatewayd.rtde.types import INTEGER_RANGES, DataType
 from gatewayd.simulator.arm import ControllerMoment, Vector
 from gatewayd.simulator.signals import Signal
 
-__all__ = ["FieldStore", "RecipeView", "Scalar", "fitting"]
-
 Scalar = int | float
 """An element of a value; BOOL is bool, an int."""
 

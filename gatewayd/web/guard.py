@@ -21,8 +21,6 @@ from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.loop.share import Busy, LoopShare
 
-__all__ = ["HEADERS", "MAX_BODY", "MAX_CONNECTIONS", "PATIENCE", "Doors", "is_local_name", "middleware"]
-
 MAX_CONNECTIONS = 32
 """Open at a time; further ones are closed at once, so that a flood costs the robot's loop next to nothing."""
 PATIENCE = 20.0

@@ -6,8 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from gatewayd.report.verdict import CellVerdict
 
-__all__ = ["health", "readiness"]
-
 
 def health(late: Sequence[str]) -> tuple[bool, dict[str, object]]:
     """Healthy while every part of the gateway makes progress. A robot or a PLC that is away plays no role."""

@@ -6,8 +6,6 @@ from bisect import bisect_left
 from collections.abc import Iterator
 from itertools import accumulate
 
-__all__ = ["BOUNDS", "Histogram"]
-
 BOUNDS = (
     0.000_05, 0.000_1, 0.000_2, 0.000_3, 0.000_5, 0.001, 0.002, 0.004, 0.008, 0.02, 0.05, 0.1, 0.25, 1.0,
 )  # fmt: skip

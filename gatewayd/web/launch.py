@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from gatewayd.control.endpoint import Reload
     from gatewayd.web.listener import StatusListener
 
-__all__ = ["RETRY_PERIOD", "serve"]
-
 RETRY_PERIOD = 2.0
 _LOOK = 0.05
 

@@ -29,8 +29,6 @@ from gatewayd.web.health import health, readiness
 from gatewayd.web.metrics import CONTENT_TYPE, Exposition
 from gatewayd.web.probes import Probes
 
-__all__ = ["PAGE", "StatusListener"]
-
 PAGE = {
     "/": ("index.html", "text/html"),
     "/style.css": ("style.css", "text/css"),

@@ -30,8 +30,6 @@ from gatewayd.web.health import readiness
 from gatewayd.web.histogram import Histogram
 from gatewayd.web.probes import CellProbe, Probes
 
-__all__ = ["CONTENT_TYPE", "METRICS", "PROCESS_METRICS", "Exposition", "MetricInfo", "MetricKind"]
-
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
 

@@ -20,8 +20,6 @@ from gatewayd.service.daemon import Daemon
 from gatewayd.service.liveness import Liveness
 from gatewayd.web.histogram import Histogram
 
-__all__ = ["LAG_PERIOD", "CellProbe", "Probes"]
-
 LAG_PERIOD = 0.1
 """Seconds between two looks at the loop's lag."""
 _LOOKS_PER_ROUND = 5

@@ -5,8 +5,6 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
-__all__ = ["MIN_TOKEN", "Settings", "SettingsError", "parse_address", "read_token"]
-
 MIN_TOKEN = 16
 """Characters that a token must have."""
 

@@ -24,8 +24,6 @@ from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.probes import Probes
 
-__all__ = ["EVENTS", "as_json", "layout", "overview", "state"]
-
 EVENTS = 100
 """Events in one answer at most; those of one act, as many variables as it may concern, count as one."""
 

@@ -10,8 +10,6 @@ from importlib import import_module
 
 from tests.benchmarks.report import Table
 
-__all__: list[str] = []
-
 SUBJECTS = {
     "throughput": "Modbus requests per second and round trips, beside libmodbus and the stock pymodbus server",
     "latency": "robot to PLC and PLC to robot, as histograms",

@@ -29,8 +29,6 @@ from gatewayd.links.canopen_node.runtime import CanLink
 from gatewayd.links.canopen_node.store import Store
 from gatewayd.mapping.loader import load
 
-__all__ = ["NODE"]
-
 NODE = 5
 MAPPING = """\
 gatewayd: 1

@@ -20,8 +20,6 @@ from tests.benchmarks.can_node import BITS, INTEGERS, NODE
 from tests.benchmarks.report import Table, at_least, at_most, histogram, percentile
 from tests.e2e.processes import Process
 
-__all__ = ["run"]
-
 SATURATED = 8752
 """Frames of 8 bytes that a bus of 1 Mbit/s carries in a second, with stuffing as it falls."""
 SLOT = 0.01

@@ -12,8 +12,6 @@ from tests.benchmarks.image import full_image
 from tests.benchmarks.processes import gatewayd, python
 from tests.benchmarks.report import Table, at_most
 
-__all__ = ["run"]
-
 ROUNDS = 7
 AIM = 0.3
 

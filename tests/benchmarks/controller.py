@@ -33,8 +33,6 @@ from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.strange import StrangePackage
 from gatewayd.rtde.types import DataType
 
-__all__ = ["Controller"]
-
 VERSION = ControllerVersion(5, 23, 0, 0)
 Values = dict[str, tuple[Scalar, ...]]
 

@@ -10,11 +10,10 @@ from tests.benchmarks.controller import Controller
 from tests.benchmarks.image import DOUBLES_OUT, INTEGERS_IN
 from tests.benchmarks.latency import PERIOD, pace
 from tests.benchmarks.plc import Plc
-from tests.benchmarks.processes import free_port, wait_for
+from tests.benchmarks.processes import free_port
 from tests.benchmarks.report import Table, at_most
 from tests.benchmarks.servers import Served, gateway, mapped_gateway, simulator
-
-__all__ = ["run"]
+from tests.e2e.processes import wait_for
 
 STARTS = 5
 SETTLE = 2.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["DOUBLES_OUT", "INTEGERS_IN", "STATE", "WRITABLE", "full_image"]
-
 INTEGERS_IN = 10
 """Address of `input_int_register_0`; the 24 integers take 48 registers, the 24 doubles after them 96."""
 WRITABLE = 48 + 72

@@ -14,8 +14,6 @@ from tests.benchmarks.processes import free_port
 from tests.benchmarks.report import Table, at_most, histogram, percentile
 from tests.benchmarks.servers import mapped_gateway
 
-__all__ = ["PERIOD", "Stream", "pace", "run", "stream"]
-
 PERIOD = 0.002
 """Seconds between packages: 500 Hz."""
 PATIENCE = 2.0

@@ -8,10 +8,8 @@ import struct
 import time
 from dataclasses import dataclass
 
-from tests.benchmarks.processes import Process
 from tests.benchmarks.report import percentile
-
-__all__ = ["Load", "measure", "reading", "writing"]
+from tests.e2e.processes import Process
 
 MBAP = struct.Struct(">HHHB")
 EXCEPTION = 0x80

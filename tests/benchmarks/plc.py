@@ -5,8 +5,6 @@ from __future__ import annotations
 import socket
 import struct
 
-__all__ = ["Plc"]
-
 READ = 3
 WRITE = 16
 MBAP = struct.Struct(">HHHB")

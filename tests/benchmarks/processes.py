@@ -12,8 +12,6 @@ from pathlib import Path
 
 from tests.e2e.processes import Process, wait_for
 
-__all__ = ["Process", "free_port", "gatewayd", "listens", "python", "running", "wait_for"]
-
 HOST = "127.0.0.1"
 LAST_WORDS = 2000
 """Characters of a log that are worth showing."""

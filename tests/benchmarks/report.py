@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-__all__ = ["Table", "at_least", "at_most", "histogram", "percentile"]
-
 BAR = 40
 """Width of a histogram's longest bar."""
 

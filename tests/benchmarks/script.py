@@ -16,8 +16,6 @@ from tests.benchmarks.processes import free_port, listens, python, running
 from tests.benchmarks.report import Table, percentile
 from tests.benchmarks.servers import Served, mapped_gateway
 
-__all__ = ["run"]
-
 ROBOT_PORT = 30004
 """ur_rtde knows no other, so the controller gets a loopback address of its own."""
 ROBOT_HOST = "127.0.0.3"

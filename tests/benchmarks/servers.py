@@ -12,9 +12,8 @@ from pathlib import Path
 
 from tests.benchmarks.image import full_image
 from tests.benchmarks.plc import Plc
-from tests.benchmarks.processes import Process, free_port, gatewayd, python, running, wait_for
-
-__all__ = ["Served", "gateway", "libmodbus", "libmodbus_is_there", "mapped_gateway", "simulator", "stock"]
+from tests.benchmarks.processes import free_port, gatewayd, python, running
+from tests.e2e.processes import Process, wait_for
 
 HERE = Path(__file__).parent
 FRESH = 2

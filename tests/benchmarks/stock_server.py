@@ -8,8 +8,6 @@ import sys
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-__all__: list[str] = []
-
 
 async def _serve(port: int) -> None:
     device = SimDevice(1, [SimData(0, count=1000, values=0, datatype=DataType.REGISTERS)])

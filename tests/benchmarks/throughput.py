@@ -11,8 +11,6 @@ from tests.benchmarks.load import Load, Request, measure, reading, writing
 from tests.benchmarks.report import Table, at_least, at_most
 from tests.benchmarks.servers import Served, gateway, libmodbus, libmodbus_is_there, stock
 
-__all__ = ["run"]
-
 Server = Callable[[], AbstractContextManager[Served]]
 
 QUIET = 10

@@ -15,8 +15,6 @@ import rtde_receive
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-__all__: list[str] = []
-
 REGISTERS = range(12, 20)
 INTEGERS_AT = 210 + 2 * 12
 DOUBLES_AT = 300 + 4 * 12

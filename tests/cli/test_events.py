@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from gatewayd.core.cell import Change
+from gatewayd.core.admission import Change
 from gatewayd.core.requester import Requester
 from tests.cli.conftest import Invoke, Running
 from tests.control.served import LIMIT

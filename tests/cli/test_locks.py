@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from gatewayd.core.cell import Change
+from gatewayd.core.admission import Change
 from gatewayd.core.definition import OPERATOR
 from gatewayd.core.requester import Requester
 from tests.cli.conftest import Invoke, Running

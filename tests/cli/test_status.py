@@ -6,7 +6,8 @@ import json
 
 import pytest
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
 from tests.cli.conftest import Invoke, Running

@@ -9,7 +9,8 @@ from rich.console import Console
 
 from gatewayd.cli.watching import KEYS, Glimpse, Show, View, chosen, plain, press, screen, settled
 from gatewayd.control.api import Api
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
 from gatewayd.service.audit import Audit
 from tests.control.served import CYCLES, SPEED, FixedGateway, Served, at, bring_up, plan

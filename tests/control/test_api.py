@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from gatewayd.control.api import NEWS, Api, ApiError, Cursor
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import OPERATOR
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality

@@ -13,7 +13,7 @@ import pytest
 from gatewayd.canopen.bus import BusState
 from gatewayd.control.api import Api
 from gatewayd.control.views import cell_view, declare
-from gatewayd.core.cell import Change
+from gatewayd.core.admission import Change
 from gatewayd.core.requester import Requester
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import CanLink

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from gatewayd.core.admission import Change
 from gatewayd.core.adoption import Adoption, AdoptionStep, adopted, named, would_fall_back
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.events import EventKind
 from gatewayd.core.image import ProcessImage

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from gatewayd.core.cell import HEARTBEAT_PERIOD, Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import HEARTBEAT_PERIOD, Cell
 from gatewayd.core.definition import (
     OPERATOR,
     CellDefinition,

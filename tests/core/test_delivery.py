@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import OPERATOR, CellDefinition
 from gatewayd.core.events import EventKind
 from gatewayd.core.image import Quality

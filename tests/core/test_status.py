@@ -4,7 +4,8 @@ import struct
 
 import pytest
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester

@@ -28,8 +28,6 @@ from gatewayd.links.canopen_node.variables import ABORT_OF
 from gatewayd.links.registry import status_fields
 from gatewayd.mapping.loader import load
 
-__all__ = ["PARTS", "table"]
-
 _NODE = Path(__file__).parents[2] / "gatewayd" / "links" / "canopen_node"
 
 
@@ -270,7 +268,7 @@ def emergencies() -> str:
 
 
 def happenings() -> str:
-    """What befalls the node, and what follows."""
+    """What happens to the node, and what follows."""
     text = _docstring_table("communication_errors.py").replace("`OVERRUN_TIME`", f"{OVERRUN_TIME:g} s")
     return text.replace("`QUIET`", f"{QUIET:g} s")
 
@@ -304,7 +302,7 @@ def error_behaviour() -> str:
 
 
 def aborts() -> str:
-    """The abort codes that tell a refusal."""
+    """The abort codes that stand for a refusal."""
     extra = {Reason.OUT_OF_LIMITS: "0609 0031h too high, 0609 0032h too low, else "}
     rows = []
     for reason in Reason:

@@ -42,8 +42,6 @@ from gatewayd.web.metrics import METRICS, PROCESS_METRICS
 from tests.docs import canopen
 from tests.docs.canopen import table
 
-__all__ = ["DOCS", "PARTS", "ROOT", "pages", "renewed"]
-
 ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"
 HELP_WIDTH = 100
@@ -232,13 +230,18 @@ def _places(offset: int, words: int) -> tuple[str, str]:
 
 def status_header() -> str:
     """The numbers of the status block."""
-    rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in status_fields()]
+    rows = [
+        (*_places(field.offset, field.words), f"`{field.name}`", field.meaning) for field in status_fields()
+    ]
     return table(("address", "4xxxxx", "name", "meaning"), rows)
 
 
 def status_tables() -> str:
     """The tables of the status block."""
-    rows = [(*_places(one.offset, one.words), f"`{one.name}`", one.meaning) for one in TABLES]
+    rows = [
+        (*_places(status_table.offset, status_table.words), f"`{status_table.name}`", status_table.meaning)
+        for status_table in TABLES
+    ]
     return table(("address", "4xxxxx", "name", "meaning"), rows)
 
 
@@ -282,7 +285,7 @@ def programs() -> str:
 
 
 def refusals() -> str:
-    """The reasons of refusals, with the exception codes that tell them."""
+    """The reasons of refusals, with the exception codes that stand for them."""
     rows = [
         (reason.value, reason.text, f"{EXCEPTION_OF[reason]:02X}", PRECEDENCE[reason] + 1)
         for reason in Reason
@@ -322,15 +325,16 @@ def _level(kind: EventKind) -> str:
 
 
 def metrics() -> str:
-    """What /metrics tells."""
+    """What /metrics has."""
     rows = [
-        (f"`{one.name}`", one.kind.value, ", ".join(one.labels) or "none", one.meaning) for one in METRICS
+        (f"`{metric.name}`", metric.kind.value, ", ".join(metric.labels) or "none", metric.meaning)
+        for metric in METRICS
     ]
     return table(("name", "type", "labels", "meaning"), rows)
 
 
 def process_metrics() -> str:
-    """What prometheus-client tells of the process."""
+    """What prometheus-client reports of the process."""
     return table(("name", "meaning"), [(f"`{name}`", text) for name, text in PROCESS_METRICS.items()])
 
 
@@ -374,7 +378,7 @@ def rtde_inputs() -> str:
 
 
 def rtde_outputs() -> str:
-    """What a controller tells."""
+    """What a controller reports."""
     return _fields(OUTPUTS)
 
 
@@ -455,7 +459,7 @@ def layers() -> str:
     """Who may import whom."""
     allowed = import_module("tests.test_architecture").LAYERS
     rows = [
-        (f"`{name}`", ", ".join(f"`{one}`" for one in sorted(may - {name})) or "nothing of ours")
+        (f"`{name}`", ", ".join(f"`{name_}`" for name_ in sorted(may - {name})) or "nothing of ours")
         for name, may in allowed.items()
         if name != "gatewayd"
     ]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
 from gatewayd.mapping.loader import load

@@ -17,7 +17,7 @@ from typing import Any, cast
 import canopen
 
 MASTER = 1
-"""Node-ID that its heartbeat tells."""
+"""Node-ID in its heartbeat."""
 BEAT = 0.05
 """Seconds between its heartbeats."""
 PATIENCE = 10.0
@@ -42,7 +42,7 @@ class Master:
     # -- commands ------------------------------------------------------------------------------------------------
 
     def connect(self) -> None:
-        """Go onto the bus and tell a heartbeat."""
+        """Go onto the bus and send a heartbeat."""
         self._network: Any = canopen.Network()
         self._network.NOTIFIER_CYCLE = 0.05
         self._network.connect(**self._bus)
@@ -76,7 +76,7 @@ class Master:
         self._node.nmt.state = name
 
     def heard(self) -> dict[str, float]:
-        """What the node's error control told: last state, seconds since then, boot-ups."""
+        """What the node's error control said: last state, seconds since then, boot-ups."""
         state = self._states[-1] if self._states else -1
         return {"state": state, "age": time.monotonic() - self._last, "boots": self._boots}
 

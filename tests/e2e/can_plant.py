@@ -11,8 +11,6 @@ from typing import Any
 from tests.e2e.plant import Plant
 from tests.e2e.processes import HOST, Process, free_port, wait_for
 
-__all__ = ["NODE", "Master", "start_bus", "start_master"]
-
 NODE = 16
 
 
@@ -42,7 +40,7 @@ class Master:
         return wait_for(lambda: self.state == state, f"NMT state {state}")
 
     def output(self, key: str) -> Any:
-        """A mapped object as its TPDO told it last."""
+        """A mapped object as its TPDO sent it last."""
         return self.ask("outputs")["values"][key]
 
     def emergency(self, code: int) -> tuple[int, int, str]:

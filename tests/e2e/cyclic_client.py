@@ -10,20 +10,18 @@ import time
 
 from tests.e2e.plc import Plc
 
-__all__ = ["CYCLE"]
-
 CYCLE = 0.02
 
 
 def main() -> None:
     host, port, source, value = sys.argv[1:]
     plc = Plc(int(port), source, host=host)
-    told = False
+    printed = False
     while True:
         code = plc.write_integers(0, *[int(value)] * 3) or plc.write(6, [1])
-        if not told:
+        if not printed:
             print(f"first write {code}", flush=True)
-            told = True
+            printed = True
         time.sleep(CYCLE)
 
 

@@ -19,8 +19,6 @@ from gatewayd.rtde.client import RtdeClient
 from gatewayd.rtde.loss import Loss
 from gatewayd.rtde.session import ClientSettings
 
-__all__ = ["resident_kilobytes"]
-
 
 def resident_kilobytes() -> int:
     """Memory that this process occupies now (VmRSS)."""

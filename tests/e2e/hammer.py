@@ -15,8 +15,6 @@ import sys
 import time
 from typing import NoReturn
 
-__all__ = ["DOUBLES", "INTEGERS"]
-
 INTEGERS, DOUBLES = 12, 24
 _DEPTH = 16
 """Requests under way."""

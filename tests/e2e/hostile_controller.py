@@ -12,8 +12,6 @@ import struct
 import sys
 from contextlib import suppress
 
-__all__ = ["HostileController"]
-
 _HEAD = struct.Struct(">HB")
 _MOST_MESSAGES = 300
 

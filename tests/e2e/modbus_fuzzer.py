@@ -14,8 +14,6 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 
-__all__ = ["ADDRESSES"]
-
 ADDRESSES = (0, 1, 2, 4, 8, 20, 100, 101, 1000, 59999, 60000, 60040, 60041, 64287, 64288, 65535)
 _PATIENCE = 5.0
 _MOMENT = 0.002

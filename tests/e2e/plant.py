@@ -8,8 +8,6 @@ from pathlib import Path
 from tests.e2e.plc import PLC, Plc
 from tests.e2e.processes import HOST, Daemon, Process, Simulator, free_port, wait_for
 
-__all__ = ["Plant"]
-
 HEAD = """\
 gatewayd: 1
 cell: {name}

@@ -11,8 +11,6 @@ from pyModbusTCP.constants import EXP_NONE, MB_CONNECT_ERR
 
 from tests.e2e.processes import HOST
 
-__all__ = ["BUSY", "FAILED", "HMI", "LINE", "NO_ADDRESS", "NO_PATH", "NO_VALUE", "PLC", "STRANGER", "Plc"]
-
 PLC = "127.0.0.2"
 HMI = "127.0.0.3"
 LINE = "127.0.0.4"

@@ -11,8 +11,6 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-__all__ = ["HOST", "PATIENCE", "Daemon", "Process", "Simulator", "free_port", "wait_for"]
-
 PATIENCE = 15.0
 """Seconds for what should take a moment: the machine may be busy, and a red test must not be its fault."""
 _PAUSE = 0.004

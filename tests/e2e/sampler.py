@@ -15,8 +15,6 @@ from typing import NoReturn
 
 from tests.e2e.hammer import DOUBLES, INTEGERS
 
-__all__ = ["NAMES"]
-
 NAMES = [
     *(f"input_int_register_{number}" for number in range(INTEGERS)),
     *(f"input_double_register_{number}" for number in range(DOUBLES)),

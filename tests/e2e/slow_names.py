@@ -11,8 +11,6 @@ from typing import Any
 
 from gatewayd.__main__ import main
 
-__all__ = ["NAME"]
-
 NAME = "robot.example"
 _getaddrinfo = socket.getaddrinfo
 

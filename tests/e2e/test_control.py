@@ -111,7 +111,7 @@ def test_everything_is_in_the_audit_file(cell: Cell) -> None:
     assert plc.write_integers(0, 12) == BUSY
     assert daemon.stop()[0] == 0
     records = [json.loads(line) for line in (socket.parent / "audit.jsonl").read_text().splitlines()]
-    told = [(one["what"], one.get("writer"), one.get("old"), one.get("new")) for one in records]
+    audited = [(each["what"], each.get("writer"), each.get("old"), each.get("new")) for each in records]
     for expected in (
         ("write accepted", "plc", 0, 11),
         ("lock taken over", "operator", None, None),
@@ -120,7 +120,7 @@ def test_everything_is_in_the_audit_file(cell: Cell) -> None:
         ("force ended", "operator", 42, None),
         ("fallback applied", "gateway", 42, 5),
     ):
-        assert expected in told
+        assert expected in audited
 
 
 def test_two_daemons_one_socket(cell: Cell, plant: Plant) -> None:

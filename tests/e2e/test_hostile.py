@@ -115,10 +115,10 @@ def test_hostile_controllers_beside_a_good_one(plant: Plant) -> None:
     wait_for(enough, "three seconds of rubbish")
     sizes.append(daemon.resident_kilobytes())
     cases, connections = cases_of(madmen)
-    told = (plc.status(15) - packages) % 65536
-    print(f"{cases} cases in {connections} connections; {told} good packages meanwhile; RSS {sizes} kB")
+    arrived = (plc.status(15) - packages) % 65536
+    print(f"{cases} cases in {connections} connections; {arrived} good packages meanwhile; RSS {sizes} kB")
     assert connections > 24
-    assert told > 100
+    assert arrived > 100
     wait_for(lambda: good.integer("input_int_register_0") == number, "the last value in the good robot")
     assert len(daemon.lines("robot lost", "cell=good")) == 0
     assert "internal error" not in daemon.text()

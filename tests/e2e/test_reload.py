@@ -33,7 +33,7 @@ HELD, FORCE, BIT = 1, 2, 3
 
 
 def reload(daemon: Daemon, count: int) -> str:
-    """SIGHUP; the line that tells how the `count`-th reload ended."""
+    """SIGHUP; the line that says how the `count`-th reload ended."""
     daemon.signal(signal.SIGHUP)
     return daemon.wait_for_line(" reload", count=count)
 

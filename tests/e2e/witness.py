@@ -16,8 +16,6 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-__all__ = ["Change", "Witness"]
-
 _HEAD = struct.Struct(">HB")
 _CODES = {"DOUBLE": "d", "INT32": "i", "UINT32": "I", "BOOL": "?", "UINT64": "Q", "UINT8": "B"}
 _FREQUENCY = 500.0

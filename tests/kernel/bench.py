@@ -20,8 +20,6 @@ import tty
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.socketcan import pack
 
-__all__ = ["Peer", "SerialAdapter", "ip", "serial_adapters_work"]
-
 _N_SLCAN = 17
 _SIOCGIFNAME = 0x8910
 _FRAME = struct.Struct("=IB3x8s")

@@ -22,8 +22,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
 
-__all__ = ["LIMIT", "REPORTS", "TUNABLES", "Boot", "launch"]
-
 LIMIT = 180
 """Seconds for one boot with everything that runs in it."""
 REPORTS = "GATEWAYD_KERNEL_REPORTS"

@@ -9,8 +9,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from gatewayd.mapping.source import Items, Node, Scalar, Table, parse
 
-__all__ = ["plain", "read", "refused", "written"]
-
 
 def plain(node: Node) -> object:
     """`node` as dict, list and scalar values; numbers remember their text (`WholeNumber`, `RealNumber`)."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester

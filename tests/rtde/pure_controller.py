@@ -13,8 +13,6 @@ from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import Session
 from gatewayd.rtde.types import DataType
 
-__all__ = ["Conversation", "PureController"]
-
 E_SERIES = m.ControllerVersion(5, 12, 0, 1101)
 
 

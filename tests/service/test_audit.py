@@ -9,7 +9,8 @@ from itertools import pairwise
 
 import pytest
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.requester import Requester
 from gatewayd.report.event_text import ACCEPTED, EventRecord

@@ -10,7 +10,8 @@ import pytest
 
 from gatewayd.control.api import Moment
 from gatewayd.control.client import Client
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.requester import Requester
 from gatewayd.loop import clock

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.requester import Requester

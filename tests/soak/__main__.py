@@ -14,8 +14,6 @@ from pathlib import Path
 from tests.soak.faults import FAULTS, ROUND
 from tests.soak.run import PAUSES, soak
 
-__all__: list[str] = []
-
 
 def _main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.soak", description=__doc__)

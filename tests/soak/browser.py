@@ -3,7 +3,7 @@
     python -m tests.soak.browser HOST PORT CELL PAUSE
 
 Each PAUSE seconds it asks for what the page asks and for /metrics, on one connection, and reads the events on another.
-Being turned away or cut off is no trouble; an answer that tells of a defect goes to standard error.
+Being turned away or cut off is no trouble; an answer that reports a defect goes to standard error.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ import sys
 import threading
 import time
 from contextlib import suppress
-
-__all__ = ["COMPLAINT"]
 
 COMPLAINT = "unexpected:"
 """Begins each line about an answer that should not be."""

@@ -11,30 +11,11 @@ from tests.e2e.plc import HMI, LINE, PLC
 from tests.e2e.processes import HOST
 from tests.soak.client import SHARED, SHARED_FIELD
 
-__all__ = [
-    "ECHOES",
-    "FIELDS",
-    "FIELDS_OF",
-    "FIRST",
-    "HELD",
-    "MASTER",
-    "MASTER_FIELDS",
-    "MOMENT",
-    "NAME",
-    "NODE",
-    "SECOND",
-    "STALE_AFTER",
-    "VARIANTS",
-    "command",
-    "journal",
-    "mapping",
-]
-
 NAME = "cell"
 FIRST, SECOND, MASTER = "first", "second", "master"
 """The writers: two PLCs, and a CANopen master."""
 ECHOES = 4
-"""Variables that tell what a writer wrote, as it came back from the robot."""
+"""Variables that show what a writer wrote, as it came back from the robot."""
 HELD = "input_int_register_3"
 """Field that a robot program may hold for itself."""
 FIRST_FIELD, SECOND_FIELD = "input_int_register_0", "input_int_register_1"

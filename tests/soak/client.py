@@ -15,8 +15,6 @@ from contextlib import suppress
 from tests.e2e.plc import Plc
 from tests.soak.journal import Journal
 
-__all__ = ["SHARED", "SHARED_FIELD"]
-
 SHARED = 8
 """Register that both PLCs write: whose lock is free takes it, the other is refused."""
 SHARED_FIELD = "input_int_register_2"

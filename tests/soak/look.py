@@ -1,4 +1,4 @@
-"""How the daemon of a soak run is, as it says itself over the control socket and as the kernel tells."""
+"""How the daemon of a soak run is, as it says itself over the control socket and as the kernel sees it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from typing import Any
 
 from gatewayd.control.client import Client, ControlError, NoDaemon
 from tests.e2e.processes import HOST
-
-__all__ = ["Look", "descriptors", "threads", "torn"]
 
 _TIMEOUT = 2.0
 
@@ -63,10 +61,10 @@ class Look:
         return {name: value for name, value in self.values().items() if name.endswith("_echo")}
 
     def values(self) -> dict[str, Any]:
-        return {one["name"]: one["value"] for one in self._variables()}
+        return {variable["name"]: variable["value"] for variable in self._variables()}
 
     def forced(self) -> list[str]:
-        return [one["name"] for one in self._variables() if one["forced"] is not None]
+        return [variable["name"] for variable in self._variables() if variable["forced"] is not None]
 
     def orphans(self) -> list[str]:
         """Locks whose owner is no living writer, the operator's among them, and forces: whoever made them is done."""
@@ -74,15 +72,17 @@ class Look:
         if status is None or locks is None:
             return []
         alive = {writer["name"] for cell in status["cells"] for writer in cell["writers"] if writer["alive"]}
-        # In this order a lock taken between the two answers may look orphaned; the second look tells.
+        # In this order a lock taken between the two answers may look orphaned; the second look shows it.
         owned = [
-            one["name"] for one in locks["locks"] if one["owner"] is not None and one["owner"] not in alive
+            lock["name"]
+            for lock in locks["locks"]
+            if lock["owner"] is not None and lock["owner"] not in alive
         ]
         return owned + [f"{name} (forced)" for name in self.forced()]
 
     def locks_of(self, owner: str) -> list[str]:
         found = self.ask("/v1/locks")
-        return [one["name"] for one in found["locks"] if one["owner"] == owner] if found else [owner]
+        return [lock["name"] for lock in found["locks"] if lock["owner"] == owner] if found else [owner]
 
     def _variables(self) -> list[dict[str, Any]]:
         found = self.ask("/v1/variables")

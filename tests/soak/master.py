@@ -2,8 +2,8 @@
 
     python -m tests.soak.master CHANNEL NODE PAUSE FIELD FIELD JOURNAL
 
-Each PAUSE seconds it tells its heartbeat. While the node's own heartbeat says OPERATIONAL it sends an RPDO as well: a
-counter, and what the node's TPDO told of that counter last. So the second number moves only if both ways are open.
+Each PAUSE seconds it sends its heartbeat. While the node's own heartbeat says OPERATIONAL it sends an RPDO as well: a
+counter, and what the node's TPDO last said of that counter. So the second number moves only if both ways are open.
 What it sent, by the FIELD of the robot, stands in the file JOURNAL.
 """
 
@@ -19,8 +19,6 @@ import can
 
 from tests.soak.journal import Journal
 
-__all__ = ["HEARTBEAT", "NMT", "OPERATIONAL", "RPDO", "TPDO"]
-
 NMT, TPDO, RPDO, HEARTBEAT = 0x000, 0x180, 0x200, 0x700
 """COB-IDs of the predefined connection set, less the node-ID."""
 OPERATIONAL = 5
@@ -29,7 +27,7 @@ _MASTER = 1
 """Its node-ID."""
 _PAIR = struct.Struct("<ii")
 _LOST = 1.0
-"""Seconds without a heartbeat of the node after which the bus is opened anew: an adapter need not tell of its end."""
+"""Seconds without a heartbeat of the node after which the bus is opened anew: an adapter need not report its end."""
 _RETRY = 0.1
 _MAX = 30_000
 
@@ -40,7 +38,7 @@ class _Node:
     def __init__(self, number: int) -> None:
         self.number = number
         self.state: int | None = None
-        self.told = 0
+        self.answered = 0
         self._heard = time.monotonic()
 
     def hear(self, message: can.Message) -> None:
@@ -49,7 +47,7 @@ class _Node:
         if message.arbitration_id == HEARTBEAT + self.number and len(data) == 1:
             self.state, self._heard = data[0], time.monotonic()
         elif message.arbitration_id == TPDO + self.number and len(data) == _PAIR.size:
-            self.told = _PAIR.unpack(data)[0]
+            self.answered = _PAIR.unpack(data)[0]
 
     def supervise(self) -> None:
         """Raises ConnectionError if its heartbeat stays away."""
@@ -64,9 +62,9 @@ def _send(bus: can.BusABC, identifier: int, data: bytes) -> None:
 def _cycle(bus: can.BusABC, node: _Node, counter: int, fields: Sequence[str], journal: Journal) -> None:
     _send(bus, HEARTBEAT + _MASTER, bytes([OPERATIONAL]))
     if node.state == OPERATIONAL:
-        for field, value in zip(fields, (counter, node.told), strict=True):
+        for field, value in zip(fields, (counter, node.answered), strict=True):
             journal.note(field, value)
-        _send(bus, RPDO + node.number, _PAIR.pack(counter, node.told))
+        _send(bus, RPDO + node.number, _PAIR.pack(counter, node.answered))
     elif node.state is not None:
         _send(bus, NMT, bytes([_START, node.number]))
 

@@ -18,8 +18,6 @@ from tests.soak.look import Look
 from tests.soak.starvation import Starvation
 from tests.soak.truth import NOT_CONNECTED, Record, misheld, unheard
 
-__all__ = ["PATIENCE", "WRITERS", "Rig"]
-
 PATIENCE = 15.0
 WRITERS = tuple(FIELDS_OF)
 _CLIENTS = (*WRITERS, "poller", "browser")
@@ -116,8 +114,10 @@ class Rig:
         lost = sorted(entry.time for entry in noted if entry.outcome == NOT_CONNECTED)
         for name in WRITERS:
             for field in FIELDS_OF[name]:
-                mine = [one for one in entries(journal(self.directory, name)) if one.field == field]
-                accepted = sorted(one.time for one in noted if one.field == field and one.outcome == 0)
+                mine = [entry for entry in entries(journal(self.directory, name)) if entry.field == field]
+                accepted = sorted(
+                    entry.time for entry in noted if entry.field == field and entry.outcome == 0
+                )
                 found += unheard(
                     field,
                     self.witness.changes[field],

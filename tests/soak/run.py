@@ -15,8 +15,6 @@ from tests.soak.look import descriptors, threads, torn
 from tests.soak.rig import PATIENCE, WRITERS, Rig
 from tests.soak.verdict import Measured, Sample
 
-__all__ = ["PAUSES", "kinds", "soak"]
-
 PAUSES = {"real": (5.0, 30.0), "fast": (0.0, 0.3)}
 """Seconds between two faults."""
 _WARM_UP = 1.0
@@ -66,7 +64,7 @@ def soak(
 
 
 def _defects(rig: Rig) -> list[str]:
-    """Exceptions that nobody expected, as the log tells them or as Python does."""
+    """Exceptions that nobody expected, as the log has them or as Python does."""
     return rig.daemon.lines(" trace=") + rig.daemon.lines("Traceback")
 
 
@@ -77,12 +75,12 @@ def _one(rig: Rig, kind: str, chance: Random, measured: Measured) -> str:
         before = rig.look.echoes()
         took = wait_for(lambda: _well(rig, before), "recovery", bound(kind))
     except (AssertionError, OSError, ControlError, NoDaemon) as error:
-        told = f"{error}; {'; '.join(rig.look.ills()) or 'all well'}"
-        measured.failures.append(f"{kind}: {told}")
+        complaint = f"{error}; {'; '.join(rig.look.ills()) or 'all well'}"
+        measured.failures.append(f"{kind}: {complaint}")
         if rig.daemon.running:
             rig.mend()
             time.sleep(1)
-        return told
+        return complaint
     measured.recoveries.setdefault(kind, []).append(took)
     return f"{took * 1000:.0f} ms"
 

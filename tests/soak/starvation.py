@@ -9,8 +9,6 @@ from pathlib import Path
 
 from tests.soak.truth import Stop
 
-__all__ = ["Starvation"]
-
 _LOOK = 0.02
 """Seconds between two looks."""
 _MIN = 0.02

@@ -89,9 +89,9 @@ def test_what_the_robot_held_must_have_been_written_lately(
     change: Change, record: Record, found: list[str]
 ) -> None:
     """Or be declared, or be the operator's, or have come when nobody looked."""
-    told = list(misheld(A, [change], [sent(10.0, 7), Entry(10.0, A, 7, 0)], record))
-    assert len(told) == len(found)
-    assert all(part in line for part, line in zip(found, told, strict=True))
+    lies = list(misheld(A, [change], [sent(10.0, 7), Entry(10.0, A, 7, 0)], record))
+    assert len(lies) == len(found)
+    assert all(part in line for part, line in zip(found, lies, strict=True))
 
 
 @pytest.mark.parametrize(
@@ -194,12 +194,12 @@ def test_a_process_that_does_not_get_the_processor_stands_still() -> None:
     assert all(stop.end > stop.begin for stop in stops)
 
 
-def test_lies_are_told_but_not_all_of_them() -> None:
+def test_lies_are_reported_but_not_all_of_them() -> None:
     measured = good()
     measured.lies = [f"lie {number}" for number in range(30)]
-    told = measured.verdict()
-    assert told[0] == "lie 0"
-    assert told[-1] == "and 10 more of what the robot held"
+    verdict = measured.verdict()
+    assert verdict[0] == "lie 0"
+    assert verdict[-1] == "and 10 more of what the robot held"
 
 
 def good(kilobytes: int = 0) -> Measured:
@@ -208,7 +208,7 @@ def good(kilobytes: int = 0) -> Measured:
     return Measured({"garbage": [0.1]}, samples=samples, descriptors_at_end=14)
 
 
-def test_a_good_run_has_nothing_to_tell() -> None:
+def test_a_good_run_has_nothing_to_report() -> None:
     assert good().verdict() == []
 
 
@@ -216,22 +216,22 @@ def test_a_run_that_measured_nothing_is_not_good() -> None:
     assert Measured().verdict() == ["nothing was measured"]
 
 
-def test_growing_memory_is_told_with_its_slope() -> None:
+def test_growing_memory_is_reported_with_its_slope() -> None:
     step = MEMORY_BOUND // 20
     assert good(step - 50).verdict() == []
-    (told,) = good(step + 50).verdict()
-    assert "memory grew" in told
+    (complaint,) = good(step + 50).verdict()
+    assert "memory grew" in complaint
     assert round(good(10).slope) == 36_000
 
 
 def test_threads_may_become_a_few_more() -> None:
     measured = good()
-    for more, told in ((THREADS_BOUND, []), (THREADS_BOUND + 1, ["threads grew from 2 to 7"])):
+    for more, verdict in ((THREADS_BOUND, []), (THREADS_BOUND + 1, ["threads grew from 2 to 7"])):
         measured.samples[-1] = Sample(40.0, 50_000, 14, 2 + more)
-        assert measured.verdict() == told
+        assert measured.verdict() == verdict
 
 
-def test_growing_descriptors_leaked_locks_and_failures_are_told() -> None:
+def test_growing_descriptors_leaked_locks_and_failures_are_reported() -> None:
     measured = good()
     measured.descriptors_at_end = 15
     measured.leaked = ["shared", "shared"]

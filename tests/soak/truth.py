@@ -13,8 +13,6 @@ from dataclasses import dataclass, field
 from tests.e2e.witness import Change
 from tests.soak.journal import SENT, Entry
 
-__all__ = ["FALLBACK", "LATELY", "NOT_CONNECTED", "Period", "Record", "Stop", "misheld", "unheard"]
-
 FALLBACK = 0
 """What every input of the cell declares for `on_release`."""
 LATELY = 2.0
@@ -72,7 +70,7 @@ def misheld(name: str, changes: Sequence[Change], entries: Sequence[Entry], reco
     for entry in entries:
         if entry.outcome == SENT:
             sent.setdefault(entry.value, []).append(entry.time)
-    pauses = [one for one in record.pauses if name in one.fields]
+    pauses = [pause for pause in record.pauses if name in pause.fields]
     stops = sorted(record.stops, key=lambda stop: stop.begin)
     for change in changes:
         if change.value == FALLBACK or _granted(name, change, record):
@@ -84,7 +82,7 @@ def misheld(name: str, changes: Sequence[Change], entries: Sequence[Entry], reco
             continue
         took = change.time - moments[place - 1]
         excused = sum(
-            max(0.0, min(one.end, change.time) - max(one.begin, moments[place - 1])) for one in pauses
+            max(0.0, min(pause.end, change.time) - max(pause.begin, moments[place - 1])) for pause in pauses
         )
         excused += _stopped_in_the_act(moments[place - 1], stops)
         if any(_served_across(stop, change, moments) for stop in stops):
@@ -115,11 +113,11 @@ def _begun(stops: Sequence[Stop], since: float, until: float) -> Sequence[Stop]:
 
 def _granted(name: str, change: Change, record: Record) -> bool:
     return any(
-        name in one.fields
-        and one.value in {None, change.value}
-        and one.begin <= change.time
-        and change.time - change.blind <= one.end
-        for one in record.periods
+        name in period.fields
+        and period.value in {None, change.value}
+        and period.begin <= change.time
+        and change.time - change.blind <= period.end
+        for period in record.periods
     )
 
 
@@ -161,7 +159,11 @@ def unheard(
                 accepted, entry.time + _CYCLES
             )
             overtaken |= any(_replaced(changes, times, stop) for stop in stopped)
-            if held != entry.value and not overtaken and all(one.value != entry.value for one in seen):
+            if (
+                held != entry.value
+                and not overtaken
+                and all(follower.value != entry.value for follower in seen)
+            ):
                 yield f"{name} never held {entry.value}, acknowledged at {entry.time:.3f}"
 
 

@@ -8,8 +8,6 @@ from statistics import linear_regression, median
 
 from tests.benchmarks.report import Table
 
-__all__ = ["MEMORY_BOUND", "THREADS_BOUND", "Measured", "Sample"]
-
 MEMORY_BOUND = 8 * 1024
 """Kilobytes by which memory may grow from the second quarter of the run to the last."""
 THREADS_BOUND = 4
@@ -65,7 +63,10 @@ class Measured:
         half = self.samples[len(self.samples) // 2 :]
         if len(half) < 2:
             return 0.0
-        return 3600 * linear_regression([one.time for one in half], [one.kilobytes for one in half]).slope
+        return (
+            3600
+            * linear_regression([sample.time for sample in half], [sample.kilobytes for sample in half]).slope
+        )
 
     def verdict(self) -> list[str]:
         """What is not as it should be; empty for a good run."""
@@ -95,7 +96,7 @@ class Measured:
         faults = Table("Faults", _DEFINITION, ("fault", "count", "median", "longest recovery"))
         for kind, times in sorted(self.recoveries.items()):
             faults.add(kind, str(len(times)), f"{median(times) * 1000:.0f} ms", f"{max(times) * 1000:.0f} ms")
-        every = [one for times in self.recoveries.values() for one in times]
+        every = [took for times in self.recoveries.values() for took in times]
         faults.add("all", str(len(every)), "", f"{max(every, default=0.0) * 1000:.0f} ms")
         daemon = Table(
             "The daemon", "Sampled after each fault.", ("what", "first", "last", "greatest", "trend")
@@ -106,12 +107,12 @@ class Measured:
                 "memory, kB",
                 str(first.kilobytes),
                 str(last.kilobytes),
-                str(max(one.kilobytes for one in self.samples)),
+                str(max(sample.kilobytes for sample in self.samples)),
                 f"{self.growth:+.0f} since the second quarter, {self.slope:+.0f} per hour",
             )
-            greatest = str(max(one.descriptors for one in self.samples))
+            greatest = str(max(sample.descriptors for sample in self.samples))
             daemon.add("descriptors", str(first.descriptors), str(self.descriptors_at_end), greatest)
-            greatest = str(max(one.threads for one in self.samples))
+            greatest = str(max(sample.threads for sample in self.samples))
             daemon.add("threads", str(first.threads), str(last.threads), greatest)
         daemon.add("locks leaked", "", str(len(self.leaked)))
         return [faults, daemon]

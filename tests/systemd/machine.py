@@ -22,8 +22,6 @@ from pathlib import Path
 from gatewayd import __version__
 from tests.kernel.uml import TUNABLES, Boot, launch
 
-__all__ = ["ENDED", "LIMIT", "NEXT", "ROOT", "has_dpkg_deb", "interpreter_with_pip", "missing", "package"]
-
 ROOT = Path(__file__).parents[2]
 ENDED = "ended"
 """Name of the file with the kernel's exit status, which comes last."""

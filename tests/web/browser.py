@@ -17,8 +17,6 @@ from typing import Any
 
 import aiohttp
 
-__all__ = ["CHROMIUM", "Page", "browsing"]
-
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 _OPTIONS = (
     "--headless",

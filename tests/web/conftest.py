@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from gatewayd.control.api import Api
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
 from gatewayd.mapping.loader import load
 from gatewayd.service.audit import Audit

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["CYCLES", "FORCE_LIMIT", "HMI", "LINE", "MAPPING", "PLC", "SPARE", "START", "TOKEN"]
-
 TOKEN = "test-token-0123456789"  # noqa: S105 - for tests
 PLC, HMI, LINE = range(3)
 START, FORCE_LIMIT, SPARE, CYCLES = range(4)

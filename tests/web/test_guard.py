@@ -54,7 +54,9 @@ async def test_changing_anything_needs_the_token(
 
 READ = ["/", "/app.js", "/healthz", "/readyz", "/metrics", "/page/cells", "/page/cells/press"]
 READ += ["/page/cells/press/state", "/nothing"]
-READ += [f"/api/v1/{name}" for name in ("version", "status", "variables", "locks", "events", "audit", "nothing")]
+READ += [
+    f"/api/v1/{name}" for name in ("version", "status", "variables", "locks", "events", "audit", "nothing")
+]
 LONG = [path for path in READ if path not in ("/", "/app.js", "/healthz", "/nothing", "/api/v1/nothing")]
 
 

@@ -6,7 +6,8 @@ import asyncio
 import time
 from contextlib import suppress
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason

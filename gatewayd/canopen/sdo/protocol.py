@@ -7,24 +7,6 @@ from enum import Enum, auto
 
 from gatewayd.canopen.dictionary import AbortCode
 
-__all__ = [
-    "BLOCK_DOWNLOAD_ENDED",
-    "BLOCK_SEGMENTS",
-    "REQUESTS",
-    "SEGMENT",
-    "Request",
-    "abort",
-    "block_download_acknowledged",
-    "block_download_initiated",
-    "block_upload_ended",
-    "block_upload_initiated",
-    "download_initiated",
-    "download_segment_taken",
-    "is_expedited",
-    "upload_initiated",
-    "upload_segment",
-]
-
 SEGMENT = 7
 """Bytes of data in a segment."""
 

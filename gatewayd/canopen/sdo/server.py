@@ -20,17 +20,6 @@ from gatewayd.canopen.sdo import protocol
 from gatewayd.canopen.sdo.protocol import BLOCK_SEGMENTS, REQUESTS, Request
 from gatewayd.canopen.sdo.transfers import MAX_BLOCK_SEGMENTS, BlockDownload, BlockUpload, Download, Upload
 
-__all__ = [
-    "LONGEST_DOWNLOAD",
-    "SLOWEST_FRAME",
-    "SUB_BLOCK_TIMEOUT",
-    "TIMEOUT",
-    "WRITE_TIMEOUT",
-    "SdoServer",
-    "SdoState",
-    "server_parameter",
-]
-
 TIMEOUT = 1.0
 """Seconds without a frame after which a transfer is aborted."""
 SUB_BLOCK_TIMEOUT = 0.25

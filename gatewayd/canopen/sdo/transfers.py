@@ -8,8 +8,6 @@ from gatewayd.canopen.dictionary import Abort, AbortCode
 from gatewayd.canopen.sdo import protocol
 from gatewayd.canopen.sdo.protocol import SEGMENT
 
-__all__ = ["MAX_BLOCK_SEGMENTS", "BlockDownload", "BlockUpload", "Download", "Upload"]
-
 MAX_BLOCK_SEGMENTS = 127
 """Segments of a sub-block."""
 

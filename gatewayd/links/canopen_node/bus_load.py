@@ -23,19 +23,6 @@ from gatewayd.links.canopen_node.expand import ExpandedPdo, the_node
 from gatewayd.links.canopen_node.sections import CanopenWriter
 from gatewayd.mapping.expanded import ExpandedCell
 
-__all__ = [
-    "BIT_RATES",
-    "ERROR_ABOVE",
-    "FIRST_EVENT_TYPE",
-    "WARNING_ABOVE",
-    "Share",
-    "bus_shares",
-    "frame_bits",
-    "load",
-    "pdo_bits",
-    "pdo_rate",
-]
-
 BIT_RATES: Final = tuple(sorted(rate for rate in lss.BIT_RATES if rate is not None))
 """Bit-rates of CiA 301, 5.2, in bit/s, from the slowest on."""
 WARNING_ABOVE: Final = 0.4

@@ -37,8 +37,6 @@ from gatewayd.links.canopen_node.observer import NodeCounters
 from gatewayd.links.canopen_node.pdo.receive import Fault
 from gatewayd.links.canopen_node.pdo.transmit import TransmitEngine
 
-__all__ = ["OVERRUN_TIME", "CommunicationErrors"]
-
 OVERRUN_TIME: Final = 1.0
 """Seconds without a lost frame after which the overrun is over."""
 

@@ -9,8 +9,6 @@ from gatewayd.links.canopen_node.plan import CanopenPlan, PdoEntry, PdoPlan
 from gatewayd.links.canopen_node.sections import CanopenWriter
 from gatewayd.mapping.expanded import ExpandedCell
 
-__all__ = ["compile_canopen"]
-
 
 def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
     """The plan of a node without errors."""

@@ -11,8 +11,6 @@ from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.contract import Description, LinkKind, LinkMetric
 from gatewayd.mapping.plan import LinkPlan
 
-__all__ = ["BUS_STATES", "KIND", "NMT_STATES"]
-
 BUS_STATES = ("", "absent", "down", "bus-off", "passive", "warning", "active")
 """What the status word `can_bus` means; 0: there is no CANopen."""
 NMT_STATES = {0: "initialising", 4: "stopped", 5: "operational", 127: "pre-operational"}

@@ -9,8 +9,6 @@ from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan
 from gatewayd.links.contract import Description, Place
 
-__all__ = ["by_name", "description"]
-
 
 def description(plan: CanopenPlan, cell: CellDefinition) -> Description:
     """Settings, and the object of each variable with the PDO that carries it."""

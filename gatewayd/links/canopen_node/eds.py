@@ -21,8 +21,6 @@ from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.store import Store
 
-__all__ = ["Sheet", "dcf_text", "eds_text", "objects_of", "sheet_of"]
-
 _DATE: Final = "01-01-2026"
 _TIME: Final = "12:00AM"
 _MANDATORY: Final = (0x1000, 0x1001, 0x1018)

@@ -36,19 +36,6 @@ from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Part
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedLink, ExpandedVariable
 
-__all__ = [
-    "CanopenCell",
-    "ExpandedPdo",
-    "MappedObject",
-    "MemberProblem",
-    "Misnamed",
-    "default_type",
-    "expand_canopen",
-    "node_of",
-    "place_of",
-    "the_node",
-]
-
 _INTEGERS: Final = (
     CanType.UNSIGNED8,
     CanType.UNSIGNED16,

@@ -12,8 +12,6 @@ from gatewayd.links.canopen_node.plan import canopen_of
 from gatewayd.links.exports import Export, ExportError
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["EXPORTS"]
-
 
 def _exported(text: Callable[[Iterable[Object], Sheet], str], plan: Plan) -> str:
     """A sheet that no other implementation understands otherwise."""

@@ -32,8 +32,6 @@ from gatewayd.mapping.model import VariableSpec, WriterSpec
 from gatewayd.mapping.reach import Reach, scaled
 from gatewayd.mapping.section import Section
 
-__all__ = ["LANGUAGE"]
-
 _RPDO: Final = "RPDO"
 _SDO: Final = "SDO"
 _MAX_REAL32: Final = float.fromhex("0x1.fffffep+127")

@@ -44,8 +44,6 @@ from gatewayd.links.canopen_node.store import Store
 from gatewayd.links.canopen_node.variables import VariableObjects
 from gatewayd.links.registry import status_fields
 
-__all__ = ["Node"]
-
 SDO_LENGTH: Final = 8
 """Bytes of every SDO frame."""
 

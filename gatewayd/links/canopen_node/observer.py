@@ -7,8 +7,6 @@ from datetime import datetime
 
 from gatewayd.canopen.nmt import NmtState
 
-__all__ = ["NodeCounters", "Observer"]
-
 
 class Observer:
     """Gets what a node has to report that is not for the bus; does nothing by itself."""

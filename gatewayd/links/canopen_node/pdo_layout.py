@@ -21,17 +21,6 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction
 from gatewayd.links.canopen_node.plan import ObjectPlan
 
-__all__ = [
-    "FIRST_INDEX",
-    "OBJECT_BASES",
-    "PDO_BITS",
-    "PDO_NUMBERS",
-    "Slot",
-    "assign",
-    "place_objects",
-    "split_into_pdos",
-]
-
 FIRST_INDEX: Final = {Direction.INPUT: 0x2000, Direction.OUTPUT: 0x2400}
 """Where the variables of a direction begin in the object dictionary."""
 OBJECT_BASES: Final = {

@@ -18,17 +18,6 @@ from gatewayd.links.canopen_node.expand import ExpandedPdo, MappedObject, the_no
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.report.wording import cob
 
-__all__ = [
-    "PdoItem",
-    "PdoRow",
-    "as_document",
-    "by_sdo_only",
-    "load_by_bit_rate",
-    "object_place",
-    "pdo_rows",
-    "transmission_words",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class PdoItem:

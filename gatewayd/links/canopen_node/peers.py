@@ -17,8 +17,6 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester, new_connection
 from gatewayd.links.canopen_node.promise import Promise, Promises
 
-__all__ = ["Peers"]
-
 
 class Peers:
     """The CANopen writers of one cell. A writer of None is nobody."""

@@ -10,8 +10,6 @@ from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import Direction
 from gatewayd.mapping.plan import LinkPlan, Plan
 
-__all__ = ["CanopenPlan", "ObjectPlan", "PdoEntry", "PdoPlan", "canopen_of"]
-
 
 @dataclass(frozen=True, slots=True)
 class ObjectPlan:

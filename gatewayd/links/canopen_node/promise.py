@@ -20,8 +20,6 @@ from gatewayd.canopen.gap import spared
 from gatewayd.canopen.heartbeat import Consumer
 from gatewayd.canopen.nmt import NmtState
 
-__all__ = ["PROMISE", "Promise", "Promises", "Sign"]
-
 
 class Promise(Enum):
     """How a node stands to what was promised for it."""

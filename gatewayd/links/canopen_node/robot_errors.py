@@ -23,8 +23,6 @@ from gatewayd.canopen.emergency import Emergency, ErrorCode
 from gatewayd.core.cell import Cell
 from gatewayd.core.freshness import Source
 
-__all__ = ["FIRST_CONNECTION", "QUIET", "RobotErrors"]
-
 FIRST_CONNECTION: Final = 2.0
 """Seconds that a gateway that has just started has to find the robot."""
 

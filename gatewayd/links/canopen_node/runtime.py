@@ -35,8 +35,6 @@ from gatewayd.loop.progress import wait_with_progress
 from gatewayd.loop.retry import until_done
 from gatewayd.mapping.plan import LinkPlan
 
-__all__ = ["CORE_TIME", "LOSS_INTERVAL", "RETRY", "RUNTIME", "CanLink"]
-
 CORE_TIME = 0.5
 """Seconds without a count of the core's heartbeat after which the core counts as stuck."""
 RETRY = 2.0

@@ -26,20 +26,6 @@ from gatewayd.mapping.scalars import (
     written,
 )
 
-__all__ = [
-    "BAD_COB_ID",
-    "EVENT",
-    "CobId",
-    "CobIdRanges",
-    "InhibitTime",
-    "Member",
-    "Members",
-    "MillisecondTime",
-    "StatusMember",
-    "StatusMembers",
-    "Transmission",
-]
-
 EVENT: Final = 254
 """Transmission type of `event`: manufacturer-specific, since the node has no device profile."""
 

@@ -20,19 +20,6 @@ from gatewayd.mapping import syntax
 from gatewayd.mapping.scalars import Duration, Name, Whole, refuse
 from gatewayd.mapping.section import Section
 
-__all__ = [
-    "AUTO",
-    "NO_PDO",
-    "Canopen",
-    "CanopenPlace",
-    "CanopenPlaces",
-    "CanopenWriter",
-    "CobIdPool",
-    "PdoDefaults",
-    "PdoSpec",
-    "Sync",
-]
-
 AUTO = "auto"
 """Stands for the automatic layout; no PDO can have this name."""
 NO_PDO = "none"

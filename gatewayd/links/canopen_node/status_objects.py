@@ -20,8 +20,6 @@ from gatewayd.links.canopen_node.status_words import HEADER, MAX_ARRAY, TABLE_IN
 from gatewayd.links.canopen_node.variables import ABORT_OF
 from gatewayd.links.registry import status_fields
 
-__all__ = ["StatusObjects", "status_word"]
-
 
 def status_word(index: int, subindex: int) -> Mapped | None:
     """What a TPDO carries of the status block there; None if it may carry nothing.

@@ -12,17 +12,6 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.status_layout import RELEASE, REQUEST
 from gatewayd.links.registry import status_fields
 
-__all__ = [
-    "FIELD_NAMES",
-    "HEADER",
-    "MAX_ARRAY",
-    "TABLE_INDICES",
-    "WORD_TYPES",
-    "StatusWord",
-    "field_word",
-    "quality_word",
-]
-
 HEADER: Final = 0x5F00
 """The record of the header's fields, in the order of `registry.status_fields`: the first object of the block."""
 TABLE_INDICES: Final = {

@@ -36,8 +36,6 @@ from gatewayd.links.canopen_node.status_words import HEADER
 from gatewayd.links.canopen_node.store import Kept, Key, LssSettings, Saved, Store, StoreError
 from gatewayd.loop.allowance import Allowance
 
-__all__ = ["SAVES", "SAVES_PER_SECOND", "Parameters", "layout_of"]
-
 ALL = range(0x1000, 0x1_0000)
 _COMMUNICATION = range(0x1000, 0x2000)
 GROUPS: Mapping[int, tuple[str, range]] = {

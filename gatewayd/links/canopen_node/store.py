@@ -13,8 +13,6 @@ from typing import Any
 
 from gatewayd.loop.threads import in_daemon_thread
 
-__all__ = ["BackgroundStore", "JsonStore", "Kept", "Key", "LssSettings", "Saved", "Store", "StoreError"]
-
 FORMAT = 1
 """Version of the file."""
 

@@ -25,8 +25,6 @@ from gatewayd.mapping.plan import Plan
 from gatewayd.report.layout import Column, ReportTable, Row, Text, span
 from gatewayd.report.wording import cob, seconds
 
-__all__ = ["TABLES"]
-
 
 class CanopenTables(LinkTables):
     """The object of each variable, and the table of the PDOs."""

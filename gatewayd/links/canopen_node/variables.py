@@ -16,14 +16,13 @@ from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, Pdo, array
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.links.canopen_node.pdo.codec import fit, native
 from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan
-
-__all__ = ["ABORT_OF", "VariableObjects"]
 
 ABORT_OF: Final = {
     Reason.NO_SUCH_ADDRESS: AbortCode.NO_OBJECT,

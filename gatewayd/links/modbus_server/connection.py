@@ -22,8 +22,6 @@ from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.report.format import address as address_text
 
-__all__ = ["PeerAdmission", "PeerConnection"]
-
 _log = logging.getLogger("gatewayd.modbus")
 
 

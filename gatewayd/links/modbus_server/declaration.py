@@ -11,8 +11,6 @@ from gatewayd.links.modbus_server.description import description
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.plan import LinkPlan
 
-__all__ = ["KIND"]
-
 
 class ModbusServer(LinkKind):
     """The kind with the section `modbus`."""

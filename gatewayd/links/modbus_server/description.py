@@ -7,8 +7,6 @@ from gatewayd.links.modbus_server.plan import ModbusPlan, Placement, network_tex
 from gatewayd.modbus.areas import AREA_NAMES
 from gatewayd.report.format import address, exact, seconds
 
-__all__ = ["description"]
-
 
 def description(plan: ModbusPlan) -> Description:
     """Settings, places of variables, networks of writers."""

@@ -19,8 +19,6 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedLink, ExpandedVariab
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import TYPES, Codec, make_codec
 
-__all__ = ["ExpandedModbus", "ExpandedPlacement", "PlacementProblem", "expand_modbus", "placements_of"]
-
 _INTEGERS: Final = ("uint16", "uint32", "uint64", "int16", "int32", "int64")
 """Types that a whole number gets where the file names none: the first that holds the robot's."""
 

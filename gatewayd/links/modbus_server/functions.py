@@ -11,7 +11,8 @@ import struct
 from collections.abc import Callable, Sequence
 
 from gatewayd.core import status_layout
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Value
 from gatewayd.core.freshness import Source
 from gatewayd.core.refusal import Reason, Refusal
@@ -30,9 +31,6 @@ from gatewayd.modbus.areas import (
 )
 from gatewayd.modbus.exceptions import ExceptionCode
 from gatewayd.modbus.identification import Identification
-
-__all__ = ["EXCEPTION_OF", "Unit", "exception", "execute"]
-
 
 EXCEPTION_OF = {
     Reason.NO_SUCH_ADDRESS: ExceptionCode.ILLEGAL_ADDRESS,

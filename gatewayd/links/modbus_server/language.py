@@ -27,8 +27,6 @@ from gatewayd.modbus.areas import MAX_WRITE_BITS, MAX_WRITE_REGISTERS, Area
 from gatewayd.modbus.codec import TYPES, Codec
 from gatewayd.modbus.exceptions import ExceptionCode
 
-__all__ = ["LANGUAGE"]
-
 _MAX_WRITE: Final = {Area.HOLDING: MAX_WRITE_REGISTERS, Area.COIL: MAX_WRITE_BITS}
 _SYNONYMS: Final = {
     ("type", "BOOL"): "bit",

@@ -11,8 +11,6 @@ from typing import Protocol, TypeVar
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.writers import Accesses, hold_anything
 
-__all__ = ["STALLED_AFTER", "UNUSED_AFTER", "idle_timeout", "longest_unused", "max_connections", "overdue"]
-
 UNUSED_AFTER = 10.0
 """Seconds without a request after which a connection without locks may have to make room for a new one."""
 STALLED_AFTER = 5.0

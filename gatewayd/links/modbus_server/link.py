@@ -9,8 +9,6 @@ from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address, counted
 
-__all__ = ["ModbusUnit"]
-
 
 class ModbusUnit(Link):
     """Has no work of its own: what comes for it comes through its listener, which `Listeners.serve` gives it."""

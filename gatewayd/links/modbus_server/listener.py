@@ -27,8 +27,6 @@ from gatewayd.links.modbus_server.writers import names_of, succeeded, writers_of
 from gatewayd.loop import clock
 from gatewayd.report.format import address as address_text
 
-__all__ = ["ListenError", "ModbusListener"]
-
 _SWEEP = 0.25
 """Seconds between two looks for connections that are idle or stalled."""
 

@@ -20,8 +20,6 @@ from gatewayd.logs.records import fields
 from gatewayd.loop.retry import reason_of, until_done
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["RETRY_PERIOD", "Listeners"]
-
 RETRY_PERIOD = 2.0
 """Seconds between two attempts to listen."""
 

@@ -9,8 +9,6 @@ from ipaddress import IPv4Address, IPv6Address, ip_address
 
 from gatewayd.links.modbus_server.plan import ModbusPlan, Network
 
-__all__ = ["Address", "DenialLog", "PeerEvent", "PeerEventKind", "address_of", "may_connect", "writer_of"]
-
 Address = IPv4Address | IPv6Address
 
 

@@ -10,8 +10,6 @@ from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import Codec
 from gatewayd.modbus.exceptions import ExceptionCode
 
-__all__ = ["Located", "ModbusPlan", "Network", "Placement", "network_text"]
-
 Network = IPv4Network | IPv6Network
 
 

@@ -12,8 +12,6 @@ from collections.abc import Callable
 
 from gatewayd.loop import clock
 
-__all__ = ["ReadPoller"]
-
 _MAX_EVENTS = 32
 """Sockets looked at together."""
 _LONGEST_TURN = 0.0002

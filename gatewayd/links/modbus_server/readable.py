@@ -6,8 +6,6 @@ from array import array
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-__all__ = ["ADDRESSES", "Readable"]
-
 ADDRESSES = 65536
 """Of each Modbus table."""
 

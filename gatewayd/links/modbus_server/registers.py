@@ -10,7 +10,8 @@ import struct
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.status_layout import BASE
@@ -19,8 +20,6 @@ from gatewayd.links.modbus_server.readable import ADDRESSES, Readable
 from gatewayd.links.modbus_server.runs import Run, bit_runs, number_runs, words_of_bits
 from gatewayd.modbus.areas import MAX_READ_BITS, MAX_READ_REGISTERS, Area
 from gatewayd.modbus.codec import Codec
-
-__all__ = ["GAPS", "BitTable", "RegisterImage", "RegisterTable"]
 
 GAPS = range(BASE)
 """Addresses at which gaps may read 0 or be written to without effect; from there on is the status block."""

@@ -16,8 +16,6 @@ from gatewayd.core.definition import Value
 from gatewayd.links.modbus_server.plan import Placement
 from gatewayd.modbus.codec import Codec
 
-__all__ = ["BitRun", "NumberRun", "Run", "WordOfBits", "bit_runs", "number_runs", "words_of_bits"]
-
 _Getter = Callable[[list[Value]], Sequence[Value]]
 
 

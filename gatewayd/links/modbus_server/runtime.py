@@ -9,8 +9,6 @@ from gatewayd.links.modbus_server.listeners import Listeners
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.plan import LinkPlan
 
-__all__ = ["RUNTIME"]
-
 
 class ModbusRuntime(LinkRuntime):
     """Units, and the listeners that they share."""

@@ -14,8 +14,6 @@ from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import declare
 from gatewayd.mapping.scalars import refuse, scalar
 
-__all__ = ["BAD_ADDRESS", "Address"]
-
 BAD_ADDRESS = declare(
     "GW115", "bad-address", "a Modbus address that cannot be read", home="gatewayd.links.modbus_server.rules"
 )

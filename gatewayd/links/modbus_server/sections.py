@@ -12,8 +12,6 @@ from gatewayd.mapping.scalars import Listen, ListenAddress, Networks, OptionalDu
 from gatewayd.mapping.section import Section
 from gatewayd.modbus.areas import AREA_NAMES, Area
 
-__all__ = ["Modbus", "ModbusPlaces", "ModbusWriter", "NumberType", "PlacementSpec", "RobotAway", "WordOrder"]
-
 NumberType = Literal[
     "bool", "bit", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"
 ]

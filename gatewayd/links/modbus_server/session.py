@@ -19,8 +19,6 @@ from gatewayd.modbus.areas import MAX_READ_REGISTERS
 from gatewayd.modbus.exceptions import ExceptionCode
 from gatewayd.modbus.frames import FrameBuffer, FramingError, encode, split
 
-__all__ = ["ModbusSession", "UnitAccess"]
-
 _READ_HOLDING = 3
 _READ_INPUT = 4
 _READ_FRAME = 12

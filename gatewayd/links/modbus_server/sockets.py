@@ -7,8 +7,6 @@ import socket
 import struct
 import termios
 
-__all__ = ["has_unread", "seconds_since_established", "set_options"]
-
 # A pulled cable is noticed after KEEPIDLE + KEEPCNT * KEEPINTVL seconds, or TCP_USER_TIMEOUT with answers under way.
 _KEEPALIVE = (
     (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),

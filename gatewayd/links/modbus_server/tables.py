@@ -15,8 +15,6 @@ from gatewayd.modbus.areas import AREA_NAMES
 from gatewayd.report.format import address as address_text
 from gatewayd.report.layout import Column, Row, span
 
-__all__ = ["TABLES"]
-
 
 class ModbusTables(LinkTables):
     """A row for each place of a variable."""

@@ -9,8 +9,6 @@ Not seen: what a peer's system sends again, because it could not deliver it to a
 
 from __future__ import annotations
 
-__all__ = ["SETTLING", "WaitedInput"]
-
 SETTLING = 0.01
 """Seconds after a gap in which what comes in counts as having waited."""
 

@@ -9,8 +9,6 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.session import UnitAccess
 
-__all__ = ["Accesses", "Writers", "hold_anything", "names_of", "succeeded", "writers_of"]
-
 Accesses = Mapping[int, UnitAccess]
 """What one connection may do, by unit."""
 Writers = list[tuple[Cell, Requester]]

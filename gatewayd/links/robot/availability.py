@@ -14,8 +14,6 @@ from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.rtde.session import Session
 from gatewayd.rtde.types import INTEGER_RANGES, DataType
 
-__all__ = ["unavailable"]
-
 
 def unavailable(session: Session, variables: Sequence[Variable]) -> dict[int, str]:
     """Reason by variable index, in the controller's word and with its likely cause."""

@@ -18,8 +18,6 @@ from gatewayd.core.definition import Direction, Value, Variable
 from gatewayd.links.robot.transfer import ElementPlace, InputTransfer
 from gatewayd.rtde.companions import COMPANIONS
 
-__all__ = ["DOMAINS", "STAGE", "Actuation", "Driven", "Key", "Stage", "all_inputs", "all_outputs"]
-
 STAGE = 0.01
 """Seconds at least for which a fallback goes out with its mask set, and never less than two control cycles."""
 CYCLES = 2

@@ -11,8 +11,6 @@ from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address, exact, seconds
 
-__all__ = ["KIND"]
-
 
 class RobotKind(LinkKind):
     """The kind with the section `robot`."""

@@ -13,8 +13,6 @@ from gatewayd.mapping.model import VariableSpec
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field
 from gatewayd.rtde.types import INTEGER_RANGES, DataType
 
-__all__ = ["define", "field_of", "is_program_output"]
-
 _USUAL: Final = {
     "robot_mode": (-1, 255),
     "joint_mode": (0, 255),

@@ -18,8 +18,6 @@ from gatewayd.links.robot.transfer import InputTransfer, Slots
 from gatewayd.rtde.claims import WATCHDOG_KEY, InputRecipe
 from gatewayd.rtde.session import Session
 
-__all__ = ["LIVED_ON", "SEND_AGAIN", "ClaimedInputs", "Due"]
-
 SEND_AGAIN = 1.0
 """Seconds between two attempts to give the controller what it does not hold."""
 LIVED_ON = 1.0

@@ -18,8 +18,6 @@ from gatewayd.mapping.expanded import CellSettings, Defined, ExpandedCell
 from gatewayd.mapping.model import VariableSpec
 from gatewayd.mapping.section import Section
 
-__all__ = ["LANGUAGE"]
-
 _STALE_PERIODS: Final = 5
 _MIN_STALE_AFTER: Final = 0.1
 _TIMESTAMP: Final = "timestamp"

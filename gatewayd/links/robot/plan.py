@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from gatewayd.mapping.plan import LinkPlan, Plan
 
-__all__ = ["RobotPlan", "WatchdogPlan", "robot_of"]
-
 
 @dataclass(frozen=True, slots=True)
 class WatchdogPlan:

@@ -7,8 +7,6 @@ from typing import Final
 from gatewayd.links.robot.sections import Robot
 from gatewayd.rtde.fields import Series
 
-__all__ = ["MIN_RATE", "package_period", "package_rate"]
-
 MIN_RATE: Final = 0.1
 """Packages per second below which nobody can mean it; 0 stands for the controller's own rate."""
 _MIN_FREQUENCY: Final = 0.001

@@ -14,8 +14,6 @@ from dataclasses import dataclass, field
 from gatewayd.core.definition import Value
 from gatewayd.links.robot.transfer import InputTransfer, Slots
 
-__all__ = ["VERIFY_AFTER", "Finding", "Package", "ReadBack", "same"]
-
 VERIFY_AFTER = 0.5
 """Seconds at least for which a difference has to last."""
 _ROUND_TRIPS = 2

@@ -14,8 +14,6 @@ from gatewayd.rtde.catalogue import bit_word
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, REGISTERS, Field
 from gatewayd.rtde.types import DataType
 
-__all__ = ["ReferenceProblem", "Target", "UnresolvedReference", "resolve"]
-
 _FAMILIES: Final = {family.prefix: family for family in REGISTERS}
 _BIT_REGISTERS: Final = {"input_bit_register_": "input", "output_bit_register_": "output"}
 _NUMBERED = re.compile(r"(.*_)(0|[1-9][0-9]{0,3})")

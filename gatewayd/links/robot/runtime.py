@@ -35,8 +35,6 @@ from gatewayd.rtde.messages import TextMessage
 from gatewayd.rtde.session import ClientSettings, Session
 from gatewayd.rtde.strange import StrangePackage
 
-__all__ = ["LAST_WORDS", "LOSS_INTERVAL", "RUNTIME", "RobotLink"]
-
 LOSS_INTERVAL = 60.0
 """Seconds after which a connection that still fails for the same reason is reported again."""
 LAST_WORDS = 0.4

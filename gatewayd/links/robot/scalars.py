@@ -15,8 +15,6 @@ from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import declare
 from gatewayd.mapping.scalars import refuse, scalar, span
 
-__all__ = ["BAD_REFERENCE", "Reference", "RobotReference", "Version"]
-
 BAD_REFERENCE = declare(
     "GW117",
     "bad-robot-reference",

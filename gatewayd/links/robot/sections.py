@@ -11,8 +11,6 @@ from gatewayd.mapping.scalars import Duration, Host, Name, Names, OptionalDurati
 from gatewayd.mapping.section import Section
 from gatewayd.rtde.types import DEFAULT_PORT
 
-__all__ = ["ADOPT_FOR", "Robot", "RobotPlace", "RobotValidity", "Watchdog"]
-
 ADOPT_FOR = 10.0
 """Seconds that an adopted input waits for an owner where the file says nothing."""
 

@@ -12,8 +12,6 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.report.layout import Column, Row
 from gatewayd.report.wording import family
 
-__all__ = ["TABLES"]
-
 
 class RobotTables(LinkTables):
     """One column: what a variable is in the robot."""

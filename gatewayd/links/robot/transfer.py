@@ -11,8 +11,6 @@ from dataclasses import dataclass
 
 from gatewayd.core.definition import Direction, Value, Variable
 
-__all__ = ["ElementPlace", "FieldPart", "InputTransfer", "OutputTransfer", "Slots"]
-
 Slots = Mapping[str, slice]
 """Where each field of a recipe lies in its flat tuple."""
 

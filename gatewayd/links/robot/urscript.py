@@ -8,8 +8,6 @@ from gatewayd.links.exports import Export, ExportError
 from gatewayd.links.robot.plan import robot_of
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["EXPORTS", "watchdog_script"]
-
 _MARGIN = 2
 """The program stops when so many feeds in a row are missing."""
 

@@ -10,8 +10,6 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 from gatewayd.report.wording import alternatives
 
-__all__ = ["MAX_VARIABLES", "MAX_WRITERS"]
-
 MAX_VARIABLES = 1024
 """The status block has a quality bit and an owner word for so many."""
 MAX_WRITERS = 32

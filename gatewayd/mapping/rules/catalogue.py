@@ -12,8 +12,6 @@ from pathlib import Path
 from gatewayd.mapping.diagnostics import FAMILIES, RETIRED, RetiredRule, Rule, all_rules
 from gatewayd.mapping.rules import run
 
-__all__ = ["catalogue", "complete", "explanation"]
-
 
 def complete() -> tuple[Rule, ...]:
     """Every rule by id."""

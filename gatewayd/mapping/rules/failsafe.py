@@ -13,8 +13,6 @@ from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.writers import is_supervised
 from gatewayd.report.wording import number
 
-__all__ = ["silent_motion"]
-
 _MOTION_WORD = re.compile(
     "drive|enable|execute|go|home|jog|motion|move|play|resume|run|speed|start|step|velocity", re.IGNORECASE
 )

@@ -14,8 +14,6 @@ from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.writers import is_supervised
 from gatewayd.report.wording import did_you_mean, seconds
 
-__all__ = ["endless_locks"]
-
 _MIN_LEASE = 0.1
 _RESERVED = (ANY, "free", "gateway", "operator", "robot", "undeclared")
 _POLICY = ("owner", "lease", "takeover")

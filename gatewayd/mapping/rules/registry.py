@@ -12,8 +12,6 @@ from typing import Final, TypeAlias, TypeVar
 from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity, declare
 from gatewayd.mapping.expanded import ExpandedCell
 
-__all__ = ["CELL_CHECKS", "PLANT_CHECKS", "CellCheck", "PlantCheck", "cell_rule", "plant_rule"]
-
 CellCheck: TypeAlias = Callable[[Rule, ExpandedCell], Iterator[Diagnostic]]
 """Looks at one cell. Must not raise, whatever the cell holds: a finding is its only way to complain."""
 PlantCheck: TypeAlias = Callable[[Rule, Sequence[ExpandedCell]], Iterator[Diagnostic]]

@@ -11,8 +11,6 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules import bounds, failsafe, ownership, sharing, supervision
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
-__all__ = ["RULE_MODULES", "check_cell", "check_plant"]
-
 RULE_MODULES = (
     bounds,
     ownership,

@@ -11,8 +11,6 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock, ExpandedVariab
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.report.wording import names_and_more
 
-__all__: list[str] = []
-
 
 @cell_rule("GW518", Severity.WARNING)
 def inherited_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

@@ -13,8 +13,6 @@ from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.writers import is_supervised, known_by
 from gatewayd.report.wording import names_and_more
 
-__all__: list[str] = []
-
 
 @cell_rule("GW521", Severity.WARNING)
 def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

@@ -7,8 +7,6 @@ from gatewayd.links.registry import languages
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.model import WriterSpec
 
-__all__ = ["is_supervised", "known_by", "more_places", "ways_of", "ways_of_variable"]
-
 
 def known_by(writer: WriterSpec) -> tuple[LinkLanguage, ...]:
     """The kinds of links by which the writer can write, in order; none only where it has errors."""

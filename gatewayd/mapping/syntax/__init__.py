@@ -4,28 +4,6 @@ from __future__ import annotations
 
 from gatewayd.mapping.diagnostics import declare
 
-__all__ = [
-    "ALIAS",
-    "BAD_CHOICE",
-    "BAD_DURATION",
-    "BAD_NAME",
-    "BAD_NETWORK",
-    "BAD_NUMBER",
-    "BAD_RANGE",
-    "DUPLICATE_KEY",
-    "EMPTY",
-    "FORMAT_VERSION",
-    "MISSING_KEY",
-    "NOT_UTF8",
-    "OUT_OF_RANGE",
-    "SEVERAL_DOCUMENTS",
-    "TAG",
-    "TOO_LARGE",
-    "UNKNOWN_KEY",
-    "WRONG_TYPE",
-    "YAML_SYNTAX",
-]
-
 YAML_SYNTAX = declare("GW101", "yaml-syntax", "the file is not valid YAML")
 DUPLICATE_KEY = declare("GW102", "duplicate-key", "a key occurs twice in one mapping")
 ALIAS = declare("GW103", "anchor-or-alias", "anchors and aliases are not part of the mapping language")

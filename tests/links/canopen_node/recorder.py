@@ -9,8 +9,6 @@ from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.errors import ErrorFrame
 from gatewayd.canopen.frame import Frame
 
-__all__ = ["Recorder", "until"]
-
 
 class Recorder:
     """Remembers everything, in the order in which it came."""

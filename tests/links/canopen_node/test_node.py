@@ -18,7 +18,8 @@ from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.heartbeat import Consumer
 from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
 from gatewayd.canopen.sync import SyncPlan
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Lock, Value, ValueKind, Variable, Writer
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester, new_connection

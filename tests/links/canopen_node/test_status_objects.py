@@ -8,7 +8,8 @@ import pytest
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Pdo
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester

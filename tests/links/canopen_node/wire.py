@@ -10,8 +10,6 @@ from gatewayd.canopen.dictionary import Abort, AbortCode, Dictionary, Object
 from gatewayd.canopen.frame import Frame, Priority
 from gatewayd.canopen.nmt import NmtSlave, NmtState
 
-__all__ = ["Client", "Wire", "slave"]
-
 
 class Wire:
     """Takes frames; `take` hands them out once."""

@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import pytest
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester

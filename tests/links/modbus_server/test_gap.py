@@ -17,7 +17,8 @@ from contextlib import ExitStack
 
 import pytest
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester

@@ -13,7 +13,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import Unit, execute

@@ -8,7 +8,8 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.events import EventKind
 from gatewayd.core.requester import Requester
@@ -20,8 +21,6 @@ from gatewayd.rtde.fields import SoftwareVersion
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import DEMO, parse
 from gatewayd.simulator.server import SimulatedController
-
-__all__ = ["HMI", "PLC", "Defect", "Rig", "Rigged", "linked", "plan_for", "rigged"]
 
 PLC, HMI = 0, 1
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from gatewayd.core.cell import Change
+from gatewayd.core.admission import Change
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.freshness import Source
 from gatewayd.core.requester import Requester

@@ -10,7 +10,8 @@ from functools import partial
 
 import pytest
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source

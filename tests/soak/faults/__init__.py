@@ -12,8 +12,6 @@ from random import Random
 from tests.soak.faults import can, daemon, http, modbus, operator, robot
 from tests.soak.rig import Rig
 
-__all__ = ["BOUND", "FAULTS", "ROUND", "Fault", "bound"]
-
 STILL = "gateway stands still"
 _OFTEN = {STILL: 3}
 """How often in a round, where not once."""

@@ -13,8 +13,6 @@ from tests.soak.faults.common import kill_writer, unjudged
 from tests.soak.master import HEARTBEAT, NMT, OPERATIONAL
 from tests.soak.rig import PATIENCE, Rig
 
-__all__ = ["command_node", "cut_bus", "flood", "kill_master"]
-
 _STOP, _PRE_OPERATIONAL, _RESET_NODE, _RESET_COMMUNICATION = 2, 128, 129, 130
 """NMT commands (CiA 301, 7.2.8.3.1)."""
 _SDO_REQUEST = 0x600

@@ -11,8 +11,6 @@ from tests.e2e.processes import Process, wait_for
 from tests.soak.rig import PATIENCE, Rig
 from tests.soak.truth import LATELY, Period
 
-__all__ = ["kill_writer", "suspend", "unjudged"]
-
 
 def kill_writer(rig: Rig, name: str) -> None:
     """Its locks are free before it comes back."""

@@ -16,8 +16,6 @@ from tests.soak.faults.common import suspend
 from tests.soak.rig import PATIENCE, Rig
 from tests.soak.truth import Stop
 
-__all__ = ["broken_reload", "full_audit", "reload", "stand_still", "unwritable_audit"]
-
 _STILL = (0.2, 1.0), (1.0, 9.5)
 """Seconds; short and long gaps come equally often. A client of the rig waits 10 s for an answer."""
 _TOLERANCE = 0.3

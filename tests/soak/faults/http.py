@@ -11,8 +11,6 @@ from tests.e2e.processes import HOST
 from tests.soak.cell import NAME
 from tests.soak.rig import Rig
 
-__all__ = ["half_requests", "never_reads"]
-
 _PATHS = ("/metrics", f"/page/cells/{NAME}", "/api/v1/audit?limit=1000", "/api/v1/events?follow=1&limit=1000")
 _HALF_OPEN = 50
 

@@ -15,8 +15,6 @@ from tests.soak.faults.common import kill_writer, suspend
 from tests.soak.rig import PATIENCE, Rig
 from tests.soak.truth import Period
 
-__all__ = ["burst", "garbage", "half_open_plc", "half_request", "kill_plc", "never_reads"]
-
 _READ = bytes.fromhex("000100000006 01 03 EA60 007D")
 """FC3 of 125 registers of the status block."""
 

@@ -13,8 +13,6 @@ from tests.soak.cell import FIELDS_OF, FIRST, MASTER_FIELDS
 from tests.soak.faults.common import unjudged
 from tests.soak.rig import PATIENCE, Rig
 
-__all__ = ["force", "take_lock"]
-
 _FORCED = ("first_in", "master_in", "second_echo", "heard_echo", "doubles[3]")
 _TAKEN = ("first_in", "second_in", "shared", "master_in", "heard_in")
 _FIELDS = {"first_in": FIELDS_OF[FIRST][:1], "master_in": MASTER_FIELDS[:1]}

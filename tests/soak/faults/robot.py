@@ -9,8 +9,6 @@ from tests.e2e.processes import wait_for
 from tests.soak.cell import HELD
 from tests.soak.rig import PATIENCE, Rig
 
-__all__ = ["drop_clients", "freeze", "hold_register", "kill_simulator", "silence"]
-
 
 def drop_clients(rig: Rig, _chance: Random) -> None:
     rig.simulator.do("drop-clients")

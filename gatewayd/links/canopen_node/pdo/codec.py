@@ -19,11 +19,9 @@ from operator import itemgetter
 from typing import Any, Final
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.core.cell import Change
+from gatewayd.core.admission import Change
 from gatewayd.core.definition import Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
-
-__all__ = ["MAX_BITS", "Layout", "Mapped", "fit", "is_aligned", "native"]
 
 MAX_BITS: Final = 64
 """What one CAN frame carries."""

@@ -33,8 +33,6 @@ from gatewayd.links.canopen_node.pdo.codec import MAX_BITS, Layout, Mapped, is_a
 from gatewayd.links.canopen_node.plan import CanopenPlan, PdoPlan
 from gatewayd.links.canopen_node.status_objects import status_word
 
-__all__ = ["MIN_NUMBER", "Configuration", "PdoParameters", "PdoTable"]
-
 MIN_NUMBER: Final = 4
 """PDOs per direction that a node has even if its mapping uses fewer, so that a master can map its own."""
 

@@ -26,12 +26,11 @@ from enum import Enum
 from typing import Final
 
 from gatewayd.canopen.gap import spared
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.links.canopen_node.pdo.parameters import Configuration
-
-__all__ = ["Fault", "ReceiveEngine", "ReportFault"]
 
 
 class Fault(Enum):

@@ -30,17 +30,6 @@ from gatewayd.links.canopen_node.pdo.codec import ReadWord
 from gatewayd.links.canopen_node.pdo.parameters import Configuration
 from gatewayd.links.registry import status_fields
 
-__all__ = [
-    "MOVES",
-    "STATUS_LOOK",
-    "Schedule",
-    "TransmitEngine",
-    "TransmitMove",
-    "TransmitPdo",
-    "TransmitSignal",
-]
-
-
 STATUS_LOOK: Final = 0.1
 """Seconds between two looks at status words that change with time, as the heartbeat of the core does."""
 

@@ -25,8 +25,6 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import plant_rule
 from gatewayd.report.wording import cob
 
-__all__: list[str] = []
-
 
 @plant_rule("GW407")
 @first_at_each_place

@@ -18,8 +18,6 @@ from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.writers import known_by, ways_of, ways_of_variable
 from gatewayd.report.wording import number, one_and_more, seconds
 
-__all__: list[str] = []
-
 _REAL32_DIGITS = 2**24
 _RPDO = "RPDO"
 

@@ -12,8 +12,6 @@ from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock, ExpandedVariable
 from gatewayd.report.wording import did_you_mean
 
-__all__: list[str] = []
-
 
 @node_rule("GW410")
 def unknown_pdo(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:

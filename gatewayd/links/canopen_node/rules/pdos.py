@@ -17,8 +17,6 @@ from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Se
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.report.wording import cob, seconds
 
-__all__ = ["cob_id_place"]
-
 _UNUSED = range(0x680, 0x6E0)
 """Identifiers that no predefined service of any node has."""
 _HIGH_NODES = (range(0x1C0, 0x200), range(0x2C0, 0x300), range(0x3C0, 0x400), range(0x4C0, 0x500))

@@ -11,8 +11,6 @@ from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
 
-__all__ = ["first_at_each_place", "node_rule"]
-
 NodeCheck: TypeAlias = Callable[[Rule, ExpandedCell, CanopenCell], Iterator[Diagnostic]]
 P = ParamSpec("P")
 

@@ -15,8 +15,6 @@ from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.modbus.codec import TYPES, Codec
 from gatewayd.report.wording import number
 
-__all__: list[str] = []
-
 _FLOAT_DIGITS = {"float32": 1 << 24, "float64": 1 << 53}
 """Integers up to here survive in a real of the type."""
 _MIN_STEPS = 10

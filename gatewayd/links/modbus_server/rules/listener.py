@@ -12,8 +12,6 @@ from gatewayd.mapping.document import Part
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 
-__all__: list[str] = []
-
 _LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
 _SHARED = ("connections", "idle_timeout")
 

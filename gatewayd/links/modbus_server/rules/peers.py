@@ -12,8 +12,6 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.model import WriterSpec
 from gatewayd.mapping.rules.registry import cell_rule
 
-__all__: list[str] = []
-
 
 @cell_rule("GW504")
 def same_peer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

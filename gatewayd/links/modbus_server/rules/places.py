@@ -14,8 +14,6 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.modbus.areas import AREA_NAMES, MAX_READ_REGISTERS, MAX_WRITE_REGISTERS, Area
 
-__all__: list[str] = []
-
 _LAST_ADDRESS = 0xFFFF
 _TRADITIONAL = {
     Area.HOLDING: range(40001, 50000),

@@ -14,8 +14,6 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.modbus.areas import Area
 
-__all__: list[str] = []
-
 
 @cell_rule("GW520", Severity.WARNING)
 def shared_register(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

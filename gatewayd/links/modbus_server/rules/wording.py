@@ -8,8 +8,6 @@ from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProb
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.modbus.areas import Area
 
-__all__ = ["AREA_WORDS", "first_of_each_line", "where", "wrong"]
-
 AREA_WORDS = {
     Area.HOLDING: "holding register",
     Area.INPUT: "input register",

@@ -11,8 +11,6 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.rtde.companions import COMPANIONS, Companions
 
-__all__: list[str] = []
-
 
 @cell_rule("GW310")
 def missing_mask(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

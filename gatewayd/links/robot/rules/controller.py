@@ -12,8 +12,6 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.model import VariableSpec
 from gatewayd.rtde.fields import Series, SoftwareVersion
 
-__all__ = ["controller", "unresolved", "watchdog_field"]
-
 
 def controller(document: Document) -> tuple[Series | None, SoftwareVersion | None]:
     """What the file says of the controller; the series may follow from the version."""

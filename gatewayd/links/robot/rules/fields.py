@@ -18,8 +18,6 @@ from gatewayd.rtde.catalogue import is_fieldbus_range, suggest
 from gatewayd.rtde.claims import OLD_LIST_LIMIT, list_size
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Series, SoftwareVersion
 
-__all__: list[str] = []
-
 _LONG_LISTS_SINCE = SoftwareVersion(5, 17)
 _UPPER_INPUTS = frozenset(
     name for name in INPUTS if name.startswith("input_") and not is_fieldbus_range(name)

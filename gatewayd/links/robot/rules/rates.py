@@ -12,8 +12,6 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.report.wording import number, seconds
 
-__all__: list[str] = []
-
 
 @cell_rule("GW306")
 def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

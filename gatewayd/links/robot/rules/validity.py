@@ -11,8 +11,6 @@ from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
 
-__all__: list[str] = []
-
 
 @cell_rule("GW613", Severity.WARNING)
 def valid_without_program(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:

@@ -13,8 +13,6 @@ from gatewayd.mapping.rules.writers import is_supervised
 from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.types import DataType
 
-__all__: list[str] = []
-
 _WATCHDOG_TYPES = (DataType.INT32, DataType.DOUBLE)
 
 

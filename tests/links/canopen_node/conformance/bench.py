@@ -30,8 +30,6 @@ from gatewayd.links.canopen_node.store import Store
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 
-__all__ = ["NODE", "Device", "LinkDevice", "Tester", "WireDevice", "compiled", "little", "powered"]
-
 NODE = 5
 MAPPING = """\
 gatewayd: 1

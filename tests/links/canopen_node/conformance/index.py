@@ -10,8 +10,6 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["CASES", "PAGE", "case_of", "renewed", "shown"]
-
 HERE = Path(__file__).parent
 ROOT = HERE.parents[3]
 PAGE = ROOT / "docs" / "reference" / "conformance.md"

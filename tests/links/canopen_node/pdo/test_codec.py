@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.core.cell import Change
+from gatewayd.core.admission import Change
 from gatewayd.core.definition import Direction, Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.links.canopen_node.pdo.codec import Layout, Mapped, fit, is_aligned, native

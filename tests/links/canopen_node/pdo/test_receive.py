@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.core.cell import Change
+from gatewayd.core.admission import Change
 from gatewayd.core.definition import Direction
 from gatewayd.core.requester import Requester
 from gatewayd.links.canopen_node.pdo.codec import Layout, Mapped

@@ -12,8 +12,6 @@ from gatewayd.report.format import address, seconds
 
 from .plan import LinesPlan
 
-__all__ = ["KIND"]
-
 
 class UdpLines(LinkKind):
     """The kind with the section `lines`."""

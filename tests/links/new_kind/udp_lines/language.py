@@ -19,8 +19,6 @@ from gatewayd.mapping.section import Section
 from .declaration import KIND
 from .plan import LinesPlan
 
-__all__ = ["LANGUAGE", "ExpandedLines", "Lines"]
-
 
 class Lines(Section):
     """The socket."""

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from gatewayd.mapping.plan import LinkPlan
 
-__all__ = ["LinesPlan"]
-
 
 @dataclass(frozen=True, slots=True)
 class LinesPlan(LinkPlan):

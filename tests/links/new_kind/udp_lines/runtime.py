@@ -6,7 +6,8 @@ import asyncio
 import json
 from typing import Any
 
-from gatewayd.core.cell import Cell, Change
+from gatewayd.core.admission import Change
+from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
 from gatewayd.links.contract import Context, Level, Link, LinkHealth, LinkRuntime
 from gatewayd.loop import clock
@@ -14,8 +15,6 @@ from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address
 
 from .plan import LinesPlan
-
-__all__ = ["RUNTIME"]
 
 
 class LinesLink(Link, asyncio.DatagramProtocol):

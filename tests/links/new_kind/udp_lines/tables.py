@@ -11,8 +11,6 @@ from gatewayd.report.layout import Column
 from .declaration import KIND
 from .language import ExpandedLines
 
-__all__ = ["TABLES"]
-
 
 class LinesTables(LinkTables):
     """The name that lines have for each variable."""

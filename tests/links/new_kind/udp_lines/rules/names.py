@@ -10,8 +10,6 @@ from gatewayd.mapping.rules.registry import cell_rule
 
 from ..language import ExpandedLines  # noqa: TID252 - the package is copied to another place
 
-__all__: list[str] = []
-
 
 @cell_rule("GW801")
 def name_of_two(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
