@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 JOBS   ?= auto
 UV     ?= uv
+ARCH   ?= $(shell dpkg --print-architecture 2>/dev/null)
 CASES  ?= 100000
 SECONDS ?= 3600
 
@@ -17,8 +18,8 @@ SOURCES = gatewayd tests
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick setup dev lint format types check docs-check generated unit-checks ci bench fuzz soak deb install lock \
-	install-hook clean
+.PHONY: help demo test quick setup dev lint format types check docs-check generated unit-checks ci bench fuzz soak deb deb-check image dist dist-check \
+	install lock install-hook clean
 
 help: ## Show this list
 	@echo "make TARGET, where TARGET is one of:"
@@ -67,10 +68,24 @@ ci: ## Everything the project asks of a commit, in a clean clone of HEAD
 bench: $(VENV)/.dev ## Measure, and print the figures as ratios (ARGS="modbus latency")
 	$(PY) -m tests.benchmarks $(ARGS)
 
-deb: $(VENV)/.made ## Build the Debian package of this tree into dist/
-	packaging/deb dist $(PY)
+deb: $(VENV)/.runtime ## Build the Debian package of this tree into dist/ (ARCH="amd64 arm64 armhf"; this machine's by default)
+	@for arch in $(ARCH); do packaging/deb dist $(PY) "$$arch" || exit 1; done; ls -sh dist/*.deb
 
-install: $(VENV)/.made ## Install as the package would, below DESTDIR (as root; see docs/howto/install.md)
+deb-check: deb ## Try the package in fresh trees of Debian 12, 13 and Ubuntu 24.04, and upgrade one (as root; needs mmdebstrap)
+	packaging/check-trees dist/gatewayd_*_$$(dpkg --print-architecture).deb $(ARGS)
+
+image: deb ## Build a container image of it into dist/, of Debian's packages alone (as root; needs mmdebstrap and buildah)
+	packaging/image dist/gatewayd_*_$$(dpkg --print-architecture).deb
+
+dist: $(VENV)/.runtime ## Build wheel and sdist into dist/
+	@mkdir -p dist && rm -f dist/*.whl dist/*.tar.gz
+	$(PY) -c 'import flit_core.buildapi as build; build.build_wheel("dist"), build.build_sdist("dist")'
+	@chmod 644 dist/*.whl
+
+dist-check: dist $(VENV)-release/.made ## ... and let twine judge what a registry would be given
+	$(VENV)-release/bin/twine check --strict dist/*.whl dist/*.tar.gz
+
+install: $(VENV)/.runtime ## Install as the package would, below DESTDIR (as root; see docs/howto/install.md)
 	packaging/install "$(DESTDIR)" $(PY)
 
 fuzz: $(VENV)/.dev ## Try the parsers and the running daemon with 100,000 hostile cases (CASES=1000000)
@@ -82,13 +97,14 @@ soak: $(VENV)/.dev ## Torment the running daemon for an hour, from a seed (SECON
 lock: ## Pin and hash the newest packages that pyproject.toml allows (needs uv)
 	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --group build -o requirements.lock
 	$(COMPILE) --upgrade --custom-compile-command "make lock" pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
+	$(COMPILE) --upgrade --custom-compile-command "make lock" --group release -c requirements.lock -o requirements-release.lock
 
 install-hook: ## Let git run lint and types before each commit
 	printf '#!/bin/sh\nexec make --no-print-directory lint types\n' > "$$(git rev-parse --git-path hooks)/pre-commit"
 	chmod +x "$$(git rev-parse --git-path hooks)/pre-commit"
 
 clean: ## Remove everything that make made
-	rm -rf -- "$(VENV)" build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf -- "$(VENV)" "$(VENV)-release" build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 # The stamps make a second run start at once. requirements-dev.lock contains requirements.lock, version by version.
 
@@ -106,3 +122,8 @@ $(VENV)/.dev: $(VENV)/.made requirements-dev.lock pyproject.toml
 	$(INSTALL) --require-hashes -r requirements-dev.lock
 	$(INSTALL) --no-deps --no-build-isolation --editable .
 	@touch "$(VENV)/.runtime" "$@"
+
+$(VENV)-release/.made: requirements-release.lock
+	$(PYTHON) -m venv "$(VENV)-release"
+	"$(VENV)-release/bin/python" -m pip install --quiet --disable-pip-version-check --no-input --require-hashes -r $<
+	@touch "$@"

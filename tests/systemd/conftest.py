@@ -34,7 +34,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         return
     items[:] = [item for item in items if item not in set(ours)] + ours
     shared = directory_of_run(config)
-    if any(character.isspace() for character in str(shared)) or machine.interpreter_with_pip() is None:
+    if any(character.isspace() for character in str(shared)) or not machine.can_build():
         return
     try:
         (shared / "begun").touch(exist_ok=False)
@@ -67,8 +67,8 @@ def shared(request: pytest.FixtureRequest) -> Path:
 @pytest.fixture(scope="session")
 def package(shared: Path) -> Path:
     """The .deb."""
-    if machine.interpreter_with_pip() is None:
-        pytest.skip("no pip at hand to build the package with")
+    if not machine.can_build():
+        pytest.skip("no pip, or no flit_core, at hand to build the package with")
     if not machine.has_dpkg_deb():
         pytest.skip("dpkg-deb is missing: this is no Debian")
     return machine.package(shared)

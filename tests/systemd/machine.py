@@ -92,15 +92,10 @@ sys.exit(os.strerror(ctypes.get_errno()) if failed else 0)
 
 
 @cache
-def interpreter_with_pip() -> Path | None:
-    """An interpreter whose pip can install into another environment."""
-    for candidate in (Path(sys.executable), Path(sys.base_prefix) / "bin/python3"):
-        if (
-            subprocess.run([candidate, "-m", "pip", "--version"], capture_output=True, check=False).returncode
-            == 0
-        ):
-            return candidate
-    return None
+def can_build() -> bool:
+    """Whether this interpreter has what packaging/deb needs: pip, and what requirements.lock names."""
+    needed = "import pip, flit_core, click"
+    return subprocess.run([sys.executable, "-c", needed], capture_output=True, check=False).returncode == 0
 
 
 def has_dpkg_deb() -> bool:
@@ -116,17 +111,26 @@ def _locked(path: Path) -> Iterator[None]:
         yield
 
 
+def _system_python() -> str:
+    """Its version, as in 3.11."""
+    command = ["/usr/bin/python3", "-Ic", "import sys; print('%d.%d' % sys.version_info[:2])"]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+
 def package(directory: Path) -> Path:
-    """The Debian package of this tree in a directory that others use too; made if it is not there."""
+    """The Debian package of this tree in a directory that others use too; made if it is not there.
+
+    With the wheels for this system's Python alone: what pip has fetched already for the tests' own environment.
+    """
     with _locked(directory / "package.lock"):
         found = list(directory.glob("gatewayd_*.deb"))
         if not found:
             done = subprocess.run(
-                [ROOT / "packaging/deb", directory, str(interpreter_with_pip())],
+                [ROOT / "packaging/deb", directory, sys.executable],
                 capture_output=True,
                 text=True,
                 check=False,
-                env={**os.environ, "COMPRESSION": "gzip"},
+                env={**os.environ, "COMPRESSION": "gzip", "PYTHONS": _system_python()},
             )
             assert done.returncode == 0, done.stderr
             found = [Path(done.stdout.strip())]

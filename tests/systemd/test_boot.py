@@ -186,6 +186,22 @@ def test_an_upgrade_restarts_what_runs_and_keeps_settings(steps: Facts) -> None:
     assert seen["mapping"]
 
 
+def test_another_python_means_another_environment_and_a_restart(steps: Facts) -> None:
+    seen = steps["another_python"]
+    assert seen["code"] == 0, seen["said"]
+    assert seen["right"], "the link names the environment of the system's Python"
+    assert len(seen["environments"]) == 1, "the former one is gone"
+    assert is_running(seen["after"])
+    assert seen["after"]["MainPID"] != seen["before"]["MainPID"]
+    assert seen["fresh"]
+
+
+def test_a_new_package_of_the_same_python_disturbs_nobody(steps: Facts) -> None:
+    seen = steps["another_python"]["unchanged"]
+    assert seen["code"] == 0, seen["said"]
+    assert seen["after"]["MainPID"] == steps["another_python"]["before"]["MainPID"]
+
+
 def test_an_upgrade_leaves_a_cell_alone_that_it_would_not_serve(steps: Facts) -> None:
     seen = steps["configure_with_a_mistake"]
     assert seen["code"] == 0, seen["said"]
