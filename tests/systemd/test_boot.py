@@ -17,7 +17,7 @@ from tests.systemd.machine import NEXT
 Facts = dict[str, Any]
 
 pytestmark = [
-    pytest.mark.timeout(400),  # whoever comes second waits for the boot
+    pytest.mark.timeout(480),  # whoever comes second waits for the boot
     pytest.mark.skipif(bool(machine.missing()), reason=f"no machine to boot: {machine.missing()}"),
 ]
 
