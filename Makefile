@@ -71,8 +71,10 @@ bench: $(VENV)/.dev ## Measure, and print the figures as ratios (ARGS="modbus la
 deb: $(VENV)/.runtime ## Build the Debian package of this tree into dist/ (ARCH="amd64 arm64 armhf"; this machine's by default)
 	@for arch in $(ARCH); do packaging/deb dist $(PY) "$$arch" || exit 1; done; ls -sh dist/*.deb
 
-deb-check: deb ## Try the package in fresh trees of Debian 12, 13 and Ubuntu 24.04, and upgrade one (as root; needs mmdebstrap)
-	packaging/check-trees dist/gatewayd_*_$$(dpkg --print-architecture).deb $(ARGS)
+deb-check: deb ## Judge it (lintian), try it in trees of Debian 12, 13, Ubuntu 24.04, upgrade one (as root; ARCH=..., mmdebstrap)
+	$(PY) packaging/check_deb.py dist/*.deb
+	lintian --allow-root --fail-on error,warning dist/*.deb
+	for package in dist/*.deb; do packaging/check-trees "$$package" || exit 1; done
 
 image: deb ## Build a container image of it into dist/, of Debian's packages alone (as root; needs mmdebstrap and buildah)
 	packaging/image dist/gatewayd_*_$$(dpkg --print-architecture).deb
