@@ -6,8 +6,6 @@ import importlib.util
 from pathlib import Path
 from types import ModuleType
 
-__all__ = ["PACKAGING", "ROOT", "program"]
-
 ROOT = Path(__file__).parents[2]
 PACKAGING = ROOT / "packaging"
 
