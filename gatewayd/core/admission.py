@@ -26,6 +26,18 @@ class Change:
     writer may have read the word before somebody else changed that bit."""
 
 
+def contradiction(changes: Iterable[Change]) -> Refusal | None:
+    """The first variable that a request gives two values.
+
+    For links that can put a variable into one request twice; the judgement of the others need not look for it.
+    """
+    values: dict[int, Value] = {}
+    for change in changes:
+        if values.setdefault(change.variable, change.value) != change.value:
+            return Refusal(Reason.CONTRADICTED, change.variable)
+    return None
+
+
 @dataclass(slots=True)
 class Verdict:
     """What a request would do. With a refusal only the renewals among the moves may be carried out."""

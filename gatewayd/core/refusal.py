@@ -31,6 +31,8 @@ class Reason(IntEnum):
     """The request waited while the gateway stood still, for longer than its writer may be silent."""
     NOT_MEANT = 11
     """It would change a bit that only shares a register with what the writer owns."""
+    CONTRADICTED = 12
+    """The request gives a variable two values."""
 
     @property
     def text(self) -> str:
@@ -59,20 +61,22 @@ _TEXTS = {
     Reason.PARTIAL_TAKEOVER: "the group is taken over whole or not at all",
     Reason.WAITED: "it waited while the gateway stood still",
     Reason.NOT_MEANT: "bit of a shared register that the writer does not own",
+    Reason.CONTRADICTED: "one request gave it two values",
 }
 
 PRECEDENCE = {
     Reason.NO_SUCH_ADDRESS: 0,
     Reason.NOT_WRITABLE: 1,
     Reason.PARTIAL_VALUE: 2,
-    Reason.OUT_OF_LIMITS: 3,
-    Reason.HEARTBEAT_LOST: 4,
-    Reason.WAITED: 5,
-    Reason.ROBOT_LOST: 6,
-    Reason.CLAIMED_ELSEWHERE: 7,
-    Reason.PARTIAL_TAKEOVER: 8,
-    Reason.HELD: 9,
-    Reason.NOT_MEANT: 10,
+    Reason.CONTRADICTED: 3,
+    Reason.OUT_OF_LIMITS: 4,
+    Reason.HEARTBEAT_LOST: 5,
+    Reason.WAITED: 6,
+    Reason.ROBOT_LOST: 7,
+    Reason.CLAIMED_ELSEWHERE: 8,
+    Reason.PARTIAL_TAKEOVER: 9,
+    Reason.HELD: 10,
+    Reason.NOT_MEANT: 11,
 }
 """Which reason is reported when several apply: what can never work first, what may pass soon last. A lost heartbeat
 stands before the robot's absence, which leaves an owner its lease: who is not heard keeps nothing alive."""

@@ -41,6 +41,7 @@ _EXCEPTIONS = {
     Reason.PARTIAL_TAKEOVER: "03",
     Reason.WAITED: "06",
     Reason.NOT_MEANT: "06",
+    Reason.CONTRADICTED: "03",
 }
 _EMERGENCIES = {
     Reason.NOT_WRITABLE: "FF05h",
@@ -51,6 +52,7 @@ _EMERGENCIES = {
     Reason.HEARTBEAT_LOST: "FF06h",
     Reason.PARTIAL_TAKEOVER: "FF07h",
     Reason.WAITED: "FF08h",
+    Reason.CONTRADICTED: "FF09h",
 }
 _STATES = {
     None: "not heard yet",

@@ -16,6 +16,7 @@ def test_the_numbers_of_the_status_block_stay() -> None:
         ("PARTIAL_TAKEOVER", 9),
         ("WAITED", 10),
         ("NOT_MEANT", 11),
+        ("CONTRADICTED", 12),
     ]
 
 
@@ -25,7 +26,13 @@ def test_every_reason_has_a_text_and_a_place_of_its_own() -> None:
 
 
 def test_what_can_never_work_is_told_before_what_may_pass() -> None:
-    never = {Reason.NO_SUCH_ADDRESS, Reason.NOT_WRITABLE, Reason.PARTIAL_VALUE, Reason.OUT_OF_LIMITS}
+    never = {
+        Reason.NO_SUCH_ADDRESS,
+        Reason.NOT_WRITABLE,
+        Reason.PARTIAL_VALUE,
+        Reason.CONTRADICTED,
+        Reason.OUT_OF_LIMITS,
+    }
     assert set(sorted(Reason, key=PRECEDENCE.__getitem__)[: len(never)]) == never
 
 

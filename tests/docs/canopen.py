@@ -255,6 +255,7 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.ROBOT_UNAVAILABLE: "the controller does not have, or gave to another client, what is mapped "
     "(bytes 4-5: how many variables)",
     ErrorCode.WRITE_WAITED: "an RPDO was dropped: it waited too long while the gateway stood still",
+    ErrorCode.WRITE_CONTRADICTED: "an RPDO was dropped: it has a variable twice, with two values",
 }
 
 

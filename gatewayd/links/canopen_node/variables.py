@@ -21,7 +21,8 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
-from gatewayd.links.canopen_node.pdo.codec import fit, native
+from gatewayd.encoding.limits import LimitReader, Meaning
+from gatewayd.links.canopen_node.pdo.codec import fit, limits_of, native
 from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan
 
 ABORT_OF: Final = {
@@ -36,6 +37,7 @@ ABORT_OF: Final = {
     Reason.PARTIAL_TAKEOVER: AbortCode.LENGTH,
     Reason.WAITED: AbortCode.DEVICE_STATE,
     Reason.NOT_MEANT: AbortCode.LOCAL_CONTROL,
+    Reason.CONTRADICTED: AbortCode.INVALID_VALUE,
 }
 """The abort code for an SDO client whose request the cell refuses."""
 
@@ -88,7 +90,7 @@ class VariableObjects:
             high=high,
             pdo=Pdo.RECEIVE if writable else Pdo.NONE,
             source=source,
-            sink=partial(self._write, item),
+            sink=partial(self._write, item, limits_of(declared, item.type)),
         )
 
     def _is_writable(self, index: int) -> bool:
@@ -104,10 +106,11 @@ class VariableObjects:
         except (struct.error, OverflowError):
             return item.type.pack(fit(value, item.type))
 
-    def _write(self, item: ObjectPlan, data: bytes) -> None:
+    def _write(self, item: ObjectPlan, limits: LimitReader | None, data: bytes) -> None:
         declared = self._cell.definition.variables[item.variable]
         requester, now = self._requester(), self._clock()
-        refusal, value = self._meaning(item, data, declared.kind)
+        read = limits.read if limits is not None else partial(native, kind=declared.kind)
+        refusal, value = self._meaning(item, data, read)
         if refusal is not None:
             self._cell.refuse(requester, refusal, now, value)
         elif value is not None:
@@ -115,7 +118,7 @@ class VariableObjects:
         if refusal is not None:
             raise Abort(_abort_code(refusal, declared, value))
 
-    def _meaning(self, item: ObjectPlan, data: bytes, kind: ValueKind) -> tuple[Refusal | None, Value | None]:
+    def _meaning(self, item: ObjectPlan, data: bytes, read: Meaning) -> tuple[Refusal | None, Value | None]:
         """What the cell is asked for, or why it need not be."""
         if self._plan.sdo_writer is None:
             return Refusal(Reason.NOT_WRITABLE, item.variable), None
@@ -123,7 +126,7 @@ class VariableObjects:
             return Refusal(Reason.PARTIAL_VALUE, item.variable), None
         if item.type is CanType.BOOLEAN and data[0] > 1:
             return Refusal(Reason.OUT_OF_LIMITS, item.variable), data[0]
-        value = native(item.type.unpack(data), kind)
+        value = read(item.type.unpack(data))
         return (Refusal(Reason.OUT_OF_LIMITS, item.variable) if value is None else None), value
 
 

@@ -44,6 +44,7 @@ EXCEPTION_OF = {
     Reason.PARTIAL_TAKEOVER: ExceptionCode.ILLEGAL_VALUE,
     Reason.WAITED: ExceptionCode.BUSY,
     Reason.NOT_MEANT: ExceptionCode.BUSY,
+    Reason.CONTRADICTED: ExceptionCode.ILLEGAL_VALUE,
 }
 
 

@@ -10,13 +10,14 @@ import struct
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from gatewayd.core.admission import Change
+from gatewayd.core.admission import Change, contradiction
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.status_layout import BASE
 from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
 from gatewayd.links.modbus_server.readable import ADDRESSES, Readable
+from gatewayd.links.modbus_server.repeated import Repeated
 from gatewayd.links.modbus_server.runs import Run, bit_runs, number_runs, words_of_bits
 from gatewayd.modbus.areas import MAX_READ_BITS, MAX_READ_REGISTERS, Area
 from gatewayd.modbus.codec import Codec
@@ -115,6 +116,7 @@ class RegisterTable(_Table):
         self._ignored = GAPS if ignore_gaps else _NO_GAPS
         self.image = bytearray(2 * ADDRESSES)
         """Big-endian words by address."""
+        self._repeated = Repeated(placements)
         self._items: dict[int, _Number | _Bits] = {
             item.address + word: item
             for item in _items(placements, cell, ignore_gaps=ignore_gaps)
@@ -146,7 +148,7 @@ class RegisterTable(_Table):
                 return _refusal(meant, item)
             changes += meant
             position = behind
-        return changes
+        return self._repeated.settled(changes, address, data) if self._repeated else changes
 
     def masked(self, address: int, and_mask: int, or_mask: int) -> list[Change] | Refusal:
         """What Mask Write Register means: (present AND and_mask) OR (or_mask AND NOT and_mask).
@@ -161,7 +163,7 @@ class RegisterTable(_Table):
             return Refusal(Reason.PARTIAL_VALUE, item.variable)
         (present,) = _WORD.unpack_from(self.image, 2 * address)
         meant = item.masked(present, and_mask, or_mask)
-        return _refusal(meant, item) if isinstance(meant, Reason) else meant
+        return _refusal(meant, item) if isinstance(meant, Reason) else contradiction(meant) or meant
 
     def ignored(self, address: int, data: bytes) -> int:
         """Registers, and ones of bits, that such a write covers without effect."""
@@ -198,6 +200,7 @@ class BitTable(_Table):
         self.image = bytearray(ADDRESSES // 8)
         """Bits by address, the first one in the least significant bit of the first byte."""
         self._variables = {placement.address: placement.variable for placement in placements}
+        self._is_repeated = len(set(self._variables.values())) < len(self._variables)
 
     def read(self, address: int, count: int) -> bytes:
         """`count` bits from `address` on, packed as the protocol sends them, padded with zeros."""
@@ -214,6 +217,8 @@ class BitTable(_Table):
                 changes.append(Change(variable, bit))
             elif position not in self._ignored:
                 return Refusal(Reason.NO_SUCH_ADDRESS)
+        if self._is_repeated and (refusal := contradiction(changes)) is not None:
+            return refusal
         return changes or Refusal(Reason.NO_SUCH_ADDRESS)
 
     def ignored(self, address: int, count: int) -> int:

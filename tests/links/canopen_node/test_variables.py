@@ -279,6 +279,19 @@ def test_writing_clamps_where_the_mapping_says_so(node: Node) -> None:
     assert node.cell.image.values[SPEED] == 1.0
 
 
+@pytest.mark.parametrize("limit", [0.05, -0.3])
+def test_a_real32_that_is_nearest_to_a_limit_is_the_limit(limit: float) -> None:
+    """The master's REAL32 of 0.05 decodes to more than 0.05; the robot gets 0.05."""
+    limited = replace(VARIABLES[SPEED], limits=Limits(-0.3, 0.05))
+    node = Node(
+        definition=replace(DEFINITION, variables=(*VARIABLES[:SPEED], limited, *VARIABLES[SPEED + 1 :]))
+    )
+    node.connect()
+    assert node.write(0x2030, 1, struct.pack("<f", limit)) is None
+    assert node.cell.image.values[SPEED] == limit
+    assert node.write(0x2030, 1, struct.pack("<f", 0.050000005)) is AbortCode.VALUE_TOO_HIGH
+
+
 def held(node: Node) -> None:
     assert node.cell.request(Requester(HMI), PART, node.now) is None
 

@@ -73,3 +73,53 @@ def test_a_set_point_on_its_maximum_reaches_the_robot_as_the_limit() -> None:
     assert [plant.value(f"offset[{n}]") for n in range(3)] == [0.05, -0.05, 0.012500000186264515]
     assert plant.read(3, 6) == tuple(words)
     assert plant.write(0, 1, 0, 1000, words[0], words[1] + 1, *words[2:]) == 3
+
+
+TWICE = (
+    HEAD
+    + SECTION
+    + """\
+variables:
+  speed: {robot: input_double_register_0, owner: plc,
+          modbus: [{holding: 10, type: float32}, {holding: 12, type: int16, scale: 0.1}]}
+  go:    {robot: input_bit_register_0, owner: plc, modbus: [20.0, 20.5, 21.0, {coil: 7}, {coil: 9}]}
+  other: {robot: input_bit_register_1, owner: plc, modbus: {coil: 8}}
+"""
+)
+
+
+def test_a_request_of_two_minds_is_refused_and_the_reason_can_be_seen() -> None:
+    """5 here and 7 there: 03, whole, with reason 12; what agrees as well as each type can is taken."""
+    plant = Plant(TWICE)
+    assert plant.write(10, *real(12.34), 123) == 16
+    assert plant.value("speed") == 12.34000015258789
+    assert plant.read(10, 3) == (*real(12.34), 123)
+    assert plant.write(10, *real(50.0), 123) == 3
+    assert plant.value("speed") == 12.34000015258789
+    refused = plant.cell.last_refusal
+    assert refused is not None
+    assert refused.refusal.reason == 12
+    assert refused.refusal.reason.text == "one request gave it two values"
+    assert plant.write(10, *real(50.0)) == 16
+    assert plant.write(12, 600) == 16
+    assert plant.value("speed") == 60.0
+    assert plant.write(10, *real(float("nan")), 0) == 16
+
+
+def test_bits_and_coils_of_two_minds() -> None:
+    """In one register, over two, by mask, and as coils."""
+    plant = Plant(TWICE)
+    assert plant.write(20, 0x21) == 16
+    assert plant.value("go") is True
+    assert plant.write(20, 0x01) == 3
+    assert plant.write(20, 0x00, 0x01) == 3
+    assert plant.write(20, 0x00, 0x00) == 16
+    assert plant.value("go") is False
+    mask_write = struct.Struct(">BHHH")
+    assert plant.ask(mask_write.pack(22, 20, 0xFFDE, 0x0020)) == bytes((0x96, 3))
+    assert plant.ask(mask_write.pack(22, 20, 0xFFDF, 0x0020))[0] == 22
+    assert plant.value("go") is True
+    coils = struct.Struct(">BHHBB")
+    assert plant.ask(coils.pack(15, 7, 3, 1, 0b011)) == bytes((0x8F, 3))
+    assert plant.ask(coils.pack(15, 7, 3, 1, 0b010))[0] == 15
+    assert plant.value("go") is False

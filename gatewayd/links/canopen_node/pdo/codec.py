@@ -14,14 +14,16 @@ import math
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, groupby
 from operator import itemgetter
 from typing import Any, Final
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.core.admission import Change
+from gatewayd.core.admission import Change, contradiction
 from gatewayd.core.definition import Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.encoding.limits import LimitReader, ends_of, read_limits
 
 MAX_BITS: Final = 64
 """What one CAN frame carries."""
@@ -78,6 +80,15 @@ def native(raw: Value, kind: ValueKind) -> Value | None:
     return round(raw) if math.isfinite(raw) else None
 
 
+def limits_of(declared: Variable, can_type: CanType) -> LimitReader | None:
+    """What reads received numbers, so that the one nearest to a limit is the limit; None where `native` does alone."""
+    limits = (declared.limits.low, declared.limits.high) if declared.limits is not None else None
+    ends = ends_of(declared.kind, limits, declared.low, declared.high)
+    if can_type is CanType.BOOLEAN:
+        return None
+    return read_limits(ends, can_type.char, lambda raw: native(raw, declared.kind))
+
+
 def is_aligned(types: Iterable[CanType]) -> bool:
     """Whether entries of these types, one after the other, leave only BOOLEANs off a byte boundary."""
     position = 0
@@ -117,6 +128,7 @@ class Layout:
         self._unpack = compiled.unpack
         self._runs = tuple(_slices(runs)) if any(run.size for run in runs) else None
         self._receivers = tuple(run.receiver(variables) for run in runs if run.values)
+        self._is_repeated = len(set(self.variables)) < len(self.variables)
 
     @property
     def has_status(self) -> bool:
@@ -149,14 +161,14 @@ class Layout:
     def changes(self, data: bytes) -> list[Change] | Refusal:
         """What `size` bytes mean for the cell. Every bit is meant: who maps it into an RPDO sends it on purpose.
 
-        A refusal says which variable has no value for what was received.
+        A refusal says which variable has no value for what was received, or is given two.
         """
         changes: list[Change] = []
         for receive, raw in zip(self._receivers, self._unpack(data), strict=True):
             refusal = receive(raw, changes)
             if refusal is not None:
                 return refusal
-        return changes
+        return (contradiction(changes) if self._is_repeated else None) or changes
 
     def _packed(self, content: Sequence[Value]) -> bytes:
         if self._runs is None:
@@ -207,7 +219,7 @@ class _Run:
         if self.size:
             return _bit_receiver(members, variables)
         if members:
-            return _number_receiver(members[0], self.mapped[0].type, variables[members[0]].kind)
+            return _number_receiver(members[0], self.mapped[0].type, variables[members[0]])
         return lambda _raw, _changes: None  # a word of the status block, which is only sent
 
 
@@ -232,11 +244,15 @@ Receive = Callable[[Any, list[Change]], Refusal | None]
 """Appends what an item of the unpacked PDO means to the changes, or returns why not."""
 
 
-def _number_receiver(variable: int, can_type: CanType, kind: ValueKind) -> Receive:
+def _number_receiver(variable: int, can_type: CanType, declared: Variable) -> Receive:
+    kind, reader = declared.kind, limits_of(declared, can_type)
     is_direct = kind is (ValueKind.FLOAT if can_type.is_real else ValueKind.INT)
+    read = reader.read if reader is not None else partial(native, kind=kind)
+    # Without limits to mind every number is between these; only infinities and NaN are read to come out the same.
+    below, above = (reader.below, reader.above) if reader is not None else (-math.inf, math.inf)
 
     def receive(raw: Any, changes: list[Change]) -> Refusal | None:
-        value = raw if is_direct else native(raw, kind)
+        value = raw if is_direct and below < raw < above else read(raw)
         if value is None:
             return Refusal(Reason.OUT_OF_LIMITS, variable)
         changes.append(Change(variable, value))

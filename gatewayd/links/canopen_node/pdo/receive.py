@@ -8,7 +8,7 @@ with the next SYNC, if its writer still lives. Both only in OPERATIONAL.
 | shorter than the mapping | dropped | 8210h |
 | longer than the mapping | its first bytes are used | 8220h |
 | none for the event time, after a first one | | 8250h |
-| the cell refuses the write | dropped | FF01h-FF08h by reason |
+| the cell refuses the write | dropped | FF01h-FF09h by reason |
 | it waited too long while the gateway stood still | dropped, and the locks that it would have renewed are released \
 | FF08h |
 
@@ -47,6 +47,7 @@ class Fault(Enum):
     HEARTBEAT_LOST = 0xFF06
     PARTIAL_TAKEOVER = 0xFF07
     WAITED = 0xFF08
+    CONTRADICTED = 0xFF09
 
     @property
     def is_refusal(self) -> bool:

@@ -82,6 +82,10 @@ MOVES: dict[tuple[Schedule, TransmitSignal], TransmitMove] = {
 """A pair that is not listed does nothing."""
 
 
+_REACHED: Final = 1 - 2**-20
+"""A deadband is decimal, and the difference of two values is not: 0.3 - 0.2 has reached 0.1."""
+
+
 class TransmitPdo:
     """One valid TPDO: its compiled content and what is known of the last transmission."""
 
@@ -89,7 +93,7 @@ class TransmitPdo:
         layout = configuration.layout
         schedule = Schedule.of(configuration.transmission)
         deadbands = tuple(
-            variables[entry.variable].deadband if entry.variable is not None else 0.0
+            variables[entry.variable].deadband * _REACHED if entry.variable is not None else 0.0
             for entry in layout.content
         )
         self.configuration = configuration

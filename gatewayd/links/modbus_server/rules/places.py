@@ -1,4 +1,4 @@
-"""Rules GW20x to GW215: where variables lie in the Modbus areas."""
+"""Rules GW20x to GW215, GW220, GW222 and GW223: where variables lie in the Modbus areas."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gatewayd.links.modbus_server.rules.wording import AREA_WORDS, first_of_each
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.modbus.areas import AREA_NAMES, MAX_READ_REGISTERS, MAX_WRITE_REGISTERS, Area
+from gatewayd.modbus.areas import AREA_NAMES, MAX_READ_REGISTERS, MAX_WRITE_BITS, MAX_WRITE_REGISTERS, Area
 
 _LAST_ADDRESS = 0xFFFF
 _TRADITIONAL = {
@@ -21,6 +21,7 @@ _TRADITIONAL = {
     Area.DISCRETE: range(10001, 20000),
 }
 _READ_ONLY = (Area.INPUT, Area.DISCRETE)
+_MAX_WRITE = {Area.HOLDING: MAX_WRITE_REGISTERS, Area.COIL: MAX_WRITE_BITS}
 
 
 @cell_rule("GW202")
@@ -197,6 +198,29 @@ def bit_in_number(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             f"`{earlier.variable.name}`: one is a bit, the other a number"
         )
         yield _overlap(rule, cell, later, earlier, message)
+
+
+@cell_rule("GW223", Severity.WARNING)
+def input_twice_in_area(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """An input in two places of one area that one request can write."""
+    first: dict[tuple[int, Area], ExpandedPlacement] = {}
+    reported: set[str] = set()
+    for placement in placements_of(cell):
+        variable, most = placement.variable, _MAX_WRITE.get(placement.area)
+        if variable.direction is Direction.OUTPUT or most is None or variable.part.name in reported:
+            continue
+        other = first.setdefault((variable.index, placement.area), placement)
+        addresses = {*other.addresses, *placement.addresses}
+        if other is placement or max(addresses) - min(addresses) >= most:
+            continue
+        reported.add(variable.part.name)
+        message = (
+            f"`{variable.name}` can be written at {where(placement)} and at {where(other)}: "
+            "a request with two values for it is refused"
+        )
+        related = (Related(other.position, f"`{variable.name}`, {where(other)}, first placed here"),)
+        hint = "leave one of the two, or put one where it is only read: {input: N}"
+        yield rule.at(placement.position, message, hint=hint, related=related)
 
 
 def _overlap(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.admission import Change
-from gatewayd.core.definition import Direction, Value, ValueKind, Variable
+from gatewayd.core.definition import Direction, Limits, Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.links.canopen_node.pdo.codec import Layout, Mapped, fit, is_aligned, native
 
@@ -128,6 +129,21 @@ def test_what_fits_comes_back(case: tuple[list[Mapped], list[Variable], list[Val
     again = layout.pack(layout.gather(arrived))
     if not any(isinstance(change.value, float) and math.isnan(change.value) for change in changes):
         assert again == data
+
+
+@given(st.integers(1, 1000).map(lambda cents: cents / 100))
+def test_a_real32_that_is_nearest_to_a_limit_is_the_limit(limit: float) -> None:
+    limited = replace(variable(0, ValueKind.FLOAT), limits=Limits(-limit, limit))
+    layout = Layout([Mapped(0, CanType.REAL32)], [limited])
+    for value in (limit, -limit):
+        assert layout.changes(struct.pack("<f", value)) == [Change(0, value)]
+    assert layout.changes(struct.pack("<f", math.inf)) == [Change(0, math.inf)]
+
+
+def test_a_variable_that_is_twice_in_a_pdo_has_one_value() -> None:
+    layout = Layout([Mapped(0, CanType.REAL32), Mapped(0, CanType.REAL32)], [variable(0, ValueKind.FLOAT)])
+    assert layout.changes(struct.pack("<ff", 1.0, 1.0)) == [Change(0, 1.0), Change(0, 1.0)]
+    assert layout.changes(struct.pack("<ff", 1.0, 2.0)) == Refusal(Reason.CONTRADICTED, 0)
 
 
 def test_64_bits_are_one_integer_least_significant_first() -> None:

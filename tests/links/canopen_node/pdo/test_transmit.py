@@ -170,6 +170,14 @@ def test_deadband_counts_from_what_was_sent_last(new_bench: Any) -> None:
     assert sender.show(0.5, out_real_0=0.0) == [f"185:{bytes(8).hex()}"]
 
 
+def test_a_move_by_exactly_the_deadband_is_sent(new_bench: Any) -> None:
+    """In decimal: 0.3 - 0.2 is less than 0.1 for a processor."""
+    sender = Sender(new_bench(out_real_0={"deadband": 0.1}), "out_real_0")
+    sender.take()
+    assert [len(sender.show(0.1 * n, out_real_0=n / 10)) for n in range(1, 8)] == [1] * 7
+    assert sender.show(1.0, out_real_0=0.7999) == []
+
+
 def test_variable_without_a_deadband_beside_one_with(new_bench: Any) -> None:
     sender = Sender(new_bench(out_single_0={"deadband": 0.5}), "out_single_0", "out_int_0")
     sender.take()
