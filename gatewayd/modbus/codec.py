@@ -2,7 +2,7 @@
 
 `raw = (value - offset) / scale`, `value = raw * scale + offset`. Orders by the bytes of a 32-bit number:
 `ABCD` big-endian (Application Protocol V1.1b3, 4.2), `CDAB` words swapped, `BADC` bytes swapped in each word,
-`DCBA` both; 64-bit numbers alike over four words, 16-bit numbers know only the byte swap.
+`DCBA` both; 64-bit numbers alike over four words. Numbers of one register know only the byte swap (`turns`).
 
 Encoding saturates: a value beyond the register type becomes the nearest number that the type holds, NaN
 becomes 0 in an integer. A float32 beyond its range becomes the greatest finite one; infinities stay what they
@@ -107,6 +107,15 @@ class Codec:
         return _compiled, (form, self.kind, linear, self.struct_code, self.ends)
 
 
+def turns(order: str, type_name: str) -> bool:
+    """Whether `order` says anything of a number of that type: in one register there are no words to swap."""
+    number = TYPES[type_name]
+    return number.words > 1 or (order in _BYTE_SWAPS and number.name != "bool")
+
+
+_BYTE_SWAPS: Final = frozenset({"BADC", "DCBA"})
+
+
 def make_codec(
     type_name: str,
     order: str = "ABCD",
@@ -125,7 +134,8 @@ def make_codec(
     number = TYPES[type_name]
     if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0:
         raise ValueError(f"scale {scale} and offset {offset} cannot be undone")
-    merged = scale == 1 and offset == 0 and order == "ABCD" and _is_lossless(number, kind, low, high)
+    is_plain = scale == 1 and offset == 0 and (order == "ABCD" or (number.words == 1 and order == "CDAB"))
+    merged = is_plain and _is_lossless(number, kind, low, high)
     ends = _NO_ENDS if type_name == "bool" else ends_of(kind, limits, low, high)
     return _compiled((type_name, order), kind, (scale, offset), number.code if merged else None, ends)
 

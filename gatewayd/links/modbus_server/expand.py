@@ -123,7 +123,7 @@ def _placement(
     address, bit = place
     single = bit is not None or spec.area.of_bits
     type_name = spec.type or ("bit" if single else _default_type(variable))
-    order = spec.order or default_order
+    order = _order(spec, type_name, default_order)
     scale = 1.0 if spec.scale is None else spec.scale
     offset = 0.0 if spec.offset is None else spec.offset
     problem = _bit_problem(variable, spec) if single else _number_problem(spec, type_name)
@@ -145,6 +145,20 @@ def _placement(
     return ExpandedPlacement(
         variable, spec, position, spec.area, address, bit, shown, order, scale, offset, codec, problem
     )
+
+
+def _order(spec: PlacementSpec, type_name: str, default: str) -> str:
+    """The order of the file is one of words and their bytes: what lies in one register it leaves as it is.
+
+    A `bool` is 0 or 1 whatever is written beside it; numbers of 16 bits can have an order of their own.
+    """
+    order, number = spec.order or default, TYPES.get(type_name)
+    is_own = spec.order is not None and type_name != "bool"
+    return order if number is None or number.words > 1 or is_own else _WITHOUT_BYTES.get(order, order)
+
+
+_WITHOUT_BYTES: Final = {"BADC": "ABCD", "DCBA": "CDAB"}
+"""The same order of words, without turning their bytes."""
 
 
 def _bit_problem(variable: ExpandedVariable, spec: PlacementSpec) -> PlacementProblem | None:

@@ -60,7 +60,9 @@ class Modbus(Section):
         description="answer to reads and writes that fail because the robot is away: exception 0B, 0A, 04 or 06",
     )
     order: WordOrder = Field(
-        default="ABCD", description="byte order of all variables that do not name their own"
+        default="ABCD",
+        description="order of all values of two and more registers that do not name their own; what lies in one "
+        "register, numbers of 16 bits, `bool` and bits, it leaves as it is",
     )
 
 
@@ -79,7 +81,9 @@ class PlacementSpec(Section):
     discrete: Address | None = Field(default=None, description="discrete input (1xxxxx), one bit, read only")
     type: NumberType | None = Field(default=None, description="number type; default: from the robot's type")
     order: WordOrder | None = Field(
-        default=None, description="ABCD: big-endian; CDAB: words swapped; BADC: bytes swapped; DCBA: both"
+        default=None,
+        description="ABCD: big-endian; CDAB: words swapped; BADC: bytes swapped; DCBA: both; of one register only "
+        "the bytes can be swapped",
     )
     scale: Real | None = Field(default=None, description="robot value = raw value * scale + offset")
     offset: Real | None = Field(default=None, description="robot value = raw value * scale + offset")

@@ -12,6 +12,7 @@ from gatewayd.links.tables import LinkTables
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.areas import AREA_NAMES
+from gatewayd.modbus.codec import turns
 from gatewayd.report.format import address as address_text
 from gatewayd.report.layout import Column, Row, span
 
@@ -43,7 +44,7 @@ class ModbusTables(LinkTables):
     def rows(self, cell: ExpandedCell) -> Mapping[int, Sequence[Mapping[str, object]]]:
         """Area, address from 0 with its bit, the same in 4xxxxx form, registers covered, and how numbers are written.
 
-        Bits have no byte order, scale and offset.
+        Bits have no byte order, scale and offset; numbers in one register have an order where their bytes are swapped.
         """
         found: dict[int, list[Mapping[str, object]]] = {}
         for placement in placements_of(cell):
@@ -99,7 +100,7 @@ def _row(placement: ExpandedPlacement) -> Mapping[str, object]:
         "notation": placement.notation,
         "words": placement.words,
         "type": placement.type,
-        "order": placement.order if is_number else "",
+        "order": placement.order if is_number and turns(placement.order, placement.type) else "",
         "scale": placement.scale if is_number else None,
         "offset": placement.offset if is_number else None,
     }

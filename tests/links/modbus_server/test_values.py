@@ -123,3 +123,24 @@ def test_bits_and_coils_of_two_minds() -> None:
     assert plant.ask(coils.pack(15, 7, 3, 1, 0b011)) == bytes((0x8F, 3))
     assert plant.ask(coils.pack(15, 7, 3, 1, 0b010))[0] == 15
     assert plant.value("go") is False
+
+
+def test_the_order_of_a_file_leaves_single_registers_as_they_are() -> None:
+    """DCBA for the double words; a `bool` is 1, not 256, and 16 bits are swapped only where they say so."""
+    plant = Plant(
+        HEAD
+        + """\
+modbus: {listen: '127.0.0.1:1502', order: DCBA}
+variables:
+  wide:    {robot: input_int_register_0, modbus: 10, owner: plc}
+  narrow:  {robot: input_int_register_1, modbus: {holding: 12, type: uint16}, owner: plc}
+  swapped: {robot: input_int_register_2, modbus: {holding: 13, type: uint16, order: BADC}, owner: plc}
+  whole:   {robot: input_bit_register_0, modbus: {holding: 14, type: bool}, owner: plc}
+  own:     {robot: input_bit_register_1, modbus: {holding: 15, type: bool, order: DCBA}, owner: plc}
+  packed:  {robot: input_bit_register_2, modbus: 16.0, owner: plc}
+"""
+    )
+    assert plant.write(10, 0x0403, 0x0201, 0x0102, 0x0201, 1, 1, 1) == 16
+    names = ("wide", "narrow", "swapped", "whole", "own", "packed")
+    assert [plant.value(name) for name in names] == [0x01020304, 0x0102, 0x0102, True, True, True]
+    assert plant.read(10, 7) == (0x0403, 0x0201, 0x0102, 0x0201, 1, 1, 1)

@@ -12,7 +12,7 @@ from gatewayd.links.modbus_server.sections import ModbusPlaces
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
-from gatewayd.modbus.codec import TYPES, Codec
+from gatewayd.modbus.codec import TYPES, Codec, turns
 from gatewayd.report.wording import number
 
 _FLOAT_DIGITS = {"float32": 1 << 24, "float64": 1 << 53}
@@ -126,6 +126,21 @@ def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             key = keys[0] if keys else "order"
             message = f"`{placement.variable.name}` is a bit and has `{key}`"
             yield rule.at(_key(placement, key), message, hint=f"remove `{key}`")
+
+
+@cell_rule("GW712", Severity.WARNING)
+def order_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """An order that means nothing for a type of one register."""
+    for placement in _numbers(cell):
+        order = placement.spec.order
+        if order in (None, "ABCD") or turns(order, placement.type):
+            continue
+        name = placement.variable.name
+        message = f"`{name}` is {placement.type} at {where(placement)}, and `order: {order}` turns nothing"
+        hint = "remove `order`: a `bool` is 0 or 1"
+        if placement.type != "bool":
+            hint = "remove `order`, or write BADC to swap the two bytes"
+        yield rule.at(_key(placement, "order"), message, hint=hint)
 
 
 @cell_rule("GW708", Severity.WARNING)
