@@ -79,7 +79,7 @@ def test_a_row_holds_everything(loaded: Loaded) -> None:
     assert (speed["words"], speed["type"], speed["order"], speed["scale"], speed["offset"]) == (
         1,
         "int16",
-        "ABCD",
+        "",
         0.1,
         -5,
     )
