@@ -110,6 +110,8 @@ def test_every_metric_of_the_cells_is_looked_at_or_named_here() -> None:
         "gatewayd_robot_state",  # robot_up and the status page say it in words
         "gatewayd_robot_packages_total",  # package_rate says it
         "gatewayd_robot_watchdog_fed",  # only with a watchdog in the mapping
+        "gatewayd_modbus_refused_connections_total",  # the log names the peers
+        "gatewayd_modbus_ignored_total",  # only with `write_gaps: ignore`, and constant in kind
         "gatewayd_input_age_seconds",
         "gatewayd_adoption_seconds",  # for seconds after a start; the status page says it
         "gatewayd_locks",

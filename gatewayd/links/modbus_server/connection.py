@@ -14,6 +14,7 @@ from typing import Protocol, cast
 
 from gatewayd.core.requester import new_connection
 from gatewayd.links.modbus_server.peers import Address, address_of
+from gatewayd.links.modbus_server.plan import Network
 from gatewayd.links.modbus_server.polling import ReadPoller
 from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
 from gatewayd.links.modbus_server.sockets import has_unread, seconds_since_established, set_options
@@ -55,6 +56,8 @@ class PeerConnection(asyncio.BufferedProtocol):
         self.peer = ""
         self.address: Address | None = None
         self.accesses: dict[int, UnitAccess] = {}
+        self.places: frozenset[Network] = frozenset()
+        """Places of declared writers that it fills."""
         self.last_request = 0.0
         """When the last whole request came in; bytes that make none keep no connection open."""
         self.stalled_since: float | None = None

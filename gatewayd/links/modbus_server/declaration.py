@@ -22,6 +22,8 @@ class ModbusServer(LinkKind):
         "listen": "host:port of the listener",
         "unit": "unit id",
         "connections": "open connections of the listener",
+        "refused": "connections that the listener refused since it was opened, by reason",
+        "ignored": "registers and bits with nothing mapped that accepted writes covered (`write_gaps: ignore`)",
     }
     status_fields = (
         StatusField(26, 1, "modbus_connections", "open Modbus connections to this unit's listener"),
@@ -38,6 +40,18 @@ class ModbusServer(LinkKind):
             "connections",
             "open Modbus connections",
             shared=("listener", "listen"),
+        ),
+        LinkMetric(
+            "gatewayd_modbus_refused_connections_total",
+            "refused",
+            "Modbus connections that were refused",
+            label="reason",
+            shared=("listener", "listen"),
+        ),
+        LinkMetric(
+            "gatewayd_modbus_ignored_total",
+            "ignored",
+            "registers and bits with nothing mapped that accepted writes covered (write_gaps: ignore)",
         ),
     )
     place = "list of its places: `area`, `address` from 0, `bit` or null, `notation` (4xxxxx form)"

@@ -24,7 +24,7 @@ def description(plan: ModbusPlan) -> Description:
             "default_unit": "true" if plan.default_unit else "false",
             "allow": ", ".join(map(network_text, plan.allow)) or "everybody",
             "connections": str(plan.connections),
-            "connections_per_peer": str(plan.connections_per_peer or "half of them"),
+            "connections_per_peer": str(plan.connections_per_peer or "half of them, at least 4"),
             "idle_timeout": seconds(plan.idle_timeout) or "none",
             "gaps": "zero" if plan.fill_gaps else "refuse",
             "write_gaps": "ignore" if plan.ignore_gaps else "refuse",

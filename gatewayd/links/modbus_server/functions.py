@@ -52,14 +52,15 @@ class Unit:
     """One robot cell as a Modbus unit."""
 
     def __init__(self, plan: ModbusPlan, cell: Cell, former: Unit | None = None) -> None:
-        """`former` had its number before: what is counted goes on."""
+        """`former` had its number before: what is counted of the same cell goes on."""
         self.plan = plan
         self.cell = cell
         self.image = RegisterImage(plan, cell)
         self.status = StatusBlock(cell, status_fields())
         self.identification = Identification(cell.definition.name, cell.definition.fingerprint)
         self.exception_of = {**EXCEPTION_OF, Reason.ROBOT_LOST: plan.robot_away}
-        self.ignored: int = 0 if former is None else former.ignored
+        goes_on = former is not None and former.cell.definition.name == cell.definition.name
+        self.ignored: int = former.ignored if former is not None and goes_on else 0
         """Registers and bits with nothing mapped that accepted writes covered."""
 
     def close(self) -> None:

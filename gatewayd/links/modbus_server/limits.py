@@ -1,18 +1,16 @@
-"""How many connections a listener has, and which of them have to end: idle, stalled, or in the way of a new one.
+"""Which connections of a listener have to end: idle or stalled.
 
 A connection is open before a request says which unit it means, so of several units' limits the most generous count.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from typing import Protocol, TypeVar
+from collections.abc import Collection
+from typing import Protocol
 
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.writers import Accesses, hold_anything
 
-UNUSED_AFTER = 10.0
-"""Seconds without a request after which a connection without locks may have to make room for a new one."""
 STALLED_AFTER = 5.0
 """Seconds for which a peer may leave its answers unread."""
 
@@ -28,33 +26,10 @@ class _Limited(Protocol):
     def accesses(self) -> Accesses: ...
 
 
-_Connection = TypeVar("_Connection", bound=_Limited)
-
-
-def max_connections(plans: Iterable[ModbusPlan]) -> int:
-    """The greatest number of connections."""
-    return max((plan.connections for plan in plans), default=0)
-
-
-def max_per_peer(plans: Iterable[ModbusPlan]) -> int:
-    """The greatest number of connections of one address."""
-    return max((plan.max_per_peer for plan in plans), default=0)
-
-
 def idle_timeout(plans: Collection[ModbusPlan]) -> float | None:
     """Seconds without a request after which a connection is closed; None: never."""
     timeouts = [plan.idle_timeout for plan in plans if plan.idle_timeout is not None]
     return max(timeouts) if timeouts and len(timeouts) == len(plans) else None
-
-
-def longest_unused(connections: Iterable[_Connection], now: float) -> _Connection | None:
-    """The connection that makes room for a new one, if any is unused and owns nothing (TCP guide, 4.2.2)."""
-    unused = [
-        connection
-        for connection in connections
-        if now - connection.last_request >= UNUSED_AFTER and not hold_anything(connection.accesses)
-    ]
-    return min(unused, key=lambda connection: connection.last_request, default=None)
 
 
 def overdue(connection: _Limited, idle: float | None, now: float) -> str:

@@ -33,11 +33,14 @@ class ModbusUnit(Link):
     def health(self) -> LinkHealth:
         """How its listener is; connections are those of all its units."""
         where = address(self.plan.host, self.plan.port)
-        connections = self.listener.connections if self.listener is not None else 0
+        listener = self.listener
+        connections = listener.connections if listener is not None else 0
         figures = {
             "listen": where,
             "unit": self.plan.unit,
             "connections": connections,
+            "refused": listener.refusals if listener is not None else {},
+            "ignored": listener.ignored(self.plan.unit) if listener is not None else 0,
             "listening": self.reachable,
         }
         if self.reachable:

@@ -17,11 +17,19 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.connection import PeerConnection
 from gatewayd.links.modbus_server.functions import Unit
-from gatewayd.links.modbus_server.limits import idle_timeout, longest_unused, max_connections, overdue
-from gatewayd.links.modbus_server.peers import DenialLog, PeerEvent, PeerEventKind, may_connect, writer_of
+from gatewayd.links.modbus_server.limits import idle_timeout, overdue
+from gatewayd.links.modbus_server.peers import (
+    Address,
+    PeerEvent,
+    PeerEventKind,
+    PeerLog,
+    may_connect,
+    writer_of,
+)
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.polling import ReadPoller
 from gatewayd.links.modbus_server.session import UnitAccess
+from gatewayd.links.modbus_server.shares import Shares
 from gatewayd.links.modbus_server.waiting import SETTLING
 from gatewayd.links.modbus_server.writers import names_of, succeeded, writers_of
 from gatewayd.loop import clock
@@ -30,6 +38,11 @@ from gatewayd.report.format import address as address_text
 _SWEEP = 0.25
 """Seconds between two looks for connections that are idle or stalled."""
 
+_ACCEPTED_AT_ONCE = 8
+"""Connections, in one turn of the loop: whoever floods the listener with them waits in the kernel, not in the way of
+requests. asyncio takes as many at once as it asks the kernel to queue."""
+_BACKLOG = 128
+"""Connections that the kernel keeps until they are accepted; of further ones the peer tries again after a second."""
 _NOBODY: Mapping[Cell, Cell] = MappingProxyType({})
 _REMEDIES = {
     errno.EADDRINUSE: "another program listens there; stop it or choose another port under modbus: listen:",
@@ -56,7 +69,10 @@ class ModbusListener:
         self._observe = observe
         self._units: dict[int, Unit] = {}
         self._connections: dict[PeerConnection, None] = {}
-        self._denials = DenialLog()
+        self._shares = Shares(())
+        self._peer_log = PeerLog()
+        self.refusals = {kind.name.lower(): 0 for kind in PeerEventKind if kind.refused}
+        """How many connections never began, by reason."""
         self._server: asyncio.Server | None = None
         self._poller: ReadPoller | None = None
         self._sweeper: asyncio.TimerHandle | None = None
@@ -74,6 +90,10 @@ class ModbusListener:
     def connections(self) -> int:
         """Connections that are open now."""
         return len(self._connections)
+
+    def ignored(self, unit: int) -> int:
+        """Registers and bits with nothing mapped that accepted writes to the unit covered."""
+        return self._units[unit].ignored if unit in self._units else 0
 
     @property
     def listening(self) -> bool:
@@ -96,8 +116,11 @@ class ModbusListener:
         accepted = partial(PeerConnection, self, poller)
         try:
             server = await asyncio.get_running_loop().create_server(
-                accepted, self._host, self._port, reuse_address=True
+                accepted, self._host, self._port, reuse_address=True, backlog=_ACCEPTED_AT_ONCE
             )
+            for listening in server.sockets:
+                with listening.dup() as same:
+                    same.listen(_BACKLOG)
         except OSError as error:
             poller.close()
             self.progress += 1
@@ -118,6 +141,7 @@ class ModbusListener:
         for connection in list(self._connections):
             connection.abort(reason)
             self.disconnected(connection)
+        self._report_kept_back(math.inf)
         for unit in self._units.values():
             unit.close()
         self._units = {}
@@ -156,9 +180,10 @@ class ModbusListener:
         for number, (plan, cell) in wanted.items():
             kept = former.get(number)
             if kept is None or kept.plan is not plan or kept.cell is not cell:
-                kept = Unit(plan, cell)
+                kept = Unit(plan, cell, kept)
             units_now[number] = kept
         self._units = units_now
+        self._shares = Shares(self._plans())
         now = clock.now()
         for connection in list(self._connections):
             if not self._admit(connection, now, "unit no longer served", successors):
@@ -187,30 +212,34 @@ class ModbusListener:
         if address is None or not any(may_connect(address, unit.plan) for unit in self._units.values()):
             self._refuse(connection, PeerEventKind.DENIED, now)
             return
-        if len(self._connections) >= max_connections(self._plans()) and not self._make_room(now):
-            self._refuse(connection, PeerEventKind.FULL, now)
+        connection.places = self._shares.places_of(address)
+        room = self._shares.room_for(connection, self._connections, now)
+        if isinstance(room, PeerEventKind):
+            self._refuse(connection, room, now)
             return
+        for former in room:
+            former.abort(f"made room for {address}")
+            self.disconnected(former)
         self._connections[connection] = None
         since, until = self._gap
         if connection.established <= until + SETTLING:
             connection.wait(min(since, connection.established), until)
         self._admit(connection, now, "")
         self._count()
-        self._observe(PeerEvent(PeerEventKind.CONNECTED, connection.peer, names_of(connection.accesses)))
+        self._report(PeerEventKind.CONNECTED, connection, now)
 
     def disconnected(self, connection: PeerConnection) -> None:
         """A connection has ended; called once or more for each."""
         if connection not in self._connections:
             return
         del self._connections[connection]
-        names = names_of(connection.accesses)
         now = clock.now()
         accesses, connection.accesses = connection.accesses, {}
         connection.session.serve({})
         for cell, requester in writers_of(accesses):
             cell.writer_disconnected(requester, now, connection.reason)
         self._count()
-        self._observe(PeerEvent(PeerEventKind.DISCONNECTED, connection.peer, names, connection.reason))
+        self._report(PeerEventKind.DISCONNECTED, connection, now, connection.reason)
 
     # -- inside ---------------------------------------------------------------------------------------------------
 
@@ -226,13 +255,8 @@ class ModbusListener:
         Writers that it is both before and after stay connected throughout.
         """
         address = connection.address
-        accesses = {
-            number: UnitAccess(
-                unit, Requester(writer_of(address, unit.plan.writers), str(address), connection.number)
-            )
-            for number, unit in self._units.items()
-            if address is not None and may_connect(address, unit.plan)
-        }
+        accesses = {} if address is None else self._accesses(address, connection.number)
+        connection.places = frozenset() if address is None else self._shares.places_of(address)
         before, after = succeeded(writers_of(connection.accesses), successors), writers_of(accesses)
         connection.accesses = accesses
         connection.session.serve(accesses)
@@ -244,20 +268,30 @@ class ModbusListener:
                 cell.writer_disconnected(requester, now, reason)
         return bool(accesses)
 
+    def _accesses(self, address: Address, connection: int) -> dict[int, UnitAccess]:
+        """What a peer may do, by unit."""
+        return {
+            number: UnitAccess(
+                unit, Requester(writer_of(address, unit.plan.writers), str(address), connection)
+            )
+            for number, unit in self._units.items()
+            if may_connect(address, unit.plan)
+        }
+
     def _refuse(self, connection: PeerConnection, kind: PeerEventKind, now: float) -> None:
         connection.abort(kind.value)
-        repeats = self._denials.repeats(f"{kind.name} {connection.address}", now)
-        if repeats is not None:
-            self._observe(PeerEvent(kind, connection.peer, reason=kind.value, repeats=repeats))
+        self.refusals[kind.name.lower()] += 1
+        self._report(kind, connection, now, kind.value)
 
-    def _make_room(self, now: float) -> bool:
-        """Close the connection that was unused longest, if any may be; returns whether one was."""
-        unused = longest_unused(self._connections, now)
-        if unused is None:
-            return False
-        unused.abort("made room for a new connection")
-        self.disconnected(unused)
-        return True
+    def _report(self, kind: PeerEventKind, connection: PeerConnection, now: float, reason: str = "") -> None:
+        address = connection.address
+        if self._peer_log.reports(str(address), kind, now):
+            writers = () if address is None else names_of(self._accesses(address, connection.number))
+            self._observe(PeerEvent(kind, connection.peer, writers, reason))
+
+    def _report_kept_back(self, now: float) -> None:
+        for event in self._peer_log.kept_back(now):
+            self._observe(event)
 
     def _plans(self) -> list[ModbusPlan]:
         return [unit.plan for unit in self._units.values()]
@@ -265,6 +299,7 @@ class ModbusListener:
     def _sweep(self) -> None:
         self.progress += 1
         now = clock.now()
+        self._report_kept_back(now)
         idle = idle_timeout(self._plans())
         for connection in list(self._connections):
             reason = overdue(connection, idle, now)

@@ -14,7 +14,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.links.contract import Link, PrepareError, SharedPart
 from gatewayd.links.modbus_server.link import ModbusUnit
 from gatewayd.links.modbus_server.listener import ListenError, ModbusListener
-from gatewayd.links.modbus_server.peers import PeerEvent, PeerEventKind
+from gatewayd.links.modbus_server.peers import PeerEvent
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.logs.records import fields
 from gatewayd.loop.retry import reason_of, until_done
@@ -170,6 +170,10 @@ def _log_peer(event: PeerEvent) -> None:
         "reason": event.reason,
         "repeats": event.repeats,
     }
-    refused = event.kind in (PeerEventKind.DENIED, PeerEventKind.FULL)
     said = fields(**{key: value for key, value in found.items() if value})
-    log.log(logging.WARNING if refused else logging.INFO, "Modbus client %s", event.kind.value, extra=said)
+    log.log(
+        logging.WARNING if event.kind.refused else logging.INFO,
+        "Modbus client %s",
+        event.kind.value,
+        extra=said,
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from ipaddress import IPv4Address, IPv6Address, ip_address
@@ -10,6 +10,7 @@ from ipaddress import IPv4Address, IPv6Address, ip_address
 from gatewayd.links.modbus_server.plan import ModbusPlan, Network
 
 Address = IPv4Address | IPv6Address
+OTHER_PEERS = "other addresses"
 
 
 class PeerEventKind(Enum):
@@ -19,6 +20,15 @@ class PeerEventKind(Enum):
     DISCONNECTED = "disconnected"
     DENIED = "not on the access list"
     FULL = "no free connection"
+    CROWDED = "too many connections of one peer"
+
+    @property
+    def refused(self) -> bool:
+        """Whether the connection never began."""
+        return self in _REFUSED
+
+
+_REFUSED = frozenset({PeerEventKind.DENIED, PeerEventKind.FULL, PeerEventKind.CROWDED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,13 +37,13 @@ class PeerEvent:
 
     kind: PeerEventKind
     peer: str
-    """Address and port."""
+    """Address and port; the address alone where it stands for several events."""
     writers: tuple[str, ...] = ()
     """Names of the writers it is, in the order of the units; empty for a peer that can only read."""
     reason: str = ""
     """Why the connection ended, or could not begin."""
     repeats: int = 0
-    """How many equal events were not reported since the last one."""
+    """It stands for so many events of the address that were not reported by themselves; 0: for one."""
 
 
 def address_of(host: str) -> Address:
@@ -52,26 +62,59 @@ def writer_of(address: Address, writers: Sequence[tuple[Network, int]]) -> int |
     return next((writer for network, writer in writers if _within(address, network)), None)
 
 
+def network_of(address: Address, writers: Sequence[tuple[Network, int]]) -> Network | None:
+    """The network by which it is that writer."""
+    return next((network for network, _writer in writers if _within(address, network)), None)
+
+
 def _within(address: Address, network: Network) -> bool:
     return address.version == network.version and address in network
 
 
-class DenialLog:
-    """Lets one denial per address and interval through: a refused client may knock a hundred times a second."""
+_USUAL = 10
+"""So many connections and ends of connections in a minute are no more than a restart of the peer."""
 
-    def __init__(self, interval: float = 60.0, max_hosts: int = 256) -> None:
+
+class PeerLog:
+    """Which events of connections are reported: a peer may knock, or come and go, a hundred times a second.
+
+    Of each address and kind some in a minute, the number of the others when the minute is over. Beyond a number of
+    addresses the others are taken together.
+    """
+
+    def __init__(self, interval: float = 60.0, max_peers: int = 256) -> None:
         self._interval = interval
-        self._max_hosts = max_hosts
-        self._reported: dict[str, tuple[float, int]] = {}
+        self._max_peers = max_peers
+        self._known: dict[tuple[str, PeerEventKind], _Minute] = {}
+        """The one that began first comes first."""
 
-    def repeats(self, host: str, now: float) -> int | None:
-        """How many denials of `host` were kept back before this one; None: keep this one back as well."""
-        reported, kept_back = self._reported.get(host, (-self._interval, 0))
-        if now - reported < self._interval:
-            self._reported[host] = (reported, kept_back + 1)
-            return None
-        self._reported.pop(host, None)
-        if len(self._reported) >= self._max_hosts:
-            del self._reported[next(iter(self._reported))]
-        self._reported[host] = (now, 0)
-        return kept_back
+    def reports(self, peer: str, kind: PeerEventKind, now: float) -> bool:
+        """Whether this event is reported by itself."""
+        minute = self._known.get((peer, kind))
+        if minute is None:
+            if len(self._known) >= self._max_peers:
+                peer = OTHER_PEERS
+            minute = self._known.setdefault((peer, kind), _Minute(now, 1 if kind.refused else _USUAL))
+        if minute.left:
+            minute.left -= 1
+            return True
+        minute.kept_back += 1
+        return False
+
+    def kept_back(self, now: float) -> Iterator[PeerEvent]:
+        """Of each minute that is over by `now` what was not reported by itself; called several times in one."""
+        while self._known:
+            (peer, kind), minute = next(iter(self._known.items()))
+            if now - minute.since < self._interval:
+                return
+            del self._known[peer, kind]
+            if minute.kept_back:
+                yield PeerEvent(kind, peer, repeats=minute.kept_back)
+
+
+@dataclass(slots=True)
+class _Minute:
+    since: float
+    left: int
+    """How many more are reported by themselves."""
+    kept_back: int = 0

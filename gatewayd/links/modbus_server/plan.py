@@ -84,7 +84,7 @@ class ModbusPlan(LinkPlan):
     ignore_gaps: bool = False
     """What has nothing mapped is let pass in a write that meets anything mapped."""
     connections_per_peer: int | None = None
-    """None: half of `connections`."""
+    """None: half of `connections`, at least 4."""
     default_unit: bool = False
     """Whether it answers to the unit ids 0 and 255, though other cells share the listener."""
     robot_away: ExceptionCode = ExceptionCode.TARGET_FAILED
@@ -93,4 +93,4 @@ class ModbusPlan(LinkPlan):
     @property
     def max_per_peer(self) -> int:
         """The greatest number of connections of one address."""
-        return self.connections_per_peer or max(1, self.connections // 2)
+        return self.connections_per_peer or max(4, self.connections // 2)

@@ -41,7 +41,7 @@ class Modbus(Section):
         default=None,
         ge=1,
         le=1024,
-        description="greatest number of connections of one address; default: half of `connections`",
+        description="greatest number of connections of one address; default: half of `connections`, at least 4",
     )
     idle_timeout: OptionalDuration = Field(
         default=60.0, description="a connection without a request for so long is closed; none: never"

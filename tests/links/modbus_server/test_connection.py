@@ -10,6 +10,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -213,17 +214,17 @@ async def test_as_many_connections_as_a_mapping_may_allow(
         pytest.skip(f"needs {needed} file descriptors")
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, needed), hard))
     try:
-        listener.serve([(plan_of(connections=MANY), live_cell)])
+        listener.serve([(replace(plan_of(connections=MANY), connections_per_peer=MANY), live_cell)])
         peers = []
         for number in range(MANY):
-            peers.append(dial(READ, "127.0.0.2" if number % 2 else "127.0.0.1"))
+            peers.append(dial(READ, f"127.0.0.{1 + number % 3}"))
             if number % 50 == 0:  # a backlog is shorter than that
                 await until(lambda: listener.connections == len(peers))
         for peer in peers:
             assert await received(peer, len(ANSWER)) == ANSWER
         assert listener.connections == MANY
-        assert live_cell.writers.connections[0] == MANY // 2
-        assert await received(dial(READ), 1) == b""
+        assert live_cell.writers.connections == [len(range(place, MANY, 3)) for place in (1, 2)]
+        assert await received(dial(READ, "127.0.0.1"), 1) == b""
         assert events[-1].kind is PeerEventKind.FULL
         for peer in peers:
             peer.send(READ)

@@ -9,10 +9,7 @@ from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import Unit
 from gatewayd.links.modbus_server.limits import (
     STALLED_AFTER,
-    UNUSED_AFTER,
     idle_timeout,
-    longest_unused,
-    max_connections,
     overdue,
 )
 from gatewayd.links.modbus_server.plan import ModbusPlan
@@ -41,22 +38,10 @@ def owning(unit: Unit, index_of: Callable[[str], int]) -> Accesses:
 
 
 def test_the_most_generous_unit_counts(plan_of: PlanOf) -> None:
-    plans = [plan_of(connections=4, idle_timeout=5.0), plan_of(connections=8, idle_timeout=2.0)]
-    assert max_connections(plans) == 8
+    plans = [plan_of(idle_timeout=5.0), plan_of(idle_timeout=2.0)]
     assert idle_timeout(plans) == 5.0
     assert idle_timeout([*plans, plan_of(idle_timeout=None)]) is None
-    assert max_connections([]) == 0
     assert idle_timeout([]) is None
-
-
-def test_what_was_unused_longest_makes_room(owning: Accesses) -> None:
-    """But nothing that holds a lock, and nothing that was used a moment ago."""
-    now = NOW + UNUSED_AFTER
-    busy, used, unused, owner = Used(NOW + 1), Used(NOW), Used(NOW - 1), Used(NOW - 2, accesses=owning)
-    assert longest_unused([busy, used, unused, owner], now) is unused
-    assert longest_unused([busy, used, owner], now) is used
-    assert longest_unused([busy, owner], now) is None
-    assert longest_unused([], now) is None
 
 
 def test_silence_ends_a_connection_that_holds_nothing(owning: Accesses) -> None:

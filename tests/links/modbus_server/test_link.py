@@ -33,7 +33,14 @@ def test_without_a_listener_nobody_reaches_it_and_it_says_so() -> None:
     health = unit.health()
     assert not unit.reachable
     assert (health.level, health.words) == (Level.BAD, "not listening, see the log")
-    assert health.figures == {"listen": "127.0.0.1:1502", "unit": 3, "connections": 0, "listening": False}
+    assert health.figures == {
+        "listen": "127.0.0.1:1502",
+        "unit": 3,
+        "connections": 0,
+        "refused": {},
+        "ignored": 0,
+        "listening": False,
+    }
 
 
 async def test_with_a_listener_that_listens_it_is_reachable() -> None:
@@ -44,6 +51,10 @@ async def test_with_a_listener_that_listens_it_is_reachable() -> None:
     try:
         assert unit.reachable
         assert (unit.health().level, unit.health().words) == (Level.GOOD, "listening, no connections")
+        assert unit.health().figures["refused"] == {"denied": 0, "full": 0, "crowded": 0}
+        unit.listener.serve([(unit.plan, unit.cell)])
+        unit.listener._units[3].ignored = 7
+        assert unit.health().figures["ignored"] == 7
     finally:
         await unit.listener.close()
 

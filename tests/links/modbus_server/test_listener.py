@@ -10,13 +10,15 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Awaitable, Callable
-from itertools import islice
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from itertools import islice, pairwise
 
 import pytest
 
 from gatewayd.core.cell import Cell
-from gatewayd.links.modbus_server import limits
+from gatewayd.links.modbus_server import limits, shares
 from gatewayd.links.modbus_server import listener as server
 from gatewayd.links.modbus_server.listener import ListenError, ModbusListener
 from gatewayd.links.modbus_server.peers import PeerEvent, PeerEventKind
@@ -28,6 +30,13 @@ PlanOf = Callable[..., ModbusPlan]
 
 READ = bytes.fromhex("0001 0000 0006 01 03 0000 0001")
 ANSWER = bytes.fromhex("0001 0000 0005 01 03 02 0000")
+
+
+@pytest.fixture
+def sockets() -> Iterator[ExitStack]:
+    """Closed after the test."""
+    with ExitStack() as sockets:
+        yield sockets
 
 
 async def dial(
@@ -150,20 +159,57 @@ async def test_who_is_not_on_the_access_list_is_cut_off(
 async def test_a_full_listener_refuses(
     listener: ModbusListener, live_cell: Cell, plan_of: PlanOf, events: list[PeerEvent]
 ) -> None:
-    listener.serve([(plan_of(connections=2), live_cell)])
+    """Two of four places are those of the writers."""
+    listener.serve([(plan_of(connections=4), live_cell)])
     streams = [await dial(listener) for _ in range(3)]
     assert [await is_served(*stream) for stream in streams] == [True, True, False]
     assert events[-1].kind is PeerEventKind.FULL
+    assert listener.refusals == {"denied": 0, "full": 1, "crowded": 0}
     for _reader, writer in streams:
         writer.close()
+
+
+async def test_a_reader_with_many_connections_keeps_no_writer_out(
+    listener: ModbusListener, live_cell: Cell, plan_of: PlanOf, events: list[PeerEvent]
+) -> None:
+    """Nor another reader: beyond its share it is refused, and reported once."""
+    listener.serve([(plan_of(), live_cell)])
+    greedy = [await dial(listener) for _ in range(40)]
+    assert [await is_served(*stream) for stream in greedy] == [True] * 16 + [False] * 24
+    others = [await dial(listener, source) for source in ("127.0.0.2", "127.0.0.3", "127.0.0.4")]
+    assert [await is_served(*stream) for stream in others] == [True] * 3
+    crowded = [event for event in events if event.kind is PeerEventKind.CROWDED]
+    assert [(event.reason, event.writers, event.repeats) for event in crowded] == [
+        ("too many connections of one peer", (), 0)
+    ]
+    await listener.close()
+    assert PeerEvent(PeerEventKind.CROWDED, "127.0.0.1", repeats=23) in events
+    for _reader, writer in (*greedy, *others):
+        writer.close()
+
+
+async def test_a_writer_that_is_declared_later_takes_the_place_of_the_reader_unused_longest(
+    listener: ModbusListener, live_cell: Cell, plan_of: PlanOf, events: list[PeerEvent]
+) -> None:
+    plan = plan_of(connections=4)
+    listener.serve([(replace(plan, writers=()), live_cell)])
+    readers = [await dial(listener) for _ in range(4)]
+    assert [await is_served(*stream) for stream in readers[1:] + readers[:1]] == [True] * 4
+    listener.serve([(plan, live_cell)])
+    writer = await dial(listener, "127.0.0.2")
+    assert await is_served(*writer)
+    assert [await is_served(*stream) for stream in readers] == [True, False, True, True]
+    assert "made room for 127.0.0.2" in [event.reason for event in events]
+    for _reader, stream in (*readers, writer):
+        stream.close()
 
 
 async def test_a_full_listener_closes_the_connection_that_was_unused_longest(
     listener: ModbusListener, live_cell: Cell, plan_of: PlanOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """But none that owns anything."""
-    monkeypatch.setattr(limits, "UNUSED_AFTER", 0.0)
-    listener.serve([(plan_of(connections=3), live_cell)])
+    monkeypatch.setattr(shares, "UNUSED_AFTER", 0.0)
+    listener.serve([(plan_of(connections=4), live_cell)])
     owner = await dial(listener, "127.0.0.2")
     owner[1].write(bytes.fromhex("0001 0000 0006 01 06 000a 0005"))
     await owner[0].readexactly(12)
@@ -174,9 +220,41 @@ async def test_a_full_listener_closes_the_connection_that_was_unused_longest(
     assert not await is_served(*oldest)
     assert await is_served(*other)
     assert await is_served(*owner)
-    assert listener.connections == 3
+    assert listener.connections == 3, "the fourth is kept for the other writer"
     for _reader, writer in (owner, oldest, other, newest):
         writer.close()
+
+
+async def test_many_connections_at_once_are_accepted_by_and_by(
+    listener: ModbusListener, live_cell: Cell, plan_of: PlanOf, sockets: ExitStack
+) -> None:
+    """They wait in the kernel meanwhile, and requests are served between them."""
+    listener.serve([(replace(plan_of(connections=128), connections_per_peer=128), live_cell)])
+    waiting = [
+        sockets.enter_context(socket.create_connection(("127.0.0.1", listener.port), timeout=0.5))
+        for _ in range(100)
+    ]
+    accepted = [0]
+    while accepted[-1] < len(waiting):
+        await asyncio.sleep(0)
+        accepted.append(listener.connections)
+    assert max(later - earlier for earlier, later in pairwise(accepted)) < 20
+
+
+async def test_a_peer_that_comes_and_goes_is_served_and_reported_in_few_lines(
+    listener: ModbusListener, events: list[PeerEvent]
+) -> None:
+    for _ in range(100):
+        reader, writer = await dial(listener)
+        assert await is_served(reader, writer)
+        writer.close()
+    await until(lambda: not listener.connections)
+    await listener.close()
+    kinds = [(event.kind, event.repeats) for event in events]
+    for kind in (PeerEventKind.CONNECTED, PeerEventKind.DISCONNECTED):
+        assert kinds.count((kind, 0)) == 10
+        assert kinds.count((kind, 90)) == 1
+    assert len(kinds) == 22
 
 
 async def test_a_connection_without_requests_is_closed(

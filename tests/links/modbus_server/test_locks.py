@@ -13,7 +13,7 @@ import pytest
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Value
-from gatewayd.links.modbus_server import limits
+from gatewayd.links.modbus_server import shares
 from gatewayd.links.modbus_server.listener import ModbusListener
 from gatewayd.links.modbus_server.peers import PeerEvent
 from gatewayd.links.modbus_server.plan import ModbusPlan
@@ -234,8 +234,8 @@ async def test_room_is_made_by_the_connections_that_hold_nothing_whoever_else_do
     plan_of: PlanOf,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(limits, "UNUSED_AFTER", 0.0)
-    listener.serve([(plan_of(connections=2), cell)])
+    monkeypatch.setattr(shares, "UNUSED_AFTER", 0.0)
+    listener.serve([(plan_of(connections=3), cell)])
     writer, reader = connect(), connect()
     await writer.write(42)
     assert await reader.read() == 42

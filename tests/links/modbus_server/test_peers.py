@@ -1,12 +1,24 @@
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from ipaddress import ip_address, ip_network
 
 import pytest
 
-from gatewayd.links.modbus_server.peers import DenialLog, address_of, may_connect, writer_of
+from gatewayd.links.modbus_server.peers import (
+    OTHER_PEERS,
+    PeerEvent,
+    PeerEventKind,
+    PeerLog,
+    address_of,
+    may_connect,
+    network_of,
+    writer_of,
+)
 from gatewayd.links.modbus_server.plan import ModbusPlan
+
+FULL = PeerEventKind.FULL
 
 
 @pytest.mark.parametrize(
@@ -29,6 +41,8 @@ def test_the_first_network_that_has_the_peer_names_the_writer() -> None:
     assert writer_of(ip_address("10.0.0.8"), writers) == 5
     assert writer_of(ip_address("fd00::1"), writers) == 4
     assert writer_of(ip_address("10.0.1.7"), writers) is None
+    assert network_of(ip_address("10.0.0.8"), writers) == ip_network("10.0.0.0/24")
+    assert network_of(ip_address("10.0.1.7"), writers) is None
 
 
 def test_without_an_access_list_everybody_may_connect(plan_of: Callable[..., ModbusPlan]) -> None:
@@ -43,17 +57,29 @@ def test_an_access_list_names_who_may(plan_of: Callable[..., ModbusPlan]) -> Non
     assert not may_connect(ip_address("fe80::9"), plan)
 
 
-def test_denials_of_one_address_are_reported_once_per_interval() -> None:
-    log = DenialLog(60.0)
-    assert log.repeats("10.0.0.9", 0.0) == 0
-    assert log.repeats("10.0.0.9", 1.0) is None
-    assert log.repeats("10.0.0.9", 59.0) is None
-    assert log.repeats("10.0.0.8", 59.0) == 0
-    assert log.repeats("10.0.0.9", 60.0) == 2
+def test_a_peer_that_knocks_all_the_time_is_reported_once_a_minute_with_the_number() -> None:
+    log = PeerLog(60.0)
+    assert log.reports("10.0.0.9", FULL, 0.0)
+    assert not any(log.reports("10.0.0.9", FULL, 0.5 * number) for number in range(1, 100))
+    assert log.reports("10.0.0.9", PeerEventKind.DENIED, 50.0), "another reason"
+    assert log.reports("10.0.0.8", FULL, 59.0), "another peer"
+    assert list(log.kept_back(59.9)) == []
+    assert list(log.kept_back(60.0)) == [PeerEvent(FULL, "10.0.0.9", repeats=99)]
+    assert log.reports("10.0.0.9", FULL, 60.1)
+    assert list(log.kept_back(math.inf)) == [], "nothing was kept back of the others"
 
 
-def test_denials_of_a_thousand_addresses_take_no_more_room_than_a_few() -> None:
-    log = DenialLog(60.0, max_hosts=8)
-    for number in range(1000):
-        assert log.repeats(str(number), 0.0) == 0
-    assert len(log._reported) == 8
+def test_a_peer_that_comes_and_goes_is_reported_ten_times_a_minute() -> None:
+    log = PeerLog(60.0)
+    reported = [log.reports("10.0.0.9", PeerEventKind.CONNECTED, 0.1 * number) for number in range(100)]
+    assert reported == [True] * 10 + [False] * 90
+    assert list(log.kept_back(60.0)) == [PeerEvent(PeerEventKind.CONNECTED, "10.0.0.9", repeats=90)]
+
+
+def test_a_thousand_addresses_take_no_more_room_and_lines_than_a_few() -> None:
+    log = PeerLog(60.0, max_peers=8)
+    reported = [log.reports(str(number), FULL, 0.0) for number in range(1000)]
+    assert reported == [True] * 9 + [False] * 991, "the ninth stands for all others"
+    assert len(log._known) == 9
+    assert list(log.kept_back(60.0)) == [PeerEvent(FULL, OTHER_PEERS, repeats=991)]
+    assert not log._known

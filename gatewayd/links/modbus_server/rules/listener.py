@@ -1,4 +1,4 @@
-"""Rules GW206 to GW208, GW216, GW217 and GW219: the Modbus listener, its units and its peers."""
+"""Rules GW206 to GW208, GW216, GW217, GW219, GW224 and GW225: the Modbus listener, its units and its peers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 
 _LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
-_SHARED = ("connections", "idle_timeout")
+_SHARED = ("connections", "connections_per_peer", "idle_timeout")
 
 
 @plant_rule("GW206")
@@ -107,6 +107,46 @@ def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
             related = (Related(modbus.at("listen"), f"the listener is {modbus.spec.listen}"),)
             hint = "listen on the address of the machine network, for example 192.168.1.2:502"
             yield rule.at(writer.at("modbus"), message, hint=hint, related=related)
+
+
+@plant_rule("GW224")
+def default_unit_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """Two cells on one listener that both answer to unit ids 0 and 255."""
+    first: dict[str, tuple[ExpandedCell, Part[Modbus]]] = {}
+    for cell, modbus in _listeners(cells):
+        if not modbus.spec.default_unit:
+            continue
+        other, earlier = first.setdefault(str(modbus.spec.listen), (cell, modbus))
+        if earlier is not modbus:
+            message = (
+                f"`default_unit` of {modbus.spec.listen} already belongs to the cell `{other.document.cell}`"
+            )
+            related = (Related(earlier.at("default_unit"), f"`default_unit` of `{other.document.cell}`"),)
+            hint = "leave `default_unit: true` with one of the two"
+            yield rule.at(modbus.at("default_unit"), message, hint=hint, related=related)
+
+
+@plant_rule("GW225", Severity.WARNING)
+def too_few_connections(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """A listener with no connection beyond those kept for its writers."""
+    peers: dict[str, set[Network]] = {}
+    widest: dict[str, Part[Modbus]] = {}
+    for cell, modbus in _listeners(cells):
+        listen = str(modbus.spec.listen)
+        its = peers.setdefault(listen, set())
+        for writer in cell.document.writers.values():
+            its.update(writer.spec.by(ModbusWriter).modbus)
+        if modbus.spec.connections > widest.setdefault(listen, modbus).spec.connections:
+            widest[listen] = modbus
+    for listen, modbus in widest.items():
+        connections, needed = modbus.spec.connections, len(peers[listen])
+        if connections <= needed:
+            message = (
+                f"{listen} has {connections} {'connection' if connections == 1 else 'connections'}, "
+                f"and {needed} addresses of writers that one is kept for"
+            )
+            hint = f"write `connections: {needed + 4}` or more, for a second connection and for those that only read"
+            yield rule.at(modbus.at("connections"), message, hint=hint)
 
 
 def _listeners(cells: Sequence[ExpandedCell]) -> Iterator[tuple[ExpandedCell, Part[Modbus]]]:
