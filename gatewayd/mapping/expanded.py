@@ -66,9 +66,9 @@ class ExpandedVariable(Defined):
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """What an integer can be: its limits, what is known of it, or its type; None for other kinds."""
+        """What a number can be: its limits, what is known of it, or its type; None for bits and unknown reals."""
         if self.low is None or self.high is None:
-            return None
+            return (self.spec.limits or self.usual) if self.kind is ValueKind.FLOAT else None
         return self.spec.limits or self.usual or (self.low, self.high)
 
     @property

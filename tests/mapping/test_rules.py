@@ -278,6 +278,53 @@ FINER_POINTS = {
 }
 
 
+def at(robot: str, place: str, more: str = "") -> str:
+    """A line with one place in registers."""
+    owner = ", owner: plc" if "input" in robot or "slider" in robot else ""
+    return f"  a: {{robot: {robot}, modbus: {{holding: 10, {place}}}{owner}{more}}}\n"
+
+
+@pytest.mark.parametrize(
+    "line, found",
+    [
+        (at("actual_q", "type: uint16, scale: 0.001"), True),
+        (at("actual_q", "type: uint16, scale: 0.001, offset: -10"), False),
+        (at("actual_q", "type: int16, scale: 0.001"), False),
+        (at("actual_q", "type: int16, scale: 0.0001"), True),
+        (at("actual_q", "type: int16, scale: 0.0001", ", limits: [-1.5, 1.5]"), False),
+        (at("actual_q", "type: int16, scale: 2"), True),
+        (at("actual_q", "type: float32"), False),
+        (at("actual_TCP_pose", "type: int16, scale: 0.0001"), False),
+        (at("actual_TCP_pose", "type: int16, scale: 0.00005"), True),
+        (at("speed_scaling", "type: uint16, scale: 1"), True),
+        (at("speed_scaling", "type: uint16, scale: 0.01"), False),
+        (at("joint_temperatures", "type: uint16, scale: 1"), False),
+        (at("timestamp", "type: int32, scale: 0.001"), True),
+        (at("output_double_register_0", "type: uint16, scale: 0.1"), False),
+        (at("output_double_register_0", "type: uint16, scale: 0.1", ", limits: [-1, 1]"), True),
+        (at("input_double_register_0", "type: uint16, scale: 0.1", ", limits: [-1, 1]"), False),
+    ],
+)
+def test_reals_that_registers_can_never_show(line: str, found: bool) -> None:
+    """Sign, range and resolution, by what the fields hold in ordinary use, element by element."""
+    assert ("GW713" in [rule for rule, _line in findings(line)]) is found
+
+
+@pytest.mark.parametrize(
+    "limits, found",
+    [
+        ("[0, 1.04]", True),
+        ("[0, 1.1]", False),
+        ("[0.04, 2]", True),
+        ("[-3276.8, 3276.7]", False),
+        ("[0, 5000.05]", False),
+    ],
+)
+def test_limits_between_two_steps(limits: str, found: bool) -> None:
+    line = at("input_double_register_0", "type: int16, scale: 0.1", f", on_release: hold, limits: {limits}")
+    assert ("GW714" in [rule for rule, _line in findings(line)]) is found
+
+
 @pytest.mark.parametrize("lines,expected", FINER_POINTS.values(), ids=FINER_POINTS.keys())
 def test_finer_points(lines: str, expected: list[tuple[str, int]]) -> None:
     assert findings(lines) == expected

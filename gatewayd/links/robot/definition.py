@@ -11,27 +11,9 @@ from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import Defined, ExpandedVariable
 from gatewayd.mapping.model import VariableSpec
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field
+from gatewayd.rtde.ranges import usual_range
 from gatewayd.rtde.types import INTEGER_RANGES, DataType
 
-_USUAL: Final = {
-    "robot_mode": (-1, 255),
-    "joint_mode": (0, 255),
-    "safety_mode": (0, 255),
-    "safety_status": (0, 255),
-    "runtime_state": (0, 255),
-    "tool_mode": (0, 255),
-    "time_scale_source": (-1, 255),
-    "robot_status_bits": (0, 0xF),
-    "safety_status_bits": (0, 0xFFF),
-    "analog_io_types": (0, 0xF),
-    "tool_analog_input_types": (0, 0xF),
-    "tool_output_voltage": (0, 24),
-    "actual_digital_input_bits": (0, 0x3FFFF),
-    "actual_digital_output_bits": (0, 0x3FFFF),
-    "actual_configurable_digital_input_bits": (0, 0xFF),
-    "actual_configurable_digital_output_bits": (0, 0xFF),
-}
-"""Values that fields take in truth, where that is much less than their type holds."""
 _GROWING: Final = ("timestamp",)
 _MOVING: Final = ("speed_slider_fraction",)
 _COUNTERPARTS: Final = {
@@ -88,7 +70,7 @@ def _defined(target: Target, *, running: bool) -> Defined:
         high=high,
         bit=target.bit,
         element=target.element,
-        usual=_USUAL.get(field),
+        usual=usual_range(field, target.element),
         valid_running=is_output and running,
         grows=field in _GROWING,
         moves=field in _MOVING,

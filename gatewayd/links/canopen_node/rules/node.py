@@ -80,7 +80,12 @@ def narrow_canopen_type(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> It
     """An integer from the robot in a CANopen type too small for it."""
     for variable, placed in _lines(cell, node):
         bounds = variable.range
-        if variable.direction is Direction.INPUT or bounds is None or not placed.fits:
+        if (
+            variable.direction is Direction.INPUT
+            or bounds is None
+            or not placed.fits
+            or placed.plan.type.is_real
+        ):
             continue
         low, high = placed.plan.type.bounds
         if bounds[0] < low or bounds[1] > high:

@@ -60,6 +60,78 @@ def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
 
+@cell_rule("GW713", Severity.WARNING)
+def field_not_shown(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """A real in registers that can never show what its field holds."""
+    reported: set[int] = set()
+    for placement in placements_of(cell):
+        variable, bounds = placement.variable, placement.variable.range
+        if placement.codec is None or variable.kind is not ValueKind.FLOAT or not _is_integer(placement):
+            continue
+        # Towards the robot limits are the mapping's own wish: GW704 and GW705 look after it.
+        is_wish = variable.direction is Direction.INPUT and variable.spec.limits is not None
+        if bounds is None or bounds[0] >= bounds[1] or is_wish or id(placement.spec) in reported:
+            continue
+        loss = _loss(placement, bounds)
+        if loss is not None:
+            reported.add(id(placement.spec))
+            low, high = map(number, bounds)
+            message = f"`{variable.name}` ({variable.target}) goes from {low} to {high}, {loss[0]}"
+            yield rule.at(_key(placement, "scale"), message, hint=loss[1])
+
+
+def _loss(placement: ExpandedPlacement, bounds: tuple[float, float]) -> tuple[str, str] | None:
+    """What is wrong with a place for values between these bounds, and the remedy."""
+    low, high = _reach(placement)
+    slack = abs(placement.scale) / 2
+    span = bounds[1] - bounds[0]
+    form = f"{placement.type} at {where(placement)}"
+    shows = f"{form} shows {number(low)} to {number(high)}"
+    if bounds[0] < 0 <= low and bounds[0] < low - slack:
+        return f"{shows}: all below is 0" if low == 0 else shows, "use a signed type such as int16"
+    if bounds[0] < low - slack or bounds[1] > high + slack:
+        return (
+            shows,
+            "use a wider type or a coarser scale, or state the range with `limits: [least, greatest]`",
+        )
+    steps = span / abs(placement.scale)
+    if placement.spec.scale is not None and steps < _MIN_STEPS:
+        text = f"scale {number(placement.scale)} leaves {number(int(steps) + 1)} values of it to {form}"
+        return text, f"robot value = raw * scale: use a finer scale such as {number(_fine(span))}"
+    return None
+
+
+@cell_rule("GW714", Severity.WARNING)
+def limit_between_steps(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """A limit between two numbers of the register."""
+    for placement in _numbers(cell, ValueKind.FLOAT):
+        variable, limits = placement.variable, placement.variable.spec.limits
+        if variable.direction is Direction.OUTPUT or limits is None or not _is_integer(placement):
+            continue
+        if limits[1] - limits[0] < _MIN_STEPS * abs(placement.scale):
+            continue  # GW704, or GW608
+        for limit in limits:
+            raw = (limit - placement.offset) / placement.scale
+            if not _within_type(raw, placement) or isclose(raw, round(raw), abs_tol=1e-6):
+                continue
+            nearest = round(raw)
+            meant = nearest * placement.scale + placement.offset
+            message = (
+                f"the limit {number(limit)} of `{variable.name}` lies between two values of {placement.type} "
+                f"with scale {number(placement.scale)}: {nearest} ({number(meant)}) is the nearest"
+            )
+            is_zero = isclose(meant, 0, abs_tol=1e-9 * abs(placement.scale))
+            message += ", and stays 0" if is_zero else f", and means {number(limit)}"
+            hint = f"write {number(meant)} as limit, or use a finer scale"
+            yield rule.at(variable.at("limits"), message, hint=hint)
+            break
+
+
+def _within_type(raw: float, placement: ExpandedPlacement) -> bool:
+    form = TYPES[placement.type]
+    return form.low <= raw <= form.high
+
+
 @cell_rule("GW704", Severity.WARNING)
 def coarse_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A scale too coarse for the limits."""
