@@ -238,7 +238,6 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "cli": "tests/cli/test_main.py",
     "cli.completion": "tests/cli/test_main.py",
     "core.requester": "a record; tests/core/test_cell.py pins what its parts mean",
-    "links.canopen_node.declaration": "tests/links/test_registry.py",
     "links.canopen_node.compile": "tests/mapping/test_compile.py compiles it",
     "links.canopen_node.exports": "tests/cli/test_export.py",
     "links.canopen_node.observer": "counters, and calls that do nothing; tests/links/canopen_node/test_node.py",

@@ -159,6 +159,11 @@ class Entry:
         return cls(subindex, name, u32, Access.RO, u32.pack(number), plus_node=plus_node)
 
     @property
+    def is_volatile(self) -> bool:
+        """Whether it shows what is at the moment, and so has no default."""
+        return self.source is not None
+
+    @property
     def number(self) -> int:
         """The stored value as an unsigned integer."""
         return int.from_bytes(self.value, "little")

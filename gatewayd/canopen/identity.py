@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -33,19 +34,31 @@ class Identity:
     revision: int
     serial: int
 
-    @classmethod
-    def of(cls, fingerprint: int) -> Identity:
-        """The identity of a cell: its mapping's fingerprint distinguishes it from the other cells on the bus."""
-        return cls(VENDOR_ID, PRODUCT_CODE, revision(), fingerprint)
+
+def revision_of(objects: Iterable[Object], node: int) -> int:
+    """A revision number that is another one for every other dictionary: objects, types, access, limits, defaults.
+
+    Defaults that contain the node-ID count without it.
+    """
+    digest = 0
+    for item in objects:
+        for entry in item.entries:
+            default = b"" if entry.is_volatile else entry.default
+            if entry.plus_node:
+                default = (int.from_bytes(default, "little") - node).to_bytes(len(default), "little")
+            what = (item.index, item.name, item.code, entry.subindex, entry.name, entry.type.name)
+            how = (entry.access.value, entry.pdo.value, entry.low, entry.high, default.hex())
+            digest = zlib.crc32(repr((what, how)).encode(), digest)
+    return digest
 
 
-def identity_objects(identity: Identity, status: Callable[[], int]) -> Iterable[Object]:
-    """1000h, 1002h, 1008h to 100Ah, 1018h. `status` gives the flags of the status block."""
+def identity_objects(identity: Identity, name: str, status: Callable[[], int]) -> Iterable[Object]:
+    """1000h, 1002h, 1008h to 100Ah, 1018h. `name`: of the device; `status` gives the flags of the status block."""
     yield variable(0x1000, Entry.constant(0, "Device type", 0))
     register = Entry.constant(0, "Manufacturer status register", 0)
     register.source = lambda: CanType.UNSIGNED32.pack(status())
     yield variable(0x1002, register)
-    yield variable(0x1008, _text("Manufacturer device name", "gatewayd"))
+    yield variable(0x1008, _text("Manufacturer device name", name))
     yield variable(0x1009, _text("Manufacturer hardware version", "none"))
     yield variable(0x100A, _text("Manufacturer software version", __version__))
     yield record(

@@ -46,14 +46,19 @@ def _differs(found: ODVariable | None, entry: Entry) -> Iterator[str]:
     if found is None:
         yield "missing"
         return
-    is_text = entry.type is CanType.VISIBLE_STRING
-    default = entry.default.decode() if is_text else entry.type.unpack(entry.default)
     for what, read, meant in (
         ("name", found.name, entry.name),
         ("type", found.data_type, entry.type.code),
         ("access", found.access_type, entry.access.value),
         ("PDO mapping", found.pdo_mappable, entry.pdo is not Pdo.NONE),
-        ("default", found.default, default),
+        ("default", found.default, _default(entry)),
     ):
         if read != meant:
             yield f"{what} {meant!r} is read as {read!r}"
+
+
+def _default(entry: Entry) -> str | float | None:
+    if entry.is_volatile:
+        return None
+    is_text = entry.type is CanType.VISIBLE_STRING
+    return entry.default.decode() if is_text else entry.type.unpack(entry.default)

@@ -160,7 +160,8 @@ class SyncService:
     def _check_overflow(self, data: bytes) -> None:
         if data[0] == 1 or data[0] > MAX_COUNTER:
             raise Abort(AbortCode.INVALID_VALUE)
-        if self._period.number:
+        # Whoever loads a configuration writes 1006h first, and then what is here already.
+        if self._period.number and data[0] != self._overflow.number:
             raise Abort(AbortCode.DEVICE_STATE)
 
 

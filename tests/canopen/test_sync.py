@@ -90,6 +90,9 @@ def test_cct_synchronization_06_counter_overflow_values(cycle: Cycle, value: int
 def test_cct_synchronization_07_counter_is_fixed_while_the_period_runs(cycle: Cycle) -> None:
     cycle.client.write(0x1006, 0, 10_000)
     cycle.client.refused(0x1019, 0, 10, AbortCode.DEVICE_STATE)
+    cycle.client.write(
+        0x1019, 0, 0
+    )  # what is there already: a configuration that is loaded in the order of indices
 
 
 def test_cct_synchronization_08_producer_starts_within_one_period_and_counts_from_1() -> None:

@@ -67,6 +67,7 @@ _SECTIONS = {
     "Watchdog": "`robot: watchdog:`",
     "Modbus": "`modbus:`",
     "Canopen": "`canopen:`",
+    "IdentitySpec": "`canopen: identity:`",
     "Sync": "`canopen: sync:`",
     "PdoDefaults": "`canopen: pdo:`",
     "CobIdPool": "`canopen: cob_ids:`",

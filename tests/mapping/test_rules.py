@@ -497,6 +497,7 @@ def test_one_cell_may_receive_what_another_sends() -> None:
     )
     receiver = (
         (CAN_HEAD.replace("press-3", "press-4").replace("1.10", "1.11").replace("node: 16", "node: 17"))
+        + "  identity: {product: 2}\n"
         + "  pdos: {in: {cob_id: 0x1C0, variables: a}}\nwriters: {other: {canopen: rpdo, node: 16, heartbeat: 1s}}\n"
         + "variables: {a: {robot: input_int_register_0, owner: other}}\n"
     )

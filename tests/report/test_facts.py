@@ -12,7 +12,7 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.heartbeat import Consumer
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import Direction, Fallback, FallbackKind, Limits, ValueKind
-from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan, PdoEntry, PdoPlan
+from gatewayd.links.canopen_node.plan import CanopenPlan, IdentityPlan, ObjectPlan, PdoEntry, PdoPlan
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.mapping.loader import load
@@ -78,6 +78,7 @@ OTHERWISE: dict[type, Any] = {str: "other", bool: None, int: 77, float: 0.123456
 OF_LINKS: dict[str, Any] = {
     "watchdog": None,
     "sync": SyncPlan(producer=True),
+    "identity": IdentityPlan(product=5),
     "rpdo_writer": 0,
     "sdo_writer": 0,
     "robot_away": ExceptionCode.BUSY,
@@ -139,6 +140,7 @@ def test_whatever_differs_is_told(part: str, name: str) -> None:
 
 NESTED = [
     *(("sync", field.name) for field in dataclasses.fields(SyncPlan)),
+    *(("identity", field.name) for field in dataclasses.fields(IdentityPlan)),
     *(("consumers", field.name) for field in dataclasses.fields(Consumer)),
     *(("objects", field.name) for field in dataclasses.fields(ObjectPlan)),
     *(("pdos", field.name) for field in dataclasses.fields(PdoPlan)),
@@ -152,7 +154,13 @@ def test_whatever_differs_inside_a_node_is_told(part: str, name: str) -> None:
     canopen: Any = old.the(CanopenPlan)
     things = getattr(canopen, part)
     first: Any = things[0] if isinstance(things, tuple) else things
-    known: dict[str, Any] = {"writer": 0, "variable": 1, "type": CanType.REAL64}
+    known: dict[str, Any] = {
+        "writer": 0,
+        "variable": 1,
+        "type": CanType.REAL64,
+        "revision": "auto",
+        "serial": 5,
+    }
     other = known[name] if name in known else changed(getattr(first, name))
     first = dataclasses.replace(first, **{name: other})
     new = old.with_links(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from gatewayd.canopen.heartbeat import Consumer
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo
-from gatewayd.links.canopen_node.plan import CanopenPlan, PdoEntry, PdoPlan
+from gatewayd.links.canopen_node.plan import CanopenPlan, IdentityPlan, PdoEntry, PdoPlan
 from gatewayd.links.canopen_node.sections import CanopenWriter
 from gatewayd.mapping.expanded import ExpandedCell
 
@@ -33,6 +33,7 @@ def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
         pdos=tuple(_pdo(pdo) for pdo in node.pdos),
         rpdo_writer=next((index for index, writer in enumerate(writers) if writer.by_rpdo), None),
         sdo_writer=next((index for index, writer in enumerate(writers) if writer.by_sdo), None),
+        identity=IdentityPlan(**spec.identity.model_dump()),
     )
 
 

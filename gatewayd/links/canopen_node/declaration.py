@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import asdict
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.status_layout import StatusField
@@ -67,7 +68,34 @@ class CanopenNode(LinkKind):
         """The same node goes on where nothing that the bus can see is different."""
         assert isinstance(old, CanopenPlan)
         assert isinstance(new, CanopenPlan)
-        return by_name(old, before) == by_name(new, after)
+        return by_name(old, before) == by_name(new, after) and not _identities(old, new, before, after)
+
+    def disturbs(
+        self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
+    ) -> Iterable[str]:
+        """Masters would not know the node again."""
+        assert isinstance(old, CanopenPlan)
+        assert isinstance(new, CanopenPlan)
+        changes = _identities(old, new, before, after)
+        if changes:
+            yield (
+                f"{old.channel} node {old.node} would have another identity: {', '.join(changes)}; "
+                "masters check it, and LSS selects by it"
+            )
+
+
+def _identities(
+    old: CanopenPlan, new: CanopenPlan, before: CellDefinition, after: CellDefinition
+) -> tuple[str, ...]:
+    """What would be another number in 1018h."""
+    from gatewayd.links.canopen_node.eds import identity_of  # a whole node, which only a reload has to make
+
+    former, successor = asdict(identity_of(old, before)), asdict(identity_of(new, after))
+    return tuple(
+        f"{name} 0x{former[name]:08X} -> 0x{number:08X}"
+        for name, number in successor.items()
+        if number != former[name]
+    )
 
 
 KIND = CanopenNode()

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, Final
 
 from gatewayd.core.definition import CellDefinition, Direction
-from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan
+from gatewayd.links.canopen_node.plan import CanopenPlan, IdentityPlan, ObjectPlan
 from gatewayd.links.contract import Description, Place
 
 
@@ -20,6 +20,9 @@ def description(plan: CanopenPlan, cell: CellDefinition) -> Description:
     settings = by_name(plan, cell)
     del settings["objects"]  # `places` has them
     return Description(settings, places, address=channel, fields={"channel": channel, "node": plan.node})
+
+
+_IDENTITY: Final = frozenset(field.name for field in fields(IdentityPlan))
 
 
 def by_name(part: Any, cell: CellDefinition) -> dict[str, str]:
@@ -44,11 +47,13 @@ def _place(placed: ObjectPlan, cob_id: int | None) -> Place:
 
 def _text(key: str, value: Any, cell: CellDefinition) -> str:
     if value is None:
-        return "" if key == "quality_of" else "none"
+        return "" if key == "quality_of" or key in _IDENTITY else "none"
     if key in ("variable", "quality_of"):
         return str(cell.variables[value].name)
     if key in ("writer", "rpdo_writer", "sdo_writer"):
         return str(cell.writers[value].name)
+    if key in _IDENTITY and isinstance(value, int):
+        return f"0x{value:08X}"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, Direction):

@@ -3,6 +3,7 @@
 Deterministic: the same mapping gives the same bytes; the dates are fixed, and the fingerprint of the mapping says
 what changed. Numbers that contain the node-ID are `$NODEID+...`. Integers are hexadecimal where they are unsigned and
 decimal where they are signed, reals decimal. Limits of reals are left out: tools disagree about how to write them.
+What shows the present state of the cell has no default: no number would be true, and 0 may be none of its values.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Dictionary, Entry, Object, ObjectCode, Pdo
+from gatewayd.canopen.identity import Identity
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition
 from gatewayd.links.canopen_node.bus_load import BIT_RATES
@@ -31,6 +33,7 @@ _DUMMIES: Final = range(1, 8)
 _UNSUPPORTED_DUMMIES: Final = (1,)
 _IDENTITY: Final = 0x1018
 _DOMAIN_OBJECT: Final = 2
+_BYTE: Final = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +51,16 @@ class Sheet:
 
 def objects_of(plan: CanopenPlan, definition: CellDefinition) -> Dictionary:
     """The object dictionary of the node of a cell, as it is after its first power-on."""
-    node = Node(plan, Cell(definition), lambda _frame, _priority: False, Store(), lambda _now: True)
-    return node.dictionary
+    return _node(plan, definition).dictionary
+
+
+def identity_of(plan: CanopenPlan, definition: CellDefinition) -> Identity:
+    """What masters know the node of a cell by."""
+    return _node(plan, definition).identity
+
+
+def _node(plan: CanopenPlan, definition: CellDefinition) -> Node:
+    return Node(plan, Cell(definition), lambda _frame, _priority: False, Store(), lambda _now: True)
 
 
 def sheet_of(plan: CanopenPlan, definition: CellDefinition) -> Sheet:
@@ -79,7 +90,7 @@ def _text(sections: Iterable[_Section]) -> str:
 
 def _sections(objects: tuple[Object, ...], sheet: Sheet, *, valued: bool) -> Iterator[_Section]:
     yield "FileInfo", _file_info(sheet, valued=valued)
-    yield "DeviceInfo", _device_info(objects)
+    yield "DeviceInfo", _device_info(objects, sheet.cell)
     if valued:
         yield "DeviceComissioning", _commissioning(sheet)
     dummies = [(f"Dummy{number:04d}", "0" if number in _UNSUPPORTED_DUMMIES else "1") for number in _DUMMIES]
@@ -112,21 +123,21 @@ def _file_info(sheet: Sheet, *, valued: bool) -> list[tuple[str, str]]:
     return [*pairs, ("LastEDS", f"{sheet.cell}.eds")] if valued else pairs
 
 
-def _device_info(objects: tuple[Object, ...]) -> list[tuple[str, str]]:
+def _device_info(objects: tuple[Object, ...], cell: str) -> list[tuple[str, str]]:
     identity = {
         entry.subindex: entry.number for item in objects if item.index == _IDENTITY for entry in item.entries
     }
     return [
         ("VendorName", "gatewayd"),
         ("VendorNumber", f"0x{identity.get(1, 0):X}"),
-        ("ProductName", "gatewayd"),
+        ("ProductName", f"gatewayd {cell}"),
         ("ProductNumber", f"0x{identity.get(2, 0):X}"),
         ("RevisionNumber", f"0x{identity.get(3, 0):X}"),
-        ("OrderCode", "gatewayd"),
+        ("OrderCode", cell),
         *((f"BaudRate_{rate // 1000}", "1") for rate in BIT_RATES),
         ("SimpleBootUpMaster", "0"),
         ("SimpleBootUpSlave", "1"),
-        ("Granularity", "1"),
+        ("Granularity", str(_granularity(objects))),
         ("DynamicChannelsSupported", "0"),
         ("GroupMessaging", "0"),
         ("NrOfRXPDO", str(sum(item.index in _RPDOS for item in objects))),
@@ -134,6 +145,12 @@ def _device_info(objects: tuple[Object, ...]) -> list[tuple[str, str]]:
         ("LSS_Supported", "1"),
         ("CompactPDO", "0"),
     ]
+
+
+def _granularity(objects: Iterable[Object]) -> int:
+    """Bits of the smallest thing that can be mapped: numbers, dummies too, lie on byte boundaries (CiA 306-1, 4.4)."""
+    mapped = (entry.type.bits for item in objects for entry in item.entries if entry.pdo is not Pdo.NONE)
+    return min(mapped, default=_BYTE)
 
 
 def _commissioning(sheet: Sheet) -> list[tuple[str, str]]:
@@ -179,7 +196,7 @@ def _entry(entry: Entry, name: str, node: int, *, valued: bool) -> list[tuple[st
         ("DataType", f"0x{entry.type.code:04X}"),
         ("AccessType", entry.access.value),
     ]
-    if not is_domain:
+    if not is_domain and not entry.is_volatile:
         pairs.append(("DefaultValue", _default(entry, node)))
     pairs.append(("PDOMapping", "0" if entry.pdo is Pdo.NONE else "1"))
     pairs.extend(_limits(entry))

@@ -19,6 +19,7 @@ from gatewayd.links.canopen_node.sections import (
     CanopenPlaces,
     CanopenWriter,
     CobIdPool,
+    IdentitySpec,
     PdoDefaults,
     PdoSpec,
     Sync,
@@ -52,6 +53,7 @@ class CanopenLanguage(LinkLanguage):
     exports = "gatewayd.links.canopen_node.exports"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
         (VariableSpec, "canopen"): CanopenPlace,
+        (Canopen, "identity"): IdentitySpec,
         (Canopen, "sync"): Sync,
         (Canopen, "pdo"): PdoDefaults,
         (Canopen, "cob_ids"): CobIdPool,
@@ -60,6 +62,7 @@ class CanopenLanguage(LinkLanguage):
     articles: ClassVar[Mapping[type[Section], str]] = {
         Canopen: "the section `canopen`",
         CanopenPlace: "`canopen` of a variable",
+        IdentitySpec: "the table `identity`",
         Sync: "the table `sync`",
         PdoDefaults: "the table `pdo`",
         CobIdPool: "the table `cob_ids`",

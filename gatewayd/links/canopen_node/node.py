@@ -20,7 +20,7 @@ from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.gap import Waiting
 from gatewayd.canopen.guarding import NodeGuarding
 from gatewayd.canopen.heartbeat import HeartbeatConsumer, HeartbeatProducer
-from gatewayd.canopen.identity import Identity, identity_objects
+from gatewayd.canopen.identity import identity_objects, revision_of
 from gatewayd.canopen.lss import LssSlave
 from gatewayd.canopen.nmt import ALLOWED, UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
 from gatewayd.canopen.sdo.server import SdoServer, server_parameter
@@ -95,17 +95,6 @@ class Node:
             clock=self._clock,
         )
         node = self.parameters.node
-        identity = Identity.of(cell.definition.fingerprint)
-        self.lss = LssSlave(
-            self._send,
-            identity,
-            node,
-            self.bit_rate,
-            bit_rates=frozenset({*bit_rates, plan.bitrate}),
-            configured=self._configured,
-            store=self._store_lss,
-            activate=self._observer.switch_bit_rate,
-        )
         self.nmt = NmtSlave(
             self._send, lambda: self.lss.node, self._nmt_changed, self._reset, autostart=plan.autostart
         )
@@ -164,7 +153,19 @@ class Node:
         self.pdos = PdoTable(
             replace(plan, node=node), cell.definition.variables, self._find, self._pdo_changed
         )
-        self.dictionary = Dictionary(self._objects(identity), self._waiting.permit)
+        objects = tuple(self._objects())
+        self.identity = plan.identity.of(cell.definition, lambda: revision_of(objects, node))
+        self.lss = LssSlave(
+            self._send,
+            self.identity,
+            node,
+            self.bit_rate,
+            bit_rates=frozenset({*bit_rates, plan.bitrate}),
+            configured=self._configured,
+            store=self._store_lss,
+            activate=self._observer.switch_bit_rate,
+        )
+        self.dictionary = Dictionary((*objects, *self._identity_objects()), self._waiting.permit)
         self.parameters.bind(self.dictionary)
         self.sdo = SdoServer(self.dictionary)
         self._timed: tuple[_Timed, ...] = (
@@ -433,14 +434,21 @@ class Node:
 
     # -- assembly ------------------------------------------------------------------------------------------------
 
-    def _objects(self, identity: Identity) -> Iterable[Object]:
+    def _identity_objects(self) -> Iterable[Object]:
         status = StatusBlock(self.cell, status_fields())
+        return identity_objects(
+            self.identity,
+            f"gatewayd {self.cell.definition.name}",
+            lambda: int.from_bytes(status.read(1, 1, self._now), "big"),
+        )
+
+    def _objects(self) -> Iterable[Object]:
+        """All of them but those that say who the node is."""
         requester = partial(self._peers.requester, self.plan.sdo_writer)
 
         def asking() -> Requester:
             return self._peers.asking(self.plan.sdo_writer, self._now)
 
-        yield from identity_objects(identity, lambda: int.from_bytes(status.read(1, 1, self._now), "big"))
         yield server_parameter(self.parameters.node)
         for service in (
             self.emergency,

@@ -2,13 +2,41 @@
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.heartbeat import Consumer
+from gatewayd.canopen.identity import PRODUCT_CODE, VENDOR_ID, Identity
+from gatewayd.canopen.identity import revision as release_revision
 from gatewayd.canopen.sync import SyncPlan
-from gatewayd.core.definition import Direction
+from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.mapping.plan import LinkPlan, Plan
+
+
+@dataclass(frozen=True, slots=True)
+class IdentityPlan:
+    """1018h as the mapping declares it."""
+
+    vendor: int = VENDOR_ID
+    product: int = PRODUCT_CODE
+    revision: int | Literal["auto"] | None = None
+    """`auto`: it follows the dictionary; None: that of the release."""
+    serial: int | Literal["fingerprint"] | None = None
+    """`fingerprint`: that of the mapping; None: it follows from the name of the cell."""
+
+    def of(self, cell: CellDefinition, follows: Callable[[], int]) -> Identity:
+        """The numbers for a cell; `follows` gives the revision that follows the dictionary."""
+        number = release_revision() if self.revision is None else self.revision
+        serial = zlib.crc32(cell.name.encode()) if self.serial is None else self.serial
+        return Identity(
+            self.vendor,
+            self.product,
+            follows() if number == "auto" else number,
+            cell.fingerprint if serial == "fingerprint" else serial,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +109,7 @@ class CanopenPlan(LinkPlan):
     """The writer that RPDOs are; None: nobody writes by PDO."""
     sdo_writer: int | None
     """The writer that SDO clients are; None: variables are read-only by SDO."""
+    identity: IdentityPlan = IdentityPlan()
 
 
 def canopen_of(plan: Plan) -> CanopenPlan | None:

@@ -35,6 +35,9 @@ BAD_COB_ID = declare(
 
 _COB_ID = re.compile(r"0x([0-9A-Fa-f]+)")
 _MAX_COB_ID: Final = 0x7FF
+_HEXADECIMAL = re.compile(r"0x[0-9A-Fa-f]{1,16}")
+_DECIMAL = re.compile(r"0|[1-9][0-9]{0,15}")
+_MAX_WORD32: Final = 0xFFFF_FFFF
 _MEMBER = re.compile(
     r"(?P<name>[A-Za-z][A-Za-z0-9_]*)(?:\[(?P<first>[0-9]{1,4})(?:\.\.(?P<last>[0-9]{1,4}))?\])?"
 )
@@ -94,6 +97,45 @@ def _cob_id(value: object) -> int:
     if number > _MAX_COB_ID:
         refuse(syntax.OUT_OF_RANGE, f"the COB-ID {text} is greater than 0x7FF", hint)
     return number
+
+
+def _word32(value: object, *words: str) -> int | str:
+    """A number of 32 bits, decimal or hexadecimal, or one of the words."""
+    hint = "write a number of 32 bits: 1, or 0x00010002"
+    if words:
+        hint += f", or {' or '.join(words)}"
+    text = scalar(value, "a number of 32 bits", hint)
+    if text in words:
+        return text
+    if _HEXADECIMAL.fullmatch(text):
+        number = int(text, 16)
+    elif _DECIMAL.fullmatch(text):
+        number = int(text)
+    else:
+        refuse(syntax.BAD_NUMBER, f"`{text}` is not a number of 32 bits", hint)
+    if number > _MAX_WORD32:
+        refuse(syntax.OUT_OF_RANGE, f"{text} has more than 32 bits", hint)
+    return number
+
+
+_WORD32_SCHEMA = int | Annotated[str, Field(pattern="^0x[0-9A-Fa-f]{1,8}$", examples=["0x00010002"])]
+Word32 = Annotated[int, BeforeValidator(_word32, json_schema_input_type=_WORD32_SCHEMA)]
+"""A number of 32 bits."""
+RevisionNumber = Annotated[
+    int | Literal["auto"],
+    BeforeValidator(
+        lambda value: _word32(value, "auto"), json_schema_input_type=_WORD32_SCHEMA | Literal["auto"]
+    ),
+]
+"""A number of 32 bits, or `auto`."""
+SerialNumber = Annotated[
+    int | Literal["fingerprint"],
+    BeforeValidator(
+        lambda value: _word32(value, "fingerprint"),
+        json_schema_input_type=_WORD32_SCHEMA | Literal["fingerprint"],
+    ),
+]
+"""A number of 32 bits, or `fingerprint`."""
 
 
 def _cob_id_range(value: object) -> range:

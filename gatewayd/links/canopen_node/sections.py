@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from gatewayd.canopen.identity import PRODUCT_CODE, VENDOR_ID
 from gatewayd.links.canopen_node.scalars import (
     EVENT,
     CobId,
@@ -13,8 +14,11 @@ from gatewayd.links.canopen_node.scalars import (
     InhibitTime,
     Members,
     MillisecondTime,
+    RevisionNumber,
+    SerialNumber,
     StatusMembers,
     Transmission,
+    Word32,
 )
 from gatewayd.mapping import syntax
 from gatewayd.mapping.scalars import Duration, Name, Whole, refuse
@@ -45,6 +49,28 @@ def _counter(value: int) -> int:
     if value == 1:
         refuse(syntax.OUT_OF_RANGE, "a SYNC counter that overflows at 1 is reserved", "write 0, or 2 to 240")
     return value
+
+
+class IdentitySpec(Section):
+    """What masters know the node by (1018h), and LSS finds it by."""
+
+    vendor: Word32 = Field(
+        default=VENDOR_ID,
+        description="vendor-ID: one that CiA has assigned to *you*, never another vendor's; 0: none",
+    )
+    product: Word32 = Field(
+        default=PRODUCT_CODE,
+        description="product code; devices that an engineering tool must tell apart need different ones",
+        json_schema_extra={"default": f"0x{PRODUCT_CODE:X}"},
+    )
+    revision: RevisionNumber | None = Field(
+        default=None,
+        description="revision number; auto: it follows the object dictionary; default: the release of gatewayd",
+    )
+    serial: SerialNumber | None = Field(
+        default=None,
+        description="serial number; fingerprint: that of the mapping; default: made of the name of the cell",
+    )
 
 
 class Sync(Section):
@@ -138,6 +164,9 @@ class Canopen(Section):
     autostart: bool = Field(default=False, description="become OPERATIONAL without waiting for an NMT master")
     heartbeat: MillisecondTime = Field(
         default=0.5, description="time between two heartbeats; none: no heartbeat"
+    )
+    identity: IdentitySpec = Field(
+        default=IdentitySpec(), description="identity of the node", json_schema_extra={"default": {}}
     )
     sync: Sync = Field(default=Sync(), description="SYNC", json_schema_extra={"default": {}})
     pdo: PdoDefaults = Field(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, Access, Entry, Object, Pdo, array, record
@@ -37,6 +38,10 @@ def status_word(index: int, subindex: int) -> Mapped | None:
         if subindex and 0 <= chunk < -(-table.words // MAX_ARRAY):
             return Mapped(None, CanType.UNSIGNED16, table.offset + chunk * MAX_ARRAY + subindex - 1)
     return None
+
+
+_LAYOUT: Final = 0
+"""Where the version of the layout is: the only word that never changes."""
 
 
 class StatusObjects:
@@ -76,6 +81,9 @@ class StatusObjects:
 
     def _entry(self, subindex: int, name: str, offset: int, words: int) -> Entry:
         writable = offset in (REQUEST, RELEASE)
+        if offset == _LAYOUT:
+            constant = self._read(offset, words)
+            return Entry(subindex, name, WORD_TYPES[words], Access.CONST, constant, pdo=Pdo.TRANSMIT)
         return Entry(
             subindex,
             name,

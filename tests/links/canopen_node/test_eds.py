@@ -14,7 +14,7 @@ import canopen
 import pytest
 
 from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.dictionary import Access, Dictionary, Entry, ObjectCode, array, variable
+from gatewayd.canopen.dictionary import Access, Dictionary, Entry, ObjectCode, Pdo, array, variable
 from gatewayd.canopen.importer import differences
 from gatewayd.links.canopen_node.eds import Sheet, dcf_text, eds_text, objects_of, sheet_of
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
@@ -104,6 +104,36 @@ def test_device_information(text: str) -> None:
     assert (device.nr_of_RXPDO, device.nr_of_TXPDO) == (4, 4)
     assert device.simple_boot_up_slave is True
     assert device.product_number == 0x4757_4401
+
+
+def test_names_are_those_of_the_cell(text: str) -> None:
+    device = parsed(text)["DeviceInfo"]
+    assert (device["ProductName"], device["OrderCode"]) == ("gatewayd two-buses", "two-buses")
+    assert imported(text)[0x1008].default == "gatewayd two-buses"
+
+
+@pytest.mark.parametrize("pdo, granularity", [(Pdo.TRANSMIT, "1"), (Pdo.NONE, "8")])
+def test_granularity_is_the_smallest_thing_that_can_be_mapped(pdo: Pdo, granularity: str) -> None:
+    bit = Entry(0, "bit", CanType.BOOLEAN, Access.RO, b"\0", pdo=pdo)
+    byte = Entry(0, "byte", CanType.UNSIGNED8, Access.RO, b"\0", pdo=Pdo.TRANSMIT)
+    text = eds_text([variable(0x2000, bit), variable(0x2001, byte)], SHEET)
+    assert parsed(text)["DeviceInfo"]["Granularity"] == granularity
+
+
+def test_what_is_constant_has_its_default_and_what_is_volatile_none(
+    dictionary: Dictionary, text: str
+) -> None:
+    """A default that is not what is read is a fault for whoever compares; 0 may lie below the low limit."""
+    od = imported(text)
+    for item in dictionary:
+        for entry in item.entries:
+            found = od[item.index] if item.code is ObjectCode.VAR else od[item.index][entry.subindex]
+            if entry.is_volatile:
+                assert found.default is None, entry.name
+            elif entry.type.size is not None:
+                assert entry.type.pack(found.default) == entry.read(), entry.name
+                assert found.min is None or found.default >= found.min, entry.name
+    assert od[0x5F00][1].default == 1, "the layout of the status block"
 
 
 def test_every_object_is_listed_once_in_its_part(dictionary: Dictionary, text: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
@@ -67,8 +68,8 @@ def test_nmt_state_as_the_heartbeat_tells_it(plant: Plant, remote: canopen.Remot
 def test_sdo_of_every_kind(plant: Plant, remote: canopen.RemoteNode) -> None:
     plant.power_on()
     plant.take()
-    assert remote.sdo.upload(0x1008, 0) == b"gatewayd"
-    assert remote.sdo.upload(0x1018, 4) == (0xCAFE_F00D).to_bytes(4, "little")
+    assert remote.sdo.upload(0x1008, 0) == b"gatewayd press-3"
+    assert remote.sdo.upload(0x1018, 4) == zlib.crc32(b"press-3").to_bytes(4, "little")
     remote.sdo.download(0x2001, 1, (-5).to_bytes(4, "little", signed=True))
     assert plant.cell.image.values[0] == -5
     with pytest.raises(canopen.SdoAbortedError) as caught:
@@ -109,7 +110,7 @@ def test_lss_finds_a_node_without_node_id_and_gives_it_one(monkeypatch: pytest.M
     lss.send_switch_state_global(lss.WAITING_STATE)
     assert lss.send_switch_state_selective(*address)
     assert lss.inquire_node_id() == UNCONFIGURED
-    assert lss.inquire_lss_address(0x5D) == 0xCAFE_F00D
+    assert lss.inquire_lss_address(0x5D) == zlib.crc32(b"press-3")
     lss.configure_node_id(9)
     lss.configure_bit_timing(2)
     lss.store_configuration()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -16,6 +17,7 @@ from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.heartbeat import Consumer
+from gatewayd.canopen.identity import PRODUCT_CODE, revision
 from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.admission import Change
@@ -29,6 +31,7 @@ from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
 from gatewayd.links.canopen_node.plan import (
     CanopenPlan,
+    IdentityPlan,
     ObjectPlan,
     PdoEntry,
     PdoPlan,
@@ -1379,8 +1382,33 @@ def test_status_flags_are_the_manufacturer_status_register() -> None:
     assert plant.read(0x1002) == plant.read(0x5F00, 2)
 
 
-def test_identity_is_that_of_the_mapping() -> None:
-    assert Plant().power_on().read(0x1018, 4) == 0xCAFE_F00D
+def _identity(declared: IdentityPlan, plan: CanopenPlan = PLAN) -> list[int | None]:
+    plant = Plant(replace(plan, identity=declared)).power_on()
+    numbers = [plant.read(0x1018, number) for number in range(1, 5)]
+    plant.hear(0x7E5, b"\x04\x01" + bytes(6))
+    for number, command in zip(numbers, range(0x5A, 0x5E), strict=True):
+        (answer,) = plant.hear(0x7E5, bytes([command]) + bytes(7))
+        assert int.from_bytes(answer.data[1:5], "little") == number, "LSS finds it by the same"
+    return numbers
+
+
+def test_identity_follows_from_release_and_cell_unless_the_mapping_declares_it() -> None:
+    assert _identity(IdentityPlan()) == [0, PRODUCT_CODE, revision(), zlib.crc32(b"press-3")]
+    assert _identity(IdentityPlan(0x319, 2, 0x0001_0002, 42)) == [0x319, 2, 0x0001_0002, 42]
+    assert _identity(IdentityPlan(serial="fingerprint"))[3] == 0xCAFE_F00D
+
+
+def test_an_automatic_revision_follows_the_dictionary_and_nothing_else() -> None:
+    auto = IdentityPlan(revision="auto")
+    before = _identity(auto)[2]
+    assert _identity(replace(auto, serial=1), replace(PLAN, channel="other"))[2] == before
+    objects = (replace(_OBJECTS[PART], type=CanType.INTEGER16), *_OBJECTS[1:])
+    assert _identity(auto, replace(PLAN, objects=objects, pdos=()))[2] != before
+    assert _identity(auto, replace(PLAN, heartbeat=5))[2] != before
+
+
+def test_device_name_has_the_name_of_the_cell() -> None:
+    assert Plant().node.dictionary.read(0x1008, 0) == b"gatewayd press-3"
 
 
 def test_robot_lost_and_ownership_are_abort_codes() -> None:

@@ -1,8 +1,9 @@
-"""Rules GW407, GW408 and GW426 to GW429: what the cells on one CAN bus share."""
+"""Rules GW407, GW408, GW426 to GW429 and GW436: what the cells on one CAN bus, or in one engineering tool, share."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 from math import ceil
 
 from gatewayd.canopen.cob_ids import Function, is_restricted
@@ -75,6 +76,27 @@ def bit_rate_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagno
                 related = (Related(first.part.at("bitrate"), f"{other.bitrate} bit/s is here"),)
                 hint = "write the bit-rate of the bus in both files"
                 yield rule.at(node.part.at("bitrate"), message, hint=hint, related=related)
+
+
+@plant_rule("GW436", Severity.WARNING)
+def same_device(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
+    """Two cells with different objects that an engineering tool takes for one device."""
+    known: dict[tuple[object, ...], CanopenCell] = {}
+    for node in chain.from_iterable(_nodes(cells)):
+        identity = node.part.spec.identity
+        if identity.revision == "auto":
+            continue
+        key = (identity.vendor, identity.product, identity.revision)
+        first = known.setdefault(key, node)
+        if [placed.plan for placed in node.objects] == [placed.plan for placed in first.objects]:
+            continue
+        message = (
+            f"the data sheets of this cell and of another one describe the same device (product "
+            f"0x{identity.product:X}) with different objects: an engineering tool replaces one by the other"
+        )
+        hint = "write `identity: {product: 2}` with a number of its own for each, or `identity: {revision: auto}`"
+        related = (Related(first.part.at("identity", "product"), "the other cell is here"),)
+        yield rule.at(node.part.at("identity", "product"), message, hint=hint, related=related)
 
 
 @plant_rule("GW429")

@@ -6,6 +6,7 @@ import io
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, cast
 
@@ -13,9 +14,9 @@ import canopen
 import pytest
 
 from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
-from gatewayd.links.canopen_node.eds import eds_text, objects_of, sheet_of
-from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
-from tests.links.canopen_node.conformance.bench import NODE, LinkDevice, compiled
+from gatewayd.links.canopen_node.eds import dcf_text, eds_text, objects_of, sheet_of
+from gatewayd.links.canopen_node.plan import CanopenPlan
+from tests.links.canopen_node.conformance.bench import MAPPING, NODE, LinkDevice, compiled
 
 SECONDS = 5.0
 
@@ -30,15 +31,14 @@ def _network() -> Any:
 class Master:
     """The device, and a network of python-canopen on its bus."""
 
-    def __init__(self, device: LinkDevice) -> None:
+    def __init__(self, device: LinkDevice, text: Callable[..., str] = eds_text) -> None:
+        """`text` makes the file that it knows the device by."""
         self.device = device
         self.network = _network()
         self.network.connect(interface="virtual", channel=device.channel)
-        plan = compiled()
-        assert canopen_of(plan) is not None
-        sheet = io.StringIO(
-            eds_text(objects_of(plan.the(CanopenPlan), plan.cell), sheet_of(plan.the(CanopenPlan), plan.cell))
-        )
+        plan = device.plan
+        node = plan.the(CanopenPlan)
+        sheet = io.StringIO(text(objects_of(node, plan.cell), sheet_of(node, plan.cell)))
         sheet.name = "dut.eds"
         self.node: Any = self.network.add_node(canopen.RemoteNode(NODE, canopen.import_od(sheet, NODE)))
         self.node.sdo.RESPONSE_TIMEOUT = SECONDS
@@ -70,10 +70,9 @@ class Master:
         self.device.do(report)
 
 
-@pytest.fixture
-def master() -> Iterator[Master]:
-    device = LinkDevice()
-    made = Master(device)
+@contextmanager
+def running(device: LinkDevice, text: Callable[..., str] = eds_text) -> Iterator[Master]:
+    made = Master(device, text)
     device.power_on()
     try:
         made.until(lambda: made.boots)
@@ -82,6 +81,30 @@ def master() -> Iterator[Master]:
         made.network.disconnect()
         device.power_off()
         device.close()
+
+
+@pytest.fixture
+def master() -> Iterator[Master]:
+    with running(LinkDevice()) as made:
+        yield made
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        "heartbeat: 1s",
+        "sync: {period: 20ms, counter: 10}",
+        "sync: {producer: true, period: 20ms, counter: 10}",
+        "pdo: {transmission: sync, deadline: 100ms, inhibit: 5ms}, sync: {period: 20ms}",
+    ],
+)
+def test_the_exported_configuration_loads_without_an_abort(settings: str) -> None:
+    """Each writable entry with the value of the file, by index: 1006h, and then 1019h."""
+    plan = compiled(MAPPING.replace("heartbeat: none", settings))
+    with running(LinkDevice(plan), dcf_text) as master:
+        master.node.load_configuration()
+        assert master.node.sdo[0x1006].raw == plan.the(CanopenPlan).sync.period
+        assert master.node.sdo[0x1019].raw == plan.the(CanopenPlan).sync.counter
 
 
 def test_master_commands_every_state_and_hears_it(master: Master) -> None:
@@ -148,11 +171,11 @@ def test_master_remaps_a_pdo(master: Master) -> None:
 
 def test_sdo_of_every_kind(master: Master) -> None:
     sdo = master.node.sdo
-    assert sdo[0x1008].raw == "gatewayd"
+    assert sdo[0x1008].raw == "gatewayd dut"
     sdo[0x2020][1].raw = 1e300
     assert sdo[0x2020][1].raw == 1e300
     with sdo.open(0x1008, mode="rb", block_transfer=True) as file:
-        assert file.read() == b"gatewayd"
+        assert file.read() == b"gatewayd dut"
     with sdo.open(0x2020, 1, mode="wb", block_transfer=True, size=8) as file:
         file.write(bytes.fromhex("000000000000f03f"))
     assert sdo[0x2020][1].raw == 1.0

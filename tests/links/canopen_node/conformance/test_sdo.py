@@ -9,7 +9,7 @@ import pytest
 from tests.links.canopen_node.conformance.bench import NODE, Tester, little
 
 BLOCK_SIZE = 20
-NAME = b"gatewayd"
+NAME = b"gatewayd dut"
 GUARD_TIME, HEARTBEAT = 0x100C, 0x1017
 
 
@@ -114,9 +114,9 @@ def _write_segmented(dut: Tester, index: int) -> None:
 
 
 def test_cct_sdo_16_long_object_read_segmented(dut: Tester) -> None:
-    assert dut.sdo(bytes.fromhex("40081000")) == bytes.fromhex("4108100008000000")
+    assert dut.sdo(bytes.fromhex("40081000")) == bytes.fromhex("410810000C000000")
     assert dut.sdo(b"\x60") == b"\x00" + NAME[:7]
-    assert dut.sdo(b"\x70") == b"\x1d" + NAME[7:].ljust(7, b"\0")
+    assert dut.sdo(b"\x70") == b"\x15" + NAME[7:].ljust(7, b"\0")
 
 
 def test_cct_sdo_17_wrong_toggle_bit(dut: Tester) -> None:
