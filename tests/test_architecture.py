@@ -70,7 +70,7 @@ LAYERS: dict[str, set[str]] = {
     "report.layout": set(),
     "report.printable": set(),
     "report.wording": set(),
-    "logs": {"core", "logs", "loop.lines", "report"},
+    "logs": {"core", "logs", "loop.clock", "loop.lines", "loop.quota", "report"},
     "control": {
         "control",
         "core",
@@ -81,6 +81,7 @@ LAYERS: dict[str, set[str]] = {
         "mapping.plan",
         "report",
         "service.audit",
+        "service.audit_record",
     },
     "control.client": {"control.paths"},
     "control.paths": set(),

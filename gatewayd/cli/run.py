@@ -105,6 +105,7 @@ def command(
     try:
         return main(options)
     finally:
+        logging.shutdown()  # lines that were merged are written before the stream ends
         stream.close()
 
 

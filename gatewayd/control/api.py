@@ -30,7 +30,8 @@ from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.loop.share import LoopShare
 from gatewayd.report.schema import EventMessage, Json, LockStatus, Status, VersionInfo
 from gatewayd.report.verdict import ServedCell
-from gatewayd.service.audit import Audit, Record, utc
+from gatewayd.service.audit import Audit
+from gatewayd.service.audit_record import Record, utc
 
 API_VERSION = 1
 STALE_ACT = 0.5

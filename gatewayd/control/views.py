@@ -32,7 +32,7 @@ from gatewayd.report.schema import (
     WriterStatus,
 )
 from gatewayd.report.verdict import CellVerdict, PicturePart, ServedCell, verdict_of
-from gatewayd.service.audit import Record, plain_value, utc
+from gatewayd.service.audit_record import Record, plain_value, utc
 
 VariableState = tuple[Value, Quality, float, str | None, float | None, tuple[Value, float] | None]
 """Value, quality and age, the owner and its lease, the forced value and its time left; None: there is none."""

@@ -19,6 +19,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Protocol
 
+from gatewayd.logs.merging import MergingHandler
 from gatewayd.report.printable import printable
 
 
@@ -69,12 +70,13 @@ def fields(**values: object) -> dict[str, object]:
 def configure(form: Format = Format.AUTO, level: int = logging.INFO, stream: Stream | None = None) -> None:
     """Send every event of at least `level` to `stream` (default: stderr); replaces what was configured before.
 
-    A stream that went away is no reason to stop: the event is lost, and nothing is raised.
+    A stream that went away is no reason to stop: the event is lost, and nothing is raised. What is the same again and
+    again is merged (`logs.merging`).
     """
     target: Stream = sys.stderr if stream is None else stream
     if form is Format.AUTO:
         form = Format.JOURNAL if _is_journal(target) else Format.TEXT
-    handler = logging.StreamHandler(target)
+    handler = MergingHandler(target)
     handler.setFormatter(_FORMATTERS[form]())
     root = logging.getLogger()
     root.handlers[:] = [handler]

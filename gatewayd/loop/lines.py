@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
+
+from gatewayd.loop import clock
 
 
 class LineThread:
@@ -33,6 +36,7 @@ class LineThread:
         self._gather = gather
         self._retry = retry
         self._waiting: deque[str] = deque()
+        self._writing_since = math.inf
         self._wake = threading.Event()
         self._closing = threading.Event()
         # A daemon thread: one that waits for a reader or a disk for ever must not keep the process from its end.
@@ -46,6 +50,10 @@ class LineThread:
     def closing(self) -> bool:
         """Whether there is no other attempt after this one."""
         return self._closing.is_set()
+
+    def held_up(self, now: float) -> float:
+        """Seconds for which the write under way takes already; 0 if there is none."""
+        return max(0.0, now - self._writing_since)
 
     def put(self, line: str) -> None:
         """Queue a line; the oldest are kept, and this one is dropped, if the queue is full."""
@@ -78,8 +86,12 @@ class LineThread:
         waiting = self._waiting
         while True:
             lines = [waiting[position] for position in range(len(waiting))]  # others append meanwhile
-            if not self._write(lines):
-                return False
+            self._writing_since = clock.now()
+            try:
+                if not self._write(lines):
+                    return False
+            finally:
+                self._writing_since = math.inf
             for _ in lines:
                 waiting.popleft()
             if not waiting:

@@ -3,30 +3,33 @@
 Every accepted write that changes something, every refusal, and whatever happens to locks, fallbacks and forces becomes
 a record. A rewrite of an unchanged value is none: a PLC that writes its whole image at 100 Hz would bury the rest. Of
 a value that one writer keeps changing, the first change is recorded at once, the others of the next `MERGED` seconds
-together. Refusals are merged by the cell itself.
+together. Refusals are merged by the cell itself. What is too much all the same is merged (`service.audit_merging`).
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import math
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
 
 from gatewayd.core.cell import Cell, Written
 from gatewayd.core.definition import Value
 from gatewayd.core.events import Event, EventKind
+from gatewayd.core.history import History
+from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.report.event_text import ACCEPTED, EventRecord
 from gatewayd.report.printable import json_text
+from gatewayd.service.audit_merging import AuditMerging
+from gatewayd.service.audit_record import Record
 
 CAPACITY = 2000
-"""Records kept in memory, of all cells together."""
+"""Last records kept in memory, of all cells together; of each kind older ones are kept beside them (`core.history`)."""
 MERGED = 1.0
 """Seconds for which further changes of a variable by the same writer are counted before they are recorded."""
 KINDS = frozenset(
@@ -44,42 +47,8 @@ KINDS = frozenset(
 """Events that are audited."""
 
 _PERIOD = 0.2
-PlainValue = bool | int | float | str | None
 
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """One thing that was done, or refused."""
-
-    wall: float
-    """Seconds since 1970, UTC."""
-    monotonic: float
-    """Seconds of the gateway's own clock, which no time server moves; equal for all changes of one request."""
-    cell: str
-    event: EventRecord
-    """Of merged changes `old` is of the first, `new` and both times are of the last."""
-
-    def as_json(self) -> dict[str, object]:
-        """Plain values for JSON; what does not apply is left out."""
-        event = self.event
-        found: dict[str, object | None] = {
-            "time": utc(self.wall),
-            "monotonic": round(self.monotonic, 6),
-            "cell": self.cell,
-            "what": event.what,
-            "writer": event.writer,
-            "variable": event.variable,
-            # A variable's lock goes without saying.
-            "lock": event.lock if event.variable is None else None,
-            "old": plain_value(event.old),
-            "new": plain_value(event.new),
-            "times": event.times if event.times > 1 else None,
-            "holder": event.holder,
-            "reason": event.reason,
-            "peer": event.peer,
-            "detail": event.detail or None,
-        }
-        return {name: value for name, value in found.items() if value is not None}
+log = logging.getLogger("gatewayd.audit")
 
 
 class Audit:
@@ -91,9 +60,11 @@ class Audit:
         capacity: int = CAPACITY,
         wall_clock: Callable[[], float] = time.time,
     ) -> None:
-        self._records: deque[Record] = deque(maxlen=capacity)
+        self._records = History[Record](capacity)
+        self._merging = AuditMerging(self._keep)
         self._sink = sink
         self._wall_clock = wall_clock
+        self._flooded: set[tuple[str, str]] = set()
         self._watches: dict[int, _Watch] = {}
 
     def watch(self, cell: Cell) -> None:
@@ -113,6 +84,17 @@ class Audit:
         """Record what was merged long enough. Cheap while nothing was."""
         for watch in self._watches.values():
             watch.tick(now)
+        self._merging.tick(now)
+        flooded = set(self._merging.flooded(now))
+        for cell, writer in sorted(flooded - self._flooded):
+            log.warning("the audit merges records, too many at once", extra=fields(cell=cell, writer=writer))
+        self._flooded = flooded
+
+    @property
+    def troubles(self) -> list[str]:
+        """For whose sake records are merged now."""
+        found = sorted(self._flooded)
+        return [f"{cell}: more audit records of {writer} than are kept one by one" for cell, writer in found]
 
     async def run(self, cells: Callable[[], Iterable[Cell]]) -> None:
         """Keep up with the gateway's cells until cancelled; then record what was merged and is not recorded yet."""
@@ -123,10 +105,14 @@ class Audit:
                 await asyncio.sleep(_PERIOD)
         finally:
             self.follow(())
+            self._merging.tick(math.inf)
 
     def append(self, record: Record) -> None:
-        """Keep the record, and give it to the sink."""
-        self._records.append(record)
+        """Keep the record, and give it to the sink; or merge it with others, if there are too many."""
+        self._merging.add(record)
+
+    def _keep(self, record: Record) -> None:
+        self._records.append((record.cell, record.event.what), record.monotonic, record)
         if self._sink is not None:
             text = json.dumps(record.as_json(), ensure_ascii=False, separators=(",", ":"))
             self._sink(json_text(text))
@@ -231,13 +217,3 @@ class _Watch:
         wall = self._audit.wall(now - series.last if now < math.inf else 0.0)
         self._audit.append(Record(wall, series.last, definition.name, record))
         series.pending = 0
-
-
-def plain_value(value: Value | None) -> PlainValue:
-    """The value for JSON, which has no NaN and no infinity: those are the texts `nan`, `inf` and `-inf`."""
-    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def utc(wall: float) -> str:
-    """`2026-11-22T09:00:00.123Z`."""
-    return datetime.fromtimestamp(wall, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

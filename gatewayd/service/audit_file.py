@@ -1,15 +1,17 @@
 """The audit's file: JSON lines, rotated by size, written by a thread of its own so that no disk ever stops the gateway.
 
-A full disk, a directory without permission, a file that somebody moved away: the gateway serves on. The trouble is
-reported once, lines wait in a bounded queue, writing is tried again, and the file counts what had to be dropped
-meanwhile.
+A full disk, one that hangs, a directory without permission, a file that somebody moved away: the gateway serves on.
+The trouble is reported once, lines wait in a bounded queue, writing is tried again, and the file counts what had to be
+dropped meanwhile.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import os
+import stat
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -26,6 +28,8 @@ QUEUE = 20_000
 """Lines that may wait for the disk."""
 RETRY = 5.0
 """Seconds between two attempts after the file could not be written."""
+HANGS = 5.0
+"""Seconds after which a disk that is still busy with one write hangs."""
 _GATHER = 0.2
 """Seconds for which lines are gathered before they are written together."""
 _MODE = 0o640
@@ -46,13 +50,28 @@ class AuditFile(LineThread):
         """Dropped lines that the file counts already."""
         self._descriptor = -1
         self._size = 0
+        self._reported_hanging = False
         # A directory that is missing is reported at the start, not at the first write of the week.
         self.start()
 
-    @property
-    def trouble(self) -> str:
-        """Why the file cannot be written now; empty while it can."""
-        return self._failure.reason
+    def trouble(self, now: float) -> str:
+        """Why the file cannot be written now, or what of it is missing; empty while all is well."""
+        if self._failure.reason:
+            return self._failure.reason
+        if self.held_up(now) > HANGS:
+            return f"it has taken nothing for more than {HANGS:g} s"
+        return "records are lost, they come faster than it takes them" if self.dropped > self._counted else ""
+
+    def look(self, now: float) -> None:
+        """Report a disk that hangs, once; its thread cannot."""
+        if self.held_up(now) <= HANGS:
+            self._reported_hanging = False
+        elif not self._reported_hanging:
+            self._reported_hanging = True
+            log.error(
+                "cannot write the audit file, serving on",
+                extra=fields(file=str(self.path), reason=self.trouble(now)),
+            )
 
     # -- the thread ----------------------------------------------------------------------------------------------
 
@@ -90,7 +109,11 @@ class AuditFile(LineThread):
             self._let_go()
             self._rotate()
         if self._descriptor < 0:
-            flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
+            with suppress(FileNotFoundError):
+                if stat.S_ISFIFO(self.path.stat().st_mode):
+                    raise OSError(errno.EINVAL, "it is a pipe, which keeps nothing: name a file")
+            # Should it become a pipe just now, nobody waits for its reader.
+            flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NONBLOCK
             self._descriptor = os.open(self.path, flags, _MODE)
             self._size = os.fstat(self._descriptor).st_size
 

@@ -21,6 +21,7 @@ from gatewayd.service.watchdog import Watched
 
 JUST_NOW = 0.1
 """Seconds after the process stood still in which what waited meanwhile is served."""
+_LOOK = 1.0
 
 log = logging.getLogger("gatewayd.operation")
 
@@ -92,6 +93,8 @@ class OperatorAccess:
     async def _run(self) -> None:
         async with asyncio.TaskGroup() as group:
             group.create_task(self.audit.run(lambda: self._daemon.cells))
+            if self._file is not None:
+                group.create_task(self._watch(self._file))
             if self._control is not None:
                 group.create_task(Endpoint(self._control, self.api, self._is_serving, self.reload).run())
 
@@ -99,5 +102,11 @@ class OperatorAccess:
         return all(self._daemon.progress().values())
 
     def _troubles(self) -> list[str]:
-        trouble = self._file.trouble if self._file is not None else ""
-        return [f"the audit file cannot be written: {trouble}"] if trouble else []
+        trouble = self._file.trouble(clock.now()) if self._file is not None else ""
+        of_file = [f"the audit file cannot be written: {trouble}"] if trouble else []
+        return [*of_file, *self.audit.troubles]
+
+    async def _watch(self, file: AuditFile) -> None:
+        while True:
+            file.look(clock.now())
+            await asyncio.sleep(_LOOK)

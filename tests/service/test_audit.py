@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+from collections import Counter
 from itertools import pairwise
 
 import pytest
@@ -14,7 +15,8 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.core.requester import Requester
 from gatewayd.report.event_text import ACCEPTED, EventRecord
-from gatewayd.service.audit import MERGED, Audit, Record, plain_value, utc
+from gatewayd.service.audit import MERGED, Audit
+from gatewayd.service.audit_record import Record
 
 NUMBER, REAL = 0, 1
 PLC, HMI = 0, 1
@@ -170,18 +172,10 @@ def test_the_ring_is_bounded(cell: Cell) -> None:
     audit.watch(cell)
     for value in range(10):
         assert cell.write(Requester(PLC), [Change(NUMBER, value + 1)], value * 10.0) is None
-    assert [record.event.new for record in audit] == [8, 9, 10]
-
-
-@pytest.mark.parametrize("value, plain", [(math.nan, "nan"), (-math.inf, "-inf"), (1.5, 1.5), (True, True)])
-def test_values_are_plain_json(value: float, plain: object) -> None:
-    assert plain_value(value) == plain
-    record = Record(WALL, 1.0, "press", EventRecord(ACCEPTED, new=value))
-    assert json.loads(json.dumps(record.as_json(), allow_nan=False))["new"] == plain
-
-
-def test_times_are_utc() -> None:
-    assert utc(0.0) == "1970-01-01T00:00:00.000Z"
+    assert written(audit)[-3:] == [("plc", 7, 8, 1), ("plc", 8, 9, 1), ("plc", 9, 10, 1)]
+    for value in range(10, 1000):
+        assert cell.write(Requester(PLC), [Change(NUMBER, value + 1)], value * 10.0) is None
+    assert len(list(audit)) < 300
 
 
 def test_following_drops_cells_that_are_gone(cell: Cell, audit: Audit) -> None:
@@ -204,3 +198,57 @@ async def test_it_keeps_up_with_the_gateway_and_tells_the_rest_at_the_end(cell: 
     running.cancel()
     await asyncio.wait((running,))
     assert written(audit) == [("plc", 0, 1, 1), ("plc", 1, 2, 1)]
+
+
+def test_a_lease_that_is_taken_and_ends_again_and_again_leaves_the_evidence(
+    cell: Cell, audit: Audit, lines: list[str]
+) -> None:
+    assert cell.write(Requester(HMI), [Change(REAL, 1.5)], 0.5) is None
+    for turn in range(8 * 3600 // 5):
+        now = 1 + 5.0 * turn
+        assert cell.request(Requester(PLC), NUMBER, now) is None
+        assert cell.release(Requester(PLC), NUMBER, now + 2.0) is None
+        audit.tick(now + 3.0)
+    assert "real" in [record.event.variable for record in audit]
+    assert len(lines) < 3200, "half an hour of them one by one, then few"
+    audit.tick(math.inf)
+    taken = [record.event for record in audit if record.event.what == "lock acquired"]
+    assert max(event.times for event in taken) > 1
+
+
+def test_a_flood_is_merged_and_nothing_of_it_is_lost(cell: Cell, audit: Audit, lines: list[str]) -> None:
+    for turn in range(5000):
+        now = 1 + turn / 500
+        assert cell.write(Requester(HMI), [Change(NUMBER, 2 * turn + 1)], now) is None
+        assert cell.write(Requester(PLC), [Change(NUMBER, 2 * turn + 2)], now) is None
+        assert cell.release(Requester(PLC), NUMBER, now) is None
+        audit.tick(now)
+    assert len(lines) < 300
+    audit.tick(math.inf)
+    counts = Counter[str]()
+    for one in map(json.loads, lines):
+        counts[one["what"]] += one.get("times", 1)
+    assert counts == {
+        "lock acquired": 5000,
+        "write accepted": 10_000,
+        "lock taken over": 5000,
+        "lock released": 5000,
+        "fallback applied": 5000,
+    }
+
+
+def test_a_writer_that_does_too_much_is_a_trouble(
+    cell: Cell, audit: Audit, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gatewayd.service.audit_merging.ALARM", 10.0)
+    for turn in range(2000):
+        assert cell.request(Requester(PLC), NUMBER, 1.0) is None
+        assert cell.release(Requester(PLC), NUMBER, 1.0) is None
+        audit.append(Record(WALL, 1.0, "press", EventRecord(ACCEPTED, "plc", f"v{turn}")))
+    audit.tick(1.0)
+    assert audit.troubles == ["press: more audit records of plc than are kept one by one"]
+    audit.tick(1000.0)
+    audit.tick(1011.0)
+    assert audit.troubles == []
+    (told,) = caplog.records
+    assert told.__dict__["fields"] == {"cell": "press", "writer": "plc"}
