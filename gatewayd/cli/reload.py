@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gatewayd.cli.remote import REFUSED, echo_json, json_option, on_gateway, readable
+from gatewayd.core.objection import MEANINGS, ObjectionKind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from gatewayd.control.client import Client
 
+_KINDS = "\n".join(f"  {kind:<11}{meaning}" for kind, meaning in MEANINGS.items())
 PATIENCE = 60.0
 """Seconds for the answer: many large files take a while on a small machine."""
 
@@ -22,23 +24,34 @@ PATIENCE = 60.0
     epilog="""\b
 Examples:
   gatewayd reload
-  gatewayd reload --force     also change what is owned at this moment
+  gatewayd reload --accept weakening   a longer time-out, wider limits: on purpose
   gatewayd diff /etc/gatewayd/press.yaml new.yaml   before: what it would change
 
 \b
-Refused without --force: a change or removal of a variable that is owned now, a direction that turns round, more than
-30 % of a cell's variables gone, a whole cell gone. With any error in any file the old mapping runs on.
+Kinds of objections, each refused unless it is accepted:
+KINDS
+With any error in any file the old mapping runs on.
 Exit codes:
   0  what runs now is what the files say
   1  refused, or a file has errors: the old mapping runs on, the reasons are printed
   2  wrong usage, or no gateway could be reached
-""",
+""".replace("KINDS", _KINDS),
 )
-@click.option("--force", is_flag=True, help="Apply it although it touches what is owned now.")
+@click.option(
+    "--accept",
+    "kinds",
+    multiple=True,
+    type=click.Choice([kind.value for kind in ObjectionKind]),
+    metavar="KIND",
+    help="Apply it in spite of objections of this kind; can be given more than once.",
+)
+@click.option("--force", is_flag=True, help="Apply it whatever stands against it: accept all kinds.")
 @on_gateway
 @json_option
 @click.pass_context
-def command(context: click.Context, client: Client, *, force: bool, as_json: bool) -> None:
+def command(
+    context: click.Context, client: Client, *, kinds: tuple[str, ...], force: bool, as_json: bool
+) -> None:
     """Have the running gateway read, check and compare its mapping files again, and serve them if that is safe.
 
     Links whose settings did not change stay up; owners and values of variables that did not change stay as they are.
@@ -47,7 +60,7 @@ def command(context: click.Context, client: Client, *, force: bool, as_json: boo
 
     answer: Mapping[str, Any]
     try:
-        answer = client.post("/v1/reload", {"force": force}, patience=PATIENCE)
+        answer = client.post("/v1/reload", {"force": force, "accept": list(kinds)}, patience=PATIENCE)
     except ControlError as error:
         if "result" not in error.body:
             raise
@@ -69,7 +82,11 @@ def _lines(answer: Mapping[str, Any]) -> list[str]:
     if result == "applied":
         lines = [f"reloaded in {answer.get('swap_ms', 0):.1f} ms"]
     elif result == "refused":
-        lines = ["refused, the old mapping runs on; --force applies it all the same:"]
+        lines = ["refused, the old mapping runs on:"]
     else:
         lines = ["failed, the old mapping runs on:"]
-    return [*lines, *(f"  {line}" for line in (*reasons, *answer.get("details", ())))]
+    kinds = [each["kind"] for each in answer.get("objections", ())] if result == "refused" else []
+    remedies = [f"--accept {kind}: {MEANINGS[kind]}" for kind in ObjectionKind if kind in kinds]
+    if len(remedies) > 1:
+        remedies.append("--force: all of this")
+    return [*lines, *(f"  {line}" for line in (*reasons, *remedies, *answer.get("details", ())))]

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gatewayd.control.api import Api
+from gatewayd.core.objection import ObjectionKind
 from gatewayd.logs.records import fields
 from gatewayd.loop.retry import reason_of, until_done
 
@@ -46,8 +47,8 @@ class Reloaded(Protocol):
         """What whoever asked for it reads."""
 
 
-Reload = Callable[[bool], Awaitable[Reloaded]]
-"""Reload the mapping files; True: also what would be refused as unsafe."""
+Reload = Callable[[frozenset[ObjectionKind]], Awaitable[Reloaded]]
+"""Reload the mapping files; objections of these kinds are none."""
 
 
 class Endpoint:

@@ -19,6 +19,7 @@ from aiohttp.typedefs import Middleware
 
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
+from gatewayd.core.objection import ObjectionKind
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.loop.share import Busy, LoopShare, in_one_step
@@ -141,15 +142,17 @@ class _Routes:
 
     async def reload(self, request: web.Request) -> web.StreamResponse:
         self._api.refuse_what_waited()
-        force = (await _body(request)).get("force", False)
+        body = await _body(request)
+        force, accept = body.get("force", False), _accepted(body.get("accept", []))
         if not isinstance(force, bool):
             raise ApiError(400, "bad_request", "`force` must be true or false")
         if self._reload is None:
             raise ApiError(501, "no_reload", "this gateway cannot reload: restart it")
         who = await _who(request)
         self._api.refuse_what_waited()
-        log.info("reload asked for", extra=fields(detail=who, force=force))
-        result = await self._reload(force)
+        kinds = ",".join(sorted(accept)) or None
+        log.info("reload asked for", extra=fields(detail=who, force=force, accept=kinds))
+        result = await self._reload(frozenset(ObjectionKind) if force else accept)
         return _json(dict(result.as_object()), 409 if result.exit_code else 200)
 
     async def events(self, request: web.Request) -> web.StreamResponse:
@@ -197,6 +200,12 @@ class _Routes:
                 if self._api.has_news(cursor, request.query):
                     lines = await self._api.share.done(asker(request), news())
         return response
+
+
+def _accepted(kinds: object) -> frozenset[ObjectionKind]:
+    if isinstance(kinds, list) and all(kind in list(ObjectionKind) for kind in kinds):
+        return frozenset(map(ObjectionKind, kinds))
+    raise ApiError(400, "bad_request", f"`accept` must be a list of {', '.join(ObjectionKind)}")
 
 
 _HTTP_ERRORS = {

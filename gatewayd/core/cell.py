@@ -7,6 +7,7 @@ Links call it; it calls its `listeners` after values or qualities changed. Every
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -185,6 +186,19 @@ class Cell:
         `at_once`: it is not a connection that ended, the writer itself is known to be gone. There is no grace then.
         """
         self._locking.disconnected(requester, now, reason, at_once=at_once)
+
+    def following(self, requesters: Collection[Requester]) -> set[int]:
+        """The locks that would end at once with all these connections."""
+        found: set[int] = set()
+        ending = Counter(requester.writer for requester in requesters)
+        for requester in requesters:
+            writer = requester.writer
+            if writer is None:
+                continue
+            whole = self.writers.alive[writer] and ending[writer] >= self.writers.connections[writer]
+            held = self.ownership.held_by(writer)
+            found.update(held if whole else self.ownership.held_through(writer, requester.connection))
+        return found
 
     def holds(self, connection: int) -> bool:
         """Whether some lock follows this connection."""
@@ -367,19 +381,20 @@ class Cell:
     def succeed(self, former: Cell, match: Match, now: float) -> None:
         """Go on where `former` stands, which must not be used for anything afterwards."""
         former.forcing.lift()
-        self.image.succeed(former.image, match.variables)
+        self.image.succeed(former.image, match.values)
         self.ownership.succeed(former.ownership, match.locks, match.writers, now)
-        self.writers.succeed(former.writers, match.writers)
+        self.writers.succeed(former.writers, match.writers, now)
         self.freshness.succeed(former.freshness)
-        self.lag.succeed(former.lag)
+        if match.same_robot:
+            self.lag.succeed(former.lag)
+            self.adoption.succeed(former.adoption)
         self.health = replace(former.health, words={})
         self.events.succeed(former.events, match)
         last = former.last_refusal
         self.last_refusal = last.translated(match) if last is not None else None
         self._refusals.succeed(former._refusals, match)
-        self.forcing.succeed(former.forcing, match.variables, match.locks)
-        self.adoption.succeed(former.adoption)
-        self.delivery.succeed(former.delivery, self.health, match.variables, match.due)
+        self.forcing.succeed(former.forcing, match.values, match.locks)
+        self.delivery.succeed(former.delivery, self.health, match.values, match.due)
         self._next_heartbeat = former._next_heartbeat
 
     # -- inside --------------------------------------------------------------------------------------------------

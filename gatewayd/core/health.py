@@ -38,5 +38,7 @@ class Health:
     watchdog_fed: bool = False
     writes_accepted: int = 0
     writes_refused: int = 0
+    lock_requests: int = 0
+    """Requests for a lock, or for its release, by the number of a variable."""
     words: dict[str, int] = field(default_factory=dict)
     """Numbers of the status block that links report, by name (`LinkKind.status_fields`)."""

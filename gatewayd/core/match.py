@@ -1,7 +1,8 @@
 """What of a cell's definition goes on in a new one.
 
 A variable does if it has the same name and the same place in the robot, a writer by its name, a lock if it has the same
-members.
+members. With another robot nobody keeps a lock, and what the present one holds ends here: a command is meant for the
+robot that it was given to.
 """
 
 from __future__ import annotations
@@ -14,13 +15,16 @@ from gatewayd.core.definition import OPERATOR, CellDefinition, Direction, Lock, 
 class Match:
     """Indices of what goes on from one definition to the next: old -> new."""
 
-    def __init__(self, old: CellDefinition, new: CellDefinition) -> None:
+    def __init__(self, old: CellDefinition, new: CellDefinition, *, same_robot: bool = True) -> None:
+        self.same_robot = same_robot
         variables = {_identity(variable): index for index, variable in enumerate(new.variables)}
         self.variables = {
             index: variables[_identity(variable)]
             for index, variable in enumerate(old.variables)
             if _identity(variable) in variables
         }
+        self.values = self.variables if same_robot else {}
+        """Those of them whose values go on."""
         writers = {writer.name: index for index, writer in enumerate(new.writers)}
         self.writers = {
             index: writers[writer.name] for index, writer in enumerate(old.writers) if writer.name in writers
@@ -46,13 +50,15 @@ class Match:
     def may_keep(self, lock: int, owner: int) -> bool:
         """Whether the owner of an old lock may go on owning it."""
         successor = self.locks.get(lock)
-        return successor is not None and (
-            owner == OPERATOR or self.writers.get(owner) in self.new.locks[successor].owners
+        return (
+            self.same_robot
+            and successor is not None
+            and (owner == OPERATOR or self.writers.get(owner) in self.new.locks[successor].owners)
         )
 
     def due(self, variables: set[int]) -> Iterator[int]:
         """New indices of those inputs; what owes its register a fallback owes it under another name too."""
-        for index in variables:
+        for index in variables if self.same_robot else ():
             successor = self.variables.get(index, self.places.get(_place(self.old.variables[index])))
             if successor is not None:
                 yield successor
@@ -60,14 +66,15 @@ class Match:
     def force_goes_on(self, variable: int) -> bool:
         """Whether what the local operator forces stays forced."""
         lock = self.old.variables[variable].lock
-        return variable in self.variables and (lock is None or lock in self.locks)
+        return self.same_robot and variable in self.variables and (lock is None or lock in self.locks)
 
     def inputs_without_successor(self) -> list[int]:
-        """Inputs whose register nobody would write any more, so that nobody could ever clear it."""
+        """Inputs whose register in this robot nobody would write any more, so that nobody could ever clear it."""
         return [
             index
             for index, variable in enumerate(self.old.variables)
-            if variable.direction is Direction.INPUT and _place(variable) not in self.places
+            if variable.direction is Direction.INPUT
+            and not (self.same_robot and _place(variable) in self.places)
         ]
 
 

@@ -95,6 +95,7 @@ class StatusBlock:
             return None
         if len(wanted) > 1 or number > len(cell.definition.variables):
             return self._refuse(requester, Refusal(Reason.OUT_OF_LIMITS), now)
+        cell.health.lock_requests += 1
         act = cell.request if offset == REQUEST else cell.release
         return act(requester, number - 1, now)
 

@@ -117,8 +117,11 @@ class WriterTable:
         length = now - since
         return now + self.writers[writer].grace if length > self._patience[writer] else end + length
 
-    def succeed(self, former: WriterTable, writers: Mapping[int, int]) -> None:
-        """Go on with the life of the former table's writers; `writers`: its indices to those here."""
+    def succeed(self, former: WriterTable, writers: Mapping[int, int], now: float) -> None:
+        """Go on with the life of the former table's writers; `writers`: its indices to those here.
+
+        Supervision by another rule begins anew: nobody had to keep it before.
+        """
         for source, target in writers.items():
             if source == OPERATOR:
                 continue
@@ -126,5 +129,9 @@ class WriterTable:
             self.connections[target] = former.connections[source]
             self.last_seen[target] = former.last_seen[source]
             self.ends[target] = former.ends[source]
-            self._excused[target] = former._excused[source]
+            same = self._rule(target) == former._rule(source)
+            self._excused[target] = former._excused[source] if same else now
         self._next_end = min(self.ends, default=math.inf)
+
+    def _rule(self, writer: int) -> tuple[float, bool]:
+        return self._timeouts[writer], self._counts_writes[writer]

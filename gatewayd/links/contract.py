@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     # A check, which has no use for a running cell, imports this module.
     from gatewayd.core.cell import Cell
     from gatewayd.core.definition import CellDefinition
+    from gatewayd.core.objection import Objection
+    from gatewayd.core.requester import Requester
     from gatewayd.core.status_layout import StatusField
     from gatewayd.mapping.plan import LinkPlan, Plan
 
@@ -113,20 +115,23 @@ class LinkKind:
         raise NotImplementedError
 
     def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
-        """Whether a running link can go on with another plan (`Link.rebind`). Asked before anything moves."""
+        """Whether a running link can go on with another plan (`Link.rebind`). Asked before anything moves.
+
+        `old` is what the link works with (`Link.plan`), which may be more than the mapping asks for.
+        """
         return False
 
-    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
-        """Facts among its settings by whose change owners would lose their connection, or find another robot.
+    def moved(self, old: LinkPlan, new: LinkPlan) -> bool:
+        """Of the link that brings the values: whether it would have another robot.
 
-        A link that is to be removed is asked with its present plan as both.
+        What the present one was given ends then, and nobody commands the other before it was asked to.
         """
-        return ()
+        return False
 
     def disturbs(
         self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
-    ) -> Iterable[str]:
-        """What else must not happen unasked, in words."""
+    ) -> Iterable[Objection]:
+        """What else must not happen unasked. Owners that would lose their way are not its matter: `Link.departing`."""
         return ()
 
 
@@ -164,6 +169,8 @@ class Link:
 
     title: ClassVar[str]
     """In the log, before the name of the cell: `robot link`."""
+    plan: LinkPlan
+    """What it works with."""
 
     @property
     def progress(self) -> int | None:
@@ -189,8 +196,15 @@ class Link:
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`; called before anything that waited is served."""
 
-    def release(self, now: float) -> None:
-        """It will not go on: writers that it alone knows are lost, in the old cell, before there is a new one."""
+    def departing(self, plan: LinkPlan | None, after: CellDefinition) -> Mapping[Requester, str]:
+        """Who writes by it now and would not be the same writer any more if it went on with `plan`, and why.
+
+        `after`: the cell of that plan; None: the link ends. Changes nothing: it is asked for objections.
+        """
+        return {}
+
+    def release(self, plan: LinkPlan | None, after: CellDefinition, now: float) -> None:
+        """These are lost at once, in the old cell, before there is a new one: nobody inherits what they own."""
 
     def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
         """Go on with another plan and the successor of the cell; only where `LinkKind.fits` said so."""

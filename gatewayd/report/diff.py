@@ -7,20 +7,19 @@ the same place in the robot (`gatewayd.core.succession`).
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from enum import Enum
 from itertools import groupby
 
-from gatewayd.core.definition import Lock
+from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.links.contract import Names
-from gatewayd.links.registry import kind_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.report import facts
 from gatewayd.report.facts import Facts
 from gatewayd.report.printable import json_document, printable
 from gatewayd.report.weakening import weakened
-from gatewayd.report.wording import family, names_and_more
+from gatewayd.report.wording import family
 
 MAX_GONE = 0.3
 """Part of the variables that may disappear unasked: more looks like the wrong file."""
@@ -155,35 +154,38 @@ def _details(old: Facts, new: Facts) -> Iterator[Detail]:
 # -- what must not happen unasked -------------------------------------------------------------------
 
 
-def objections(changes: Changes, owned: Collection[str]) -> tuple[str, ...]:
-    """Why the new mapping must not replace the running one unasked; `owned`: variables that are owned at this moment.
+def objections(
+    changes: Changes, kept: Collection[str], *, numbers_used: bool = False
+) -> tuple[Objection, ...]:
+    """Why the new mapping must not replace the running one unasked, as far as the two of them tell it.
 
-    A machine may be moving by what it owns, a direction that turns round makes a reader a writer, a promise that is
-    weakened is one that others rely on, and a file that lost many variables is most often the wrong one.
+    `kept`: variables that are owned at this moment and stay so; what owners would lose, the running cell knows.
+    `numbers_used`: locks were requested by number. A machine may be moving by what is owned, a direction that turns
+    round makes a reader a writer, a promise that is weakened is one that others rely on, and a file that lost many
+    variables is most often the wrong one.
     """
     found = [
-        *_touches_owned(changes, owned),
-        *_turns_round(changes),
-        *_cuts_owners_off(changes, owned),
-        *_disturbed(changes),
-        *weakened(changes.old.cell, changes.new.cell),
+        *(Objection(ObjectionKind.OWNED, text) for text in _touches_owned(changes, kept)),
+        *(Objection(ObjectionKind.DIRECTION, text) for text in _turns_round(changes)),
+        *(Objection(ObjectionKind.WEAKENING, text) for text in weakened(changes.old.cell, changes.new.cell)),
+        *(Objection(ObjectionKind.NUMBERS, text) for text in _means_others(changes) if numbers_used),
     ]
     gone, before = len(changes.of(ChangeKind.REMOVED)), len(changes.old.cell.variables)
     if gone > MAX_GONE * before:
-        found.append(f"{gone} of {before} variables would be gone: is it the right file?")
+        found.append(
+            Objection(
+                ObjectionKind.GONE, f"{gone} of {before} variables would be gone: is it the right file?"
+            )
+        )
     return tuple(found)
 
 
-def _touches_owned(changes: Changes, owned: Collection[str]) -> Iterator[str]:
+def _touches_owned(changes: Changes, kept: Collection[str]) -> Iterator[str]:
     for difference in changes.variables:
-        if difference.name not in owned:
-            continue
-        if difference.kind is ChangeKind.REMOVED:
-            yield f"`{difference.name}` is owned now and would be removed"
-        elif difference.detail("direction") is None and not all(map(_is_harmless, difference.details)):
+        if difference.name in kept and not all(map(_is_harmless, difference.details)):
             yield f"`{difference.name}` is owned now and would change: {_changed(difference.details)}"
     for difference in changes.groups:
-        for name in sorted(_members(changes.old, difference.name).intersection(owned))[:1]:
+        for name in sorted(_members(changes.old, difference.name).intersection(kept))[:1]:
             yield (
                 f"`{name}` of the group `{difference.name}` is owned now, and the group would change: "
                 f"{_changed(difference.details)}"
@@ -204,57 +206,19 @@ def _turns_round(changes: Changes) -> Iterator[str]:
             yield f"`{difference.name}` would turn from {turned.old} to {turned.new}"
 
 
-def _cuts_owners_off(changes: Changes, owned: Collection[str]) -> Iterator[str]:
-    """Changes of a link or writer by which the present owners would lose their connection, or find another robot."""
-    if not owned:
-        return
-    whose = _are(sorted(owned))
-    for link in changes.links:
-        moved = [detail for what in _moved(changes, link.name) if (detail := link.detail(what)) is not None]
-        if moved:
-            yield f"{link.name} would move while {whose} owned: {_changed(moved)}"
-    for writer in changes.writers:
-        if writer.kind is ChangeKind.ADDED or not any(writer.detail(name) for name in changes.old.links):
-            continue
-        held = sorted(_may_own(changes.old, writer.name).intersection(owned))
-        if held:
-            change = _changed(writer.details)
-            yield f"writer `{writer.name}` would change while {_are(held)} owned: {change}"
-
-
-def _moved(changes: Changes, link: str) -> Iterable[str]:
-    old, new = changes.old.links.get(link), changes.new.links.get(link)
-    if old is None:
-        return ()
-    return kind_of(old.kind).moved(old, new if new is not None and new.kind == old.kind else old)
-
-
-def _disturbed(changes: Changes) -> Iterator[str]:
-    """What the links object to themselves."""
-    old, new = changes.old, changes.new
-    for name, link in old.links.items():
-        successor = new.links.get(name)
-        if successor is not None and successor.kind == link.kind:
-            yield from kind_of(link.kind).disturbs(link, successor, old.cell, new.cell)
-
-
-def _guarded(plan: Plan, locks: Iterable[Lock]) -> set[str]:
-    return {plan.cell.variables[index].name for lock in locks for index in lock.members}
+def _means_others(changes: Changes) -> Iterator[str]:
+    """Numbers that stand for another variable; one that stands for none is refused, and harms nobody."""
+    pairs = zip(changes.old.cell.variables, changes.new.cell.variables, strict=False)
+    moved = [(old, new) for old, new in pairs if old.name != new.name]
+    if moved:
+        (old, new), count = moved[0], len(moved)
+        more = f" (and {count - 1} more)" if count > 1 else ""
+        yield f"a request for lock {old.number} would mean `{new.name}` instead of `{old.name}`{more}"
 
 
 def _members(plan: Plan, group: str) -> set[str]:
-    return _guarded(plan, (lock for lock in plan.cell.locks if lock.name == group))
-
-
-def _may_own(plan: Plan, writer: str) -> set[str]:
-    writers = [known.name for known in plan.cell.writers]
-    index = writers.index(writer)
-    return _guarded(plan, (lock for lock in plan.cell.locks if index in lock.owners))
-
-
-def _are(names: Sequence[str]) -> str:
-    """`a` is; `a`, `b` and 3 more are."""
-    return f"{names_and_more(names)} {'is' if len(names) == 1 else 'are'}"
+    locks = (lock for lock in plan.cell.locks if lock.name == group)
+    return {plan.cell.variables[index].name for lock in locks for index in lock.members}
 
 
 # -- for people and programs -------------------------------------------------------------------

@@ -1,15 +1,17 @@
 """Which promises of a running mapping a new one would weaken: supervision, limits, owners.
 
 A promise is what the rest of the machine was built on. A reload may strengthen it at any time; a weaker one needs
-somebody who says so (`gatewayd reload --force`). What every writer may own (`any`) promises nobody to be the only one.
+somebody who says so (`gatewayd reload --accept weakening`). What every writer may own (`any`) promises nobody to be the
+only one.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import combinations
 
-from gatewayd.core.definition import CellDefinition, Direction, Lock, Variable, Writer
+from gatewayd.core.definition import CellDefinition, Direction, FallbackKind, Lock, Variable, Writer
 
 
 def weakened(old: CellDefinition, new: CellDefinition) -> Iterator[str]:
@@ -20,11 +22,18 @@ def weakened(old: CellDefinition, new: CellDefinition) -> Iterator[str]:
             yield from _supervision(writer, writers[writer.name])
     if _endless(new.adopt_for) > _endless(old.adopt_for):
         yield f"adopted values would be kept longer: adopt_for {_seconds(old.adopt_for)} -> {_seconds(new.adopt_for)}"
+    if new.stale_after > old.stale_after:
+        yield f"values would be stale later: stale_after {old.stale_after:g} s -> {new.stale_after:g} s"
+    if old.clear_on_connect and not new.clear_on_connect:
+        yield "inputs without an owner would keep what the controller holds: on_connect adopt"
     yield from _locks(old, new)
     variables = {variable.name: variable for variable in new.variables}
     for variable in old.variables:
         successor = variables.get(variable.name)
-        if successor is not None and variable.direction is successor.direction is Direction.INPUT:
+        if successor is None or variable.direction is not successor.direction:
+            continue
+        yield from _fallbacks(variable, successor)
+        if variable.direction is Direction.INPUT:
             yield from _limits(variable, successor)
             yield from _owners(variable, successor, old, new)
 
@@ -54,6 +63,36 @@ def _locks(old: CellDefinition, new: CellDefinition) -> Iterator[str]:
             yield f"`{lock.name}` would be kept longer for a silent owner: lease {before} -> {_seconds(after.lease)}"
         if lock.whole and not after.whole:
             yield f"`{lock.name}` could be taken over in part"
+    for lock in old.locks:
+        after = locks.get(lock.name)
+        if after is not None:
+            yield from _priority(lock, _outranks(lock, old), _outranks(after, new), _names(after, new))
+
+
+def _priority(
+    lock: Lock, before: set[tuple[str, str]], after: set[tuple[str, str]], owners: list[str]
+) -> Iterator[str]:
+    lost = sorted(pair for pair in before - after if set(pair) <= set(owners))
+    if lost:
+        higher, lower = lost[0]
+        yield f"`{higher}` could no longer take `{lock.name}` over from `{lower}`"
+
+
+def _outranks(lock: Lock, definition: CellDefinition) -> set[tuple[str, str]]:
+    """Pairs of writers of which the first may take the lock over from the second."""
+    names = _names(lock, definition) if lock.takeover else []
+    return set(combinations(names, 2))
+
+
+def _fallbacks(old: Variable, new: Variable) -> Iterator[str]:
+    for what, before, after in (
+        ("on_release", old.on_release, new.on_release),
+        ("on_stale", old.on_stale, new.on_stale),
+    ):
+        if after.kind is FallbackKind.HOLD and before.kind is not FallbackKind.HOLD:
+            yield f"`{old.name}` would hold its value: {what} hold"
+    if old.valid_running and not new.valid_running:
+        yield f"`{old.name}` would be good while the robot program does not run: valid"
 
 
 def _limits(old: Variable, new: Variable) -> Iterator[str]:
@@ -63,6 +102,8 @@ def _limits(old: Variable, new: Variable) -> Iterator[str]:
     if low < old.limits.low or high > old.limits.high:
         after = "none" if new.limits is None else f"{low:g}..{high:g}"
         yield f"`{old.name}` could be written beyond its limits: {old.limits.low:g}..{old.limits.high:g} -> {after}"
+    elif new.limits is not None and new.limits.clamp and not old.limits.clamp:
+        yield f"`{old.name}` would be brought to its limits where it is refused today: clamp"
 
 
 def _owners(old: Variable, new: Variable, before: CellDefinition, after: CellDefinition) -> Iterator[str]:

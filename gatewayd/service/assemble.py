@@ -52,7 +52,7 @@ async def _serve(daemon: Daemon, found: Startup, options: Options) -> None:
         control,
         options.audit,
         lambda: reporter.notes,
-        lambda force: reloader.reload(force=force),
+        lambda accept: reloader.reload(accept=accept),
         stood_still=standstill.seconds,
     )
     reporting = asyncio.create_task(reporter.run(stop))

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition
-from gatewayd.core.succession import Succession, succeed
+from gatewayd.core.match import Match
+from gatewayd.core.succession import Succession, left_behind, losing, succeed
 from gatewayd.links.contract import Context, Link, SharedPart, SourceLink
 from gatewayd.links.registry import kind_of, runtime_of
 from gatewayd.logs.events import EventLog
-from gatewayd.mapping.plan import Plan
+from gatewayd.mapping.plan import LinkPlan, Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Losses:
+    """What a reload would take from owners and leave in the robot."""
+
+    locks: Mapping[int, str]
+    """Locks that would be released, and why."""
+    forces: Sequence[int]
+    """Variables whose force would end."""
+    left: Sequence[int]
+    """Inputs of which the robot would keep a value that nobody could clear any more."""
 
 
 class CellRuntime:
@@ -53,14 +66,27 @@ class CellRuntime:
         for link in self.links.values():
             link.gap(since, now)
 
+    def losses(self, plan: Plan | None) -> Losses:
+        """What `succeed`, or `retire` for None, would take and leave now. Changes nothing."""
+        after = plan.cell if plan is not None else self._nothing
+        match = Match(self.cell.definition, after, same_robot=self._same_robot(plan))
+        why = "not the same in the new mapping" if match.same_robot else "its robot would be another one"
+        locks = dict.fromkeys(losing(self.cell, match), why)
+        for name, link in self.links.items():
+            departing = link.departing(self._next(name, plan), after)
+            for lock in self.cell.following(departing):
+                owner, connection = self.cell.ownership.owners[lock], self.cell.ownership.connections[lock]
+                reasons = {who.connection: why for who, why in departing.items() if who.writer == owner}
+                locks.setdefault(lock, reasons.get(connection) or next(iter(reasons.values())))
+        forces = [index for index in self.cell.forcing.forces if not match.force_goes_on(index)]
+        return Losses(locks, forces, tuple(left_behind(self.cell, match)))
+
     def succeed(self, plan: Plan, now: float) -> tuple[str, ...]:
         """Go on with another plan, by the same links where that can be; names of inputs left as they were."""
-        before, former = self.plan, self.links
-        staying = {name for name in plan.links if name in former and _fits(name, before, plan)}
-        for name, link in former.items():
-            if name not in staying:
-                link.release(now)
-        succession = self._hand_over(plan.cell, now)
+        former, same_robot = self.links, self._same_robot(plan)
+        staying = {name for name in former if self._next(name, plan) is not None}
+        self._release(plan, plan.cell, now)
+        succession = self._hand_over(plan.cell, now, same_robot=same_robot)
         self.plan, self.links = plan, {}
         self.cell = self._set_up(succession.cell)
         for name, link_plan in plan.links.items():
@@ -73,12 +99,36 @@ class CellRuntime:
 
     def retire(self, now: float) -> tuple[str, ...]:
         """Release everything for good; names of inputs left as they were."""
-        return self._hand_over(replace(self.plan.cell, variables=(), locks=(), writers=()), now).stranded
+        self._release(None, self._nothing, now)
+        return self._hand_over(self._nothing, now, same_robot=True).stranded
 
-    def _hand_over(self, definition: CellDefinition, now: float) -> Succession:
+    @property
+    def _nothing(self) -> CellDefinition:
+        return replace(self.plan.cell, variables=(), locks=(), writers=())
+
+    def _same_robot(self, plan: Plan | None) -> bool:
+        return plan is None or not any(
+            kind_of(old.kind).moved(old, new) for old, new in self._pairs(plan) if old.kind == new.kind
+        )
+
+    def _pairs(self, plan: Plan) -> Iterator[tuple[LinkPlan, LinkPlan]]:
+        return ((old, plan.links[name]) for name, old in self.plan.links.items() if name in plan.links)
+
+    def _next(self, name: str, plan: Plan | None) -> LinkPlan | None:
+        """The plan with which the link of this name goes on; None: it ends."""
+        old, new = self.links[name].plan, plan.links.get(name) if plan is not None else None
+        if plan is None or new is None or new.kind != old.kind:
+            return None
+        return new if kind_of(new.kind).fits(old, new, self.plan.cell, plan.cell) else None
+
+    def _release(self, plan: Plan | None, after: CellDefinition, now: float) -> None:
+        for name, link in self.links.items():
+            link.release(self._next(name, plan), after, now)
+
+    def _hand_over(self, definition: CellDefinition, now: float, *, same_robot: bool) -> Succession:
         """End the cell: links send what falls due by that, and nobody listens to it any more."""
         former = self.cell
-        succession = succeed(former, definition, now)
+        succession = succeed(former, definition, now, same_robot=same_robot)
         for link in self.links.values():
             link.flush(now)
         former.listeners.clear()
@@ -94,8 +144,3 @@ class CellRuntime:
         plan = self.plan.links[name]
         context = Context(now, self._state, self._shared(plan.kind), former)
         return runtime_of(plan.kind).make(plan, self.cell, context)
-
-
-def _fits(name: str, before: Plan, after: Plan) -> bool:
-    old, new = before.links[name], after.links[name]
-    return old.kind == new.kind and kind_of(new.kind).fits(old, new, before.cell, after.cell)

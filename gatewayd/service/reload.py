@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
-from gatewayd.core.cell import Cell
+from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.links.contract import PrepareError
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
@@ -21,9 +21,10 @@ from gatewayd.loop.retry import reason_of
 from gatewayd.mapping.compiled import Compiled
 from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.plan import Plan
-from gatewayd.report.diff import Changes, as_text, compare, objections
+from gatewayd.report.diff import Changes, as_text, compare
 from gatewayd.service.compilation import Compilation, CompilationError
 from gatewayd.service.daemon import Daemon
+from gatewayd.service.objections import objections_of_change, objections_of_removal
 from gatewayd.service.startup import log_findings, mapping_files
 
 SETTLING_TIME = 0.5
@@ -41,7 +42,7 @@ class Result(Enum):
     UNCHANGED = "unchanged"
     """The files mean what is running already."""
     REFUSED = "refused"
-    """Unsafe now, and not forced."""
+    """Unsafe now, and not accepted."""
     FAILED = "failed"
     """A file has errors or cannot be read, something shared cannot be had, or a defect."""
 
@@ -49,6 +50,23 @@ class Result(Enum):
     def is_good(self) -> bool:
         """Whether what runs now is what the files say."""
         return self in (Result.APPLIED, Result.UNCHANGED)
+
+
+@dataclass(frozen=True, slots=True)
+class CellObjection:
+    """What stands against it in one cell."""
+
+    cell: str
+    objection: Objection
+
+    @property
+    def text(self) -> str:
+        """With the kind by which it is accepted."""
+        return f"{self.cell}: {self.objection.text} [{self.objection.kind}]"
+
+    def as_object(self) -> dict[str, str]:
+        """For JSON."""
+        return {"cell": self.cell, "kind": self.objection.kind.value, "text": self.objection.text}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +82,8 @@ class ReloadOutcome:
     """Seconds that the swap itself took."""
     details: tuple[str, ...] = ()
     """The changes one by one, as `gatewayd diff` shows them."""
+    objections: tuple[CellObjection, ...] = ()
+    """What stands against it; of an applied one, what was accepted."""
 
     @property
     def text(self) -> str:
@@ -78,8 +98,15 @@ class ReloadOutcome:
             case Result.APPLIED:
                 return f"reloaded: {changes}" + (f" (but {reasons})" if reasons else "")
             case Result.REFUSED:
-                return f"reload refused, the old mapping runs on: {reasons} (gatewayd reload --force does it)"
+                accept = "".join(f" --accept {kind}" for kind in self.kinds)
+                return f"reload refused, the old mapping runs on: {reasons} (gatewayd reload{accept} does it)"
         return f"reload failed, the old mapping runs on: {reasons}"
+
+    @property
+    def kinds(self) -> tuple[ObjectionKind, ...]:
+        """The kinds of its objections, in the order of their table."""
+        found = {each.objection.kind for each in self.objections}
+        return tuple(kind for kind in ObjectionKind if kind in found)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -92,12 +119,13 @@ class ReloadOutcome:
         return 0 if self.result.is_good else 1
 
     def as_object(self) -> dict[str, object]:
-        """For JSON: `result`, `text`, `reasons`, `changes`, `details`, `swap_ms`."""
+        """For JSON: `result`, `text`, `reasons`, `changes`, `objections`, `details`, `swap_ms`."""
         return {
             "result": self.result.value,
             "text": self.text,
             "reasons": list(self.reasons),
             "changes": list(self.changes),
+            "objections": [each.as_object() for each in self.objections],
             "details": list(self.details),
             "swap_ms": round(self.swap * 1000, 3),
         }
@@ -136,13 +164,16 @@ class Reloader:
             self._asked.clear()
             await self.reload()
 
-    async def reload(self, *, force: bool = False) -> ReloadOutcome:
-        """Read, check, compare and swap; `force`: also what is unsafe. Never raises but for a cancellation."""
+    async def reload(self, *, force: bool = False, accept: Collection[ObjectionKind] = ()) -> ReloadOutcome:
+        """Read, check, compare and swap. Never raises but for a cancellation.
+
+        `accept`: kinds of objections that are none now; `force`: all of them.
+        """
         async with self._busy:
             self._began()
             outcome = ReloadOutcome(Result.FAILED, ("it was interrupted",))
             try:
-                outcome = await self._reload(force=force)
+                outcome = await self._reload(frozenset(ObjectionKind if force else accept))
             except Exception as error:
                 log.exception("internal error")
                 outcome = ReloadOutcome(Result.FAILED, (f"internal error: {error!r}",))
@@ -154,7 +185,7 @@ class Reloader:
         log.log(level, outcome.text, extra=fields(**took))
         return outcome
 
-    async def _reload(self, *, force: bool) -> ReloadOutcome:
+    async def _reload(self, accept: frozenset[ObjectionKind]) -> ReloadOutcome:
         files = await asyncio.to_thread(mapping_files, self._paths)
         if not files:
             return ReloadOutcome(Result.FAILED, (f"no mapping file in {', '.join(map(str, self._paths))}",))
@@ -171,32 +202,31 @@ class Reloader:
         differences = self._compare(plans)
         if not differences:
             return ReloadOutcome(Result.UNCHANGED)
-        outcome = await self._swap(plans, differences, force=force)
+        outcome = await self._swap(plans, differences, accept)
         summaries = (change if isinstance(change, str) else change.summary for change in differences)
         return replace(outcome, changes=tuple(summaries), details=tuple(_details(differences)))
 
     async def _swap(
-        self, plans: Sequence[Plan], differences: Sequence[Changes | str], *, force: bool
+        self, plans: Sequence[Plan], differences: Sequence[Changes | str], accept: frozenset[ObjectionKind]
     ) -> ReloadOutcome:
-        objected = () if force else self._objections(plans, differences)
-        if objected:
-            return ReloadOutcome(Result.REFUSED, objected)
+        refusal = _refused(self._objections(plans, differences), accept)
+        if refusal is not None:
+            return refusal
         try:
             prepared = await self._daemon.shared.prepare(plans)
         except PrepareError as error:
             return ReloadOutcome(Result.FAILED, (reason_of(error),))
         await self._settle()
         # From here to the swap nothing waits: what is owned now is owned in the swap.
-        objected = () if force else self._objections(plans, differences)
-        if objected or not self._daemon.running:
+        accepted = self._objections(plans, differences)
+        refusal = _refused(accepted, accept)
+        if refusal is not None or not self._daemon.running:
             await prepared.abort()
-            if objected:
-                return ReloadOutcome(Result.REFUSED, objected)
-            return ReloadOutcome(Result.FAILED, ("the gateway stops",))
+            return refusal or ReloadOutcome(Result.FAILED, ("the gateway stops",))
         now = clock.now()
         stranded = self._daemon.swap(plans, now, prepared)
         left = tuple(f"the robot keeps what it holds in {name}" for name in stranded)
-        return ReloadOutcome(Result.APPLIED, left, swap=clock.now() - now)
+        return ReloadOutcome(Result.APPLIED, left, objections=accepted, swap=clock.now() - now)
 
     def _compare(self, plans: Sequence[Plan]) -> list[Changes | str]:
         """What differs, by cell; a cell that is new or gone in one sentence."""
@@ -213,15 +243,17 @@ class Reloader:
         found.extend(f"{name}: cell removed" for name in running)
         return found
 
-    def _objections(self, plans: Sequence[Plan], differences: Sequence[Changes | str]) -> tuple[str, ...]:
+    def _objections(
+        self, plans: Sequence[Plan], differences: Sequence[Changes | str]
+    ) -> tuple[CellObjection, ...]:
         runtimes = {runtime.plan.cell.name: runtime for runtime in self._daemon.runtimes}
-        found: list[str] = []
+        found: list[CellObjection] = []
         for changes in differences:
             if isinstance(changes, Changes):
                 name = changes.old.cell.name
-                found += (f"{name}: {text}" for text in objections(changes, _owned(runtimes[name].cell)))
-        gone = runtimes.keys() - {plan.cell.name for plan in plans}
-        found += (f"{name}: the whole cell would be gone" for name in sorted(gone))
+                found += (CellObjection(name, each) for each in objections_of_change(runtimes[name], changes))
+        for name in sorted(runtimes.keys() - {plan.cell.name for plan in plans}):
+            found += (CellObjection(name, each) for each in objections_of_removal(runtimes[name]))
         return tuple(found)
 
     async def _settle(self) -> None:
@@ -241,9 +273,10 @@ def _details(differences: Sequence[Changes | str]) -> Iterator[str]:
             yield from as_text(changes).splitlines()
 
 
-def _owned(cell: Cell) -> set[str]:
-    owners, variables = cell.ownership.owners, cell.definition.variables
-    return {its.name for its in variables if its.lock is not None and owners[its.lock] is not None}
+def _refused(objections: Sequence[CellObjection], accept: frozenset[ObjectionKind]) -> ReloadOutcome | None:
+    """The refusal, if some objection is not accepted."""
+    left = tuple(each for each in objections if each.objection.kind not in accept)
+    return ReloadOutcome(Result.REFUSED, tuple(each.text for each in left), objections=left) if left else None
 
 
 def _reasons(compiled: Compiled) -> Iterator[str]:

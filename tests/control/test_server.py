@@ -8,6 +8,7 @@ import json
 import socket
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from gatewayd.control import server
 from gatewayd.control.api import Api
 from gatewayd.control.client import Client, ControlError
 from gatewayd.control.endpoint import bind
+from gatewayd.core.objection import ObjectionKind
 from gatewayd.loop.share import Busy, LoopShare
 from gatewayd.service.audit import Audit
 from tests.control.served import CYCLES, LIMIT, FixedGateway, Served
@@ -31,15 +33,15 @@ class Outcome:
 
 
 @pytest.fixture
-def asked() -> list[bool]:
+def asked() -> list[frozenset[ObjectionKind]]:
     return []
 
 
 @pytest.fixture
-async def path(tmp_path: Path, api: Api, asked: list[bool]) -> AsyncIterator[Path]:
-    async def reload(force: bool) -> Outcome:
-        asked.append(force)
-        return Outcome(0 if force else 1)
+async def path(tmp_path: Path, api: Api, asked: list[frozenset[ObjectionKind]]) -> AsyncIterator[Path]:
+    async def reload(accept: frozenset[ObjectionKind]) -> Outcome:
+        asked.append(accept)
+        return Outcome(0 if accept else 1)
 
     found = tmp_path / "control.sock"
     async with server.serving(bind(found), api, reload):
@@ -70,10 +72,10 @@ async def test_what_waited_while_the_gateway_stood_still_is_not_carried_out(  # 
     body: dict[str, object],
 ) -> None:
     stood_still = 4.8
-    reloaded: list[bool] = []
+    reloaded: list[frozenset[ObjectionKind]] = []
 
-    async def reload(force: bool) -> Outcome:
-        reloaded.append(force)
+    async def reload(accept: frozenset[ObjectionKind]) -> Outcome:
+        reloaded.append(accept)
         return Outcome(0)
 
     press.cell.operator.take_lock(1, 0.0, 1e9, "by anna")
@@ -92,7 +94,7 @@ async def test_what_waited_while_the_gateway_stood_still_is_not_carried_out(  # 
         stood_still = 0.5
         if path_of_it == "/v1/reload":
             await asyncio.to_thread(client.post, path_of_it, body)
-            assert reloaded == [True]
+            assert reloaded == [frozenset(ObjectionKind)]
 
 
 async def get(client: Client, path: str, **query: Any) -> dict[str, Any]:
@@ -185,13 +187,22 @@ async def test_garbage_does_not_end_the_server(path: Path, client: Client) -> No
     assert await get(client, "/v1/version")
 
 
-async def test_a_reload_is_handed_on(client: Client, asked: list[bool]) -> None:
+async def test_a_reload_is_handed_on(client: Client, asked: list[frozenset[ObjectionKind]]) -> None:
     assert await asyncio.to_thread(client.post, "/v1/reload", {"force": True}) == {"result": "applied"}
     with pytest.raises(ControlError) as caught:
         await asyncio.to_thread(client.post, "/v1/reload")
     assert (caught.value.status, caught.value.body) == (409, {"result": "refused"})
-    assert asked == [True, False]
-    assert await refused(lambda: client.post("/v1/reload", {"force": "yes"})) == (400, "bad_request")
+    accepted: dict[str, object] = {"accept": ["weakening"]}
+    assert await asyncio.to_thread(client.post, "/v1/reload", accepted) == {"result": "applied"}
+    assert asked == [frozenset(ObjectionKind), frozenset(), {ObjectionKind.WEAKENING}]
+    bodies: tuple[dict[str, object], ...] = (
+        {"force": "yes"},
+        {"accept": ["nothing"]},
+        {"accept": "left"},
+        {"accept": [1]},
+    )
+    for body in bodies:
+        assert await refused(partial(client.post, "/v1/reload", body)) == (400, "bad_request")
 
 
 async def test_a_gateway_that_cannot_reload_says_so(tmp_path: Path, api: Api) -> None:

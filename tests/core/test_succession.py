@@ -27,11 +27,12 @@ from gatewayd.core.definition import (
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
+from gatewayd.core.match import Match
 from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 from gatewayd.core.status_layout import LENGTH
-from gatewayd.core.succession import succeed
+from gatewayd.core.succession import left_behind, losing, succeed
 
 PLC, HMI, AUX = range(3)
 START, LAMP, PART, FORCE, SPEED, PATH, CYCLES, LEVEL, MODE, ALARM = range(10)
@@ -119,7 +120,37 @@ def test_what_the_robot_could_not_be_told_is_named(cell: Cell, press: CellDefini
     assert cell.write(Requester(PLC), [Change(START, value=True), Change(PART, 3)], 1.0) is None
     cell.robot_lost("cable", 1.5)
     succession = succeed(cell, without(press, "start", "part", "force"), 2.0)
-    assert succession.stranded == ("start",), "part is held anyway, force was never touched"
+    assert succession.stranded == ("start", "part"), (
+        "nobody could clear either any more; force was never touched"
+    )
+
+
+def test_another_robot_gets_nothing_of_what_the_present_one_holds(cell: Cell, press: CellDefinition) -> None:
+    """Its owners lose it, the present robot gets the fallbacks, and the other one is as a robot after a start."""
+    assert cell.write(Requester(PLC), [Change(START, value=True), Change(PART, 3)], 1.0) is None
+    cell.writers.connected(PLC, 1.0)
+    cell.adoption.over = True
+    before = cell.health.writes_accepted
+    succession = succeed(cell, press, 2.0, same_robot=False)
+    assert succession.stranded == ("part",), "its policy is to hold it"
+    assert (cell.image.values[START], cell.image.values[PART]) == (False, 3)
+    new = succession.cell
+    assert new.ownership.owners == [None] * len(press.locks)
+    assert set(new.image.quality) == {Quality.NEVER}
+    assert (new.image.values[START], new.image.values[PART], new.delivery.owed) == (False, 0, set())
+    assert (new.writers.alive[PLC], new.health.writes_accepted, new.adoption.over) == (True, before, False)
+    kinds = [event.kind for event in cell.events]
+    assert kinds.count(EventKind.RELEASED) == 2
+
+
+def test_what_would_be_left_is_known_before_and_after(cell: Cell, press: CellDefinition) -> None:
+    assert cell.write(Requester(PLC), [Change(START, value=True), Change(PART, 3)], 1.0) is None
+    match = Match(press, press, same_robot=False)
+    assert list(left_behind(cell, match)) == [PART]
+    assert losing(cell, match) == [press.variables[START].lock, press.variables[PART].lock]
+    cell.robot_lost("cable", 1.5)
+    assert list(left_behind(cell, match)) == [START, PART]
+    assert succeed(cell, press, 2.0, same_robot=False).stranded == ("start", "part")
 
 
 def test_fallbacks_that_fell_due_are_given_after_the_robot_is_back(cell: Cell, press: CellDefinition) -> None:

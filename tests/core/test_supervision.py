@@ -128,8 +128,18 @@ def test_lives_and_graces_go_on_in_a_successor(table: WriterTable) -> None:
     table.gap(0.5, 0.625)
     table.disconnected(GRACIOUS, 0.75)
     new = WriterTable([Writer("gracious", grace=1.0), Writer("watched", timeout=1.0)])
-    new.succeed(table, {WATCHED: 1, GRACIOUS: 0, OPERATOR: OPERATOR})
+    new.succeed(table, {WATCHED: 1, GRACIOUS: 0, OPERATOR: OPERATOR}, 1.0)
     assert (new.alive, new.connections, new.last_seen) == ([True, True], [0, 1], [0.0, 0.25])
     assert new.gone(2.75) == [0]
     assert new.silent(1.375) == []
     assert new.silent(1.376) == [1]
+
+
+@pytest.mark.parametrize("rule", [{"timeout": 0.5}, {"timeout": 2.0, "counts_writes": True}])
+def test_another_rule_begins_anew_in_a_successor(table: WriterTable, rule: dict[str, float]) -> None:
+    """Who was silent for longer than a time-out that was not declared then has broken nothing."""
+    table.connected(WATCHED, 0.25)
+    new = WriterTable([Writer("watched", **rule)])  # type: ignore[arg-type]
+    new.succeed(table, {WATCHED: 0}, 1.0)
+    assert new.silent(1.0 + rule["timeout"]) == []
+    assert new.silent(1.001 + rule["timeout"]) == [0]

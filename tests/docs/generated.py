@@ -25,6 +25,7 @@ from gatewayd.cli import COMMANDS
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
+from gatewayd.core.objection import MEANINGS
 from gatewayd.core.program import STATES
 from gatewayd.core.refusal import PRECEDENCE, Reason
 from gatewayd.core.status_layout import BASE, TABLES
@@ -308,6 +309,11 @@ _EXCEPTIONS = {
 }
 
 
+def objections() -> str:
+    """The kinds of objections to a reload."""
+    return table(("kind", "meaning"), ((f"`{kind}`", meaning) for kind, meaning in MEANINGS.items()))
+
+
 def exceptions() -> str:
     """The exception codes in use."""
     rows = [(f"{code:02X}", code.text, _EXCEPTIONS[code]) for code in ExceptionCode]
@@ -478,6 +484,7 @@ def simulator_control() -> str:
 
 
 PARTS: dict[str, Callable[[], str]] = {
+    "objections": objections,
     "mapping-keys": mapping_keys,
     "command-line": command_line,
     "exit-codes": exit_codes,

@@ -167,8 +167,8 @@ def test_what_is_owned_is_not_touched_unless_forced(plant: Plant) -> None:
     refused = controlled.reload()
     print(refused.stderr)
     assert refused.returncode == 1
-    assert "`force` is owned now and would be removed" in refused.stderr
-    assert "--force" in refused.stderr
+    assert "`force` is owned by plc now and would be removed [release]" in refused.stderr
+    assert "--accept release: an owner would lose" in refused.stderr
     assert in_robot(simulator) == (77, 9.5, 2)
     assert plc.doubles(2) == [9.5]
 
@@ -195,9 +195,9 @@ def test_a_port_moves_when_it_is_forced(plant: Plant) -> None:
     plant.mapping(CELL, simulator.port)
     refused = controlled.reload()
     assert refused.returncode == 1
-    assert "modbus would move while" in refused.stderr
+    assert "are owned by plc now and would be released: modbus moves: listen" in refused.stderr
     assert plc.integers(0) == [77]
-    assert controlled.reload("--force").returncode == 0
+    assert controlled.reload("--accept", "release").returncode == 0
     with pytest.raises(ConnectionError):
         plc.write_integers(0, 78)
     with pytest.raises(ConnectionError):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.diff import ChangeKind, Changes, as_json, as_text, compare, objections
@@ -188,17 +189,13 @@ def test_nothing_is_objected_to_what_touches_nobody() -> None:
 
 @pytest.mark.parametrize("replacement, owned, said", [
     (("[0, 150]", "[0, 100]"), "force", "`force` is owned now and would change: limits 0..150 clamped -> 0..100"),
-    ((OLD[OLD.index("  start:"):OLD.index("  part:")], ""), "start", "`start` is owned now and would be removed"),
     (("owner: [plc, hmi], lease: 2s}", "owner: [plc, hmi], lease: 1s}"), "speed", "`speed` of the group `motion`"),
-    (("127.0.0.1:1502", "127.0.0.1:1503"), "start", "modbus would move while `start` is owned: listen 127"),
-    (("host: 127.0.0.1", "host: 127.0.0.9"), "start", "robot would move while `start` is owned: host"),
-    (("plc: {modbus: 127.0.0.2", "plc: {modbus: 127.0.0.5"), "part", "writer `plc` would change while `part` is"),
 ])  # fmt: skip
 def test_what_touches_an_owner_is_objected_to(replacement: tuple[str, str], owned: str, said: str) -> None:
     changes = changed(replacement)
     assert objections(changes, set()) == ()
     (only,) = objections(changes, {owned})
-    assert only.startswith(said)
+    assert (only.kind, only.text.startswith(said)) == (ObjectionKind.OWNED, True)
 
 
 def test_a_comment_on_what_is_owned_is_harmless() -> None:
@@ -215,14 +212,32 @@ def test_one_more_who_may_own_it_too_is_harmless() -> None:
 def test_a_direction_never_turns_unasked() -> None:
     changes = changed(("cycles: {robot: output_int_register_0, modbus: 100, on_stale: hold}",
                        "cycles: {robot: input_int_register_5, modbus: 100}"))  # fmt: skip
-    assert objections(changes, set()) == ("`cycles` would turn from output to input",)
+    assert objections(changes, set()) == (
+        Objection(ObjectionKind.DIRECTION, "`cycles` would turn from output to input"),
+    )
 
 
 def test_many_variables_gone_look_like_the_wrong_file() -> None:
     """More than 30 %: of 13 variables 3 may go, not 4."""
 
-    def gone(count: int) -> tuple[str, ...]:
+    def gone(count: int) -> tuple[Objection, ...]:
         return objections(changed(("register_0..7", f"register_0..{7 - count}")), set())
 
     assert gone(3) == ()
-    assert gone(4) == ("4 of 13 variables would be gone: is it the right file?",)
+    assert gone(4) == (
+        Objection(ObjectionKind.GONE, "4 of 13 variables would be gone: is it the right file?"),
+    )
+
+
+def test_a_number_that_means_another_variable_matters_to_who_asks_by_number() -> None:
+    inserted = changed(ADDED)
+    assert objections(inserted, set()) == ()
+    (only,) = objections(inserted, set(), numbers_used=True)
+    assert (only.kind, only.text) == (
+        ObjectionKind.NUMBERS,
+        "a request for lock 1 would mean `more` instead of `start` (and 12 more)",
+    )
+    last = "  recipe: {robot: output_double_register_0..7, modbus: 200}\n"
+    appended = changed((last, last + "  more: {robot: output_int_register_1, modbus: 110}\n"))
+    assert objections(appended, set(), numbers_used=True) == ()
+    assert objections(changed((last, "")), set(), numbers_used=True)[0].kind is ObjectionKind.GONE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from gatewayd.core.definition import CellDefinition
@@ -11,7 +13,7 @@ from gatewayd.report.weakening import weakened
 TEXT = """\
 gatewayd: 1
 cell: press
-robot: {host: 127.0.0.1, adopt_for: 10s}
+robot: {host: 127.0.0.1, adopt_for: 10s, stale_after: 200ms}
 modbus: {listen: '127.0.0.1:1502'}
 canopen: {channel: can0, interface: virtual, bitrate: 500000, node: 16}
 writers:
@@ -25,6 +27,7 @@ variables:
   start: {robot: input_bit_register_0, modbus: 0.0, owner: plc}
   force: {robot: input_double_register_0, modbus: 20, owner: [plc, line], canopen: auto, limits: [0, 150]}
   free:  {robot: input_double_register_1, modbus: 24, owner: plc}
+  count: {robot: output_int_register_0, modbus: 100, on_stale: exception, valid: running}
 """
 
 
@@ -53,13 +56,33 @@ def definition(text: str) -> CellDefinition:
         (", whole: true", "", "`move` could be taken over in part"),
         ("adopt_for: 10s", "adopt_for: none", "adopted values would be kept longer: adopt_for 10 s -> none"),
         ("24, owner: plc", "24, owner: [plc, line]", "`free` could be owned by line too"),
+        ("owner: [line, plc]", "owner: [plc, line]", "`line` could no longer take `move` over from `plc`"),
+        (
+            "[plc, line], canopen",
+            "[plc, line], takeover: false, canopen",
+            "`plc` could no longer take `force` over from `line`",
+        ),
+        (
+            "limits: [0, 150]",
+            "limits: [0, 150], clamp: true",
+            "`force` would be brought to its limits where it is refused today: clamp",
+        ),
+        (
+            "24, owner: plc",
+            "24, owner: plc, on_release: hold",
+            "`free` would hold its value: on_release hold",
+        ),
+        ("on_stale: exception", "on_stale: hold", "`count` would hold its value: on_stale hold"),
+        (", valid: running", "", "`count` would be good while the robot program does not run: valid"),
+        ("stale_after: 200ms", "stale_after: 1s", "values would be stale later: stale_after 0.2 s -> 1 s"),
     ],
 )
 def test_a_weaker_promise_is_named(before: str, after: str, found: str) -> None:
     old = definition(TEXT)
     new = definition(TEXT.replace(before, after))
     assert found in list(weakened(old, new))
-    assert list(weakened(new, old)) == [], "the other way round it is stronger"
+    if "take `move` over" not in found:
+        assert list(weakened(new, old)) == [], "the other way round it is stronger"
 
 
 def test_what_is_new_or_gone_weakens_nothing() -> None:
@@ -67,3 +90,11 @@ def test_what_is_new_or_gone_weakens_nothing() -> None:
     less = "".join(line for line in TEXT.splitlines(keepends=True) if "force:" not in line)
     new = definition(less + "  more: {robot: input_double_register_2, modbus: 30}\n")
     assert list(weakened(old, new)) == []
+
+
+def test_inputs_that_are_adopted_instead_of_cleared_are_named() -> None:
+    new = definition(TEXT.replace("adopt_for: 10s", "adopt_for: none"))
+    old = replace(new, clear_on_connect=True)
+    assert list(weakened(old, new)) == [
+        "inputs without an owner would keep what the controller holds: on_connect adopt"
+    ]

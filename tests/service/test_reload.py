@@ -253,8 +253,8 @@ async def test_a_removed_input_gets_its_fallback_and_leaves_the_rest(rigged: Rig
         refused = await rig.reloader.reload()
         assert refused.result is Result.REFUSED
         assert refused.text == (
-            "reload refused, the old mapping runs on: press: `real` is owned now and would be removed "
-            "(gatewayd reload --force does it)"
+            "reload refused, the old mapping runs on: press: `real` is owned by plc now and would be removed "
+            "[release] (gatewayd reload --accept release does it)"
         )
         assert refused.exit_code == 1
         assert rig.value("real") == 9.5
@@ -273,7 +273,7 @@ async def test_a_renamed_input_goes_on_with_what_the_robot_was_given_last(
     async with rigged() as rig:
         variables = VARIABLES.replace("limits: [0, 100]", f"limits: [0, 100], on_release: {policy}")
         rig.write(variables)
-        assert (await rig.reloader.reload()).result is not Result.FAILED
+        assert (await rig.reloader.reload(force=True)).result.is_good
         rig.set("number", 17)
         rig.write(variables.replace("number:", "count: "))
         assert (await rig.reloader.reload(force=True)).result is Result.APPLIED
@@ -348,7 +348,7 @@ async def test_a_listener_moves(rigged: Rigged) -> None:
         port = free_port()
         rig.write(port=port)
         outcome = await rig.reloader.reload()
-        assert "modbus would move while `number` is owned" in outcome.text
+        assert "`number` is owned by plc now and would be released: modbus moves: listen" in outcome.text
         assert (await rig.reloader.reload(force=True)).result is Result.APPLIED
         assert await asyncio.wait_for(reader.read(), 5) == b""
         assert rig.owners() == {}
@@ -396,7 +396,10 @@ async def test_a_writer_whose_peers_change_is_another_one(rigged: Rigged) -> Non
         rig.set("number", 42)
         path = rig.directory / "press.yaml"
         path.write_text(path.read_text().replace("plc: {modbus: 127.0.0.1}", "plc: {modbus: 127.0.0.7}"))
-        assert "writer `plc` would change" in (await rig.reloader.reload()).text
+        said = (await rig.reloader.reload()).text
+        assert (
+            "`number` is owned by plc now and would be released: 127.0.0.1 is no writer from then on" in said
+        )
         assert (await rig.reloader.reload(force=True)).result is Result.APPLIED
         assert rig.owners() == {}
         assert rig.cell.writers.alive == [False, False]

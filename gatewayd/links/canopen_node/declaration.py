@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import asdict
 
 from gatewayd.core.definition import CellDefinition
+from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.core.status_layout import StatusField
 from gatewayd.links.canopen_node.description import by_name, description
 from gatewayd.links.canopen_node.plan import CanopenPlan
@@ -60,10 +61,6 @@ class CanopenNode(LinkKind):
         assert isinstance(plan, CanopenPlan)
         return description(plan, cell)
 
-    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
-        """Another bus, or another node on it, is not the one that a master has started."""
-        return ("interface", "channel", "node")
-
     def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
         """The same node goes on where nothing that the bus can see is different."""
         assert isinstance(old, CanopenPlan)
@@ -72,15 +69,16 @@ class CanopenNode(LinkKind):
 
     def disturbs(
         self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
-    ) -> Iterable[str]:
+    ) -> Iterable[Objection]:
         """Masters would not know the node again."""
         assert isinstance(old, CanopenPlan)
         assert isinstance(new, CanopenPlan)
         changes = _identities(old, new, before, after)
         if changes:
-            yield (
+            yield Objection(
+                ObjectionKind.IDENTITY,
                 f"{old.channel} node {old.node} would have another identity: {', '.join(changes)}; "
-                "masters check it, and LSS selects by it"
+                "masters check it, and LSS selects by it",
             )
 
 

@@ -238,6 +238,10 @@ class Node:
         self.producer.resume(former.producer)
         self.receive_pdos.resume(former.receive_pdos)
 
+    def writers(self) -> list[Requester]:
+        """The writers on this bus that are alive."""
+        return self._peers.living()
+
     def lose_writers(self, reason: str, now: float) -> None:
         """Nobody on this bus is a writer any more."""
         self._peers.lose_all(reason, now)

@@ -92,6 +92,10 @@ class Peers:
             self._alive.discard(writer)
             self._cell.writer_disconnected(self._requesters[writer], now, reason, at_once=True)
 
+    def living(self) -> list[Requester]:
+        """The writers that are alive."""
+        return [self._requesters[writer] for writer in sorted(self._alive)]
+
     def lose_all(self, reason: str, now: float) -> None:
         """No writer can be heard any more."""
         for writer in sorted(self._alive):

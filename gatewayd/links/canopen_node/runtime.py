@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from datetime import datetime
@@ -22,7 +23,8 @@ from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.queue import Transmitter
 from gatewayd.canopen.supervised import SupervisedBus
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import Direction
+from gatewayd.core.definition import CellDefinition, Direction
+from gatewayd.core.requester import Requester
 from gatewayd.links.canopen_node.declaration import BUS_STATES, NMT_STATES
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
@@ -51,9 +53,10 @@ class CanLink(Link, Observer):
     """Keeps `cell` on its CAN bus while `run` runs."""
 
     title = "CAN link"
+    plan: CanopenPlan
 
     def __init__(self, plan: CanopenPlan, cell: Cell, store: Store) -> None:
-        self._plan = plan
+        self.plan = plan
         self._cell = cell
         self._bus: SupervisedBus | None = None
         self._transmitter = Transmitter(
@@ -106,14 +109,14 @@ class CanLink(Link, Observer):
             level, words = Level.WARN, f"{words}, but {nmt}: no PDOs until a master starts the node"
         number = self.node.node_id
         return LinkHealth(
-            f"CAN {self._plan.channel}",
+            f"CAN {self.plan.channel}",
             level,
             words,
             f"node {number if number <= 127 else 'without id'}, {nmt}",
             () if bus is BusState.ACTIVE else (f"CAN bus {BUS_STATES[bus + 1]}",),
             {
-                "channel": f"{self._plan.interface}:{self._plan.channel}",
-                "node": self._plan.node,
+                "channel": f"{self.plan.interface}:{self.plan.channel}",
+                "node": self.plan.node,
                 "bus": BUS_STATES[bus + 1],
                 "bus_state": bus + 1,
                 "nmt_state": nmt,
@@ -140,15 +143,24 @@ class CanLink(Link, Observer):
         finally:
             self._leave()
 
-    def release(self, now: float) -> None:
+    def departing(self, plan: LinkPlan | None, after: CellDefinition) -> Mapping[Requester, str]:
+        """Where another node takes the place of this one, whoever writes by it; the same node keeps its writers."""
+        return (
+            {}
+            if plan is not None
+            else dict.fromkeys(self.node.writers(), "its CANopen node boots anew or ends")
+        )
+
+    def release(self, plan: LinkPlan | None, after: CellDefinition, now: float) -> None:
         """Another node takes the place of this one: who wrote by it is lost."""
-        self.node.lose_writers("the new mapping needs another node", now)
+        if plan is None:
+            self.node.lose_writers("the new mapping needs another node", now)
 
     def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
         """Go on, unnoticed by the bus, with the cell that succeeded the present one."""
         assert isinstance(plan, CanopenPlan)
         former = self.node
-        self._plan, self._cell = plan, cell
+        self.plan, self._cell = plan, cell
         self.node = self._new_node()
         if self._started:
             self.node.resume(former, now)
@@ -249,7 +261,7 @@ class CanLink(Link, Observer):
 
     def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
         """An LSS master activates a bit rate: be silent, switch, be silent for as long again (CiA 305)."""
-        if self._plan.interface == "socketcan":
+        if self.plan.interface == "socketcan":
             return
         self._close_bus("LSS switches the bit rate")
         self._switch = (bit_rate, 2 * delay)
@@ -262,7 +274,7 @@ class CanLink(Link, Observer):
 
     def _new_node(self) -> Node:
         return Node(
-            self._plan,
+            self.plan,
             self._cell,
             self._transmitter.send,
             self._store,
@@ -286,7 +298,7 @@ class CanLink(Link, Observer):
         """Open the bus; a set-up that cannot work is tried again, in case it is repaired."""
 
         async def attempt() -> None:
-            bus = self._bus = make_bus(self._plan.interface, self._plan.channel, bit_rate, self)
+            bus = self._bus = make_bus(self.plan.interface, self.plan.channel, bit_rate, self)
             bus.set_filters(self.node.cob_ids(), self.node.remote_ids())
             try:
                 await wait_with_progress(bus.open(), self._count, math.inf)
@@ -302,10 +314,10 @@ class CanLink(Link, Observer):
     def _compare_bit_rates(self) -> None:
         """The kernel's interface is what it is; `check` has computed the load with what the mapping says."""
         actual = self._bus.bitrate if self._bus is not None else None
-        if actual not in (None, self._plan.bitrate, self._other_bit_rate):
+        if actual not in (None, self.plan.bitrate, self._other_bit_rate):
             log.warning(
                 "CAN bit rate is not that of the mapping",
-                extra=fields(**self._names(), bitrate=actual, mapping=self._plan.bitrate),
+                extra=fields(**self._names(), bitrate=actual, mapping=self.plan.bitrate),
             )
         self._other_bit_rate = actual
 
@@ -383,8 +395,8 @@ class CanLink(Link, Observer):
     def _names(self) -> dict[str, object]:
         return {
             "cell": self._cell.definition.name,
-            "bus": f"{self._plan.interface}:{self._plan.channel}",
-            "node": self._plan.node,
+            "bus": f"{self.plan.interface}:{self.plan.channel}",
+            "node": self.plan.node,
         }
 
 

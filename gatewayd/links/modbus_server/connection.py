@@ -130,6 +130,11 @@ class PeerConnection(asyncio.BufferedProtocol):
         if session.broken:
             self.drop(f"no Modbus TCP: {session.broken}")
 
+    def forget(self, unit: int) -> None:
+        """It may do nothing with this unit any more."""
+        self.accesses = {number: access for number, access in self.accesses.items() if number != unit}
+        self.session.serve(self.accesses)
+
     def stood_still(self, since: float, until: float) -> None:
         """Nothing was read for this time: it is no silence of the peer, and what is in the socket may be that old."""
         length = until - since

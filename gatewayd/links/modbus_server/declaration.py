@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
+from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.core.status_layout import StatusField
 from gatewayd.links.contract import Description, LinkKind, LinkMetric
 from gatewayd.links.modbus_server.description import description
-from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, Network, network_text
 from gatewayd.mapping.plan import LinkPlan
 
 
@@ -61,13 +62,27 @@ class ModbusServer(LinkKind):
         assert isinstance(plan, ModbusPlan)
         return description(plan)
 
-    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
-        """Clients of another listener or unit connect anew; those of the default unit would find another robot."""
-        return ("listen", "unit", "default_unit")
+    def disturbs(
+        self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
+    ) -> Iterable[Objection]:
+        """Somebody more could connect."""
+        assert isinstance(old, ModbusPlan)
+        assert isinstance(new, ModbusPlan)
+        if old.allow and not (new.allow and all(_is_within(network, old.allow) for network in new.allow)):
+            more = ", ".join(
+                network_text(network) for network in new.allow if not _is_within(network, old.allow)
+            )
+            yield Objection(ObjectionKind.WEAKENING, f"{more or 'everybody'} could connect to modbus too")
 
     def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
         """A unit always goes on; if it moves to another listener, its clients have to follow."""
         return True
+
+
+def _is_within(network: Network, allowed: Iterable[Network]) -> bool:
+    """Whether all of its addresses are in one of these networks."""
+    first, last = network[0], network[-1]
+    return any(first in known and last in known for known in allowed)
 
 
 KIND = ModbusServer()

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+
 from gatewayd.core.cell import Cell
+from gatewayd.core.definition import CellDefinition
+from gatewayd.core.requester import Requester
 from gatewayd.links.contract import Level, Link, LinkHealth
+from gatewayd.links.modbus_server.connection import PeerConnection
 from gatewayd.links.modbus_server.listener import ModbusListener
+from gatewayd.links.modbus_server.peers import Address, may_connect, writer_of
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address, counted
@@ -14,6 +20,7 @@ class ModbusUnit(Link):
     """Has no work of its own: what comes for it comes through its listener, which `Listeners.serve` gives it."""
 
     title = "Modbus unit"
+    plan: ModbusPlan
 
     def __init__(self, plan: ModbusPlan, cell: Cell) -> None:
         self.plan = plan
@@ -24,6 +31,42 @@ class ModbusUnit(Link):
     def reachable(self) -> bool:
         """While its listener listens."""
         return self.listener is not None and self.listener.listening
+
+    def departing(self, plan: LinkPlan | None, after: CellDefinition) -> Mapping[Requester, str]:
+        """Connections that end, lose the unit, or are another writer from then on."""
+        assert plan is None or isinstance(plan, ModbusPlan)
+        return {requester: why for _connection, requester, why in self._departing(plan, after)}
+
+    def release(self, plan: LinkPlan | None, after: CellDefinition, now: float) -> None:
+        """These are writers of the cell no more, before any other connection can be one in their place."""
+        assert plan is None or isinstance(plan, ModbusPlan)
+        for connection, requester, why in list(self._departing(plan, after)):
+            connection.forget(self.plan.unit)
+            self.cell.writer_disconnected(requester, now, why, at_once=True)
+
+    def _departing(
+        self, plan: ModbusPlan | None, after: CellDefinition
+    ) -> Iterator[tuple[PeerConnection, Requester, str]]:
+        if self.listener is None:
+            return
+        for connection, requester in self.listener.writers(self.cell):
+            assert requester.writer is not None
+            name = self.cell.definition.writers[requester.writer].name
+            why = self._moved(plan) or _stranger(connection.address, name, plan, after)
+            if why:
+                yield connection, requester, why
+
+    def _moved(self, plan: ModbusPlan | None) -> str:
+        """Why no connection goes on; empty: they do."""
+        if plan is None:
+            return "its Modbus unit is no longer served"
+        old, new = address(self.plan.host, self.plan.port), address(plan.host, plan.port)
+        if old != new:
+            return f"modbus moves: listen {old} -> {new}"
+        if plan.unit != self.plan.unit:
+            return f"modbus moves: unit {self.plan.unit} -> {plan.unit}"
+        # Whoever asks for the units 255 and 0 would find another robot.
+        return "it is the default unit no more" if self.plan.default_unit and not plan.default_unit else ""
 
     def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
         """Be the unit of another plan and cell; the listeners that it has and had see to the connections."""
@@ -48,3 +91,12 @@ class ModbusUnit(Link):
         else:
             level, words = Level.BAD, "not listening, see the log"
         return LinkHealth(f"Modbus {where}", level, words, figures=figures)
+
+
+def _stranger(peer: Address | None, name: str, plan: ModbusPlan | None, after: CellDefinition) -> str:
+    """Why the peer would be the writer of this name no more; empty: it would."""
+    if plan is None or peer is None or not may_connect(peer, plan):
+        return f"{peer} may not connect any more"
+    writer = writer_of(peer, plan.writers)
+    found = after.writers[writer].name if writer is not None else "no writer"
+    return "" if found == name else f"{peer} is {found} from then on"

@@ -194,6 +194,15 @@ class ModbusListener:
                 unit.close()
         self._count()
 
+    def writers(self, cell: Cell) -> list[tuple[PeerConnection, Requester]]:
+        """The connections that are writers of the cell."""
+        return [
+            (connection, requester)
+            for connection in self._connections
+            for its, requester in writers_of(connection.accesses)
+            if its is cell
+        ]
+
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`: what is in the sockets may have waited that long."""
         self._gap = since, now

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
+from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.links.contract import Description, LinkKind, LinkMetric, Names
 from gatewayd.links.robot.companions import all_inputs, all_outputs
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
@@ -86,9 +87,33 @@ class RobotKind(LinkKind):
             fields={"address": where},
         )
 
-    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
+    def moved(self, old: LinkPlan, new: LinkPlan) -> bool:
         """Another address is another robot."""
-        return ("host", "port")
+        assert isinstance(old, RobotPlan)
+        assert isinstance(new, RobotPlan)
+        return (old.host, old.port) != (new.host, new.port)
+
+    def disturbs(
+        self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
+    ) -> Iterable[Objection]:
+        """What the watchdog and the comparison by reading back promise, and feeding that pauses for a new session."""
+        assert isinstance(old, RobotPlan)
+        assert isinstance(new, RobotPlan)
+        if old.verify and not new.verify:
+            yield Objection(
+                ObjectionKind.WEAKENING,
+                "inputs that the robot holds otherwise would no longer be noticed: verify",
+            )
+        if old.watchdog is None:
+            return
+        text = _weaker_watchdog(old.watchdog, new.watchdog, before, after)
+        if text:
+            yield Objection(ObjectionKind.WEAKENING, text)
+        if new.watchdog is not None and not self.fits(old, new, before, after):
+            yield Objection(
+                ObjectionKind.WATCHDOG,
+                f"a new session with the robot begins, and {old.watchdog.field} is not fed until then",
+            )
 
 
 def _watchdog(watchdog: WatchdogPlan | None, cell: CellDefinition) -> str:
@@ -96,6 +121,22 @@ def _watchdog(watchdog: WatchdogPlan | None, cell: CellDefinition) -> str:
         return ""
     required = "".join(f", requires {cell.writers[writer].name}" for writer in watchdog.requires)
     return f"{watchdog.field} at {exact(watchdog.frequency)} Hz{required}"
+
+
+def _weaker_watchdog(
+    old: WatchdogPlan, new: WatchdogPlan | None, before: CellDefinition, after: CellDefinition
+) -> str:
+    """What a watchdog would no longer stand for, in words."""
+    if new is None:
+        return f"the robot program would not be watched any more: watchdog {old.field}"
+    if new.field != old.field:
+        return f"the robot program's watchdog would not be fed any more: {old.field} -> {new.field}"
+    if new.frequency < old.frequency:
+        rates = f"{exact(old.frequency)} Hz -> {exact(new.frequency)} Hz"
+        return f"the robot program's watchdog would be fed less often: {rates}"
+    required = {after.writers[writer].name for writer in new.requires}
+    gone = [name for name in (before.writers[writer].name for writer in old.requires) if name not in required]
+    return f"the watchdog would be fed without {', '.join(gone)}" if gone else ""
 
 
 def _session_of(plan: RobotPlan) -> tuple[object, ...]:

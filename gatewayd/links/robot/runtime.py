@@ -12,6 +12,7 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, FallbackKind, Value
@@ -20,6 +21,7 @@ from gatewayd.core.image import Quality
 from gatewayd.links.contract import Context, Level, LinkHealth, LinkRuntime, SourceLink
 from gatewayd.links.robot.availability import unavailable
 from gatewayd.links.robot.companions import Driven, all_inputs, all_outputs
+from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.inputs import ClaimedInputs
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.links.robot.readback import Package
@@ -51,10 +53,11 @@ class RobotLink(SourceLink):
     """Keeps `cell` and its controller in step while `run` runs."""
 
     title = "robot link"
+    plan: RobotPlan
 
     def __init__(self, plan: RobotPlan, cell: Cell, former: RobotLink | None = None) -> None:
         """With a `former` link the counters go on; its `run` must have ended before this one's begins."""
-        self._plan = plan
+        self.plan = plan
         self._cell = cell
         watchdog, variables = plan.watchdog, cell.definition.variables
         self._client = RtdeClient(
@@ -72,7 +75,8 @@ class RobotLink(SourceLink):
         self._driven = Driven()
         if former is not None:
             self._client.statistics = former._client.statistics  # noqa: SLF001 - another one of the same class
-            self._driven = former._driven  # noqa: SLF001
+            if not KIND.moved(former.plan, plan):
+                self._driven = former._driven  # noqa: SLF001
         self._outputs = OutputTransfer((), {})
         self._slots: dict[str, slice] = {}
         self._has_timestamp = False
@@ -97,7 +101,7 @@ class RobotLink(SourceLink):
 
     def health(self) -> LinkHealth:
         """The session; how fresh what it brings is, the cell knows."""
-        where = address(self._plan.host, self._plan.port)
+        where = address(self.plan.host, self.plan.port)
         trouble = self._loss_reported[0].removeprefix(f"{where}: ")
         statistics = self._client.statistics
         figures: dict[str, object] = {
@@ -113,7 +117,7 @@ class RobotLink(SourceLink):
         return LinkHealth("Robot", Level.BAD, "not connected", trouble or where, problems, figures)
 
     def _watchdog_fed(self) -> bool | None:
-        return None if self._plan.watchdog is None else self._cell.health.watchdog_fed
+        return None if self.plan.watchdog is None else self._cell.health.watchdog_fed
 
     @property
     def progress(self) -> int:
@@ -143,12 +147,12 @@ class RobotLink(SourceLink):
             await asyncio.gather(work, return_exceptions=True)
 
     async def _work(self) -> None:
-        if self._plan.watchdog is None:
+        if self.plan.watchdog is None:
             await self._client.run()
             return
         async with asyncio.TaskGroup() as group:
             group.create_task(self._client.run())
-            group.create_task(self._feed_watchdog(1 / self._plan.watchdog.frequency))
+            group.create_task(self._feed_watchdog(1 / self.plan.watchdog.frequency))
 
     async def close(self) -> None:
         """Send what is still due. Cancelling `run` afterwards ends the connection; what was sent is delivered."""
@@ -202,9 +206,11 @@ class RobotLink(SourceLink):
         """
         assert isinstance(plan, RobotPlan)
         self.flush(now)
+        # What the session subscribed goes on to come: what is mapped again later needs no other one.
+        plan = replace(plan, outputs=tuple(dict.fromkeys((*plan.outputs, *self.plan.outputs))))
         if self._on_change in self._cell.listeners:
             self._cell.listeners.remove(self._on_change)
-        self._plan, self._cell = plan, cell
+        self.plan, self._cell = plan, cell
         cell.listeners.append(self._on_change)
         session = self._agreed
         if session is None:
@@ -266,7 +272,7 @@ class RobotLink(SourceLink):
             self._inputs.look(flat)
             if self._session is not None:
                 self._adopt(self._session, flat, now)
-            elif self._plan.verify:
+            elif self.plan.verify:
                 self._compare(flat, now)
         if cell.delivery.under_way:
             for index in self._inputs.delivered(
@@ -288,7 +294,7 @@ class RobotLink(SourceLink):
         reported, at = self._loss_reported
         if not loss.started and (loss.text != reported or now - at >= LOSS_INTERVAL):
             self._loss_reported = (loss.text, now)
-            where = address(self._plan.host, self._plan.port)
+            where = address(self.plan.host, self.plan.port)
             log.warning(
                 "no robot", extra=fields(cell=self._cell.definition.name, robot=where, reason=loss.text)
             )
@@ -428,7 +434,7 @@ class RobotLink(SourceLink):
 
     def _is_healthy(self) -> bool:
         """Whether the robot is heard, and every writer that the watchdog stands for is alive."""
-        watchdog, cell = self._plan.watchdog, self._cell
+        watchdog, cell = self.plan.watchdog, self._cell
         if watchdog is None or self._closing or cell.freshness.state is not Source.FRESH:
             return False
         return all(cell.writers.alive[writer] for writer in watchdog.requires)
@@ -443,7 +449,8 @@ class RobotRuntime(LinkRuntime):
         former = context.former
         if not isinstance(former, RobotLink):
             return RobotLink(plan, cell)
-        cell.robot_lost("the new mapping needs another session", context.now)
+        needs = "has another robot" if KIND.moved(former.plan, plan) else "needs another session"
+        cell.robot_lost(f"the new mapping {needs}", context.now)
         return RobotLink(plan, cell, former)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.links.canopen_node.declaration import KIND
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
@@ -22,7 +23,7 @@ def plan(identity: str = "", variables: str = FORCE, robot: str = "") -> Plan:
     return loaded.plan
 
 
-def objections(old: Plan, new: Plan) -> list[str]:
+def objections(old: Plan, new: Plan) -> list[Objection]:
     return [*KIND.disturbs(old.links["canopen"], new.links["canopen"], old.cell, new.cell)]
 
 
@@ -45,8 +46,9 @@ def fits(old: Plan, new: Plan) -> bool:
 )
 def test_another_identity_is_an_objection_and_another_node(old: Plan, new: Plan, changes: str) -> None:
     (found,) = objections(old, new)
-    assert changes in found
-    assert "LSS selects by it" in found
+    assert found.kind is ObjectionKind.IDENTITY
+    assert changes in found.text
+    assert "LSS selects by it" in found.text
     assert not fits(old, new)
 
 

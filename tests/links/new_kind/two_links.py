@@ -14,8 +14,9 @@ from gatewayd.control.views import cell_view, declare
 from gatewayd.loop import clock
 from gatewayd.mapping.plan import Plan
 from gatewayd.mapping.worker import compile_files
-from gatewayd.report.diff import as_text, compare, objections
+from gatewayd.report.diff import as_text, compare
 from gatewayd.service.daemon import Daemon
+from gatewayd.service.objections import objections_of_change
 from gatewayd.web.metrics import Exposition
 from gatewayd.web.probes import Probes
 from gatewayd.web.view import layout
@@ -53,6 +54,7 @@ async def main(file: str, directory: Path, listen: int, to: int) -> dict[str, ob
     await asyncio.sleep(3 * right.period)
     before = looks(daemon)
     changes = compare(old, new)
+    objected = [each.text for each in objections_of_change(daemon.runtimes[0], changes)]
     daemon.swap([new], clock.now(), await daemon.shared.prepare([new]))
     after = looks(daemon)
     stop.set()
@@ -61,7 +63,7 @@ async def main(file: str, directory: Path, listen: int, to: int) -> dict[str, ob
         "before": before,
         "after": after,
         "diff": as_text(changes),
-        "objections": objections(changes, {"speed"}),
+        "objections": objected,
     }
 
 

@@ -146,8 +146,8 @@ async def mapping_removes_the_writer(rig: Rig, _until: Until) -> None:
     rig.cell, old = succeed(rig.cell, replace(definition, locks=locks), now).cell, rig.cell
     rig.link.flush(now)
     old.listeners.clear()
-    assert KIND.fits(rig.link._plan, rig.link._plan, old.definition, rig.cell.definition)
-    rig.link.rebind(rig.link._plan, rig.cell, now)
+    assert KIND.fits(rig.link.plan, rig.link.plan, old.definition, rig.cell.definition)
+    rig.link.rebind(rig.link.plan, rig.cell, now)
 
 
 async def mapping_removes_the_variables(rig: Rig, until: Until) -> None:
@@ -158,7 +158,7 @@ async def mapping_removes_the_variables(rig: Rig, until: Until) -> None:
     rig.cell, old = succeed(rig.cell, plan.cell, now).cell, rig.cell
     rig.link.flush(now)
     old.listeners.clear()
-    assert not KIND.fits(rig.link._plan, robot_of(plan), old.definition, rig.cell.definition)
+    assert not KIND.fits(rig.link.plan, robot_of(plan), old.definition, rig.cell.definition)
     rig.task.cancel()
     await until(rig.task.done)
 

@@ -346,7 +346,7 @@ async def test_the_watchdog_is_fed_for_living_writers_only(rigged: Rigged, until
 def rebound(rig: Rig, variables: str, options: str = "") -> Cell | None:
     """The cell that went on with these variables, by the same link; None if that takes another session."""
     plan = plan_for(rig.robot.port, variables, options)
-    if not KIND.fits(rig.link._plan, robot_of(plan), rig.cell.definition, plan.cell):
+    if not KIND.fits(rig.link.plan, robot_of(plan), rig.cell.definition, plan.cell):
         return None
     now = time.monotonic()
     new = succeed(rig.cell, plan.cell, now).cell

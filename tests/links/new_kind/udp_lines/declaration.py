@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gatewayd.core.definition import CellDefinition
+from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.core.status_layout import StatusField
 from gatewayd.links.contract import Description, LinkKind, LinkMetric, Place
 from gatewayd.mapping.plan import LinkPlan
@@ -45,18 +46,15 @@ class UdpLines(LinkKind):
         assert isinstance(new, LinesPlan)
         return old.listen == new.listen
 
-    def moved(self, old: LinkPlan, new: LinkPlan) -> Iterable[str]:
-        """Writers would have to send elsewhere."""
-        return ("listen",)
-
     def disturbs(
         self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
-    ) -> Iterable[str]:
+    ) -> Iterable[Objection]:
         """Whoever listens would miss the lines."""
         assert isinstance(old, LinesPlan)
         assert isinstance(new, LinesPlan)
         if old.to != new.to:
-            yield f"lines would go to {address(*new.to)} instead of {address(*old.to)}"
+            text = f"lines would go to {address(*new.to)} instead of {address(*old.to)}"
+            yield Objection(ObjectionKind.WEAKENING, text)
 
 
 KIND = UdpLines()
