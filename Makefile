@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 JOBS   ?= auto
 UV     ?= uv
-ARCH   ?= $(shell dpkg --print-architecture 2>/dev/null)
+ARCH   ?= $(shell dpkg --print-architecture 2>/dev/null || echo unknown)
 CASES  ?= 100000
 SECONDS ?= 3600
 
