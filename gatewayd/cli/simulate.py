@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from gatewayd.rtde.fields import Series, SoftwareVersion
+    from gatewayd.rtde.fields import Field, Series, SoftwareVersion
     from gatewayd.simulator.controller import Controller
     from gatewayd.simulator.program import ProgramRule
 
@@ -149,6 +149,13 @@ Exit codes:
 )
 @click.option("--hold", metavar="FIELD,...", help="Fault: inputs that the controller itself has claimed.")
 @click.option(
+    "--field",
+    "fields",
+    multiple=True,
+    metavar="NAME:TYPE",
+    help="An output that is newer than the catalogue, or has another type there; may be repeated.",
+)
+@click.option(
     "--unreadable",
     metavar="FIELD,...",
     help="Fault: inputs that can be claimed and are NOT_FOUND where they are read back.",
@@ -245,6 +252,7 @@ def _controller(
     programs: tuple[str, ...],
     program_files: tuple[Path, ...],
     hold: str | None,
+    fields: tuple[str, ...],
     unreadable: str | None,
     strict_lists: str | None,
     drop_at: str | None,
@@ -259,6 +267,8 @@ def _controller(
 
     with _blamed("--drop-at"):
         step = DropAt.parse(drop_at) if drop_at is not None else None
+    with _blamed("--field"):
+        own = [_field(text) for text in fields]
     with _blamed("--unreadable"):
         inputs = _inputs(unreadable)
     with _blamed("--version"):
@@ -276,12 +286,18 @@ def _controller(
     try:
         rules = _rules(programs, program_files)
         return Controller(
-            generation, software, frequency=frequency, uptime=uptime, program=rules, faults=faults
+            generation,
+            software,
+            frequency=frequency,
+            uptime=uptime,
+            program=rules,
+            faults=faults,
+            fields=own,
         )
     except ProgramError as error:
         raise _ProgramMistakeError(str(error)) from error
     except ValueError as error:
-        raise click.BadParameter(str(error), param_hint="--hold") from error
+        raise click.BadParameter(str(error), param_hint="--hold, --field") from error
 
 
 @contextmanager
@@ -291,6 +307,20 @@ def _blamed(option: str) -> Iterator[None]:
         yield
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint=option) from error
+
+
+def _field(text: str) -> Field:
+    """Read "dexterity:DOUBLE"."""
+    from gatewayd.rtde.fields import Field
+    from gatewayd.rtde.types import DataType
+
+    name, _, word = text.partition(":")
+    try:
+        return Field(name, DataType.from_word(word), "of this simulator")
+    except KeyError:
+        types = ", ".join(kind.word for kind in DataType)
+        msg = f"{text!r} is not NAME:TYPE with a type out of {types}"
+        raise ValueError(msg) from None
 
 
 def _fields(text: str | None) -> tuple[str, ...]:

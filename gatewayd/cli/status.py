@@ -127,7 +127,7 @@ def _colour(level: str) -> str | None:
 
 
 def _robot(robot: Answer) -> list[str]:
-    from gatewayd.report.format import age, counted
+    from gatewayd.report.format import age
     from gatewayd.report.words import LEVEL_COLOURS, SOURCE_LEVELS, SOURCES, source
 
     state = source(robot["state"])
@@ -138,21 +138,46 @@ def _robot(robot: Answer) -> list[str]:
         if not robot["writable"]:
             first += click.style(", not writable yet", fg="yellow")
     first += f", last package {age(robot['age'])} ago" if robot["age"] is not None else ""
-    counts = [counted(robot["packages"], "package"), f"{robot['skipped']} skipped", f"{robot['late']} late"]
-    counts += [counted(robot["sessions"], "session")]
+    return [first, ", ".join(_counts(robot)), *_controller(robot)]
+
+
+def _counts(robot: Answer) -> Iterator[str]:
+    from gatewayd.report.format import age, counted
+
+    yield from (counted(robot["packages"], "package"), f"{robot['skipped']} skipped", f"{robot['late']} late")
+    if robot.get("pauses"):
+        yield counted(robot["pauses"], "pause")
+    yield counted(robot["sessions"], "session")
+    strange = {kind: count for kind, count in (robot.get("strange") or {}).items() if count}
+    if strange:
+        text = f"{counted(sum(strange.values()), 'strange package')} ({', '.join(strange)})"
+        yield click.style(text, fg="yellow")
     if robot["mismatches"]:
-        counts.append(click.style(f"{robot['mismatches']} read back differently", fg="red"))
+        yield click.style(f"{robot['mismatches']} read back differently", fg="red")
     for count, words in ((robot["unadopted"], "not known"), (robot["differing"], "different in the robot")):
         if count:
-            counts.append(click.style(f"{counted(count, 'input')} {words}", fg="red"))
+            yield click.style(f"{counted(count, 'input')} {words}", fg="red")
     if robot["lag"] >= _LAG:
-        counts.append(click.style(f"{age(robot['lag'])} behind", fg="yellow"))
+        yield click.style(f"{age(robot['lag'])} behind", fg="yellow")
     if robot["adoption"]:
         left = age(robot["adoption"])
-        counts.append(click.style(f"adopted values without an owner fall back in {left}", fg="yellow"))
+        yield click.style(f"adopted values without an owner fall back in {left}", fg="yellow")
     if robot["watchdog"] is not None:
-        counts.append("watchdog fed" if robot["watchdog"] else click.style("watchdog not fed", fg="red"))
-    return [first, ", ".join(counts)]
+        yield "watchdog fed" if robot["watchdog"] else click.style("watchdog not fed", fg="red")
+
+
+def _controller(robot: Answer) -> Iterator[str]:
+    """What is known of the controller itself; a gateway that was started before an upgrade does not say it."""
+    from gatewayd.report.format import age
+
+    if robot.get("controller") is not None:
+        series = f" (series {robot['series']})" if robot["series"] is not None else ""
+        yield f"software {robot['controller']}{series}, RTDE protocol {robot['protocol']}"
+    if robot.get("contradiction") is not None:
+        yield click.style(robot["contradiction"], fg="yellow")
+    said = robot.get("last_text")
+    if said is not None:
+        yield f"last text {age(said['age'])} ago, {said['level']}: {said['text']}"
 
 
 def _writer(writer: Answer, locks: int) -> str:

@@ -156,5 +156,5 @@ def _fields_of(kind: type[Any]) -> tuple[tuple[str, Any], ...]:
     return tuple(
         (field.name, unwritten.get(field.name, field.default))
         for field in dataclasses.fields(kind)
-        if field.name not in without
+        if field.name not in without and field.metadata.get("meaning", True)
     )

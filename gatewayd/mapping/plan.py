@@ -12,12 +12,15 @@ from typing import ClassVar, TypeVar
 
 from gatewayd.core.definition import CellDefinition
 
+NO_MEANING: Mapping[str, bool] = {"meaning": False}
+"""Metadata of a field of a link's plan that does not count for the fingerprint: it is there for words only."""
+
 
 class LinkPlan:
     """One link of a cell, compiled: a frozen dataclass of the link's own that fits into a pickle.
 
-    All of its fields count for the fingerprint but those at their default; a part that has a `meaning` (JSON's types)
-    counts with that.
+    All of its fields count for the fingerprint but those at their default and those with `NO_MEANING`; a part that has
+    a `meaning` (JSON's types) counts with that.
     """
 
     __slots__ = ()

@@ -102,7 +102,10 @@ def verdict_of(served: ServedCell, now: float) -> CellVerdict:
 def judge(cell: Cell, source: LinkHealth, links: Mapping[str, LinkHealth], now: float) -> CellVerdict:
     """The verdict on a cell, its robot link (`source`: the problems are the cause of a loss) and its other links."""
     writers = range(len(cell.writers.alive))
-    unserved, held = list(_unserved(cell, source, now)), list(_held_by_robot(cell))
+    unserved, held = (
+        list(_unserved(cell, source, now)),
+        [*_held_by_robot(cell), *_said_by_source(cell, source)],
+    )
     of_gateway = list(_of_gateway(cell, now))
     lost = {index: finding for index in writers for finding in _lost(cell, index, now)}
     return CellVerdict(
@@ -161,6 +164,12 @@ def _held_by_robot(cell: Cell) -> Iterator[_Finding]:
         yield _Finding(Level.WARN, text)
     yield from _with_quality(cell, Quality.UNAVAILABLE, Level.WARN, "unavailable")
     yield from _with_quality(cell, Quality.DIFFERS, Level.BAD, "different in the robot")
+
+
+def _said_by_source(cell: Cell, source: LinkHealth) -> Iterator[_Finding]:
+    """Why something is as it is, as far as the link knows; the causes of a loss are said with it."""
+    if cell.freshness.state is not Source.LOST:
+        yield from (_Finding(Level.WARN, problem) for problem in source.problems)
 
 
 def _rate(cell: Cell, source: LinkHealth) -> str:

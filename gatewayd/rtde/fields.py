@@ -154,7 +154,7 @@ _LOWER = _since("3.4.0")
 _UPPER = _since("3.9.0", "5.3.0")
 _TORQUE = _since("-", "5.23.0", "10.11.0")
 _GRAVITY = _since("-", "5.26.0", "10.12.0")
-_BASE = _since("-", "5.26.0", "10.13.0")
+_STEP = _since("-", "5.26.0", "10.13.0")
 _NOWHERE = _since("-", "-", "-")
 
 _BOOL, _UINT8, _UINT32, _UINT64 = DataType.BOOL, DataType.UINT8, DataType.UINT32, DataType.UINT64
@@ -302,9 +302,8 @@ OUTPUTS: Mapping[str, Field] = _table(
     Field("time_scale_source", _INT32, "why motion is slowed, see modes and states", since=_since("-", "5.17.0")),
     Field("target_gravity", _V3, "gravity set by mounting or set_gravity()", "m/s²", _GRAVITY),
     Field("target_base_acceleration", _V6, "acceleration set by set_base_acceleration()", since=_GRAVITY),
-    Field("target_base_wrench", _V6, "target wrench at the base (in no guide)", since=_BASE),
-    Field("control_step", _UINT64, "control steps since start-up (in no guide)", since=_BASE),
-    Field("external_force_torque", _V6, "external wrench read back (in no guide)", since=_NOT_CB3),
+    Field("target_base_wrench", _V6, "target wrench at the base (in no guide)", since=_since("-", "", "10.14.0")),
+    Field("control_step", _UINT64, "control steps since start-up (in no guide)", since=_STEP),
 )
 """What a client may subscribe, by name; `input_*` fields are read-backs."""
 # fmt: on

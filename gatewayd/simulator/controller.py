@@ -40,8 +40,9 @@ class Controller:
     """One simulated controller.
 
     `frequency` is the rate of its control cycle in Hz (default: that of the series), `uptime` its first timestamp in
-    seconds. Raises ProgramError if `program` names what the controller does not have, ValueError for inputs to be
-    held that do not exist.
+    seconds. `fields` are outputs that the catalogue does not have, or has with another type; they rest at zero. Raises
+    ProgramError if `program` names what the controller does not have, ValueError for inputs to be
+    held that do not exist, and for fields that are inputs or tell the time.
     """
 
     def __init__(
@@ -53,6 +54,7 @@ class Controller:
         uptime: float | None = None,
         program: Iterable[ProgramRule] = (),
         faults: Faults | None = None,
+        fields: Iterable[Field] = (),
     ) -> None:
         self.series = series
         self.version = version or DEFAULT_VERSIONS[series]
@@ -64,9 +66,16 @@ class Controller:
         self.cycle = 0
         """Cycles run. Unlike the step counter it goes on while the controller is frozen."""
         self.claims = ControllerClaims()
-        self.store = FieldStore(
-            {name: field.type for name, field in {**INPUTS, **OUTPUTS}.items()}, SIGNALS, INITIAL
-        )
+        own = {field.name: field for field in fields}
+        taken = own.keys() & (INPUTS.keys() | CYCLE_FIELDS)
+        if taken:
+            message = f"{min(taken)} cannot be another field"
+            raise ValueError(message)
+        self._outputs = {**OUTPUTS, **own}
+        signals = {name: signal for name, signal in SIGNALS.items() if name not in own}
+        initial = {name: value for name, value in INITIAL.items() if name not in own}
+        types = {name: field.type for name, field in {**INPUTS, **self._outputs}.items()}
+        self.store = FieldStore(types, signals, initial)
         self._overwritten: dict[str, tuple[Scalar, ...]] = {}
         self._rules = tuple(program)
         self._interpreter = self._load()
@@ -74,8 +83,8 @@ class Controller:
             uptime = DEFAULT_UPTIME if self.faults.boot_restart is None else 0.0
         self._set_step(round(uptime * self.rate), 0.0, 1.0)
         if self.faults.adapter is not None:
-            fields = [name for name in ADAPTER_FIELDS if self.input_type(name)]
-            self.claims.claim(ADAPTERS[self.faults.adapter], fields)
+            taken_by_it = [name for name in ADAPTER_FIELDS if self.input_type(name)]
+            self.claims.claim(ADAPTERS[self.faults.adapter], taken_by_it)
         self.hold(self.faults.hold)
 
     @property
@@ -85,7 +94,7 @@ class Controller:
 
     def output_type(self, name: str) -> DataType | None:
         """The type of an output, None if this series and version does not have it, or by a fault."""
-        return None if name in self.faults.unreadable else self._type(OUTPUTS.get(name))
+        return None if name in self.faults.unreadable else self._type(self._outputs.get(name))
 
     def input_type(self, name: str) -> DataType | None:
         """The type of an input, None if this series and version does not have it."""

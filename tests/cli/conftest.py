@@ -23,6 +23,7 @@ class Running:
     path: Path
     cell: Cell
     loop: asyncio.AbstractEventLoop
+    served: Served
 
     def do(self, act: Callable[[Cell], object]) -> None:
         """Do something to the cell, in its own thread."""
@@ -58,7 +59,7 @@ def gateway(tmp_path: Path) -> Iterator[Running]:
     thread = threading.Thread(target=loop.run_until_complete, args=(serve(),))
     thread.start()
     assert ready.wait(10)
-    yield Running(path, served.cell, loop)
+    yield Running(path, served.cell, loop, served)
     loop.call_soon_threadsafe(stop.set)
     thread.join(10)
     loop.close()

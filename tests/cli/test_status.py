@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -71,6 +72,31 @@ def test_what_the_robot_holds_and_how_late_it_is(gateway: Running, invoke: Invok
     ):
         assert words in done.output
     assert "out of range" in invoke("watch", "--once").output
+
+
+def test_what_is_known_of_the_controller(gateway: Running, invoke: Invoke) -> None:
+    source = gateway.served.source
+    figures = {
+        **source.state.figures,
+        "controller": "5.12.0.1101",
+        "series": "e",
+        "protocol": 2,
+        "pauses": 2,
+        "strange": {"unknown type": 3, "layout": 0},
+        "contradiction": "the mapping says software 5.9.0, the controller runs 5.12.0, which is newer",
+        "last_text": {"text": "Protective stop", "source": "URControl", "level": "warning", "age": 3.0},
+    }
+    source.state = replace(source.state, figures=figures)
+    done = invoke("status")
+    assert done.exit_code == 0
+    for words in (
+        "software 5.12.0.1101 (series e), RTDE protocol 2",
+        "2 pauses",
+        "3 strange packages (unknown type)",
+        "the controller runs 5.12.0, which is newer",
+        "last text 3.0 s ago, warning: Protective stop",
+    ):
+        assert words in done.output
 
 
 def test_a_stopped_program_alone_is_no_trouble(gateway: Running, invoke: Invoke) -> None:

@@ -76,6 +76,7 @@ _SECTIONS = {
     "WriterSpec": "`writers:` NAME`:`",
     "Group": "`groups:` NAME`:`",
     "VariableSpec": "`variables:` NAME`:`",
+    "RobotField": "`variables:` NAME`: robot:`",
     "PlacementSpec": "`variables:` NAME`: modbus:`",
     "CanopenPlace": "`variables:` NAME`: canopen:`",
 }

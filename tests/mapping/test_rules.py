@@ -403,6 +403,38 @@ def test_a_misspelt_reserved_bit_is_recognised(side: str) -> None:
     assert finding.hint.startswith(f"did you mean `{side}_bit_register_7`")
 
 
+@pytest.mark.parametrize(
+    "place, expected",
+    [
+        ("{field: dexterity, type: DOUBLE}", ["GW317"]),
+        ("{field: dexterity}", ["GW301"]),
+        ("dexterity", ["GW301"]),
+        ("{field: dexterity, type: REAL}", ["GW114"]),
+        ("{field: robot_mode, type: UINT8}", ["GW317"]),
+        ("{field: robot_mode, type: INT32}", []),
+        ("{field: robot_mode, type: INT32, direction: output}", ["GW522"]),
+        ("{field: output_bit_register_5, type: BOOL}", ["GW522"]),
+        ("{field: output_int_register_48, type: INT32}", ["GW317"]),
+        ("{field: 'new_register_0..3', type: INT32}", ["GW317"]),
+        ("{field: 'new_pose[6]', type: VECTOR6D}", ["GW304"]),
+        ("{type: DOUBLE}", ["GW109"]),
+        ("{field: robot_mode, typ: INT32}", ["GW108"]),
+    ],
+)
+def test_fields_that_are_declared_with_their_type(place: str, expected: list[str]) -> None:
+    found = findings(f"  a: {{robot: {place}, modbus: 100}}\n")
+    assert [rule for rule, _ in found] == expected
+
+
+def test_a_declared_field_of_an_older_controller_is_only_warned_of() -> None:
+    head = HEAD.replace("robot: {", "robot: {version: 5.12, ")
+    assert head != HEAD
+    lines = "  a: {{robot: {}, modbus: 100}}\n"
+    assert [rule for rule, _ in findings(lines.format("control_step"), head)] == ["GW303"]
+    declared = lines.format("{field: control_step, type: UINT64}")
+    assert [rule for rule, _ in findings(declared, head)] == ["GW317"]
+
+
 CAN_HEAD = """\
 gatewayd: 1
 cell: press-3

@@ -42,7 +42,7 @@ variables:
   speed:  {robot: input_double_register_1, modbus: {holding: 24, type: int16, scale: 0.1, offset: -5, order: BADC},
            group: motion, limits: [-1, 1.5]}
   path:   {robot: input_int_register_1, modbus: 30, group: motion, on_release: 7}
-  pose:   {robot: 'actual_TCP_pose[2]', modbus: 40, on_stale: exception}
+  pose:   {robot: {field: 'actual_TCP_pose[2]', type: VECTOR6D}, modbus: 40, on_stale: exception}
   door:   {robot: actual_digital_input_bits.3, modbus: {discrete: 64}, on_stale: true, comment: front}
 """
 

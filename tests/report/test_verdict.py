@@ -62,6 +62,13 @@ def test_robot_green_needs_every_variable(cell: Cell) -> None:
     assert verdict(cell).healthy
 
 
+def test_robot_yellow_tells_what_its_link_knows(cell: Cell) -> None:
+    why = "another client holds input_int_register_9: probably a URCap"
+    assert robot(cell, why=why).words == f"1 of 10 variables unavailable: spare; {why}"
+    assert verdict(cell, why=why).problems[-1] == why
+    assert verdict(cell, why=why).unserved == ()
+
+
 def test_robot_red_tells_why_and_for_how_long(cell: Cell) -> None:
     cell.robot_lost(f"{ADDRESS}: cable pulled", NOW)
     found = robot(cell, NOW + 300, "refused")

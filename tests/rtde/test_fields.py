@@ -17,7 +17,6 @@ IN_NO_GUIDE = {
         "actual_qdd",
         "actual_moment",
         "control_step",
-        "external_force_torque",
         "target_base_wrench",
     },
 }
@@ -96,6 +95,9 @@ def test_register_families_have_the_guides_numbers() -> None:
         ("actual_qdd", Series.E, None, False),
         ("control_step", Series.X, "10.13", True),
         ("control_step", Series.X, "10.12", False),
+        ("target_base_wrench", Series.X, "10.13", False),
+        ("target_base_wrench", Series.X, "10.14", True),
+        ("target_base_wrench", Series.E, "5.12", True),
     ],
 )
 def test_availability_by_series_and_version(

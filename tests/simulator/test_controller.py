@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import pytest
 
-from gatewayd.rtde.fields import Series, SoftwareVersion
+from gatewayd.rtde.fields import Field, Series, SoftwareVersion
+from gatewayd.rtde.types import DataType
 from gatewayd.simulator.controller import INTERNAL, Controller
 from gatewayd.simulator.faults import ADAPTER_FIELDS, Faults
 from gatewayd.simulator.program import parse
@@ -157,3 +158,21 @@ def test_hold_and_free() -> None:
 def test_the_cycle_counters_cannot_be_set() -> None:
     with pytest.raises(ValueError, match="timestamp follows the controller's cycles"):
         Controller().set("timestamp", (0.0,))
+
+
+def test_a_controller_may_have_fields_that_the_catalogue_does_not_have() -> None:
+    fields = [Field("dexterity", DataType.VECTOR3D, ""), Field("robot_mode", DataType.UINT8, "")]
+    controller = Controller(fields=fields)
+    assert controller.output_type("dexterity") is DataType.VECTOR3D
+    assert controller.output_type("robot_mode") is DataType.UINT8
+    assert Controller().output_type("dexterity") is None
+    controller.set("dexterity", (1, 2, 3))
+    assert controller.get("dexterity") == (1.0, 2.0, 3.0)
+    controller.restart()
+    assert controller.get("dexterity") == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", ["timestamp", "input_int_register_0"])
+def test_inputs_and_the_clock_are_what_they_are(name: str) -> None:
+    with pytest.raises(ValueError, match=f"{name} cannot be another field"):
+        Controller(fields=[Field(name, DataType.DOUBLE, "")])

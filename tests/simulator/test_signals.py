@@ -43,7 +43,6 @@ def test_a_field_without_a_value_of_its_own_is_a_register_or_rests_at_zero() -> 
         "actual_digital_output_bits",
         "actual_configurable_digital_output_bits",
         "euromap67_output_bits",
-        "external_force_torque",
         "target_base_acceleration",
         "tool_output_mode",
     }

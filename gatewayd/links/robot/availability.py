@@ -7,6 +7,7 @@ of being read or written wrongly.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from gatewayd.core.definition import Direction, ValueKind, Variable
 from gatewayd.links.robot.companions import DOMAINS
@@ -15,8 +16,13 @@ from gatewayd.rtde.session import Session
 from gatewayd.rtde.types import INTEGER_RANGES, DataType
 
 
-def unavailable(session: Session, variables: Sequence[Variable]) -> dict[int, str]:
-    """Reason by variable index, in the controller's word and with its likely cause."""
+def unavailable(
+    session: Session, variables: Sequence[Variable], declared: Mapping[str, str] = MappingProxyType({})
+) -> dict[int, str]:
+    """Reason by variable index, in the controller's word and with its likely cause.
+
+    `declared` are the types that the mapping declares for fields, by their words.
+    """
     refused = {
         (missing.field, missing.output): f"{missing.word}: {missing.hint}" for missing in session.unavailable
     }
@@ -26,7 +32,7 @@ def unavailable(session: Session, variables: Sequence[Variable]) -> dict[int, st
     for index, variable in enumerate(variables):
         reason = (
             refused.get((variable.field, variable.direction is Direction.OUTPUT))
-            or _misfit(variable, types)
+            or _misfit(variable, types, declared)
             or _domain_unknown(session, variable, variables, refused)
         )
         if reason is not None:
@@ -34,10 +40,15 @@ def unavailable(session: Session, variables: Sequence[Variable]) -> dict[int, st
     return reasons
 
 
-def _misfit(variable: Variable, types: Mapping[str, DataType]) -> str | None:
+def _misfit(variable: Variable, types: Mapping[str, DataType], declared: Mapping[str, str]) -> str | None:
     """Why the type that the controller answered cannot carry the variable; None if it can, or answered none."""
-    answered = types.get(variable.field)
-    if answered is None or _carries(answered, variable):
+    answered, word = types.get(variable.field), declared.get(variable.field)
+    if answered is None:
+        return None
+    if word is not None:
+        is_other = answered.word != word
+        return f"the controller answers {answered.word}, the mapping declares {word}" if is_other else None
+    if _carries(answered, variable):
         return None
     return f"the controller answers {answered.word}, which is not what the mapping was made for"
 

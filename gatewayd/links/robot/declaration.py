@@ -38,6 +38,14 @@ class RobotKind(LinkKind):
         "differing": "inputs for which the robot holds something else than it was given",
         "adoption": "seconds until adopted inputs without an owner fall back; 0: none will",
         "watchdog": "whether the robot's watchdog is fed, or null without one",
+        "controller": "software of the controller: `5.12.0.1101`, as it last said, or null",
+        "series": "`cb3`, `e` or `x`, or null for another one",
+        "protocol": "version of RTDE that is spoken, or null",
+        "contradiction": "what the mapping says of the controller and it contradicts, in words, or null",
+        "last_text": "last text message of the controller: `text`, `source`, `level` (`exception`, `error`, `warning`, "
+        "`info`), `age`; or null",
+        "unavailable": "list of `field`, `reason` and `variables` (names) that the controller does not give",
+        "held_elsewhere": "list of inputs that another client holds: `field`, and who it `probably` is",
     }
 
     metrics = (
@@ -80,6 +88,9 @@ class RobotKind(LinkKind):
                 "adopt_for": seconds(cell.adopt_for) or "none",
                 "verify": str(plan.verify).lower(),
                 "watchdog": _watchdog(plan.watchdog, cell),
+                "series": plan.series or "",
+                "version": plan.version or "",
+                "declared types": Names(" ".join(f"{name}:{word}" for name, word in sorted(plan.types))),
                 "subscribed": Names(" ".join(sorted(plan.outputs))),
                 "claimed": Names(" ".join(sorted(plan.inputs))),
             },

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Final
 
 from gatewayd.core.definition import Direction, ValueKind
-from gatewayd.links.robot.reference import Target, resolve
-from gatewayd.links.robot.sections import Robot, RobotPlace, RobotValidity
+from gatewayd.links.robot.reference import FieldDeclaration, Target, resolve
+from gatewayd.links.robot.sections import Robot, RobotField, RobotPlace, RobotValidity
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import Defined, ExpandedVariable
 from gatewayd.mapping.model import VariableSpec
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field
-from gatewayd.rtde.ranges import usual_range
+from gatewayd.rtde.ranges import Range, usual_range
 from gatewayd.rtde.types import INTEGER_RANGES, DataType
 
 _GROWING: Final = ("timestamp",)
@@ -29,21 +29,39 @@ _OUTPUT_REGISTER: Final = "output_"
 
 def define(line: Part[VariableSpec], document: Document) -> tuple[list[Defined], bool]:
     """The values that a line names, in order, and whether they are a family. Raises UnresolvedReference."""
-    reference = line.spec.by(RobotPlace).robot
-    targets = resolve(reference)
+    place = line.spec.by(RobotPlace).robot
+    reference = place.field
+    targets = resolve(reference, declared(place))
     robot = document.part(Robot)
     of_all = robot is not None and robot.spec.valid is not None
     is_asked = line.spec.by(RobotValidity).valid is not None
     values = [
-        _defined(target, running=is_asked or (of_all and _is_of_program(target.field.name)))
+        _defined(
+            target,
+            running=is_asked or (of_all and _is_of_program(target.field.name)),
+            # What is known of the catalogue's type says nothing of another one.
+            usual=usual_range(target.field.name, target.element) if place.type is None else None,
+        )
         for target in targets
     ]
     return values, reference.many or len(targets) > 1
 
 
-def field_of(variable: ExpandedVariable) -> Field:
-    """The catalogue's entry of the field that carries it."""
-    return (INPUTS if variable.direction is Direction.INPUT else OUTPUTS)[variable.field]
+def declared(place: RobotField) -> FieldDeclaration:
+    """What a line says of its field besides the name."""
+    is_input = None if place.direction is None else place.direction == "input"
+    return FieldDeclaration(DataType.from_word(place.type) if place.type is not None else None, is_input)
+
+
+def field_of(variable: ExpandedVariable) -> Field | None:
+    """The catalogue's entry of the field that carries it; None if it has none."""
+    return (INPUTS if variable.direction is Direction.INPUT else OUTPUTS).get(variable.field)
+
+
+def type_of(variable: ExpandedVariable) -> DataType | None:
+    """The type that is declared for the field that carries it; None where the catalogue says it."""
+    is_bit_register = not variable.target.startswith(variable.field)
+    return None if is_bit_register else declared(variable.spec.by(RobotPlace).robot).type
 
 
 def is_program_output(variable: ExpandedVariable) -> bool:
@@ -55,9 +73,9 @@ def _is_of_program(field: str) -> bool:
     return field.startswith(_OUTPUT_REGISTER)
 
 
-def _defined(target: Target, *, running: bool) -> Defined:
+def _defined(target: Target, *, running: bool, usual: Range | None) -> Defined:
     field = target.field.name
-    direction = Direction.INPUT if field in INPUTS else Direction.OUTPUT
+    direction = Direction.INPUT if target.is_input else Direction.OUTPUT
     low, high = INTEGER_RANGES.get(target.type.code, (None, None))
     is_output = direction is Direction.OUTPUT
     return Defined(
@@ -70,7 +88,7 @@ def _defined(target: Target, *, running: bool) -> Defined:
         high=high,
         bit=target.bit,
         element=target.element,
-        usual=usual_range(field, target.element),
+        usual=usual,
         valid_running=is_output and running,
         grows=field in _GROWING,
         moves=field in _MOVING,

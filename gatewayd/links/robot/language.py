@@ -8,15 +8,17 @@ from typing import ClassVar, Final
 from gatewayd.core.definition import Direction
 from gatewayd.links.language import DefiningLanguage, WriterName
 from gatewayd.links.robot.declaration import KIND
-from gatewayd.links.robot.definition import define
+from gatewayd.links.robot.definition import define, type_of
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
 from gatewayd.links.robot.rates import package_period, package_rate
-from gatewayd.links.robot.sections import ADOPT_FOR, Robot, RobotPlace, RobotValidity, Watchdog
+from gatewayd.links.robot.reference import is_bit_register, is_known
+from gatewayd.links.robot.sections import ADOPT_FOR, Robot, RobotField, RobotPlace, RobotValidity, Watchdog
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import CellSettings, Defined, ExpandedCell
 from gatewayd.mapping.model import VariableSpec
 from gatewayd.mapping.section import Section
+from gatewayd.rtde.fields import SoftwareVersion
 
 _STALE_PERIODS: Final = 5
 _MIN_STALE_AFTER: Final = 0.1
@@ -40,14 +42,21 @@ class RobotLanguage(DefiningLanguage):
              "gatewayd.links.robot.rules.validity")  # fmt: skip
     tables = "gatewayd.links.robot.tables"
     exports = "gatewayd.links.robot.urscript"
-    nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {(Robot, "watchdog"): Watchdog}
-    articles: ClassVar[Mapping[type[Section], str]] = {Robot: "the section `robot`", Watchdog: "the watchdog"}
+    nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
+        (Robot, "watchdog"): Watchdog,
+        (VariableSpec, "robot"): RobotField,
+    }
+    articles: ClassVar[Mapping[type[Section], str]] = {
+        Robot: "the section `robot`",
+        Watchdog: "the watchdog",
+        RobotField: "a field of the robot",
+    }
     telling_keys = ("host", "frequency", "port", "series", "version", "adopt_for", "valid")
     output_policies: ClassVar[Mapping[str, str]] = {"valid": "it says when an output is good"}
     unwritten: ClassVar[Mapping[str, object]] = {"adopt_for": ADOPT_FOR}
 
     def without_effect(self, document: Document) -> Iterable[tuple[Position, str, str]]:
-        """`adopt_for` where nothing is adopted."""
+        """`adopt_for` where nothing is adopted, and what is declared of a field that the name says already."""
         robot = document.part(Robot)
         if (
             robot is not None
@@ -56,6 +65,14 @@ class RobotLanguage(DefiningLanguage):
         ):
             message = "`adopt_for` is for adopted inputs, and `on_connect: fallback` adopts none"
             yield robot.key_at("adopt_for"), message, "remove one of the two"
+        for line in document.variables.values():
+            place = line.spec.by(RobotPlace).robot
+            if place.direction is not None and is_known(place.field):
+                message = f"the direction of `{place.field}` follows from its name"
+                yield line.key_at("robot", "direction"), message, "remove it"
+            if place.type is not None and is_bit_register(place.field):
+                message = f"`{place.field}` is a bit of a register word and has no type of its own"
+                yield line.key_at("robot", "type"), message, "remove it"
 
     def names_writers(self, document: Document) -> Iterable[WriterName]:
         """The writers that the watchdog requires."""
@@ -77,7 +94,7 @@ class RobotLanguage(DefiningLanguage):
 
     def named(self, line: Part[VariableSpec]) -> str:
         """The reference of a line."""
-        return str(line.spec.by(RobotPlace).robot)
+        return str(line.spec.by(RobotPlace).robot.field)
 
     def settings(self, document: Document) -> CellSettings:
         """When values are stale, and what becomes of those that the controller holds."""
@@ -103,6 +120,9 @@ class RobotLanguage(DefiningLanguage):
             outputs=tuple(name for name in _subscribed(cell) if name != _TIMESTAMP),
             inputs=_fields(cell, Direction.INPUT),
             verify=robot.verify,
+            types=_declared_types(cell),
+            series=robot.series,
+            version=str(SoftwareVersion(*robot.version)) if robot.version is not None else None,
             watchdog=None
             if watchdog is None
             else WatchdogPlan(
@@ -119,6 +139,11 @@ def _subscribed(cell: ExpandedCell) -> tuple[str, ...]:
     if not any(variable.valid_running for variable in cell.variables):
         return fields
     return tuple(dict.fromkeys((*fields, _PROGRAM_STATE)))
+
+
+def _declared_types(cell: ExpandedCell) -> tuple[tuple[str, str], ...]:
+    found = {variable.field: kind.word for variable in cell.variables if (kind := type_of(variable))}
+    return tuple(found.items())
 
 
 def _fields(cell: ExpandedCell, direction: Direction) -> tuple[str, ...]:

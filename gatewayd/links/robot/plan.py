@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from gatewayd.mapping.plan import LinkPlan, Plan
+from gatewayd.mapping.plan import NO_MEANING, LinkPlan, Plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +35,12 @@ class RobotPlan(LinkPlan):
     verify: bool
     """Compare what was written with what the controller reads back."""
     watchdog: WatchdogPlan | None = None
+    types: tuple[tuple[str, str], ...] = ()
+    """Fields whose type the file declares, with the type's word."""
+    series: str | None = field(default=None, metadata=NO_MEANING)
+    """What the file says of the controller, for `check` and for whoever compares it with the controller's answer."""
+    version: str | None = field(default=None, metadata=NO_MEANING)
+    """The same of its software."""
 
 
 def robot_of(plan: Plan) -> RobotPlan:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from typing import Final
 
@@ -18,6 +18,7 @@ _FAMILIES: Final = {family.prefix: family for family in REGISTERS}
 _BIT_REGISTERS: Final = {"input_bit_register_": "input", "output_bit_register_": "output"}
 _NUMBERED = re.compile(r"(.*_)(0|[1-9][0-9]{0,3})")
 _WORD_BITS: Final = range(64)
+_INPUTS: Final = "input_"
 
 
 class ReferenceProblem(Enum):
@@ -44,6 +45,7 @@ class Target:
     """The field that carries it."""
     type: DataType
     """Of the one value: BOOL for a bit, the element type for a vector."""
+    is_input: bool
     bit: int | None = None
     element: int | None = None
 
@@ -56,26 +58,74 @@ class UnresolvedReference(UndefinedError):
         self.problem, self.name, self.limit = problem, name, limit
 
 
-def resolve(reference: Reference) -> list[Target]:
+@dataclass(frozen=True, slots=True)
+class FieldDeclaration:
+    """What a file says of a field besides its name."""
+
+    type: DataType | None = None
+    """Goes before the catalogue's, and makes a field usable that the catalogue does not have."""
+    is_input: bool | None = None
+    """Of a field that the catalogue does not have; None: as its name says."""
+
+
+_UNDECLARED: Final = FieldDeclaration()
+
+
+def resolve(reference: Reference, declared: FieldDeclaration = _UNDECLARED) -> list[Target]:
     """Find what a reference names, in the order it is written.
 
-    Bits 0 to 63 are bits of the register words that RTDE has; a vector without an element is all its elements.
-    Raises `UnresolvedReference`.
+    Bits 0 to 63 are bits of the register words that RTDE has, whatever is declared; a vector without an element is all
+    its elements. Raises `UnresolvedReference`.
     """
     if reference.registers is not None:
-        return [_register(reference.field, number) for number in reference.registers]
+        return [_register(reference.field, number, declared) for number in reference.registers]
     family = _split_register(reference.field)
     if family is not None:
-        whole = _register(*family)
+        whole = _register(*family, declared)
     else:
-        field = INPUTS.get(reference.field) or OUTPUTS.get(reference.field)
-        if field is None:
-            raise UnresolvedReference(ReferenceProblem.UNKNOWN_FIELD, reference.field)
-        whole = Target(field.name, field, field.type)
+        whole = _whole(
+            reference.field, declared, UnresolvedReference(ReferenceProblem.UNKNOWN_FIELD, reference.field)
+        )
     elements = list(_elements(whole, reference.elements))
     if reference.bits is None:
         return elements
     return [bit for element in elements for bit in _bits(element, reference.bits)]
+
+
+def is_bit_register(reference: Reference) -> bool:
+    """Whether it names bits 0 to 63, which are bits of words."""
+    family = _split_register(reference.field)
+    prefix, numbers = family if family is not None else (reference.field, None)
+    if prefix not in _BIT_REGISTERS:
+        return False
+    first = numbers if numbers is not None else (reference.registers or range(1)).start
+    return first in _WORD_BITS
+
+
+def is_known(reference: Reference) -> bool:
+    """Whether the catalogue says the direction of everything that it names."""
+    try:
+        resolve(reference)
+    except UnresolvedReference as error:
+        return error.problem not in (
+            ReferenceProblem.UNKNOWN_FIELD,
+            ReferenceProblem.NOT_NUMBERED,
+            ReferenceProblem.NO_SUCH_REGISTER,
+        )
+    return True
+
+
+def _whole(name: str, declared: FieldDeclaration, unknown: UnresolvedReference) -> Target:
+    """A field as the catalogue has it and the file declares it; raises `unknown` where neither says its type."""
+    field = INPUTS.get(name) or OUTPUTS.get(name)
+    if field is None:
+        if declared.type is None:
+            raise unknown
+        is_input = declared.is_input if declared.is_input is not None else name.startswith(_INPUTS)
+        return Target(name, Field(name, declared.type, "not in the catalogue"), declared.type, is_input)
+    if declared.type is not None:
+        field = replace(field, type=declared.type)
+    return Target(name, field, field.type, name in INPUTS)
 
 
 def _split_register(field: str) -> tuple[str, int] | None:
@@ -86,19 +136,20 @@ def _split_register(field: str) -> tuple[str, int] | None:
     return match[1], int(match[2])
 
 
-def _register(prefix: str, number: int) -> Target:
+def _register(prefix: str, number: int, declared: FieldDeclaration) -> Target:
     name = f"{prefix}{number}"
     side = _BIT_REGISTERS.get(prefix)
     if side is not None and number in _WORD_BITS:
         word, bit = bit_word(side, number)
-        return Target(name, (INPUTS if side == "input" else OUTPUTS)[word], DataType.BOOL, bit)
+        is_input = side == "input"
+        return Target(name, (INPUTS if is_input else OUTPUTS)[word], DataType.BOOL, is_input, bit)
     family = _FAMILIES.get(prefix)
-    if family is None:
-        raise UnresolvedReference(ReferenceProblem.NOT_NUMBERED, prefix)
-    if number not in family.numbers:
-        raise UnresolvedReference(ReferenceProblem.NO_SUCH_REGISTER, name, family.numbers[-1])
-    field = INPUTS.get(name) or OUTPUTS[name]
-    return Target(name, field, field.type)
+    unknown = (
+        UnresolvedReference(ReferenceProblem.NOT_NUMBERED, prefix)
+        if family is None
+        else UnresolvedReference(ReferenceProblem.NO_SUCH_REGISTER, name, family.numbers[-1])
+    )
+    return _whole(name, declared, unknown)
 
 
 def _elements(whole: Target, wanted: range | None) -> Iterator[Target]:
@@ -110,7 +161,9 @@ def _elements(whole: Target, wanted: range | None) -> Iterator[Target]:
     for element in wanted if wanted is not None else range(whole.type.count):
         if element >= whole.type.count:
             raise UnresolvedReference(ReferenceProblem.NO_SUCH_ELEMENT, whole.name, whole.type.count)
-        yield Target(f"{whole.name}[{element}]", whole.field, whole.type.element, whole.bit, element)
+        yield Target(
+            f"{whole.name}[{element}]", whole.field, whole.type.element, whole.is_input, whole.bit, element
+        )
 
 
 def _bits(whole: Target, wanted: range) -> Iterator[Target]:
@@ -120,4 +173,4 @@ def _bits(whole: Target, wanted: range) -> Iterator[Target]:
     for bit in wanted:
         if bit >= width:
             raise UnresolvedReference(ReferenceProblem.NO_SUCH_BIT, whole.name, width)
-        yield Target(f"{whole.name}.{bit}", whole.field, DataType.BOOL, bit, whole.element)
+        yield Target(f"{whole.name}.{bit}", whole.field, DataType.BOOL, whole.is_input, bit, whole.element)

@@ -21,6 +21,7 @@ from gatewayd.core.image import Quality
 from gatewayd.links.contract import Context, Level, LinkHealth, LinkRuntime, SourceLink
 from gatewayd.links.robot.availability import unavailable
 from gatewayd.links.robot.companions import Driven, all_inputs, all_outputs
+from gatewayd.links.robot.controller import ControllerNotes
 from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.inputs import ClaimedInputs
 from gatewayd.links.robot.plan import RobotPlan
@@ -73,10 +74,11 @@ class RobotLink(SourceLink):
             self,
         )
         self._driven = Driven()
+        self._notes = ControllerNotes()
         if former is not None:
             self._client.statistics = former._client.statistics  # noqa: SLF001 - another one of the same class
             if not KIND.moved(former.plan, plan):
-                self._driven = former._driven  # noqa: SLF001
+                self._driven, self._notes = former._driven, former._notes  # noqa: SLF001
         self._outputs = OutputTransfer((), {})
         self._slots: dict[str, slice] = {}
         self._has_timestamp = False
@@ -110,9 +112,12 @@ class RobotLink(SourceLink):
             "watchdog": self._watchdog_fed(),
             "pauses": statistics.pauses,
             "strange": {oddity.value: count for oddity, count in statistics.strange.by_oddity.items()},
+            **self._notes.figures(self.plan, clock.now()),
         }
         if self._client.session is not None:
-            return LinkHealth("Robot", Level.GOOD, "connected", where, figures=figures)
+            problems = self._notes.problems(self.plan)
+            level = Level.WARN if problems else Level.GOOD
+            return LinkHealth("Robot", level, "connected", where, problems, figures)
         problems = (trouble,) if trouble else ()
         return LinkHealth("Robot", Level.BAD, "not connected", trouble or where, problems, figures)
 
@@ -216,7 +221,7 @@ class RobotLink(SourceLink):
         if session is None:
             return
         variables = cell.definition.variables
-        reasons = unavailable(session, variables)
+        reasons = unavailable(session, variables, dict(self.plan.types))
         self._outputs = OutputTransfer(variables, self._slots, reasons)
         self._adopting = True
         held = self._inputs.rebind(variables, reasons)
@@ -237,12 +242,13 @@ class RobotLink(SourceLink):
         self._slots = session.outputs.slots
         self._has_timestamp = "timestamp" in self._slots
         self._program = self._slots[_PROGRAM].start if _PROGRAM in self._slots else None
-        reasons = unavailable(session, variables)
+        reasons = unavailable(session, variables, dict(self.plan.types))
         self._outputs = OutputTransfer(variables, self._slots, reasons)
         self._cycle = 1 / session.series.base_rate if session.series is not None else _CYCLE_UNKNOWN
         self._inputs = ClaimedInputs(variables, session, self._driven, self._cycle)
         self._session = self._agreed = session
         self._loss_reported = ("", -math.inf)
+        self._notes.agreed(session)
         rate = f"{1 / session.period:g} Hz"
         self._cell.robot_connected(
             now, f"controller {session.controller}, RTDE protocol {session.protocol}, {rate}"
@@ -305,7 +311,8 @@ class RobotLink(SourceLink):
             self._client.reconnect("its clock stood still for a while, or what it sent was held up")
 
     def text(self, message: TextMessage) -> None:
-        """The controller says something; it goes to the log."""
+        """The controller says something; it goes to the log, and the last one to the status."""
+        self._notes.said(message, clock.now())
         log.warning(
             "the controller says",
             extra=fields(
@@ -336,6 +343,7 @@ class RobotLink(SourceLink):
         health.frequency = statistics.frequency
 
     def _report_availability(self, reasons: Mapping[int, str], now: float) -> None:
+        self._notes.refused(self._agreed, reasons, self._cell.definition.variables)
         for index, reason in reasons.items():
             self._cell.set_availability([index], False, reason, now)
         served = (index for index in range(len(self._cell.definition.variables)) if index not in reasons)
@@ -344,7 +352,7 @@ class RobotLink(SourceLink):
     def _adopt(self, session: Session, flat: Sequence[Value], now: float) -> None:
         """Take over what the controller's inputs hold, as the package reads them back."""
         self._session, self._agreed = None, session
-        reasons = unavailable(session, self._cell.definition.variables)
+        reasons = unavailable(session, self._cell.definition.variables, dict(self.plan.types))
         self._adopting = True
         adopted = self._inputs.adopt(session, flat, now, reasons)
         self._report_availability(reasons, now)

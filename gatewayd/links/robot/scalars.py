@@ -105,4 +105,4 @@ RobotReference = Annotated[
         ],
     ),
 ]
-"""What a variable is in the robot."""
+"""A field of the robot, or a part of it."""

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from gatewayd.links.robot.scalars import RobotReference, Version
 from gatewayd.mapping.scalars import Duration, Host, Name, Names, OptionalDuration, Real, Whole
 from gatewayd.mapping.section import Section
 from gatewayd.rtde.types import DEFAULT_PORT
+
+FieldType = Literal[
+    "BOOL", "UINT8", "UINT32", "UINT64", "INT32", "DOUBLE",
+    "VECTOR3D", "VECTOR6D", "VECTOR6INT32", "VECTOR6UINT32",
+]  # fmt: skip
+"""The type words of RTDE."""
 
 ADOPT_FOR = 10.0
 """Seconds that an adopted input waits for an owner where the file says nothing."""
@@ -66,11 +72,33 @@ class Robot(Section):
     watchdog: Watchdog | None = Field(default=None, description="register that is fed while all is well")
 
 
+class RobotField(Section):
+    """A field with what is known of it beyond the catalogue."""
+
+    field: RobotReference = Field(description="RTDE field, or what else `robot:` alone can name")
+    type: FieldType | None = Field(
+        default=None,
+        description="type that the controller gives it; for a field that the catalogue does not have, or has otherwise",
+    )
+    direction: Literal["input", "output"] | None = Field(
+        default=None,
+        description="of a field that the catalogue does not have; default: input for input_*, else output",
+    )
+
+
+def _field(value: Any) -> Any:
+    """Bring the short form into the long one."""
+    return value if isinstance(value, dict | RobotField) else {"field": value}
+
+
 class RobotPlace(Section):
     """What a variable is in the robot."""
 
-    robot: RobotReference = Field(
-        description="RTDE field, 'field[element]', field.bit, or a range of registers such as output_int_register_0..23"
+    robot: Annotated[
+        RobotField, BeforeValidator(_field, json_schema_input_type=RobotReference | RobotField)
+    ] = Field(
+        description="RTDE field, 'field[element]', field.bit, a range of registers such as output_int_register_0..23, "
+        "or {field: ..., type: ...} for one that the catalogue does not have"
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 
@@ -17,7 +17,7 @@ from gatewayd.links.robot.plan import robot_of
 from gatewayd.links.robot.runtime import RobotLink
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
-from gatewayd.rtde.fields import SoftwareVersion
+from gatewayd.rtde.fields import Field, SoftwareVersion
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.program import DEMO, parse
 from gatewayd.simulator.server import SimulatedController
@@ -78,9 +78,11 @@ async def rigged(
     prepare: Callable[[SimulatedController], None] | None = None,
     version: SoftwareVersion | None = None,
     definition: Callable[[CellDefinition], CellDefinition] = lambda one: one,
+    *,
+    fields: Sequence[Field] = (),
 ) -> AsyncIterator[Rig]:
     """A controller that echoes its registers, a cell for the variables given, and their link, running."""
-    async with SimulatedController(Controller(version=version, program=parse(DEMO))) as robot:
+    async with SimulatedController(Controller(version=version, program=parse(DEMO), fields=fields)) as robot:
         if prepare is not None:
             prepare(robot)
         plan = plan_for(robot.port, variables, options)

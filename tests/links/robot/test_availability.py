@@ -64,3 +64,11 @@ def test_another_type_than_the_mappings_is_left_alone(answered: DataType) -> Non
 def test_each_kind_knows_its_types(variable: Variable, fitting: DataType, wrong: DataType) -> None:
     assert unavailable(session({"f": fitting}, {}), [variable]) == {}
     assert list(unavailable(session({"f": wrong}, {}), [variable])) == [0]
+
+
+@pytest.mark.parametrize("answered, fits", [(DataType.DOUBLE, True), (DataType.VECTOR3D, False)])
+def test_a_declared_type_is_to_be_the_controllers(answered: DataType, fits: bool) -> None:
+    """Also where the answer could carry the value: what else the file says of the field may be wrong as well."""
+    variable = Variable(1, "v", Direction.OUTPUT, ValueKind.FLOAT, "f", element=0)
+    reasons = unavailable(session({"f": answered}, {}), [variable], {"f": "DOUBLE"})
+    assert reasons == ({} if fits else {0: "the controller answers VECTOR3D, the mapping declares DOUBLE"})

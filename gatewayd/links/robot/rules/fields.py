@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 from gatewayd.core.definition import Direction
-from gatewayd.links.robot.definition import field_of
+from gatewayd.links.robot.definition import field_of, type_of
 from gatewayd.links.robot.reference import ReferenceProblem, UnresolvedReference
 from gatewayd.links.robot.rules.controller import controller, unresolved, watchdog_field
 from gatewayd.links.robot.sections import Robot, RobotPlace
@@ -47,7 +47,8 @@ _NAMES = (
 def _suggestion(name: str) -> str:
     close = suggest(name, _NAMES)
     if not close:
-        return "fields are listed in the RTDE guide; registers are such as output_int_register_0"
+        newer = f"if the controller has it, declare its type: {{field: {name}, type: DOUBLE}}"
+        return f"fields are listed in the RTDE guide; registers are such as output_int_register_0; {newer}"
     return "did you mean " + " or ".join(f"`{item}`" for item in close) + "?"
 
 
@@ -60,7 +61,9 @@ def field_not_in_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     seen: set[str] = set()
     for variable in cell.variables:
         field = field_of(variable)
-        if variable.part.name in seen or field.available(series, version):
+        if field is None or type_of(variable) is not None or variable.part.name in seen:
+            continue
+        if field.available(series, version):
             continue
         seen.add(variable.part.name)
         shown = f"software {version}" if version is not None else "any software"
@@ -69,6 +72,48 @@ def field_not_in_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         known = field.exists(series) and first is not None
         hint = f"it exists from {first} on" if known else "no version of this series has it"
         yield rule.at(variable.at("robot"), message, hint=hint)
+
+
+@cell_rule("GW317", Severity.WARNING)
+def field_beyond_catalogue(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """A declared type of a field that the catalogue does not have, or has otherwise."""
+    series, version = controller(cell.document)
+    seen: set[str] = set()
+    for variable in cell.variables:
+        declared, field = type_of(variable), field_of(variable)
+        if declared is None or variable.part.name in seen:
+            continue
+        seen.add(variable.part.name)
+        if field is None:
+            difference = "is not in the catalogue"
+        elif field.type is not declared:
+            difference = f"is {field.type.word} in the catalogue"
+        elif series is not None and not field.available(series, version):
+            difference = (
+                f"is not in the catalogue for {series.word} {version if version is not None else ''}".rstrip()
+            )
+        else:
+            continue
+        message = f"`{variable.field}`, declared {declared.word}, {difference}"
+        hint = "the controller's answer decides: with another type, or none, the variable is unavailable"
+        yield rule.at(variable.at("robot", "type"), message, hint=hint)
+
+
+@cell_rule("GW318")
+def field_of_two_types(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Two lines that declare different types or directions for one field."""
+    known: dict[str, tuple[object, ExpandedVariable]] = {}
+    reported: set[str] = set()
+    for variable in cell.variables:
+        field = field_of(variable)
+        kind = type_of(variable) or (field.type if field is not None else None)
+        said, first = known.setdefault(variable.field, ((kind, variable.direction), variable))
+        if said != (kind, variable.direction) and variable.part.name not in reported:
+            reported.add(variable.part.name)
+            message = f"`{variable.field}` is declared otherwise by `{first.name}`"
+            related = (Related(first.at("robot"), "declared here"),)
+            hint = "a field has one type and one direction: write the same for both"
+            yield rule.at(variable.at("robot"), message, hint=hint, related=related)
 
 
 @cell_rule("GW312")
@@ -95,7 +140,7 @@ def no_such_part(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for part, error in unresolved(cell):
         if error.problem in _PARTS:
             message, hint = _PARTS[error.problem]
-            text = str(part.spec.by(RobotPlace).robot)
+            text = str(part.spec.by(RobotPlace).robot.field)
             values = {"name": error.name, "text": text, "last": _last(error)}
             position = part.at("robot")
             yield rule.at(position, message.format(**values), hint=hint.format(**values))
