@@ -307,3 +307,6 @@ OUTPUTS: Mapping[str, Field] = _table(
 )
 """What a client may subscribe, by name; `input_*` fields are read-backs."""
 # fmt: on
+
+UNTYPED = frozenset({"dexterity", "tool_output_current_2", "tool_output_voltage_2"})
+"""Outputs that the newest controllers are known to have, and whose type no guide states yet."""

@@ -17,7 +17,7 @@ from enum import Enum, auto
 from typing import ClassVar, NamedTuple
 
 from gatewayd.rtde import messages
-from gatewayd.rtde.claims import Claims, HandshakeError, is_long, sort_types
+from gatewayd.rtde.claims import REFUSED, Claims, HandshakeError, is_long, sort_types
 from gatewayd.rtde.fields import Series
 from gatewayd.rtde.reading import Reading
 from gatewayd.rtde.recipe import Recipe
@@ -339,22 +339,27 @@ class Negotiation:
     # readings
 
     def _piece_answered(self, reply: messages.OutputsSetup) -> NextStep:
+        if len(reply.types) != len(self._asked):
+            return self._give_up_piece(f"{len(reply.types)} types for {len(self._asked)} fields of a reading")
         types, refused = sort_types(self._asked, reply.types)
         if refused:
             self._reading.refused |= refused
             return self._advance()
         if reply.recipe == 0:
-            raise HandshakeError(
-                "the controller refused the output recipe of a reading without naming a field"
-            )
+            return self._give_up_piece("a refused reading without a word for any field")
         self.outputs_id = reply.recipe
         self._reading.expect(Recipe(self._asked, types))
         return self._go(State.READING_START, messages.Start())
 
+    def _give_up_piece(self, strange: str) -> NextStep:
+        """The fields of the piece stay unread, in recipes of their own until they are given; that costs no session."""
+        self._reading.refused |= dict.fromkeys(self._asked, REFUSED)
+        return self._advance()._replace(strange=strange)
+
     def _reading_started(self, message: messages.StartReply | messages.DataPackage) -> NextStep:
         """A package before the answer proves the start; the reading is the next, which surely is of this piece."""
         if isinstance(message, messages.StartReply) and not message.accepted:
-            raise HandshakeError("the controller refused to start the output of a reading")
+            return self._give_up_piece("a refused start of a reading")
         return self._go(State.READING, None)
 
     def _read(self, package: messages.DataPackage) -> NextStep:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from gatewayd.report.format import address
 from gatewayd.rtde.catalogue import likely_holders
-from gatewayd.rtde.claims import InputRecipe
+from gatewayd.rtde.claims import REFUSED, InputRecipe
 from gatewayd.rtde.fields import OUTPUTS, Series
 from gatewayd.rtde.messages import IN_USE, NOT_FOUND, ControllerVersion
 from gatewayd.rtde.recipe import Recipe, Scalar
@@ -138,6 +138,8 @@ def output_hint(word: str, *, read_back: bool) -> str:
     """What the word for an output, or for the reading of an input, means."""
     if word == NOT_FOUND:
         return "this controller's software does not have the field"
+    if word == REFUSED:
+        return "the controller did not let it be read"
     if word != TOO_LONG:
         return f"the controller names a type that is not known here: {word}"
     if read_back:

@@ -426,6 +426,14 @@ def test_fields_that_are_declared_with_their_type(place: str, expected: list[str
     assert [rule for rule, _ in found] == expected
 
 
+def test_a_field_of_the_newest_controllers_is_not_taken_for_a_slip() -> None:
+    found = load((HEAD + "  a: {robot: tool_output_voltage_2, modbus: 100}\n").encode(), "c.yaml").diagnostics
+    (hint,) = [one.hint for one in found if one.rule.id == "GW301"]
+    assert hint is not None
+    assert "{field: tool_output_voltage_2, type: DOUBLE}" in hint
+    assert "did you mean" not in hint
+
+
 def test_a_declared_field_of_an_older_controller_is_only_warned_of() -> None:
     head = HEAD.replace("robot: {", "robot: {version: 5.12, ")
     assert head != HEAD

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.rtde.fields import INPUTS, OUTPUTS, REGISTERS, Field, Series, SoftwareVersion
+from gatewayd.rtde.fields import INPUTS, OUTPUTS, REGISTERS, UNTYPED, Field, Series, SoftwareVersion
 from gatewayd.rtde.types import DataType
 
 GUIDE = Path(__file__).parent / "newer_guide.txt"
@@ -124,3 +124,7 @@ def test_series_are_found_by_word_and_by_major_version() -> None:
     assert [Series.from_word(word) for word in ("cb3", "e", "x")] == list(Series)
     assert [Series.from_major(major) for major in (3, 5, 10, 7)] == [Series.CB3, Series.E, Series.X, None]
     assert [series.base_rate for series in Series] == [125, 500, 500]
+
+
+def test_fields_without_a_known_type_are_not_in_the_catalogue() -> None:
+    assert UNTYPED.isdisjoint({*INPUTS, *OUTPUTS})

@@ -213,6 +213,38 @@ def test_a_claim_answered_with_too_many_or_no_types_is_refused_and_asked_again(
     assert negotiation.handle(m.InputsSetup(2, ("INT32",))).event is Notice.INPUTS_CHANGED
 
 
+TO_READING = (*TO_OUTPUTS, m.InputsSetup(1, ("INT32",)))
+PIECE = m.OutputsSetup(1, ("INT32",))
+
+
+@pytest.mark.parametrize(
+    "answers, words",
+    [
+        ((m.OutputsSetup(1, ()),), "0 types for 1 fields of a reading"),
+        ((m.OutputsSetup(0, ("INT32",)),), "a refused reading without a word for any field"),
+        ((PIECE, m.StartReply(False)), "a refused start of a reading"),
+    ],
+)
+def test_a_reading_that_comes_to_nothing_leaves_its_fields_unread_and_costs_no_session(
+    answers: Sequence[m.ControllerMessage], words: str
+) -> None:
+    wishes = Wishes(("output_int_register_0",), ("input_int_register_0",), read_back=False)
+    negotiation, steps = talk(wishes, (*TO_READING, *answers))
+    assert steps[-1].strange == words
+    assert steps[-1].send == m.SetupOutputs(("timestamp", "output_int_register_0"), 500.0)
+    step = negotiation.handle(m.OutputsSetup(1, ("DOUBLE", "INT32")))
+    assert step.send == m.SetupInputs(("input_int_register_0",)), "in a recipe of its own"
+    negotiation.handle(m.InputsSetup(2, ("INT32",)))
+    assert negotiation.handle(m.StartReply(True)).event is Notice.STARTED
+    assert negotiation.session().unread == {"input_int_register_0"}
+    (unread,) = negotiation.session().unavailable
+    assert (unread.output, unread.word, unread.hint) == (
+        True,
+        "REFUSED",
+        "the controller did not let it be read",
+    )
+
+
 @pytest.mark.parametrize("package", [m.DataPackage(2, bytes(16)), m.DataPackage(1, bytes(17))])
 def test_only_data_of_the_agreed_recipe_proves_a_start(package: m.DataPackage) -> None:
     negotiation, steps = talk(WISHES, (*TO_START, package))

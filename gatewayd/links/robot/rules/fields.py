@@ -16,7 +16,7 @@ from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 from gatewayd.mapping.rules.writers import more_places
 from gatewayd.rtde.catalogue import is_fieldbus_range, suggest
 from gatewayd.rtde.claims import OLD_LIST_LIMIT, list_size
-from gatewayd.rtde.fields import INPUTS, OUTPUTS, Series, SoftwareVersion
+from gatewayd.rtde.fields import INPUTS, OUTPUTS, UNTYPED, Series, SoftwareVersion
 
 _LONG_LISTS_SINCE = SoftwareVersion(5, 17)
 _UPPER_INPUTS = frozenset(
@@ -45,6 +45,8 @@ _NAMES = (
 
 
 def _suggestion(name: str) -> str:
+    if name in UNTYPED:
+        return f"the newest controllers have it; declare the type that they give it: {{field: {name}, type: DOUBLE}}"
     close = suggest(name, _NAMES)
     if not close:
         newer = f"if the controller has it, declare its type: {{field: {name}, type: DOUBLE}}"
