@@ -49,6 +49,8 @@ class ErrorCode(IntEnum):
     PDO_TOO_LONG = 0x8220
     SYNC_LENGTH = 0x8240
     RPDO_TIMEOUT = 0x8250
+    COB_ID_COLLISION = 0x8150
+    """Another node transmits with a COB-ID of this one."""
     WRITE_HELD = 0xFF01
     WRITE_OUT_OF_LIMITS = 0xFF02
     WRITE_ROBOT_LOST = 0xFF03
@@ -91,9 +93,9 @@ def register_of(code: int) -> Register:
 
 
 class Emergency:
-    """The errors of one node. `allowed()` says whether the NMT state lets EMCY run."""
+    """The errors of one node. `allowed()` says whether the NMT state lets EMCY run; `inhibit` in 100 us (1015h)."""
 
-    def __init__(self, send: Send, node: int, allowed: Callable[[], bool]) -> None:
+    def __init__(self, send: Send, node: int, allowed: Callable[[], bool], inhibit: int = 0) -> None:
         self._send = send
         self._allowed = allowed
         self._active: dict[tuple[int, int], Register] = {}
@@ -105,7 +107,7 @@ class Emergency:
         self._cob_id = Entry.parameter(
             0, "COB-ID EMCY", u32, default, plus_node=True, check=self._check_cob_id
         )
-        self._inhibit = Entry.parameter(0, "Inhibit time EMCY", CanType.UNSIGNED16, 0)
+        self._inhibit = Entry.parameter(0, "Inhibit time EMCY", CanType.UNSIGNED16, inhibit)
 
     @property
     def inhibit(self) -> float:

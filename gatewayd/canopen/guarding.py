@@ -18,8 +18,9 @@ TOGGLE = 0x80
 class NodeGuarding:
     """Answers remote frames on 700h + node-ID, and misses them if they stay away for the node life time.
 
-    The life time is 100Ch milliseconds times 100Dh; supervision begins with the first request. `lost(now)` and
-    `back(now)` are called for the master. Nothing happens while `heartbeat()` says that this node produces a heartbeat.
+    The life time is 100Ch milliseconds times 100Dh, after power-on `time` and `factor`; supervision begins with the
+    first request. `lost(now)` and `back(now)` are called for the master. Nothing happens while `heartbeat()` says that
+    this node produces a heartbeat.
     """
 
     def __init__(
@@ -30,6 +31,8 @@ class NodeGuarding:
         *,
         lost: Callable[[float], None],
         back: Callable[[float], None],
+        time: int = 0,
+        factor: int = 0,
     ) -> None:
         self._send = send
         self._nmt = nmt
@@ -38,8 +41,10 @@ class NodeGuarding:
         self._back = back
         self._spared = False
         self.restart()
-        self._time = Entry.parameter(0, "Guard time", CanType.UNSIGNED16, 0, changed=self._supervise)
-        self._factor = Entry.parameter(0, "Life time factor", CanType.UNSIGNED8, 0, changed=self._supervise)
+        self._time = Entry.parameter(0, "Guard time", CanType.UNSIGNED16, time, changed=self._supervise)
+        self._factor = Entry.parameter(
+            0, "Life time factor", CanType.UNSIGNED8, factor, changed=self._supervise
+        )
 
     def objects(self) -> Iterable[Object]:
         """100Ch and 100Dh."""

@@ -84,9 +84,10 @@ REACTIONS: dict[tuple[int, NmtState], NmtCommand] = {
 class ErrorBehaviour:
     """1029h: the change of NMT state after a communication error (heartbeat, guarding, bus-off)."""
 
-    def __init__(self) -> None:
+    def __init__(self, behaviour: int = 0) -> None:
+        """`behaviour`: that after power-on."""
         self._communication = Entry.parameter(
-            1, "Communication error", CanType.UNSIGNED8, 0, check=_check_behaviour
+            1, "Communication error", CanType.UNSIGNED8, behaviour, check=_check_behaviour
         )
 
     def objects(self) -> Iterable[Object]:

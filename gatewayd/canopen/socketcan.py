@@ -281,11 +281,18 @@ def _take_other(parts: tuple[int, int, bytes], frames: list[Frame], errors: list
         frames.append(Frame(can_id & _BASIC, b"", remote=True, length=length))
 
 
+def no_socketcan(error: OSError) -> str:
+    """Why the kernel gives no CAN socket, and what to do."""
+    if error.errno in (errno.EPERM, errno.EACCES):
+        return f"this process may not use SocketCAN: {error.strerror}; run it as the service does, or lift the sandbox"
+    return (
+        f"this machine offers no SocketCAN: {error.strerror}; load the kernel modules can and can_raw, "
+        "and allow AF_CAN (in a systemd unit: RestrictAddressFamilies=)"
+    )
+
+
 def _probe() -> None:
     try:
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
     except OSError as error:
-        raise BusError(
-            f"this machine offers no SocketCAN: {error.strerror}; load the kernel modules can and can_raw, "
-            "and allow AF_CAN (in a systemd unit: RestrictAddressFamilies=)"
-        ) from error
+        raise BusError(no_socketcan(error)) from error

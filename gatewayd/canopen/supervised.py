@@ -31,6 +31,8 @@ class SupervisedBus(ABC):
     def __init__(self, handler: BusHandler) -> None:
         self._handler = handler
         self._supervisor = Supervisor()
+        self.reason = ""
+        """Why the bus is as it is, in words, as of the last look."""
         self._looking: asyncio.TimerHandle | None = None
         """The next look at the interface."""
         self._full = False
@@ -99,6 +101,7 @@ class SupervisedBus(ABC):
 
     def _feed(self, signal: BusSignal, now: float, reason: str) -> None:
         """Judge a signal, and report the state if it is another one now."""
+        self.reason = reason
         if not self._supervisor.feed(signal):
             return
         state = self._supervisor.state

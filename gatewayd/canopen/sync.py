@@ -29,6 +29,8 @@ class SyncPlan:
     """Communication cycle period in us; 0: none."""
     counter: int = 0
     """Synchronous counter overflow value; 0: SYNC carries no counter."""
+    window: int = 0
+    """Synchronous window length in us; 0: none."""
 
 
 class SyncService:
@@ -67,7 +69,7 @@ class SyncService:
         self._period = Entry.parameter(
             0, "Communication cycle period", u32, plan.period, check=_check_period, changed=changed
         )
-        self._window = Entry.parameter(0, "Synchronous window length", u32, 0)
+        self._window = Entry.parameter(0, "Synchronous window length", u32, plan.window)
         self._overflow = Entry.parameter(
             0, "Synchronous counter overflow value", u8, plan.counter, check=self._check_overflow
         )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
 import socket
 import struct
 from collections.abc import Iterator
@@ -13,7 +15,7 @@ from gatewayd.canopen.bus import DRAIN, BusError, BusState
 from gatewayd.canopen.errors import ErrorClass
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.interface import ControllerState, Interface
-from gatewayd.canopen.socketcan import SocketCanBus, filters, pack, seen
+from gatewayd.canopen.socketcan import SocketCanBus, filters, no_socketcan, pack, seen
 from gatewayd.canopen.supervision import BusSignal
 from tests.links.canopen_node.recorder import Recorder
 
@@ -117,3 +119,11 @@ async def test_machine_without_can_is_refused_with_advice() -> None:
         pytest.skip("this kernel has CAN")
     with pytest.raises(BusError, match="load the kernel modules can and can_raw"):
         await SocketCanBus("can0", Recorder()).open()
+
+
+@pytest.mark.parametrize(
+    "number, words",
+    [(errno.EPERM, "may not use SocketCAN"), (errno.EAFNOSUPPORT, "load the kernel modules")],
+)
+def test_why_there_is_no_can_socket(number: int, words: str) -> None:
+    assert words in no_socketcan(OSError(number, os.strerror(number)))

@@ -18,7 +18,7 @@ from gatewayd.canopen.nmt import ALLOWED, NmtState, Service
 from gatewayd.core.refusal import Reason
 from gatewayd.core.status_layout import TABLES
 from gatewayd.links.canopen_node.bus_load import BIT_RATES, frame_bits
-from gatewayd.links.canopen_node.communication_errors import OVERRUN_TIME
+from gatewayd.links.canopen_node.communication_errors import DOUBLED_TIME, OVERRUN_TIME
 from gatewayd.links.canopen_node.eds import objects_of
 from gatewayd.links.canopen_node.pdo_table import load_by_bit_rate, pdo_rows
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
@@ -241,6 +241,7 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.PDO_TOO_SHORT: "an RPDO was shorter than its mapping and was dropped (bytes 4-5: its number)",
     ErrorCode.PDO_TOO_LONG: "an RPDO was longer than its mapping; its first bytes were used",
     ErrorCode.SYNC_LENGTH: "SYNC has another length than 1019h says (byte 4: the length)",
+    ErrorCode.COB_ID_COLLISION: "another node on the bus has the node-ID of this one",
     ErrorCode.RPDO_TIMEOUT: "an RPDO did not come within its deadline; the RPDO writer is lost",
     ErrorCode.WRITE_HELD: "an RPDO was dropped: another writer owns a variable of it",
     ErrorCode.WRITE_OUT_OF_LIMITS: "an RPDO was dropped: a value is out of limits",
@@ -271,6 +272,7 @@ def emergencies() -> str:
 def happenings() -> str:
     """What happens to the node, and what follows."""
     text = _docstring_table("communication_errors.py").replace("`OVERRUN_TIME`", f"{OVERRUN_TIME:g} s")
+    text = text.replace("`DOUBLED_TIME`", f"{DOUBLED_TIME:g} s")
     return text.replace("`QUIET`", f"{QUIET:g} s")
 
 

@@ -70,6 +70,8 @@ _SECTIONS = {
     "Canopen": "`canopen:`",
     "IdentitySpec": "`canopen: identity:`",
     "Sync": "`canopen: sync:`",
+    "Guarding": "`canopen: guarding:`",
+    "Emcy": "`canopen: emcy:`",
     "PdoDefaults": "`canopen: pdo:`",
     "CobIdPool": "`canopen: cob_ids:`",
     "PdoSpec": "`canopen: pdos:` NAME`:`",

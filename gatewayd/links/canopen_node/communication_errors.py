@@ -18,6 +18,7 @@ What happens to the node, and what follows:
 | bus is back | | "reset communication" if its loss had ended OPERATIONAL / as it is / as it is | 8140h, 0000h after \
 bus-off |
 | controller passive | | as it is | 8120h until it is no more |
+| another node has our node-ID | | as it is | 8150h until it was not seen for `DOUBLED_TIME` |
 | received frames lost | | as it is | 8110h until none was lost for `OVERRUN_TIME` |
 | robot lost / stale / holds something else / registers unavailable | | as it is | FF10h / FF11h / FF12h / FF13h until \
 that has not been so for `QUIET` |
@@ -37,6 +38,8 @@ from gatewayd.links.canopen_node.observer import NodeCounters
 from gatewayd.links.canopen_node.pdo.receive import Fault
 from gatewayd.links.canopen_node.pdo.transmit import TransmitEngine
 
+DOUBLED_TIME: Final = 60.0
+"""Seconds after the last sign of another node with our node-ID until it counts as gone: heartbeats may be rare."""
 OVERRUN_TIME: Final = 1.0
 """Seconds without a lost frame after which the overrun is over."""
 
@@ -53,8 +56,9 @@ class CommunicationErrors:
         *,
         lose_node: Callable[[str, int, float], None],
         lose_rpdo: Callable[[str, float], None],
+        behaviour: int = 0,
     ) -> None:
-        self.behaviour = ErrorBehaviour()
+        self.behaviour = ErrorBehaviour(behaviour)
         self._emergency = emergency
         self._nmt = nmt
         self._transmit = transmit
@@ -63,6 +67,7 @@ class CommunicationErrors:
         self._lose_rpdo = lose_rpdo
         self._fell = self._was_off = False
         self._overrun_until = math.inf
+        self._doubled_until = math.inf
 
     # -- peers ---------------------------------------------------------------------------------------------------
 
@@ -130,23 +135,38 @@ class CommunicationErrors:
         self._overrun_until = now + OVERRUN_TIME
         self._emergency.raise_error(ErrorCode.OVERRUN, now)
 
+    def doubled(self, now: float) -> bool:
+        """Somebody else sends with the COB-ID of our heartbeat; returns whether that is new."""
+        news = not self.is_doubled
+        self._doubled_until = now + DOUBLED_TIME
+        self._emergency.raise_error(ErrorCode.COB_ID_COLLISION, now)
+        return news
+
+    @property
+    def is_doubled(self) -> bool:
+        """Whether another node has our node-ID."""
+        return self._doubled_until < math.inf
+
     # -- time ----------------------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> None:
-        """End an overrun after which nothing was lost."""
+        """End an overrun after which nothing was lost, and what was not seen again of another node."""
+        if now >= self._doubled_until:
+            self._doubled_until = math.inf
+            self._emergency.clear(ErrorCode.COB_ID_COLLISION, now)
         if now >= self._overrun_until:
             self._overrun_until = math.inf
             self._emergency.clear(ErrorCode.OVERRUN, now)
 
     def next_deadline(self, now: float) -> float:
-        """When it ends; infinity without one."""
-        return self._overrun_until
+        """When one of them ends; infinity without any."""
+        return min(self._overrun_until, self._doubled_until)
 
     def resume(self, former: CommunicationErrors) -> None:
         """Take over what the bus has done to another node."""
         self._counters = former._counters
         self._fell, self._was_off = former._fell, former._was_off
-        self._overrun_until = former._overrun_until
+        self._overrun_until, self._doubled_until = former._overrun_until, former._doubled_until
 
     def _communication_error(self, now: float) -> None:
         self._counters.communication_errors += 1

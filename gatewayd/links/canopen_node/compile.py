@@ -6,7 +6,7 @@ from gatewayd.canopen.heartbeat import Consumer
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo
 from gatewayd.links.canopen_node.plan import CanopenPlan, IdentityPlan, PdoEntry, PdoPlan
-from gatewayd.links.canopen_node.sections import CanopenWriter
+from gatewayd.links.canopen_node.sections import ERROR_BEHAVIOURS, CanopenWriter
 from gatewayd.mapping.expanded import ExpandedCell
 
 
@@ -22,7 +22,11 @@ def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
         autostart=spec.autostart,
         heartbeat=_ticks(spec.heartbeat, 1000),
         sync=SyncPlan(
-            spec.sync.cob_id, spec.sync.producer, _ticks(spec.sync.period, 1_000_000), spec.sync.counter
+            spec.sync.cob_id,
+            spec.sync.producer,
+            _ticks(spec.sync.period, 1_000_000),
+            spec.sync.counter,
+            _ticks(spec.sync.window, 1_000_000),
         ),
         consumers=tuple(
             Consumer(writer.node, _ticks(writer.heartbeat, 1000), index)
@@ -33,6 +37,10 @@ def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
         pdos=tuple(_pdo(pdo) for pdo in node.pdos),
         rpdo_writer=next((index for index, writer in enumerate(writers) if writer.by_rpdo), None),
         sdo_writer=next((index for index, writer in enumerate(writers) if writer.by_sdo), None),
+        guard_time=_ticks(spec.guarding.time, 1000),
+        life_time_factor=spec.guarding.factor if spec.guarding.time is not None else 0,
+        emcy_inhibit=_ticks(spec.emcy.inhibit, 10_000),
+        error_behaviour=ERROR_BEHAVIOURS.index(spec.on_communication_error),
         identity=IdentityPlan(**spec.identity.model_dump()),
     )
 

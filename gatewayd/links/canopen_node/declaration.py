@@ -32,6 +32,7 @@ class CanopenNode(LinkKind):
         "channel": "interface:channel of the bus",
         "node": "node-ID of the mapping",
         "bus": "`absent`, `down`, `bus-off`, `passive`, `warning` or `active`",
+        "reason": "why the bus is not as it should be, in words; empty where all is well",
         "nmt_state": "`initialising`, `stopped`, `pre-operational` or `operational`",
     }
     status_fields = (

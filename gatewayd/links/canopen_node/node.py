@@ -99,7 +99,7 @@ class Node:
             self._send, lambda: self.lss.node, self._nmt_changed, self._reset, autostart=plan.autostart
         )
         self.emergency = Emergency(
-            self._send, node, lambda: self.bus.carries and self.nmt.allows(Service.EMCY)
+            self._send, node, lambda: self.bus.carries and self.nmt.allows(Service.EMCY), plan.emcy_inhibit
         )
         self.robot_errors = RobotErrors(
             cell, self.emergency, lambda: self._started and self.nmt.state is not NmtState.INITIALISING
@@ -112,6 +112,7 @@ class Node:
             self.counters,
             lose_node=self._lose_node,
             lose_rpdo=partial(self._lose, plan.rpdo_writer),
+            behaviour=plan.error_behaviour,
         )
         self.producer = HeartbeatProducer(self._send, self.nmt, alive, plan.heartbeat)
         self.consumer = HeartbeatConsumer(
@@ -134,6 +135,8 @@ class Node:
             lambda: self.producer.enabled,
             lost=self.errors.guarding_lost,
             back=partial(self.emergency.clear, ErrorCode.HEARTBEAT),
+            time=plan.guard_time,
+            factor=plan.life_time_factor,
         )
         self.sync = SyncService(
             self._send,
@@ -359,6 +362,10 @@ class Node:
             self._answer(self.sdo.receive(frame.data, now))
 
     def _receive_guarding(self, frame: Frame, now: float) -> None:
+        if not frame.remote:
+            if self.errors.doubled(now):
+                self._observer.report(f"another node on the bus has the node-ID {self.node_id} too")
+            return
         self.guarding.receive(frame, now, late=self._waiting.seconds > 0)
 
     def _answer(self, answers: Iterable[bytes]) -> None:

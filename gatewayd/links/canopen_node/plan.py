@@ -110,6 +110,14 @@ class CanopenPlan(LinkPlan):
     sdo_writer: int | None
     """The writer that SDO clients are; None: variables are read-only by SDO."""
     identity: IdentityPlan = IdentityPlan()
+    guard_time: int = 0
+    """Milliseconds between two requests of a guarding master (100Ch); 0: not supervised."""
+    life_time_factor: int = 0
+    """Guard times after which it is missed (100Dh)."""
+    emcy_inhibit: int = 0
+    """Least distance of two EMCY in 100 us (1015h)."""
+    error_behaviour: int = 0
+    """What a communication error does to the NMT state (1029h): 0 leave OPERATIONAL, 1 nothing, 2 stop."""
 
 
 def canopen_of(plan: Plan) -> CanopenPlan | None:

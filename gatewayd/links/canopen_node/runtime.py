@@ -76,6 +76,8 @@ class CanLink(Link, Observer):
         self._lost = 0
         self._lost_reported = -math.inf
         self._other_bit_rate: int | None = None
+        self._unusable = ""
+        """Why the bus cannot be used as it is set up, until it can."""
         self._switch = (0, 0.0)
         self._switching = asyncio.Event()
         self._progress = 0
@@ -105,7 +107,18 @@ class CanLink(Link, Observer):
         """
         bus, nmt = self.node.bus, NMT_STATES[self.node.nmt.state]
         level, words = _BUS_WORDS[bus]
-        if level is Level.GOOD and nmt != "operational":
+        problems = [] if bus is BusState.ACTIVE else [f"CAN bus {BUS_STATES[bus + 1]}"]
+        reason = self.reason
+        if reason:
+            problems = [f"{problem}: {reason}" for problem in problems] or [reason]
+            words = f"{BUS_STATES[bus + 1]}: {reason}"
+        if self.node.errors.is_doubled:
+            problems.append(
+                f"another node on the bus has node-ID {self.node.node_id} too: give one a new one"
+            )
+        if problems and level is Level.GOOD:
+            level = Level.WARN
+        elif level is Level.GOOD and nmt != "operational":
             level, words = Level.WARN, f"{words}, but {nmt}: no PDOs until a master starts the node"
         number = self.node.node_id
         return LinkHealth(
@@ -113,15 +126,30 @@ class CanLink(Link, Observer):
             level,
             words,
             f"node {number if number <= 127 else 'without id'}, {nmt}",
-            () if bus is BusState.ACTIVE else (f"CAN bus {BUS_STATES[bus + 1]}",),
+            tuple(problems),
             {
                 "channel": f"{self.plan.interface}:{self.plan.channel}",
                 "node": self.plan.node,
                 "bus": BUS_STATES[bus + 1],
                 "bus_state": bus + 1,
+                "reason": reason,
                 "nmt_state": nmt,
                 "counters": asdict(self.node.counters),
             },
+        )
+
+    @property
+    def reason(self) -> str:
+        """Why the bus is not as it should be, in words with a remedy; empty where all is well."""
+        if self._unusable:
+            return self._unusable
+        if self.node.bus is not BusState.ACTIVE:
+            return self._bus.reason if self._bus is not None else ""
+        if self._other_bit_rate in (None, self._plan.bitrate):
+            return ""
+        return (
+            f"{self._plan.channel} runs at {self._other_bit_rate} bit/s, the mapping says {self._plan.bitrate}: "
+            "set up the interface anew, or correct the mapping"
         )
 
     async def run(self) -> None:
@@ -307,9 +335,13 @@ class CanLink(Link, Observer):
                 raise
 
         def report(error: Exception) -> None:
+            self._unusable = str(error)
             log.error("%s", error, extra=fields(**self._names(), retry_s=RETRY))
 
         await until_done(attempt, BusError, report, RETRY, self._count)
+        self._unusable = ""
+        if self._bus is not None and not self._bus.state.carries and self._bus.reason:
+            self.on_state(self._bus.state, self._bus.reason, clock.now())
 
     def _compare_bit_rates(self) -> None:
         """The kernel's interface is what it is; `check` has computed the load with what the mapping says."""

@@ -81,6 +81,9 @@ class Sync(Section):
     period: Duration | None = Field(
         default=None, description="time between two SYNCs; a consumer states it for the bus load"
     )
+    window: Duration | None = Field(
+        default=None, description="time after SYNC in which synchronous PDOs count (1007h); default: always"
+    )
     counter: Annotated[Whole, AfterValidator(_counter)] = Field(
         default=0,
         ge=0,
@@ -88,6 +91,27 @@ class Sync(Section):
         description="greatest value of the counter in SYNC, 2 to 240; 0: SYNC carries none",
     )
 
+
+class Guarding(Section):
+    """Supervision of a master that asks by remote frame, while no heartbeat is produced."""
+
+    time: MillisecondTime = Field(
+        default=None,
+        description="time between two requests of the master (100Ch); none: it is not supervised",
+    )
+    factor: Whole = Field(
+        default=3, ge=1, le=255, description="so many of these times without one, and it is missed (100Dh)"
+    )
+
+
+class Emcy(Section):
+    """How EMCY is sent."""
+
+    inhibit: InhibitTime = Field(default=None, description="least time between two messages (1015h)")
+
+
+ERROR_BEHAVIOURS = ("pre_operational", "stay", "stop")
+"""What a communication error does, by the value of 1029h."""
 
 _TRANSMISSION = "event (when a value changed), sync (every SYNC), or a type: 0, 1 to 240, 254, 255"
 Inhibit = Annotated[InhibitTime, Field(description="least time between two transmissions")]
@@ -164,6 +188,16 @@ class Canopen(Section):
     autostart: bool = Field(default=False, description="become OPERATIONAL without waiting for an NMT master")
     heartbeat: MillisecondTime = Field(
         default=0.5, description="time between two heartbeats; none: no heartbeat"
+    )
+    guarding: Guarding = Field(
+        default=Guarding(),
+        description="life guarding; only with `heartbeat: none`",
+        json_schema_extra={"default": {}},
+    )
+    emcy: Emcy = Field(default=Emcy(), description="EMCY", json_schema_extra={"default": {}})
+    on_communication_error: Literal["pre_operational", "stay", "stop"] = Field(
+        default="pre_operational",
+        description="NMT state after the loss of the bus, of a watched heartbeat or of the guarding (1029h)",
     )
     identity: IdentitySpec = Field(
         default=IdentitySpec(), description="identity of the node", json_schema_extra={"default": {}}

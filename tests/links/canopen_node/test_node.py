@@ -1507,3 +1507,21 @@ def test_sdo_server_tells_its_cob_ids_whatever_the_node_id() -> None:
     _lss(plant, 0x11, 9)
     plant.hear(0, RESET_COMMUNICATION)
     assert (plant.read(0x1200, 1, node=9), plant.read(0x1200, 2, node=9)) == (0x609, 0x589)
+
+
+def test_what_the_mapping_says_of_services_is_what_they_begin_with() -> None:
+    plan = replace(
+        PLAN,
+        sync=SyncPlan(window=2000),
+        heartbeat=0,
+        guard_time=100,
+        life_time_factor=3,
+        emcy_inhibit=500,
+        error_behaviour=2,
+    )
+    plant = Plant(plan).power_on()
+    objects = ((0x1007, 0), (0x100C, 0), (0x100D, 0), (0x1015, 0), (0x1029, 1))
+    assert [plant.read(*place) for place in objects] == [2000, 100, 3, 500, 2]
+    plant.write(0x1015, 0, 1, 2)
+    plant.hear(0, RESET_COMMUNICATION)
+    assert plant.read(0x1015) == 500

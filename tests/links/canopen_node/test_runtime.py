@@ -21,6 +21,7 @@ from gatewayd.canopen.pythoncan import PythonCanBus
 from gatewayd.core.cell import Cell
 from gatewayd.core.succession import succeed
 from gatewayd.links.canopen_node import runtime as link_module
+from gatewayd.links.canopen_node.communication_errors import DOUBLED_TIME
 from gatewayd.links.canopen_node.declaration import KIND
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import LOSS_INTERVAL, CanLink
@@ -379,3 +380,42 @@ def test_an_active_can_bus_is_not_well_until_a_master_starts_the_node(station: S
     assert health.words == "active, but pre-operational: no PDOs until a master starts the node"
     node.bus = BusState.ABSENT
     assert station.link.health().words == "absent: no such interface"
+
+
+async def test_why_a_bus_cannot_be_used_is_in_the_health() -> None:
+    """The reason that the log has: no interface, no SocketCAN, a wrong name."""
+    station = Station("none")
+    station.link = CanLink(replace(station.link.node.plan, interface="there-is-none"), station.cell, Store())
+    async with running(station):
+        await until(lambda: station.link.health().problems != ("CAN bus absent",))
+        health = station.link.health()
+    assert "there-is-none" in health.words
+    assert health.problems == (f"CAN bus absent: {health.figures['reason']}",)
+    assert health.level is Level.BAD
+
+
+def test_a_bit_rate_that_is_not_the_mapping_s_is_a_problem(
+    station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(station.link, "_other_bit_rate", 250_000)
+    node = station.link.node
+    node.bus, node.nmt.state = BusState.ACTIVE, NmtState.OPERATIONAL
+    health = station.link.health()
+    assert health.level is Level.WARN
+    assert "250000 bit/s, the mapping says 500000" in health.problems[0]
+
+
+async def test_another_node_with_our_id_is_a_problem_until_it_is_gone(
+    station: Station, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with running(station):
+        await until(lambda: station.frames(HEARTBEAT))
+        for _ in range(3):
+            station.send(HEARTBEAT, b"\5")
+        await until(lambda: station.frames(0x085))
+        assert station.frames(0x085)[0][:2] == b"\x50\x81"
+        assert any("node-ID 5 too" in problem for problem in station.link.health().problems)
+        node = station.link.node
+        node.errors.tick(time.monotonic() + DOUBLED_TIME)
+        assert not any("too" in problem for problem in station.link.health().problems)
+    assert sum("another node" in record.getMessage() for record in caplog.records) == 1

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.sections import Canopen, CanopenPlace, CanopenPlaces
 from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.document import Document
+from gatewayd.mapping.loader import load
 from gatewayd.mapping.reader import read_document
 from gatewayd.mapping.rules.writers import is_supervised
 from gatewayd.mapping.source import parse
@@ -144,3 +146,39 @@ def test_supervision_of_a_writer() -> None:
         "c": True,
         "d": False,
     }
+
+
+def test_parameters_of_services() -> None:
+    """What a master would have to write at every boot of the node."""
+    text = HEAD.replace("robot: {host: r}", "robot: {host: 127.0.0.9}").replace(
+        "variables: {}", "variables: {a: {robot: output_int_register_0, canopen: auto}}"
+    )
+    loaded = load(
+        (
+            text
+            + "canopen: {channel: can0, bitrate: 500000, node: 16, heartbeat: none, sync: {window: 2ms}, "
+            "guarding: {time: 100ms}, emcy: {inhibit: 50ms}, on_communication_error: stop}\n"
+        ).encode(),
+        "f",
+    )
+    assert loaded.plan is not None, loaded.diagnostics
+    node = loaded.plan.the(CanopenPlan)
+    assert (node.sync.window, node.guard_time, node.life_time_factor) == (2000, 100, 3)
+    assert (node.emcy_inhibit, node.error_behaviour) == (500, 2)
+
+
+def test_numbers_of_the_identity() -> None:
+    identity = section(", identity: {vendor: 0x319, product: 7, revision: auto, serial: 0xFFFFFFFF}").identity
+    assert (identity.vendor, identity.product, identity.revision, identity.serial) == (
+        793,
+        7,
+        "auto",
+        2**32 - 1,
+    )
+
+
+@pytest.mark.parametrize("text", ["vendor: 0x100000000", "vendor: -1", "revision: automatic", "serial: 1.5"])
+def test_what_is_no_number_of_32_bits_is_refused(text: str) -> None:
+    _, findings = read(f"canopen: {{channel: can0, bitrate: 500000, node: 16, identity: {{{text}}}}}")
+    assert len(findings) == 1
+    assert "32 bits" in f"{findings[0].message} {findings[0].hint}"

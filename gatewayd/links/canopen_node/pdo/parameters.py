@@ -5,7 +5,7 @@ What an SDO client may change, and when, with the abort code of everything else:
 | entry | may be written | else |
 |---|---|---|
 | COB-ID | with bit 31 set always; a valid one again only unchanged in bits 0-29; made valid with 11 bits, neither \
-restricted nor that of another TPDO, and with something mapped | 0609 0030 |
+restricted nor that of another TPDO, a TPDO with bit 30 set, and with something mapped | 0609 0030 |
 | transmission type | always: 0-240, 254, 255 | 0609 0030 |
 | inhibit time, SYNC start value (0-240) | while the PDO is invalid | 0609 0030 |
 | event timer | always | |
@@ -14,8 +14,8 @@ restricted nor that of another TPDO, and with something mapped | 0609 0030 |
 | mapped object | while the PDO is invalid and the number is 0 | 0601 0000 |
 | ... | the object exists / may be mapped in this direction with its whole length | 0602 0000 / 0604 0041 |
 
-Bit 30 of a TPDO's COB-ID ("no RTR allowed") is kept as written, because many masters write it as 0; remote frames are
-not answered either way. A mapped object written as 0 is an unset one. Where CiA 301 leaves the code open, these are
+A TPDO is made valid only with bit 30 of its COB-ID ("no RTR allowed"), since remote frames are not answered; made
+invalid it may be without. A mapped object written as 0 is an unset one. Where CiA 301 leaves the code open, these are
 CANopenNode's, which its conformance test accepts.
 """
 
@@ -210,7 +210,8 @@ class PdoParameters:
     def _check_cob_id(self, data: bytes) -> None:
         new = int.from_bytes(data, "little")
         changes = (new ^ self._cob_id.number) & _IDENTIFIER
-        if not new & INVALID and self.is_valid and changes:
+        asks_rtr = self._kind.flags and not new & (INVALID | NO_RTR)
+        if asks_rtr or (not new & INVALID and self.is_valid and changes):
             raise Abort(AbortCode.INVALID_VALUE)
         self._verify_cob_id(new)
 

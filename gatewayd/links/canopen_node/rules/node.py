@@ -1,4 +1,4 @@
-"""Rules GW401, GW413 to GW415, GW420 to GW425, GW432, GW435: the node, number types, who writes by CANopen."""
+"""Rules GW401, GW413 to GW415, GW420 to GW425, GW432, GW435, GW437: the node, number types, who writes by CANopen."""
 
 from __future__ import annotations
 
@@ -55,6 +55,16 @@ def _suited(variable: ExpandedVariable) -> str:
     if variable.kind is ValueKind.BOOL:
         return "BOOLEAN"
     return "REAL64 or REAL32" if variable.kind is ValueKind.FLOAT else "an INTEGER or UNSIGNED type"
+
+
+@node_rule("GW437")
+def guarding_beside_heartbeat(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
+    """Guarding of a node that produces a heartbeat."""
+    if node.part.spec.guarding.time is not None and node.part.spec.heartbeat is not None:
+        message = "the node produces a heartbeat, so that no master can guard it"
+        yield rule.at(
+            node.part.key_at("guarding"), message, hint="write `heartbeat: none`, or remove `guarding`"
+        )
 
 
 @node_rule("GW414", Severity.WARNING)

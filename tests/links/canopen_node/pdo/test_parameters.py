@@ -168,10 +168,13 @@ def test_testing_other_10_restricted_identifiers_are_refused(case: Case, can_id:
     assert case.configuration is None
 
 
-def test_rtr_bit_is_kept_as_the_master_writes_it(bench: Bench) -> None:
+def test_a_tpdo_that_remote_frames_may_ask_for_is_refused(bench: Bench) -> None:
+    """They are not answered. Made invalid it may be without the bit, as many masters write it."""
     case = Case(bench, Direction.OUTPUT)
-    assert case.com(1, case.cob_id) is None
-    assert bench.read(0x1800, 1) == case.cob_id
+    assert case.com(1, case.cob_id) is INVALID_VALUE
+    assert case.com(1, INVALID | case.cob_id) is None
+    assert case.com(1, case.cob_id) is INVALID_VALUE
+    assert case.com(1, NO_RTR | case.cob_id) is None
     assert case.configuration.can_id == case.cob_id
 
 
@@ -184,8 +187,8 @@ def test_two_tpdos_never_share_an_identifier_and_two_rpdos_may(bench: Bench) -> 
     case = Case(bench, Direction.OUTPUT)
     assert bench.write(0x1A01, 1, case.entry("int_2")) is None
     assert bench.write(0x1A01, 0, 1) is None
-    assert bench.write(0x1801, 1, 0x185) is INVALID_VALUE
-    assert bench.write(0x1801, 1, 0x285) is None
+    assert bench.write(0x1801, 1, NO_RTR | 0x185) is INVALID_VALUE
+    assert bench.write(0x1801, 1, NO_RTR | 0x285) is None
     case = Case(bench, Direction.INPUT)
     assert bench.write(0x1601, 1, case.entry("int_2")) is None
     assert bench.write(0x1601, 0, 1) is None
@@ -215,7 +218,7 @@ def test_inhibit_time_and_sync_start_change_only_while_invalid(bench: Bench) -> 
     assert case.com(3, 100) is None
     assert case.com(6, 241) is INVALID_VALUE
     assert case.com(6, 240) is None
-    case.com(1, case.cob_id)
+    case.com(1, case.cob_id | case.flags)
     assert case.configuration.inhibit == 0.01
     assert case.configuration.sync_start == 240
 
@@ -227,13 +230,13 @@ def test_pdo_21_mapping_can_be_switched_off_and_on(case: Case) -> None:
     case.com(1, case.cob_id | INVALID)
     assert case.map(0, 0) is None
     assert case.map(0, 2) is None
-    assert case.com(1, case.cob_id) is None
+    assert case.com(1, case.cob_id | case.flags) is None
     assert case.configuration.layout.size == 8
 
 
 def test_pdo_22_pdo_can_be_mapped_anew(case: Case) -> None:
     assert case.remap("short_0", "single_1", "short_2") is None
-    assert case.com(1, case.cob_id) is None
+    assert case.com(1, case.cob_id | case.flags) is None
     expected = [case.bench.by_name[name] for name in case.names("short_0", "single_1", "short_2")]
     assert list(case.configuration.layout.variables) == expected
 
@@ -261,7 +264,7 @@ def test_pdo_25_more_objects_than_set_or_possible_are_refused(case: Case) -> Non
 def test_pdo_26_more_than_64_bits_are_refused(case: Case) -> None:
     assert case.remap("real_0", "bit_0") is PDO_LENGTH
     assert case.remap("int_0", "int_1", "short_0") is PDO_LENGTH
-    assert case.com(1, case.cob_id) is INVALID_VALUE
+    assert case.com(1, case.cob_id | case.flags) is INVALID_VALUE
 
 
 @pytest.mark.parametrize("bits", [1, 16, 31, 64])
@@ -284,7 +287,7 @@ def test_pdo_29_object_that_does_not_exist_is_refused(case: Case) -> None:
 
 def test_pdo_30_64_booleans_fill_a_pdo(case: Case) -> None:
     assert case.remap(*(f"bit_{position}" for position in range(64))) is None
-    assert case.com(1, case.cob_id) is None
+    assert case.com(1, case.cob_id | case.flags) is None
     assert case.configuration.layout.size == 8
 
 
