@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from struct import Struct
+from struct import Struct, calcsize
 from typing import Final, TypeAlias
 
 from gatewayd.core.definition import Value, ValueKind
@@ -37,10 +37,20 @@ class NumberFormat:
     code: str
     """`struct` format character."""
     words: int
-    """Registers."""
+    """Registers; a byte lies in one with another beside it."""
     low: float
     """Least number; for reals the negative of the greatest finite one."""
     high: float
+
+    @property
+    def is_byte(self) -> bool:
+        """Whether it is one byte of a register."""
+        return self.code in "bB"
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return calcsize(f">{self.code}")
 
     @property
     def is_real(self) -> bool:
@@ -55,6 +65,8 @@ TYPES: Final = {
     number.name: number
     for number in (
         NumberFormat("bool", "H", 1, 0, 1),
+        NumberFormat("int8", "b", 1, -(1 << 7), (1 << 7) - 1),
+        NumberFormat("uint8", "B", 1, 0, (1 << 8) - 1),
         NumberFormat("int16", "h", 1, -(1 << 15), (1 << 15) - 1),
         NumberFormat("uint16", "H", 1, 0, (1 << 16) - 1),
         NumberFormat("int32", "i", 2, -(1 << 31), (1 << 31) - 1),
@@ -88,12 +100,12 @@ class Codec:
     ends: Ends
     """Least and greatest value that `decode` gives exactly; None: they need no care."""
     encode: Callable[[Value], bytes] = field(compare=False, repr=False)
-    """Value in the robot's unit -> `2 * words` register bytes as they go over the wire. Never raises for numbers."""
+    """Value in the robot's unit -> the type's bytes as they go over the wire. Never raises for numbers."""
     decode: Callable[[Buffer], Value | None] = field(compare=False, repr=False)
-    """Register bytes -> value in the robot's unit; None for what the robot's kind has no value for (NaN as INT).
+    """These bytes -> value in the robot's unit; None for what the robot's kind has no value for (NaN as INT).
 
     Whether the robot's type is wide enough is for `Variable.low` and `.high` to say. Raises `struct.error`
-    for another number of bytes than `2 * words`.
+    for another number of bytes.
     """
 
     @property
@@ -110,7 +122,7 @@ class Codec:
 def turns(order: str, type_name: str) -> bool:
     """Whether `order` says anything of a number of that type: in one register there are no words to swap."""
     number = TYPES[type_name]
-    return number.words > 1 or (order in _BYTE_SWAPS and number.name != "bool")
+    return number.words > 1 or (order in _BYTE_SWAPS and number.size > 1 and number.name != "bool")
 
 
 _BYTE_SWAPS: Final = frozenset({"BADC", "DCBA"})
@@ -151,7 +163,7 @@ def _compiled(
     number = TYPES[type_name]
     byte_order, swapped = ORDERS[order]
     layout = Struct(byte_order + number.code)
-    pack, unpack = _swapping(layout) if swapped else (layout.pack, layout.unpack)
+    pack, unpack = _swapping(layout) if swapped and not number.is_byte else (layout.pack, layout.unpack)
     plain = scale == 1 and offset == 0
     encode = _plain_encoder(number, pack, kind) if plain else _encoder(number, pack, scale, offset)
     reader = read_limits(ends, number.code, _meaning(number, scale, offset, kind), scale, offset)

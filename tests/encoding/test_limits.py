@@ -66,7 +66,7 @@ def test_other_raw_numbers_mean_what_they_meant(
     """Only limits are touched, by at most half a step; what lies beyond stays beyond, and is refused."""
     codec = make_codec(number.name, kind=FLOAT, scale=scale, offset=offset, limits=limits)
     plain = make_codec(number.name, kind=FLOAT, scale=scale, offset=offset)
-    raw = data[: 2 * codec.words]
+    raw = data[: number.size]
     value, before = codec.decode(raw), plain.decode(raw)
     assert value is not None
     assert before is not None

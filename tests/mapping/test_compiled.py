@@ -36,8 +36,8 @@ def test_shipped_mappings_arrive_as_they_were(path: Path) -> None:
 
 def test_every_kind_of_number_arrives_with_functions_that_do_the_same() -> None:
     lines = [
-        f"  v{n}: {{robot: 'output_double_register_{n % 24}', modbus: {{holding: {4 * n}, type: {name}, "
-        f"order: {order}{scale}}}}}\n"
+        f"  v{n}: {{robot: 'output_double_register_{n % 24}', "
+        f"modbus: {{holding: {4 * n}{'.low' * TYPES[name].is_byte}, type: {name}, order: {order}{scale}}}}}\n"
         for n, (name, order, scale) in enumerate(
             (name, order, scale)
             for name in TYPES

@@ -61,7 +61,7 @@ def test_schema_takes_what_check_takes(line: str) -> None:
         "a: {robot: x, on_relase: hold}",
         "a: {robot: x, modbus: {holding: 7, coil: 3}}",
         "a: {robot: x, modbus: {type: int16}}",
-        "a: {robot: x, modbus: {holding: 7, type: int8}}",
+        "a: {robot: x, modbus: {holding: 7, type: int12}}",
         "a: {robot: x, lease: 5}",
         "a: {robot: x, limits: [1]}",
         "a: {robot: x, on_release: exception}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from gatewayd.links.contract import Description, Place
 from gatewayd.links.modbus_server.plan import ModbusPlan, Placement, network_text
 from gatewayd.modbus.areas import AREA_NAMES
+from gatewayd.modbus.codec import Codec, turns
 from gatewayd.report.format import address, exact, seconds
 
 
@@ -46,8 +47,12 @@ def _place(placement: Placement) -> Place:
         area=area,
         address=placement.place,
         notation=notation,
-        type="bit" if codec is None else f"{codec.type} {codec.order}".strip(),
+        type="bit" if codec is None else f"{codec.type} {_order(codec)}".strip(),
     )
+
+
+def _order(codec: Codec) -> str:
+    return codec.order if turns(codec.order, codec.type) else ""
 
 
 def _encoding(placement: Placement) -> str:
@@ -55,7 +60,7 @@ def _encoding(placement: Placement) -> str:
     codec = placement.codec
     if codec is None:
         return ""
-    order = "" if codec.order == "ABCD" else f" {codec.order}"
+    order = "" if _order(codec) in ("", "ABCD") else f" {codec.order}"
     scale = "" if codec.scale == 1 else f" * {exact(codec.scale)}"
     offset = f" + {exact(codec.offset)}" if codec.offset else ""
     return f" {codec.type}{order}{scale}{offset}"

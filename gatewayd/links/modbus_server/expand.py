@@ -19,6 +19,7 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedLink, ExpandedVariab
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import TYPES, Codec, make_codec
 
+_BYTES: Final = ("int8", "uint8")
 _INTEGERS: Final = ("uint16", "uint32", "uint64", "int16", "int32", "int64")
 """Types that a whole number gets where the file names none: the first that holds the robot's."""
 
@@ -34,6 +35,8 @@ class PlacementProblem(Enum):
     """A number type for a coil, discrete input or single bit."""
     SCALED_BIT = auto()
     """Scale, offset or order for a single bit."""
+    BYTE_TYPE = auto()
+    """A byte of another type than int8 and uint8, or one of these in a whole register."""
     SCALE_OF_ZERO = auto()
     BEYOND_END = auto()
     """Addresses after 65535."""
@@ -102,6 +105,8 @@ def _line(variables: Sequence[ExpandedVariable], default_order: str) -> Iterator
             yield placement
             if bit is None:
                 address += placement.words
+            elif spec.is_byte:
+                address, bit = address + (bit == 0), 8 - bit
             else:
                 address, bit = address + (bit + 1) // 16, (bit + 1) % 16
 
@@ -121,8 +126,8 @@ def _placement(
     default_order: str,
 ) -> ExpandedPlacement:
     address, bit = place
-    single = bit is not None or spec.area.of_bits
-    type_name = spec.type or ("bit" if single else _default_type(variable))
+    single = (bit is not None and not spec.is_byte) or spec.area.of_bits
+    type_name = spec.type or ("bit" if single else "uint8" if spec.is_byte else _default_type(variable))
     order = _order(spec, type_name, default_order)
     scale = 1.0 if spec.scale is None else spec.scale
     offset = 0.0 if spec.offset is None else spec.offset
@@ -153,7 +158,7 @@ def _order(spec: PlacementSpec, type_name: str, default: str) -> str:
     A `bool` is 0 or 1 whatever is written beside it; numbers of 16 bits can have an order of their own.
     """
     order, number = spec.order or default, TYPES.get(type_name)
-    is_own = spec.order is not None and type_name != "bool"
+    is_own = spec.order is not None and type_name not in ("bool", *_BYTES)
     return order if number is None or number.words > 1 or is_own else _WITHOUT_BYTES.get(order, order)
 
 
@@ -172,6 +177,8 @@ def _bit_problem(variable: ExpandedVariable, spec: PlacementSpec) -> PlacementPr
 
 
 def _number_problem(spec: PlacementSpec, type_name: str) -> PlacementProblem | None:
+    if spec.is_byte != (type_name in _BYTES):
+        return PlacementProblem.BYTE_TYPE
     if type_name not in TYPES:
         return PlacementProblem.BIT_WITHOUT_PLACE
     return PlacementProblem.SCALE_OF_ZERO if spec.scale == 0 else None

@@ -18,6 +18,13 @@ def network_text(network: Network) -> str:
     return str(network.network_address) if network.num_addresses == 1 else str(network)
 
 
+def part_text(bit: int | None, *, is_byte: bool) -> str:
+    """The part of a register behind its address: `.3`, `.high`; empty for all of it."""
+    if bit is None:
+        return ""
+    return f".{bit}" if not is_byte else ".high" if bit else ".low"
+
+
 class Located:
     """What lies in a Modbus area: the properties of everything with these fields."""
 
@@ -26,9 +33,10 @@ class Located:
     address: int
     """Protocol address from 0: of the first register, or of the coil."""
     bit: int | None
-    """Bit of the register (0 = least significant) for a bit packed into a register; else None."""
+    """Bit of the register (0 = least significant) for a bit packed into a register, the lowest one of a byte; else
+    None."""
     codec: Codec | None
-    """Number encoding of whole registers; None for coils, discrete inputs and packed bits."""
+    """Number encoding of bytes and whole registers; None for coils, discrete inputs and packed bits."""
 
     @property
     def words(self) -> int:
@@ -42,13 +50,17 @@ class Located:
 
     @property
     def place(self) -> str:
-        """The address as the file counts: `100` or `100.3`."""
-        return str(self.address) if self.bit is None else f"{self.address}.{self.bit}"
+        """The address as the file counts: `100`, `100.3` or `100.high`."""
+        return f"{self.address}{self._part}"
 
     @property
     def notation(self) -> str:
         """The 4xxxxx form, with the bit where there is one: `400001.3`."""
-        return self.area.notation(self.address) + ("" if self.bit is None else f".{self.bit}")
+        return f"{self.area.notation(self.address)}{self._part}"
+
+    @property
+    def _part(self) -> str:
+        return part_text(self.bit, is_byte=self.codec is not None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gatewayd.core.admission import Change, contradiction
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import Direction
+from gatewayd.core.definition import Direction, Value
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.status_layout import BASE
 from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
@@ -49,8 +49,33 @@ class _Number:
 
 
 @dataclass(frozen=True, slots=True)
+class _Byte:
+    """A number in a byte of a register."""
+
+    mask: int
+    variable: int
+    implied: bool
+    """As those of bits."""
+    codec: Codec
+    values: Sequence[Value]
+    """The process image."""
+
+    def change(self, word: int) -> Change | None:
+        """None if the byte means nothing that the variable could hold.
+
+        What is implied and shows the present value means it, whatever digits the byte has no room for.
+        """
+        raw = ((word & self.mask) >> (8 if self.mask > 0xFF else 0)).to_bytes()
+        present = self.values[self.variable]
+        if self.implied and self.codec.encode(present) == raw:
+            return Change(self.variable, present, implied=True)
+        value = self.codec.decode(raw)
+        return None if value is None else Change(self.variable, value, self.implied)
+
+
+@dataclass(frozen=True, slots=True)
 class _Bits:
-    """A register into which bits are packed."""
+    """A register into which bits and bytes are packed."""
 
     address: int
     writable: bool
@@ -59,6 +84,7 @@ class _Bits:
     unmapped: int
     """Mask of the other bits."""
     ignores_gaps: bool
+    numbers: tuple[_Byte, ...] = ()
 
     @property
     def words(self) -> int:
@@ -66,26 +92,38 @@ class _Bits:
 
     @property
     def variable(self) -> int:
-        return self.bits[0][1]
+        return self.bits[0][1] if self.bits else self.numbers[0].variable
 
     def changes(self, data: bytes) -> list[Change] | Reason:
         """Refused where a 1 would be lost."""
         (word,) = _WORD.unpack(data)
         if word & self.unmapped and not self.ignores_gaps:
             return Reason.NO_SUCH_ADDRESS
-        return [Change(variable, bool(word & mask), implied) for mask, variable, implied in self.bits]
+        changes = [Change(variable, bool(word & mask), implied) for mask, variable, implied in self.bits]
+        return self._with_bytes(changes, word, 0xFFFF) if self.numbers else changes
 
-    def masked(self, _present: int, and_mask: int, or_mask: int) -> list[Change] | Reason:
+    def masked(self, present: int, and_mask: int, or_mask: int) -> list[Change] | Reason:
         """Refused where a 1 would be lost, and if it is for unmapped bits alone."""
         selected = ~and_mask & 0xFFFF
         lost = or_mask & selected & self.unmapped
         if (lost and not self.ignores_gaps) or (selected and not selected & ~self.unmapped):
             return Reason.NO_SUCH_ADDRESS
-        return [
+        changes = [
             Change(variable, bool(or_mask & mask))
             for mask, variable, _implied in self.bits
             if selected & mask
         ]
+        word = (present & and_mask) | (or_mask & selected)
+        return self._with_bytes(changes, word, selected) if self.numbers else changes
+
+    def _with_bytes(self, changes: list[Change], word: int, selected: int) -> list[Change] | Reason:
+        for part in self.numbers:
+            if selected & part.mask:
+                change = part.change(word)
+                if change is None:
+                    return Reason.OUT_OF_LIMITS
+                changes.append(change if selected == 0xFFFF else replace(change, implied=False))
+        return changes
 
 
 class _Table:
@@ -290,24 +328,32 @@ def _refusal(reason: Reason, item: _Number | _Bits) -> Refusal:
 
 def _items(placements: Sequence[Placement], cell: Cell, *, ignore_gaps: bool) -> Iterator[_Number | _Bits]:
     variables = cell.definition.variables
-    packed: dict[int, list[tuple[int, int]]] = {}
+    packed: dict[int, list[Placement]] = {}
     for placement in placements:
         if placement.bit is not None:
-            packed.setdefault(placement.address, []).append((1 << placement.bit, placement.variable))
+            packed.setdefault(placement.address, []).append(placement)
         elif placement.codec is not None:
             writable = variables[placement.variable].direction is Direction.INPUT
             yield _Number(placement.address, placement.words, placement.variable, writable, placement.codec)
-    for address, bits in packed.items():
-        locks = {variables[variable].lock for _mask, variable in bits} - {None}
-        # Who writes a register whose inputs are one lock, or that is one bit, means it. An output in it nobody means.
+    for address, parts in packed.items():
+        locks = {variables[part.variable].lock for part in parts} - {None}
+        # Who writes a register whose inputs are one lock, or that is one part, means it. An output in it nobody means.
         shared = len(locks) > 1
+        implied = {part.variable: shared or variables[part.variable].lock is None for part in parts}
+        bits = sorted((1 << (part.bit or 0), part.variable) for part in parts if part.codec is None)
+        numbers = tuple(
+            _Byte(
+                0xFF << (part.bit or 0), part.variable, implied[part.variable], part.codec, cell.image.values
+            )
+            for part in parts
+            if part.codec is not None
+        )
+        mapped = sum({mask for mask, _variable in bits} | {number.mask for number in numbers})
         yield _Bits(
             address,
             writable=bool(locks),
-            bits=tuple(
-                (mask, variable, shared or variables[variable].lock is None)
-                for mask, variable in sorted(bits)
-            ),
-            unmapped=0xFFFF & ~sum({mask for mask, _variable in bits}),
+            bits=tuple((mask, variable, implied[variable]) for mask, variable in bits),
+            unmapped=0xFFFF & ~mapped,
             ignores_gaps=ignore_gaps,
+            numbers=numbers,
         )

@@ -54,6 +54,8 @@ class Repeated:
 
 
 def _says(place: Placement, raw: bytes, value: Value) -> bool:
+    if place.bit is not None and place.codec is not None:
+        raw = raw[:1] if place.bit else raw[1:]
     if place.codec is None:
         return bool(int.from_bytes(raw, "big") >> (place.bit or 0) & 1) == value
     return place.codec.encode(value) == raw or place.codec.decode(raw) == value

@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
-from operator import itemgetter
+from operator import itemgetter, mul
 from typing import Protocol
 
 from gatewayd.core.definition import Value
@@ -66,25 +66,35 @@ class NumberRun:
 
 
 class WordOfBits:
-    """The mapped bits of one register; the others are always 0."""
+    """The mapped bits and bytes of one register; the other bits are always 0."""
 
-    __slots__ = ("_get", "_image", "_last", "_masks", "_offset")
+    __slots__ = ("_bytes", "_get", "_image", "_last", "_masks", "_offset")
 
     def __init__(self, placements: Sequence[Placement], image: bytearray) -> None:
         self._image = image
         self._offset = 2 * placements[0].address
         self._get = _getter([placement.variable for placement in placements])
         self._masks = [1 << (placement.bit or 0) for placement in placements]
+        self._bytes = [(n, placement.codec) for n, placement in enumerate(placements) if placement.codec]
         self._last: Sequence[Value] = ()
 
     def refresh(self, values: list[Value]) -> None:
-        """Write the register anew if a bit changed."""
+        """Write the register anew if a part changed."""
         present = self._get(values)
         if present == self._last:
             return
         self._last = present
-        word = sum(mask for mask, value in zip(self._masks, present, strict=True) if value)
+        if self._bytes:
+            word = sum(map(mul, self._masks, self._encoded(present)))
+        else:
+            word = sum(mask for mask, value in zip(self._masks, present, strict=True) if value)
         self._image[self._offset : self._offset + 2] = word.to_bytes(2, "big")
+
+    def _encoded(self, present: Sequence[Value]) -> list[int]:
+        parts = [int(bool(value)) for value in present]
+        for position, codec in self._bytes:
+            parts[position] = codec.encode(present[position])[0]
+        return parts
 
 
 class BitRun:

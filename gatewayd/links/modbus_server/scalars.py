@@ -6,7 +6,7 @@ As `gatewayd.mapping.scalars`: what cannot be read raises `PydanticCustomError` 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -17,31 +17,37 @@ from gatewayd.mapping.scalars import refuse, scalar
 BAD_ADDRESS = declare(
     "GW115", "bad-address", "a Modbus address that cannot be read", home="gatewayd.links.modbus_server.rules"
 )
-_ADDRESS = re.compile(r"(0|[1-9][0-9]*)(?:\.(0|[1-9][0-9]*))?")
+Half = Literal["high", "low"]
+"""A byte of a register. The high one comes first on the wire."""
+Part = int | Half | None
+"""Bit or byte of a register; None: all of it."""
+
+_ADDRESS = re.compile(r"(0|[1-9][0-9]*|0[xX][0-9A-Fa-f]+)(?:\.(?:(0|[1-9][0-9]*)|(high|low)))?")
 _MAX_ADDRESS: Final = 0xFFFF
 _MAX_BIT: Final = 15
 
 
-def _address(value: object) -> tuple[int, int | None]:
+def _address(value: object) -> tuple[int, Part]:
     if isinstance(value, tuple):
         return value
-    hint = "write a register (100) or a bit of a register (100.3), counted from 0"
+    hint = "write a register (100, 0x64), a bit (100.3) or a byte of it (100.high, 100.low), counted from 0"
     text = scalar(value, "an address", hint)
     match = _ADDRESS.fullmatch(text)
     if match is None:
         refuse(BAD_ADDRESS, f"`{text}` is not an address", hint)
-    address = int(match[1])
+    address = int(match[1], 0)
     if address > _MAX_ADDRESS:
         refuse(
             syntax.OUT_OF_RANGE,
             f"the address {address} is greater than 65535",
             _notation_hint(match[1]) or hint,
         )
+    half: Half | None = "high" if match[3] == "high" else "low" if match[3] == "low" else None
     bit = int(match[2]) if match[2] is not None else None
     if bit is not None and bit > _MAX_BIT:
         hint = "bit 0 is the least significant of the register, bit 15 the most"
         refuse(syntax.OUT_OF_RANGE, f"the register has no bit {bit}", hint)
-    return address, bit
+    return address, half or bit
 
 
 def _notation_hint(digits: str) -> str | None:
@@ -53,11 +59,12 @@ def _notation_hint(digits: str) -> str | None:
 
 
 Address = Annotated[
-    tuple[int, int | None],
+    tuple[int, Part],
     BeforeValidator(
         _address,
-        json_schema_input_type=float | Annotated[str, Field(pattern=r"^[0-9]{1,5}(\.[0-9]{1,2})?$")],
+        json_schema_input_type=float
+        | Annotated[str, Field(pattern=r"^([0-9]{1,5}|0[xX][0-9A-Fa-f]{1,4})(\.([0-9]{1,2}|high|low))?$")],
     ),
     Field(strict=False),
 ]
-"""Protocol address from 0 and, after a dot, the bit of the register."""
+"""Protocol address from 0, decimal or hexadecimal, and after a dot the bit or the byte of the register."""

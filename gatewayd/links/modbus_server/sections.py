@@ -6,14 +6,25 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
-from gatewayd.links.modbus_server.scalars import BAD_ADDRESS, Address
+from gatewayd.links.modbus_server.scalars import BAD_ADDRESS, Address, Part
 from gatewayd.mapping import syntax
 from gatewayd.mapping.scalars import Listen, ListenAddress, Networks, OptionalDuration, Real, Whole, refuse
 from gatewayd.mapping.section import Section
 from gatewayd.modbus.areas import AREA_NAMES, Area
 
 NumberType = Literal[
-    "bool", "bit", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"
+    "bool",
+    "bit",
+    "int8",
+    "uint8",
+    "int16",
+    "uint16",
+    "int32",
+    "uint32",
+    "int64",
+    "uint64",
+    "float32",
+    "float64",
 ]
 WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
 RobotAway = Literal["target_failed", "path_unavailable", "device_failure", "busy"]
@@ -96,7 +107,7 @@ class PlacementSpec(Section):
             message = f"a placement names exactly one of holding, input, coil and discrete; found {found}"
             refuse(BAD_ADDRESS, message, "write for example {holding: 100}; several placements make a list")
         if self.area.of_bits and self.bit is not None:
-            message = f"a {given[0]} address has no bits"
+            message = f"a {given[0]} address has no bits and bytes"
             refuse(BAD_ADDRESS, message, f"write {{{given[0]}: N}} with a whole number")
         return self
 
@@ -117,9 +128,14 @@ class PlacementSpec(Section):
 
     @property
     def bit(self) -> int | None:
-        """Bit of the register, or None."""
-        bit: int | None = getattr(self, self.area_key)[1]
-        return bit
+        """Bit of the register, the lowest one of a byte; or None."""
+        part: Part = getattr(self, self.area_key)[1]
+        return {"low": 0, "high": 8}[part] if isinstance(part, str) else part
+
+    @property
+    def is_byte(self) -> bool:
+        """Whether it is a byte of the register."""
+        return isinstance(getattr(self, self.area_key)[1], str)
 
 
 _AREAS = {AREA_NAMES[area]: area for area in (Area.HOLDING, Area.INPUT, Area.COIL, Area.DISCRETE)}
@@ -138,7 +154,7 @@ def _present(item: Any) -> Any:
         refuse(
             syntax.WRONG_TYPE,
             "a Modbus address is missing",
-            "write a register (100), a bit (100.3) or {coil: 5}",
+            "write a register (100), a bit (100.3), a byte (100.high) or {coil: 5}",
         )
     return item
 
@@ -154,7 +170,8 @@ class ModbusPlaces(Section):
         Field(strict=False),
     ] = Field(
         default=(),
-        description="address from 0 (100), bit of a register (100.3), {area: address, type: ...}, or a list of these",
+        description="address from 0 (100, 0x64), bit (100.3) or byte (100.high) of a register, "
+        "{area: address, type: ...}, or a list of these",
     )
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 from gatewayd.links.modbus_server.declaration import KIND
 from gatewayd.links.modbus_server.expand import ExpandedPlacement, placements_of
-from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, part_text
 from gatewayd.links.tables import LinkTables
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.plan import Plan
@@ -59,10 +59,10 @@ class ModbusTables(LinkTables):
 
     def on_page(self, row: Row) -> Mapping[str, str]:
         """The place in both ways of counting."""
-        address, bit = row["address"], row["bit"]
+        address = row["address"]
         return {
             "area": row["area"],
-            "address from 0": "" if address is None else str(address) + ("" if bit is None else f".{bit}"),
+            "address from 0": "" if address is None else f"{address}{_part(row)}",
             "4xxxxx": row["notation"],
             "type": f"{row['type']} {row['order']}".strip(),
         }
@@ -106,12 +106,16 @@ def _row(placement: ExpandedPlacement) -> Mapping[str, object]:
     }
 
 
+def _part(row: Row) -> str:
+    return part_text(row["bit"], is_byte=row["type"] != "bit")
+
+
 def _addresses(first: Row, last: Row) -> str:
     """Protocol addresses covered: `100-147`, `0.0-3.15`."""
     if first["address"] is None or last["address"] is None:
         return ""
     if first["bit"] is not None:
-        return span(f"{first['address']}.{first['bit']}", f"{last['address']}.{last['bit']}")
+        return span(f"{first['address']}{_part(first)}", f"{last['address']}{_part(last)}")
     return span(str(first["address"]), str(last["address"] + last["words"] - 1))
 
 

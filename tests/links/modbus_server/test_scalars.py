@@ -10,9 +10,20 @@ from tests.mapping.values import read, refused
 
 @pytest.mark.parametrize(
     "text, address",
-    [("0", (0, None)), ("65535", (65535, None)), ("0.10", (0, 10)), ("0.1", (0, 1)), ("'12.15'", (12, 15))],
+    [
+        ("0", (0, None)),
+        ("65535", (65535, None)),
+        ("0.10", (0, 10)),
+        ("0.1", (0, 1)),
+        ("'12.15'", (12, 15)),
+        ("0x10", (16, None)),
+        ("0XfFfF", (65535, None)),
+        ("0x1F.3", (31, 3)),
+        ("100.high", (100, "high")),
+        ("0x64.low", (100, "low")),
+    ],
 )
-def test_addresses(text: str, address: tuple[int, int | None]) -> None:
+def test_addresses(text: str, address: tuple[int, int | str | None]) -> None:
     """The text counts: `0.10` is bit 10, not bit 1."""
     assert read(Address, text) == address
 
@@ -21,7 +32,11 @@ def test_addresses(text: str, address: tuple[int, int | None]) -> None:
     "text, slug",
     [
         ("-1", "bad-address"),
-        ("0x10", "bad-address"),
+        ("0x", "bad-address"),
+        ("0x1G", "bad-address"),
+        ("0b11", "bad-address"),
+        ("100.middle", "bad-address"),
+        ("0x10000", "out-of-range"),
         ("010", "bad-address"),
         ("1e2", "bad-address"),
         ("0.01", "bad-address"),

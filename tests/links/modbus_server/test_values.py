@@ -6,6 +6,7 @@ import struct
 from pathlib import Path
 
 from gatewayd.core.cell import Cell
+from gatewayd.core.definition import Direction
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.functions import Unit, execute
 from gatewayd.links.modbus_server.plan import ModbusPlan
@@ -144,3 +145,47 @@ variables:
     names = ("wide", "narrow", "swapped", "whole", "own", "packed")
     assert [plant.value(name) for name in names] == [0x01020304, 0x0102, 0x0102, True, True, True]
     assert plant.read(10, 7) == (0x0403, 0x0201, 0x0102, 0x0201, 1, 1, 1)
+
+
+GRIPPER = (
+    HEAD
+    + SECTION
+    + """\
+groups:
+  grip: {owner: plc}
+variables:
+  width:  {robot: input_int_register_0, modbus: 0x64.high, group: grip, limits: [0, 255], on_release: hold}
+  force:  {robot: input_double_register_0, group: grip, limits: [-0.5, 0.5],
+           modbus: {holding: 0x64.low, type: int8, scale: 0.01}}
+  state:  {robot: 'output_int_register_0..3', modbus: {input: 7.low}, limits: [0, 255]}
+  half:   {robot: input_int_register_1, modbus: 0x65.low, owner: plc, limits: [0, 9]}
+  jaw:    {robot: input_bit_register_0, modbus: 0x65.8, owner: plc}
+"""
+)
+
+
+def test_bytes_of_a_register() -> None:
+    """Two numbers in one register, as grippers have them; addresses in hexadecimal."""
+    plant = Plant(GRIPPER)
+    assert plant.write(100, 0xC8CE) == 16
+    assert (plant.value("width"), plant.value("force")) == (200, -0.5)
+    assert plant.read(100) == (0xC8CE,)
+    mask_write = struct.Struct(">BHHH")
+    assert plant.ask(mask_write.pack(22, 100, 0xFF00, 0x0032))[0] == 22
+    assert (plant.value("width"), plant.value("force")) == (200, 0.5)
+    assert plant.write(100, 0xC833) == 3, "0.51 is beyond the limits, and nothing of it is written"
+    assert plant.read(100) == (0xC832,)
+    for index, value in zip(plant.cell.image.outputs, (1, 2, 300, 4), strict=True):
+        plant.cell.image.values[index] = value
+    plant.unit.image.refresh(Direction.OUTPUT)
+    assert plant.ask(struct.pack(">BHH", 4, 7, 3)) == bytes((4, 6, 0, 1, 2, 255, 4, 0))
+
+
+def test_a_byte_beside_a_bit() -> None:
+    """What nothing is mapped to in their register takes no ones."""
+    plant = Plant(GRIPPER)
+    assert plant.write(101, 0x0107) == 16
+    assert (plant.value("half"), plant.value("jaw")) == (7, True)
+    assert plant.write(101, 0x0307) == 2
+    assert plant.write(101, 0x000A) == 3
+    assert plant.read(101) == (0x0107,)

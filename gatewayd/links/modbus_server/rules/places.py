@@ -1,4 +1,4 @@
-"""Rules GW20x to GW215, GW220, GW222 and GW223: where variables lie in the Modbus areas."""
+"""Rules GW20x to GW215, GW220 and GW222, GW223 and GW229: where variables lie in the Modbus areas."""
 
 from __future__ import annotations
 
@@ -110,6 +110,23 @@ def bit_without_place(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(placement.position, message, hint=hint)
 
 
+@cell_rule("GW229")
+def byte_type(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """A byte that is no int8 or uint8, or one of these in a whole register."""
+    for placement in wrong(cell, PlacementProblem.BYTE_TYPE):
+        name, area = placement.variable.name, AREA_NAMES[placement.area]
+        register = f"{AREA_WORDS[placement.area]} {placement.address}"
+        if placement.spec.is_byte:
+            message = f"`{name}` has the type {placement.type} in a byte of {register}"
+            hint = (
+                f"write `type: uint8` or `type: int8`, or the whole register, {{{area}: {placement.address}}}"
+            )
+        else:
+            message = f"`{name}` has the type {placement.type}, but {register} is a whole one"
+            hint = f"write the byte, {{{area}: {placement.address}.high}} or {placement.address}.low, or a 16-bit type"
+        yield rule.at(placement.position, message, hint=hint)
+
+
 @cell_rule("GW222")
 def type_of_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A number type for a place that holds a single bit."""
@@ -193,9 +210,10 @@ def register_overlap(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 def bit_in_number(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A register that holds bits and a number."""
     for later, earlier, _ in _overlaps(cell, mixed=True):
+        packed = later if later.bit is not None else earlier
         message = (
             f"`{later.variable.name}` lies at {where(later)}, inside the same register as "
-            f"`{earlier.variable.name}`: one is a bit, the other a number"
+            f"`{earlier.variable.name}`: one is a {'bit' if packed.codec is None else 'byte'}, the other a number"
         )
         yield _overlap(rule, cell, later, earlier, message)
 
@@ -262,7 +280,7 @@ def _span(placement: ExpandedPlacement) -> tuple[int, int]:
     """First bit and the bit after the last, counting sixteen to an address."""
     start = placement.address * 16
     if placement.bit is not None:
-        return start + placement.bit, start + placement.bit + 1
+        return start + placement.bit, start + placement.bit + (1 if placement.codec is None else 8)
     return start, start + placement.words * 16
 
 

@@ -20,6 +20,9 @@ AREA_WORDS = {
 def where(placement: ExpandedPlacement) -> str:
     """Where it lies, both ways of counting: `holding registers 100 to 103 (400101 to 400104)`."""
     word = AREA_WORDS[placement.area]
+    if placement.bit is not None and placement.codec is not None:
+        half = "high" if placement.bit else "low"
+        return f"the {half} byte of {word} {placement.address} ({placement.notation})"
     if placement.bit is not None:
         return f"bit {placement.bit} of {word} {placement.address} ({placement.notation})"
     if placement.words == 1:
