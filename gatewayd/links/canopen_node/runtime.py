@@ -145,10 +145,10 @@ class CanLink(Link, Observer):
             return self._unusable
         if self.node.bus is not BusState.ACTIVE:
             return self._bus.reason if self._bus is not None else ""
-        if self._other_bit_rate in (None, self._plan.bitrate):
+        if self._other_bit_rate in (None, self.plan.bitrate):
             return ""
         return (
-            f"{self._plan.channel} runs at {self._other_bit_rate} bit/s, the mapping says {self._plan.bitrate}: "
+            f"{self.plan.channel} runs at {self._other_bit_rate} bit/s, the mapping says {self.plan.bitrate}: "
             "set up the interface anew, or correct the mapping"
         )
 
