@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from gatewayd.core.events import Event, translated
 from gatewayd.core.match import Match, at
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.core.requester import host_of
 
 MAX_PEERS = 64
 """Hosts without a writer whose refusals are told apart."""
@@ -64,7 +65,7 @@ class RefusalLog:
 
     def add(self, event: Event) -> None:
         """A request was refused: report it, or count it if an equal one was reported within the interval."""
-        host = _host(event.peer)
+        host = host_of(event.peer)
         if host and host not in self._peers:
             if len(self._peers) < MAX_PEERS:
                 self._peers.add(host)
@@ -111,8 +112,3 @@ class RefusalLog:
                 self._report(translated(replace(reported.last, repeats=reported.pending - 1), match))
         self._peers = set(former._peers)
         self._next = former._next
-
-
-def _host(peer: str) -> str:
-    """The peer's address without the port, which is another one for each connection."""
-    return peer.rpartition(":")[0] or peer

@@ -34,3 +34,8 @@ _connections = count(1)
 def new_connection() -> int:
     """A number that no other connection has or had."""
     return next(_connections)
+
+
+def host_of(peer: str) -> str:
+    """The peer's address without its port (`10.0.0.1:502`, `[fe80::1]:502`), which each connection has another one."""
+    return peer.rpartition(":")[0] if peer.count(":") == 1 or "]:" in peer else peer

@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from gatewayd.core.requester import host_of
 from gatewayd.loop import clock
 from gatewayd.loop.quota import Quota
 
@@ -108,7 +109,7 @@ def _subject(record: logging.LogRecord) -> Hashable:
     """What the line is about; a peer is its address without the port, which is another one for each connection."""
     found: dict[str, object] = getattr(record, "fields", {})
     return tuple(
-        (name, value.rpartition(":")[0] if name == "peer" and isinstance(value, str) else str(value))
+        (name, host_of(str(value)) if name == "peer" else str(value))
         for name, value in found.items()
         if name not in _VOLATILE
     )

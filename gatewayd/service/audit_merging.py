@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Hashable
 from dataclasses import replace
 
+from gatewayd.core.requester import host_of
 from gatewayd.loop.quota import Quota
 from gatewayd.report.event_text import ACCEPTED, EventRecord
 from gatewayd.service.audit_record import Record
@@ -105,7 +106,7 @@ def _source(record: Record) -> _Source:
 
 
 def _subject(event: EventRecord) -> Hashable:
-    host = event.peer and (event.peer.rpartition(":")[0] or event.peer)
+    host = None if event.peer is None else host_of(event.peer)
     return event.what, host, event.variable, event.lock, event.reason, event.holder
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import hmac
 import logging
+from collections import defaultdict
 from collections.abc import Awaitable, Callable
 from ipaddress import ip_address
 from typing import cast
@@ -23,6 +24,8 @@ from gatewayd.loop.share import Busy, LoopShare
 
 MAX_CONNECTIONS = 32
 """Open at a time; further ones are closed at once, so that a flood costs the robot's loop next to nothing."""
+FAIR = 8
+"""Connections of one peer that nobody takes from it. It may have more while there is room."""
 PATIENCE = 20.0
 """Seconds after which a connection that has not finished a request is closed: idle, slow, or not reading its answer."""
 MAX_BODY = 4096
@@ -39,6 +42,8 @@ HEADERS = {
     "Server": "gatewayd",
 }
 """Go with every answer."""
+MAX_PATH = 200
+"""Characters of a path in the log."""
 _READING = ("GET", "HEAD")
 _SWEEP = 2.0
 
@@ -48,7 +53,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Doors:
-    """Lets in at most `MAX_CONNECTIONS` connections to `server`, and shows out who wastes one."""
+    """Lets in at most `MAX_CONNECTIONS` connections to `server`, and shows out who wastes one or keeps others out."""
 
     def __init__(self, server: web.Server) -> None:
         self._server = server
@@ -58,7 +63,7 @@ class Doors:
     def __call__(self) -> asyncio.Protocol:
         """The protocol of a new connection."""
         self._forget_closed()
-        if len(self._seen) >= MAX_CONNECTIONS:
+        if len(self._seen) >= MAX_CONNECTIONS and not self._make_room():
             return _Full()
         handler = self._server()
         self._seen[handler] = clock.now()
@@ -79,6 +84,21 @@ class Doors:
                 transport = handler.transport
                 if transport is not None:
                     transport.abort()
+
+    def _make_room(self) -> bool:
+        """The peer with the most connections, if they are more than `FAIR`, loses the one answered longest ago."""
+        of_peer: defaultdict[object, list[RequestHandler]] = defaultdict(list)
+        for handler in self._seen:
+            peer = handler.transport.get_extra_info("peername") if handler.transport is not None else None
+            of_peer[peer and peer[0]].append(handler)
+        most = max(of_peer.values(), key=len)
+        if len(most) <= FAIR:
+            return False
+        longest = min(most, key=self._seen.__getitem__)
+        del self._seen[longest]
+        if longest.transport is not None:
+            longest.transport.abort()
+        return True
 
     def _forget_closed(self) -> None:
         now = clock.now()
@@ -145,7 +165,10 @@ def _refusal(request: web.Request, token: str | None, *, local_only: bool) -> tu
         return 403, "reading only: the gateway was started without --token-file"
     given = request.headers.get("Authorization", "").removeprefix("Bearer ")
     if not hmac.compare_digest(given.encode("utf-8", "surrogateescape"), token.encode()):
-        log.warning("a request without the right token", extra=fields(peer=request.remote, path=request.path))
+        log.warning(
+            "a request without the right token",
+            extra=fields(peer=request.remote, path=request.path[:MAX_PATH]),
+        )
         return 401, "this needs the token: Authorization: Bearer TOKEN"
     return None
 

@@ -301,7 +301,7 @@ def test_only_what_is_shown_to_people_asks_the_wall_clock() -> None:
 
 
 def test_a_log_that_nobody_reads_stops_nobody(plant: Plant) -> None:
-    """Standard error is a pipe, full after some hundred connections; the daemon goes on, and ends when told to."""
+    """Standard error is a pipe, full after some hundred locks; the daemon goes on, and ends when told to."""
     simulator = plant.simulator()
     mapping = plant.mapping(CELL, simulator.port)
     command = [
@@ -326,6 +326,7 @@ def test_a_log_that_nobody_reads_stops_nobody(plant: Plant) -> None:
             connect(plant).close()
             asked = time.monotonic()
             assert plc.write_integers(0, number) == 0
+            assert plc.release(1) == 0
             slowest = max(slowest, time.monotonic() - asked)
         assert slowest < QUICK
         assert plc.robot_state == FRESH

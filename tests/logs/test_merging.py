@@ -70,6 +70,13 @@ def test_wrong_tokens_are_few_lines_whatever_is_asked_for(written: Log) -> None:
     assert written.count() == 9000
 
 
+def test_peers_are_told_apart_by_their_address_alone(written: Log) -> None:
+    for peer in ("192.168.1.7:{}", "192.168.1.8:{}", "[fe80::1]:{}", "[fe80::2]:{}", "fe80::3", "fe80::4"):
+        for port in range(2 * EACH):
+            log.warning("refused", extra=fields(peer=peer.format(port)))
+    assert len(written.lines()) == 6 * EACH
+
+
 def test_what_differs_is_written_one_by_one_up_to_a_bound(written: Log) -> None:
     for number in range(5000):
         log.warning("fallback applied", extra=fields(cell="press", variable=f"v{number}"))

@@ -160,13 +160,19 @@ async def test_nonsense_is_refused_without_a_traceback(listener: StatusListener,
     assert b"root:" not in answer
 
 
+async def connect(listener: StatusListener, source: str) -> asyncio.StreamWriter:
+    _, writer = await asyncio.open_connection("127.0.0.1", listener.port, local_addr=(source, 0))
+    return writer
+
+
 async def test_connections_are_bounded_and_come_back(
     listener: StatusListener, session: aiohttp.ClientSession
 ) -> None:
-    many = [await asyncio.open_connection("127.0.0.1", listener.port) for _ in range(guard.MAX_CONNECTIONS)]
+    sources = [f"127.0.0.{2 + number // guard.FAIR}" for number in range(guard.MAX_CONNECTIONS)]
+    many = [await connect(listener, source) for source in sources]
     await asyncio.sleep(0.05)
     assert await raw(listener.port, b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n") == b""
-    for _, writer in many:
+    for writer in many:
         writer.close()
     for _ in range(100):
         await asyncio.sleep(0.05)
@@ -176,6 +182,18 @@ async def test_connections_are_bounded_and_come_back(
             continue
         return
     raise AssertionError("the connections did not come free")
+
+
+async def test_one_peer_keeps_nobody_out(listener: StatusListener) -> None:
+    """However many connections it has and makes anew: what it has too much goes, and others' stay."""
+    many = [await connect(listener, "127.0.0.2") for _ in range(2 * guard.MAX_CONNECTIONS)]
+    reader, writer = await asyncio.open_connection("127.0.0.1", listener.port, local_addr=("127.0.0.3", 0))
+    for _ in range(5):
+        writer.write(b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        assert (await asyncio.wait_for(reader.readuntil(b"}"), 10)).startswith(b"HTTP/1.1 200")
+        many += [await connect(listener, "127.0.0.2") for _ in range(guard.MAX_CONNECTIONS)]
+    for connection in (writer, *many):
+        connection.close()
 
 
 async def test_who_wastes_a_connection_is_shown_out(
