@@ -48,9 +48,11 @@ class AbortCode(IntEnum):
 class Abort(Exception):
     """Ends an SDO transfer; `code` goes to the client."""
 
-    def __init__(self, code: AbortCode) -> None:
+    def __init__(self, code: AbortCode, *, recorded: bool = False) -> None:
         super().__init__(f"{code:#010x} {code.name}")
         self.code = code
+        self.recorded = recorded
+        """Whoever refuses has recorded it already: `aborted` of the server is not called."""
 
 
 class Pending:

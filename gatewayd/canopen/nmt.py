@@ -91,6 +91,8 @@ class NmtSlave:
         self._changed = changed
         self._reset = reset
         self._autostart = autostart
+        self.ignored: Callable[[bytes], None] = lambda _data: None
+        """Called with what was sent to this node and is no command."""
 
     def allows(self, service: Service) -> bool:
         """Whether the service runs in the present state."""
@@ -102,10 +104,13 @@ class NmtSlave:
 
     def receive(self, frame: Frame, now: float) -> None:
         """A frame with COB-ID 0. Wrong lengths, other nodes' commands and unknown commands are ignored."""
-        if frame.remote or len(frame.data) != 2 or frame.data[1] not in (0, self._node()):
+        data = frame.data
+        if frame.remote or (len(data) == 2 and data[1] not in (0, self._node())):
             return
-        if frame.data[0] in _TARGETS:
-            self.command(NmtCommand(frame.data[0]), now)
+        if len(data) == 2 and data[0] in _TARGETS:
+            self.command(NmtCommand(data[0]), now)
+        else:
+            self.ignored(data)
 
     def command(self, command: NmtCommand, now: float) -> None:
         """Carry out a command, of the master or of the error behaviour (1029h)."""

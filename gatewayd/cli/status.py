@@ -219,10 +219,15 @@ def _locks(locks: list[Answer]) -> list[str]:
 
 
 def _writes(cell: Answer) -> list[str]:
-    from gatewayd.report.format import age
+    from gatewayd.report.format import age, counted
 
     writes, last = cell["writes"], cell["last_refusal"]
     lines = [f"{writes['accepted']} accepted, {writes['refused']} refused"]
     if last is not None:
         lines.append(f"last refusal {age(last['age'])} ago: {last['text']}")
+    count, asked = sum(cell["unserved"].values()), cell["last_unserved"]
+    if asked is not None:
+        lines.append(
+            f"{counted(count, 'request')} not served, the last {age(asked['age'])} ago: {asked['text']}"
+        )
     return lines

@@ -27,6 +27,7 @@ from gatewayd.report.schema import (
     LinkStatus,
     LockStatus,
     RefusalStatus,
+    UnservedStatus,
     VariableDeclaration,
     VariableStatus,
     WriterStatus,
@@ -123,6 +124,8 @@ def cell_view(served: ServedCell, declared: Declared, now: float) -> Json:
         },
         writes={"accepted": health.writes_accepted, "refused": health.writes_refused},
         last_refusal=_last_refusal(cell, now),
+        unserved={reason.name.lower(): count for reason, count in cell.health.unserved.items()},
+        last_unserved=_last_unserved(cell, now),
         heartbeat=health.heartbeat,
         gaps=health.gaps,
     )
@@ -239,6 +242,7 @@ def event_view(cell: Cell, seq: int, event: Event, now: float, wall: float) -> E
         "old": plain_value(record.old),
         "new": plain_value(record.new),
         "repeats": event.repeats or None,
+        "request": record.request or None,
         "detail": record.detail or None,
         "text": record.text(),
         "bad": record.bad,
@@ -275,7 +279,9 @@ def _last_refusal(cell: Cell, now: float) -> RefusalStatus | None:
         writer=writer,
         other=refusal.holder,
         reason=refusal.reason,
+        detail=refusal.hint,
         peer=last.peer,
+        request=refusal.request,
     )
     record = EventRecord.of(event, cell.definition)
     return RefusalStatus(
@@ -284,6 +290,20 @@ def _last_refusal(cell: Cell, now: float) -> RefusalStatus | None:
         holder=record.holder,
         reason=record.reason,
         age=_seconds(now - last.time),
+        text=record.text(),
+    )
+
+
+def _last_unserved(cell: Cell, now: float) -> UnservedStatus | None:
+    event = cell.last_unserved
+    if event is None:
+        return None
+    record = EventRecord.of(event, cell.definition)
+    return UnservedStatus(
+        writer=None if event.writer is None else record.writer,
+        peer=record.peer,
+        reason=record.reason,
+        age=_seconds(now - event.time),
         text=record.text(),
     )
 

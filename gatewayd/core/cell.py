@@ -16,7 +16,7 @@ from gatewayd.core.admission import Admission, Change
 from gatewayd.core.adoption import Adoption, AdoptionStep, adopted, named
 from gatewayd.core.definition import CellDefinition, Direction, Value
 from gatewayd.core.delivery import Delivery
-from gatewayd.core.events import Event, EventKind, EventRing
+from gatewayd.core.events import Event, EventKind, EventRing, translated
 from gatewayd.core.fallbacks import Fallbacks
 from gatewayd.core.forcing import Forcing
 from gatewayd.core.freshness import Freshness, Source
@@ -32,6 +32,7 @@ from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.refusal_log import LastRefusal, RefusalLog
 from gatewayd.core.requester import Requester
 from gatewayd.core.supervision import WriterTable
+from gatewayd.core.unserved import Unserved
 
 HEARTBEAT_PERIOD = 0.1
 """Seconds between two counts of the heartbeat."""
@@ -64,6 +65,8 @@ class Cell:
         self.write_listeners: list[Callable[[int, Written, float], None]] = []
         """Called with every accepted write that changes something: writer, changes, time. They must not raise."""
         self.last_refusal: LastRefusal | None = None
+        self.last_unserved: Event | None = None
+        """The last request that nothing here serves, reported or only counted."""
         self._admission = Admission(definition.variables, definition.writers, self.ownership, self.image)
         inputs_changed = partial(self._notify, Direction.INPUT)
         self._locking = Locking(
@@ -74,6 +77,7 @@ class Cell:
             record, self.refuse, self._notify,
         )  # fmt: skip
         self._refusals = RefusalLog(record)
+        self._unserved = RefusalLog(record)
         self._next_heartbeat: float | None = None
 
     @property
@@ -129,9 +133,24 @@ class Cell:
                 reason=refusal.reason,
                 old=self.image.values[index] if index is not None else None,
                 new=value,
+                detail=refusal.hint,
                 peer=peer,
+                request=refusal.request,
             )
         )
+
+    def unserved(self, requester: Requester, reason: Unserved, request: str, now: float) -> None:
+        """Count and record a request that nothing here serves; those of one peer and reason are reported together.
+
+        `request`: what was asked and what is here, in words of the link: `asked unit 7; units here: 1`.
+        """
+        self.health.unserved[reason] += 1
+        peer = requester.peer if requester.writer is None else ""
+        event = Event(
+            now, EventKind.UNSERVED, writer=requester.writer, reason=reason, peer=peer, request=request
+        )
+        self.last_unserved = event
+        self._unserved.add(event)
 
     def request(self, requester: Requester, variable: int, now: float) -> Refusal | None:
         """Take the lock that guards `variable` (and with it its whole group) without writing a value.
@@ -366,6 +385,7 @@ class Cell:
             self._source_stale(now)
         self._count_adoption(now)
         self._refusals.tick(now)
+        self._unserved.tick(now)
         self._beat(now)
 
     def gap(self, since: float, now: float) -> None:
@@ -393,6 +413,9 @@ class Cell:
         last = former.last_refusal
         self.last_refusal = last.translated(match) if last is not None else None
         self._refusals.succeed(former._refusals, match)
+        unserved = former.last_unserved
+        self.last_unserved = translated(unserved, match) if unserved is not None else None
+        self._unserved.succeed(former._unserved, match)
         self.forcing.succeed(former.forcing, match.values, match.locks)
         self.delivery.succeed(former.delivery, self.health, match.values, match.due)
         self._next_heartbeat = former._next_heartbeat

@@ -10,6 +10,7 @@ from gatewayd.core.definition import Value
 from gatewayd.core.history import History
 from gatewayd.core.match import Match, at
 from gatewayd.core.refusal import Reason
+from gatewayd.core.unserved import Unserved
 
 CAPACITY = 1000
 """Last events kept, whatever their kinds; of each kind older ones are kept beside them (`core.history`)."""
@@ -38,6 +39,7 @@ class EventKind(Enum):
     ADOPTION_ENDS = "adopted values fall back soon"
     FOLLOWED = "image follows the robot"
     STOOD_STILL = "gateway stood still"
+    UNSERVED = "request not served"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +55,7 @@ class Event:
     """Who did it, or to whom it happened."""
     other: int | None = None
     """The former owner of a lock taken over, or the holder in a refusal."""
-    reason: Reason | None = None
+    reason: Reason | Unserved | None = None
     old: Value | None = None
     new: Value | None = None
     repeats: int = 0
@@ -61,6 +63,8 @@ class Event:
     detail: str = ""
     peer: str = ""
     """Address of the peer in a refusal, where no writer was declared for it."""
+    request: str = ""
+    """What was asked for, in words of its link, where no variable tells it: `wrote holding 101`."""
 
 
 class EventRing:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from gatewayd.core.unserved import Unserved
+
 
 @dataclass(slots=True)
 class Health:
@@ -40,5 +42,7 @@ class Health:
     writes_refused: int = 0
     lock_requests: int = 0
     """Requests for a lock, or for its release, by the number of a variable."""
+    unserved: dict[Unserved, int] = field(default_factory=lambda: dict.fromkeys(Unserved, 0))
+    """Requests that nothing here serves, by reason."""
     words: dict[str, int] = field(default_factory=dict)
     """Numbers of the status block that links report, by name (`LinkKind.status_fields`)."""

@@ -91,3 +91,7 @@ class Refusal:
     """Index of the first variable that stood in the way."""
     holder: int | None = None
     """Index of the writer that owns it, for `Reason.HELD`."""
+    request: str = ""
+    """What was asked for, in words of the link, where no variable tells it: `wrote holding 101`."""
+    hint: str = ""
+    """What could have been meant, in words of the link: `nearest: part_done 100`."""

@@ -10,6 +10,7 @@ from gatewayd.core.events import Event, translated
 from gatewayd.core.match import Match, at
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import host_of
+from gatewayd.core.unserved import Unserved
 
 MAX_PEERS = 64
 """Hosts without a writer whose refusals are told apart."""
@@ -44,9 +45,22 @@ class _Reported:
     time: float
     pending: int = 0
     last: Event | None = None
+    various: bool = False
+    """Not all of what was counted asked for the same."""
+
+    def count(self, event: Event) -> None:
+        """One more, in the interval."""
+        self.pending += 1
+        self.various |= self.last is not None and self.last.request != event.request
+        self.last = event
+
+    def details(self, *more: str) -> str:
+        """What the event says besides itself."""
+        assert self.last is not None
+        return ", ".join(filter(None, (self.last.detail, "others among them" if self.various else "", *more)))
 
 
-_Key = tuple[int | None, str, int | None, Reason | None]
+_Key = tuple[int | None, str, int | None, Reason | Unserved | None]
 
 
 class RefusalLog:
@@ -74,10 +88,12 @@ class RefusalLog:
         key = (event.writer, host, event.variable, event.reason)
         reported = self._reported.get(key)
         if reported is not None and event.time - reported.time < REFUSAL_INTERVAL:
-            reported.pending += 1
-            reported.last = event
+            reported.count(event)
             return
-        self._report(event if reported is None else replace(event, repeats=reported.pending))
+        if reported is not None and reported.last is not None:
+            reported.count(event)
+            event = replace(event, repeats=reported.pending - 1, detail=reported.details())
+        self._report(event)
         self._reported[key] = _Reported(event.time)
         self._next = min(self._next, event.time + REFUSAL_INTERVAL)
 
@@ -91,7 +107,7 @@ class RefusalLog:
             if reported.last is None:
                 del self._reported[key]
                 continue
-            detail = f"the last {now - reported.last.time:.1f} s ago"
+            detail = reported.details(f"the last {now - reported.last.time:.1f} s ago")
             self._report(replace(reported.last, time=now, repeats=reported.pending - 1, detail=detail))
             self._reported[key] = _Reported(now)
         self._peers = {host for _, host, _, _ in self._reported if host}

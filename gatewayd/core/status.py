@@ -138,6 +138,8 @@ class StatusBlock:
             min(_U16, math.ceil(health.adoption)),
             0 if health.program is None else min(_U16, health.program + 1),
             health.gaps & _U16,
+            sum(health.unserved.values()) & _U32,
+            0 if cell.last_unserved is None else cell.last_unserved.reason or 0,
         )
         words = health.words
         others = (min(_MAX[field.words], words.get(field.name, 0)) for field in self._words)

@@ -10,6 +10,7 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.program import STATES
 from gatewayd.core.refusal import Reason
+from gatewayd.core.unserved import Unserved
 
 LAYOUT_VERSION = 1
 BASE = 60000
@@ -100,6 +101,10 @@ FIELDS = (
     ),
     StatusField(47, 1, "program", f"state of the robot program: 0 unknown, {_program_states()}"),
     StatusField(48, 1, "gaps", "times that the gateway stood still, wraps"),
+    StatusField(49, 2, "unserved", "requests that nothing here serves: wrong unit, address or quantity"),
+    StatusField(
+        51, 1, "unserved_reason", "the last of them: " + ", ".join(f"{u.value} {u.text}" for u in Unserved)
+    ),
 )
 """The core's own numbers; kinds of links have others between them (`LinkKind.status_fields`)."""
 HEADER_WORDS = 64

@@ -142,7 +142,7 @@ def describe(event: Event, cell: Cell, can_writer: int | None = None) -> str:
     `can_writer` hears of refusals by EMCY, everybody else by exceptions.
     """
     record = EventRecord.of(event, cell.definition)
-    if event.reason is None:
+    if not isinstance(event.reason, Reason):
         return record.text()
     return record.text(f"refused with {_answer(event.reason, event.writer, can_writer)}")
 

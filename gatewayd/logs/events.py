@@ -28,6 +28,7 @@ LEVELS = {
     EventKind.TAKEN_OVER: logging.WARNING,
     EventKind.FALLBACK: logging.WARNING,
     EventKind.REFUSED: logging.WARNING,
+    EventKind.UNSERVED: logging.WARNING,
     EventKind.FORCED: logging.WARNING,
     EventKind.UNFORCED: logging.WARNING,
     EventKind.ACQUIRED: logging.DEBUG,
@@ -35,6 +36,8 @@ LEVELS = {
 }
 """Kinds that are not logged at INFO. Locks come and go with every lease, so they are for debugging and for the ring."""
 
+_ASKED = (EventKind.REFUSED, EventKind.UNSERVED)
+"""Kinds that somebody is told for who may be undeclared."""
 _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 
 
@@ -88,8 +91,9 @@ class EventLog:
             "lock": definition.locks[event.lock].name
             if event.lock is not None and variable is None
             else None,
-            "writer": self._writer(event.writer, unknown=event.kind is EventKind.REFUSED),
+            "writer": self._writer(event.writer, unknown=event.kind in _ASKED),
             "peer": event.peer or None,
+            "request": event.request or None,
             "holder" if event.kind is EventKind.REFUSED else "former": self._writer(event.other),
             "reason": event.reason.text if event.reason is not None else None,
             "limits": _limits(event, variable),

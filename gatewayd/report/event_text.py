@@ -31,12 +31,13 @@ BAD = frozenset(
         EventKind.STOOD_STILL,
         EventKind.WRITER_LOST,
         EventKind.REFUSED,
+        EventKind.UNSERVED,
         EventKind.FORCED,
     )
 )
 """What somebody should look at."""
-_NOBODY = {EventKind.REFUSED: UNDECLARED, EventKind.FALLBACK: GATEWAY}
-_REFUSED = EventKind.REFUSED.value
+_NOBODY = {EventKind.REFUSED: UNDECLARED, EventKind.UNSERVED: UNDECLARED, EventKind.FALLBACK: GATEWAY}
+_REFUSED, _UNSERVED = EventKind.REFUSED.value, EventKind.UNSERVED.value
 _TEXTS = {
     ACCEPTED: "{writer} wrote {variable}: {old} -> {new}",
     EventKind.FALLBACK.value: "{variable} fell back from {old} to {new}",
@@ -60,7 +61,14 @@ _WITHOUT_VALUES = {
 }
 """The same where the values are not known, or where it happened to several, each with a value of its own."""
 _IN_PARENTHESES = frozenset(
-    {ACCEPTED, _REFUSED, EventKind.ACQUIRED.value, EventKind.TAKEN_OVER.value, EventKind.FORCED.value}
+    {
+        ACCEPTED,
+        _REFUSED,
+        _UNSERVED,
+        EventKind.ACQUIRED.value,
+        EventKind.TAKEN_OVER.value,
+        EventKind.FORCED.value,
+    }
 )
 """What has its detail in parentheses (by whom, how often); that of all others is the reason."""
 
@@ -90,6 +98,8 @@ class EventRecord:
     peer: str | None = None
     """Address of a peer that no writer stands for."""
     detail: str = ""
+    request: str = ""
+    """What was asked for, where no variable tells it: `wrote holding 101`."""
     others: int = 0
     """Further variables or locks that it happened to in the same moment: `plc took start and 3 more`."""
 
@@ -115,6 +125,7 @@ class EventRecord:
             _limits(event, definition),
             event.peer or None,
             event.detail,
+            event.request,
         )
 
     def of_several(self, others: int) -> EventRecord:
@@ -135,7 +146,12 @@ class EventRecord:
         return printable(self._text(refused))
 
     def _text(self, refused: str) -> str:
-        text = self._refusal(refused) if self.what == _REFUSED else self._usual()
+        if self.what == _REFUSED:
+            text = self._refusal(refused)
+        elif self.what == _UNSERVED:
+            text = f"{self._who()} {self.request}"
+        else:
+            text = self._usual()
         if self.what not in _IN_PARENTHESES:
             return f"{text}: {self.detail}" if self.detail else text
         often = f"{self.times} {'changes' if self.what == ACCEPTED else 'times'}" if self.times > 1 else ""
@@ -143,11 +159,14 @@ class EventRecord:
         return f"{text} ({inside})" if inside else text
 
     def _refusal(self, refused: str) -> str:
-        writer = _undeclared_peer(self.peer) if self.writer == UNDECLARED else self.writer
         wrote = "" if self.new is None else f" = {value(self.new, self.unit)}"
         why = f"held by {self.holder}" if self.holder else self.reason
         answer = ", ".join(filter(None, (refused, why, self.limits)))
-        return f"{writer} wrote {self.variable or 'an address'}{wrote}: {answer}"
+        request = self.request or f"wrote {self.variable or 'an address'}"
+        return f"{self._who()} {request}{wrote}: {answer}"
+
+    def _who(self) -> str | None:
+        return _undeclared_peer(self.peer) if self.writer == UNDECLARED else self.writer
 
     def _usual(self) -> str:
         others = f" and {self.others} more" if self.others else ""

@@ -56,6 +56,16 @@ class RefusalStatus(TypedDict):
     text: Annotated[str, "the refusal in one sentence"]
 
 
+class UnservedStatus(TypedDict):
+    """A request that nothing here serves."""
+
+    writer: Annotated[str | None, "name of the writer that asked, or null if it is not declared"]
+    peer: Annotated[str | None, "address of an undeclared peer, or null"]
+    reason: Annotated[str | None, "why, in words"]
+    age: Annotated[float | None, "seconds since then"]
+    text: Annotated[str, "who asked for what, and what is here, in one sentence"]
+
+
 class CellStatus(TypedDict):
     """One cell at a glance, but for the objects of its links."""
 
@@ -74,6 +84,12 @@ class CellStatus(TypedDict):
     locks: Annotated[dict[str, int], "`total`, `owned`, `operator` (held by the local operator)"]
     writes: Annotated[dict[str, int], "requests `accepted` and `refused` since the start"]
     last_refusal: Annotated[RefusalStatus | None, "the last refused request, or null"]
+    unserved: Annotated[
+        dict[str, int],
+        "requests that nothing here serves since the start, by reason: `no_such_unit`, `no_such_address`, "
+        "`no_such_function`, `malformed`, `not_allowed`, `robot_lost`",
+    ]
+    last_unserved: Annotated[UnservedStatus | None, "the last of them, or null"]
     heartbeat: Annotated[int, "counts up every 100 ms"]
     gaps: Annotated[int, "times the gateway stood still, stopped, suspended or starved of the CPU"]
 
@@ -158,6 +174,7 @@ class EventMessage(TypedDict):
     old: NotRequired[Annotated[object, "value before"]]
     new: NotRequired[Annotated[object, "value after, or refused"]]
     repeats: NotRequired[Annotated[int, "further refusals like this one, counted since the last one"]]
+    request: NotRequired[Annotated[str, "what was asked for, in words, where no variable tells it"]]
     detail: NotRequired[Annotated[str, "more, in words"]]
     text: Annotated[
         str, "all that in one sentence for people, values with their unit; it may be worded anew at any time"
@@ -185,6 +202,7 @@ class AuditRecord(TypedDict):
     holder: NotRequired[Annotated[str, "owner that stood in the way, or former owner"]]
     reason: NotRequired[Annotated[str, "why it was refused, in words"]]
     peer: NotRequired[Annotated[str, "address of an undeclared peer"]]
+    request: NotRequired[Annotated[str, "what was asked for, in words, where no variable tells it"]]
     detail: NotRequired[Annotated[str, "more, in words"]]
     text: NotRequired[
         Annotated[str, "all that in one sentence, as of an event; the audit's file does not have it"]
@@ -201,6 +219,7 @@ def documented() -> dict[str, Mapping[str, str]]:
         **{kind.key: kind.fields for kind in kinds() if kind.fields},
         "writer": _meanings(WriterStatus),
         "refusal": _meanings(RefusalStatus),
+        "unserved": _meanings(UnservedStatus),
         "variable": _meanings(VariableDeclaration)
         | {kind.key: kind.place for kind in kinds() if kind.place}
         | _meanings(VariableStatus),

@@ -42,6 +42,7 @@ class Record:
             "holder": event.holder,
             "reason": event.reason,
             "peer": event.peer,
+            "request": event.request or None,
             "detail": event.detail or None,
         }
         return {name: value for name, value in found.items() if value is not None}

@@ -151,6 +151,8 @@ _OF_CELLS = (
     _OfCell("gatewayd_refusals_total",
         "requests refused by reason; equal ones are added every 10 s, so it may lag behind the total",
         lambda at: {reason.name.lower(): at.probe.refusals[reason] for reason in Reason}, "reason"),
+    _OfCell("gatewayd_unserved_total", "requests that nothing here serves, by reason",
+        lambda at: {reason.name.lower(): count for reason, count in at.health.unserved.items()}, "reason"),
     _OfCell("gatewayd_events_total", "events by kind",
         lambda at: {kind.value: at.probe.events[kind] for kind in EventKind}, "kind"),
 )  # fmt: skip

@@ -66,7 +66,7 @@ class CellProbe:
     def _event(self, event: Event) -> None:
         self._counted += 1
         self.events[event.kind] += 1 + event.repeats
-        if event.reason is not None:
+        if isinstance(event.reason, Reason):
             self.refusals[event.reason] += 1 + event.repeats
         if event.kind is EventKind.ROBOT_LOST:
             self._written_at = None

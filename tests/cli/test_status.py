@@ -11,6 +11,7 @@ from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
 from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
+from gatewayd.core.unserved import Unserved
 from tests.cli.conftest import Invoke, Running
 from tests.control.served import CYCLES, LIMIT, SPEED
 
@@ -39,6 +40,16 @@ def test_a_degraded_one_says_why(gateway: Running, invoke: Invoke) -> None:
     assert "! press: robot not connected for" in done.output
     assert "hmi wrote limit: refused, never writable by this writer" in done.output
     assert "12: 0 good, 12 stale" in done.output
+
+
+def test_what_nobody_serves_is_said_and_no_fault_of_the_cell(gateway: Running, invoke: Invoke) -> None:
+    gateway.do(
+        lambda cell: cell.unserved(Requester(PLC), Unserved.NO_SUCH_UNIT, "asked unit 7; units here: 1", 1.0)
+    )
+    done = invoke("status")
+    assert done.exit_code == 0
+    assert "1 request not served, the last" in done.output
+    assert "ago: plc asked unit 7; units here: 1" in done.output
 
 
 def test_what_is_forced_is_degraded(gateway: Running, invoke: Invoke) -> None:

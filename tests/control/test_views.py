@@ -15,6 +15,7 @@ from gatewayd.control.api import Api
 from gatewayd.control.views import cell_view, declare
 from gatewayd.core.admission import Change
 from gatewayd.core.requester import Requester
+from gatewayd.core.unserved import Unserved
 from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import CanLink
 from gatewayd.mapping.loader import load
@@ -30,6 +31,7 @@ PLC, HMI = 0, 1
 
 def test_the_status_has_the_documented_fields(api: Api, press: Served) -> None:
     assert press.cell.write(Requester(PLC), [Change(LIMIT, 999.0)], 0.5) is not None
+    press.cell.unserved(Requester(None, "10.0.0.7"), Unserved.NO_SUCH_UNIT, "asked unit 7", 0.5)
     status = finished(api.status(at(1.0)))
     (cell,) = status["cells"]
     assert status.keys() == documented()["status"].keys()
@@ -38,6 +40,8 @@ def test_the_status_has_the_documented_fields(api: Api, press: Served) -> None:
     assert cell["modbus"].keys() == documented()["modbus"].keys()
     assert cell["writers"][0].keys() == documented()["writer"].keys()
     assert cell["last_refusal"].keys() == documented()["refusal"].keys()
+    assert cell["last_unserved"].keys() == documented()["unserved"].keys()
+    assert cell["unserved"]["no_such_unit"] == sum(cell["unserved"].values()) == 1
     assert api.version().keys() == documented()["version"].keys()
 
 

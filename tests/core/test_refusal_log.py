@@ -98,3 +98,22 @@ def test_peers_are_told_apart_up_to_a_bound_and_those_beyond_it_have_no_address(
     log.tick(4 * REFUSAL_INTERVAL)
     log.add(refusal(5 * REFUSAL_INTERVAL, writer=None, peer="192.168.1.30:502"))
     assert told[-1].peer == "192.168.1.30:502"
+
+
+def test_addresses_of_version_6_are_told_apart() -> None:
+    """They have colons, and no port."""
+    told: list[Event] = []
+    log = RefusalLog(told.append)
+    for peer in ("2001:db8::1", "2001:db8::2"):
+        log.add(Event(0.0, EventKind.REFUSED, reason=Reason.NOT_WRITABLE, peer=peer))
+    assert [event.peer for event in told] == ["2001:db8::1", "2001:db8::2"]
+
+
+def test_merged_requests_that_differ_are_said_to_differ() -> None:
+    told: list[Event] = []
+    log = RefusalLog(told.append)
+    for time, request in ((0.0, "read 1"), (1.0, "read 1"), (2.0, "read 2")):
+        log.add(Event(time, EventKind.UNSERVED, writer=0, request=request))
+    log.tick(REFUSAL_INTERVAL)
+    assert (told[1].request, told[1].repeats) == ("read 2", 1)
+    assert told[1].detail == "others among them, the last 8.0 s ago"

@@ -83,15 +83,15 @@ def test_the_appended_words_show_what_the_health_says(cell: Cell, status: Status
 
 
 def test_the_numbers_of_links_lie_between_the_cores(cell: Cell) -> None:
-    more = (StatusField(29, 1, "valve", ""), StatusField(50, 2, "shots", ""))
+    more = (StatusField(29, 1, "valve", ""), StatusField(60, 2, "shots", ""))
     status = StatusBlock(cell, (*more, *FIELDS))
     assert status.read(0, LENGTH, 1.0) == StatusBlock(cell).read(0, LENGTH, 1.0)
     cell.health.words.update(valve=7, shots=0x1_0002, unknown=3)
     assert struct.unpack(">HHH", status.read(28, 3, 1.0)) == (0, 7, 0)
-    assert struct.unpack(">HHI", status.read(48, 4, 1.0)) == (0, 0, 0x1_0002)
+    assert struct.unpack(">HHI", status.read(58, 4, 1.0)) == (0, 0, 0x1_0002)
     cell.health.words.update(valve=1 << 16, shots=1 << 40)
     assert struct.unpack(">H", status.read(29, 1, 1.0)) == (0xFFFF,)
-    assert struct.unpack(">I", status.read(50, 2, 1.0)) == (0xFFFF_FFFF,)
+    assert struct.unpack(">I", status.read(60, 2, 1.0)) == (0xFFFF_FFFF,)
     assert status.read(0, 28, 1.0) == StatusBlock(cell).read(0, 28, 1.0)
 
 

@@ -48,6 +48,8 @@ HEADER = (
     (46, 1, "adoption"),
     (47, 1, "program"),
     (48, 1, "gaps"),
+    (49, 2, "unserved"),
+    (51, 1, "unserved_reason"),
 )
 """The header as PLC programs have it built in: entries are only appended. With the links' numbers between them
 they stand in tests/golden/contracts."""

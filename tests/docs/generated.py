@@ -362,6 +362,7 @@ _OBJECTS = {
     **{kind.key: f"{kind.title} (`{kind.key}` of a cell)" for kind in kinds()},
     "writer": "Writer (`writers` of a cell)",
     "refusal": "Refusal (`last_refusal` of a cell)",
+    "unserved": "Request not served (`last_unserved` of a cell)",
     "variable": "Variable",
     "lock": "Lock",
     "event": "Event",

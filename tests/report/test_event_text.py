@@ -154,6 +154,7 @@ def test_only_what_somebody_should_look_at_is_bad(cell: Cell) -> None:
         EventKind.STOOD_STILL,
         EventKind.WRITER_LOST,
         EventKind.REFUSED,
+        EventKind.UNSERVED,
         EventKind.FORCED,
     }
     assert ACCEPTED not in BAD

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
@@ -67,6 +68,16 @@ class SdoState(Enum):
     WRITING = "the end of what a download has begun"
 
 
+@dataclass(frozen=True, slots=True)
+class SdoAbort:
+    """A request that was refused. Index and sub-index are 0 where the frame named no object."""
+
+    code: AbortCode
+    request: Request
+    index: int
+    subindex: int
+
+
 Act = Callable[["SdoServer", bytes], list[bytes]]
 """Takes a frame and gives the answers; raises Abort."""
 
@@ -74,8 +85,14 @@ Act = Callable[["SdoServer", bytes], list[bytes]]
 class SdoServer:
     """One SDO channel."""
 
-    def __init__(self, dictionary: Dictionary, longest: int = LONGEST_DOWNLOAD) -> None:
-        """`longest`: bytes that a download may have."""
+    def __init__(
+        self,
+        dictionary: Dictionary,
+        longest: int = LONGEST_DOWNLOAD,
+        aborted: Callable[[SdoAbort], None] = lambda _abort: None,
+    ) -> None:
+        """`longest`: bytes that a download may have. `aborted` hears of requests that are refused."""
+        self._aborted = aborted
         self._dictionary = dictionary
         self._longest = longest
         self._multiplexer = _NOTHING
@@ -105,6 +122,9 @@ class SdoServer:
                 raise self._unexpected(data)
             return act(self, data)
         except Abort as abort:
+            if not abort.recorded:
+                index, subindex = _MULTIPLEXER.unpack(self._multiplexer)
+                self._aborted(SdoAbort(abort.code, request, index, subindex))
             return self._abort(abort.code)
 
     def tick(self, now: float) -> list[bytes]:

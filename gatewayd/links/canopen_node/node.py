@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
-from typing import Final, Protocol
+from typing import Protocol
 
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.clock import TimeConsumer
@@ -41,11 +41,9 @@ from gatewayd.links.canopen_node.robot_errors import RobotErrors
 from gatewayd.links.canopen_node.status_objects import StatusObjects
 from gatewayd.links.canopen_node.storage import Parameters
 from gatewayd.links.canopen_node.store import Store
+from gatewayd.links.canopen_node.unserved import UnservedFrames
 from gatewayd.links.canopen_node.variables import VariableObjects
 from gatewayd.links.registry import status_fields
-
-SDO_LENGTH: Final = 8
-"""Bytes of every SDO frame."""
 
 Handler = Callable[[Frame, float], None]
 
@@ -95,9 +93,11 @@ class Node:
             clock=self._clock,
         )
         node = self.parameters.node
+        self._unserved = UnservedFrames(cell, plan.sdo_writer, self._clock, lambda: self.dictionary)
         self.nmt = NmtSlave(
             self._send, lambda: self.lss.node, self._nmt_changed, self._reset, autostart=plan.autostart
         )
+        self.nmt.ignored = self._unserved.nmt
         self.emergency = Emergency(
             self._send, node, lambda: self.bus.carries and self.nmt.allows(Service.EMCY), plan.emcy_inhibit
         )
@@ -170,7 +170,7 @@ class Node:
         )
         self.dictionary = Dictionary((*objects, *self._identity_objects()), self._waiting.permit)
         self.parameters.bind(self.dictionary)
-        self.sdo = SdoServer(self.dictionary)
+        self.sdo = SdoServer(self.dictionary, aborted=self._unserved.sdo)
         self._timed: tuple[_Timed, ...] = (
             self.sync,
             self.transmit,
@@ -357,7 +357,7 @@ class Node:
         self.receive_pdos.receive(frame.can_id, frame.data, now)
 
     def _receive_sdo(self, frame: Frame, now: float) -> None:
-        if not frame.remote and len(frame.data) == SDO_LENGTH:
+        if self._unserved.is_sdo(frame):
             self._peers.heard(self.plan.sdo_writer, "SDO", now)
             self._answer(self.sdo.receive(frame.data, now))
 

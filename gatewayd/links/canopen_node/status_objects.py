@@ -114,4 +114,4 @@ class StatusObjects:
         requester = self._asking() if offset == REQUEST and word else self._requester()
         refusal = self._block.write(requester, offset, (word,), self._clock())
         if refusal is not None:
-            raise Abort(ABORT_OF[refusal.reason])
+            raise Abort(ABORT_OF[refusal.reason], recorded=True)

@@ -116,7 +116,7 @@ class VariableObjects:
         elif value is not None:
             refusal = self._cell.write(requester, [Change(item.variable, value)], now)
         if refusal is not None:
-            raise Abort(_abort_code(refusal, declared, value))
+            raise Abort(_abort_code(refusal, declared, value), recorded=True)
 
     def _meaning(self, item: ObjectPlan, data: bytes, read: Meaning) -> tuple[Refusal | None, Value | None]:
         """What the cell is asked for, or why it need not be."""

@@ -20,6 +20,7 @@ from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.registers import BitTable, RegisterImage, RegisterTable
+from gatewayd.links.modbus_server.unserved import Places, named, unserved
 from gatewayd.links.registry import status_fields
 from gatewayd.modbus import identification
 from gatewayd.modbus.areas import (
@@ -56,6 +57,7 @@ class Unit:
         self.plan = plan
         self.cell = cell
         self.image = RegisterImage(plan, cell)
+        self.places = Places(plan, cell.definition)
         self.status = StatusBlock(cell, status_fields())
         self.identification = Identification(cell.definition.name, cell.definition.fingerprint)
         self.exception_of = {**EXCEPTION_OF, Reason.ROBOT_LOST: plan.robot_away}
@@ -84,10 +86,17 @@ _READ_WRITE = struct.Struct(">HHHHB")
 def execute(unit: Unit, requester: Requester, pdu: bytes, now: float) -> bytes:
     """The answer to a request of `requester`."""
     serve, sizes = _FUNCTIONS.get(pdu[0], (None, ()))
+    answer: Answer
     if serve is None:
-        return exception(pdu[0], ExceptionCode.ILLEGAL_FUNCTION)
-    answer = serve(unit, requester, pdu, now) if len(pdu) in sizes else ExceptionCode.ILLEGAL_VALUE
-    return exception(pdu[0], answer) if isinstance(answer, ExceptionCode) else answer
+        answer = ExceptionCode.ILLEGAL_FUNCTION
+    else:
+        answer = serve(unit, requester, pdu, now) if len(pdu) in sizes else ExceptionCode.ILLEGAL_VALUE
+    if not isinstance(answer, ExceptionCode):
+        return answer
+    found = unserved(pdu, answer, unit.places, unit.image.readable)
+    if found is not None:
+        unit.cell.unserved(requester, *found, now)
+    return exception(pdu[0], answer)
 
 
 def exception(function: int, code: ExceptionCode) -> bytes:
@@ -147,12 +156,12 @@ def _write_coil(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
     address, value = _TWO_WORDS.unpack_from(pdu, 1)
     if value not in {0, _COIL_ON}:
         return ExceptionCode.ILLEGAL_VALUE
-    return _apply_coils(unit, requester, address, [value == _COIL_ON], now) or pdu
+    return _apply_coils(unit, requester, pdu, (address, [value == _COIL_ON]), now) or pdu
 
 
 def _write_register(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
     (address, _value) = _TWO_WORDS.unpack_from(pdu, 1)
-    return _write_registers(unit, requester, address, pdu[3:], now) or pdu
+    return _write_registers(unit, requester, pdu, (address, pdu[3:]), now) or pdu
 
 
 def _write_coils(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
@@ -161,14 +170,14 @@ def _write_coils(unit: Unit, requester: Requester, pdu: bytes, now: float) -> An
         return ExceptionCode.ILLEGAL_VALUE
     packed = int.from_bytes(pdu[6:], "little")
     bits = [bool(packed >> position & 1) for position in range(count)]
-    return _apply_coils(unit, requester, address, bits, now) or pdu[:5]
+    return _apply_coils(unit, requester, pdu, (address, bits), now) or pdu[:5]
 
 
 def _write_multiple(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
     address, count, size = _WRITE_MULTIPLE.unpack_from(pdu, 1)
     if not 1 <= count <= MAX_WRITE_REGISTERS or size != 2 * count or len(pdu) != 6 + size:
         return ExceptionCode.ILLEGAL_VALUE
-    return _write_registers(unit, requester, address, pdu[6:], now) or pdu[:5]
+    return _write_registers(unit, requester, pdu, (address, pdu[6:]), now) or pdu[:5]
 
 
 def _mask_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
@@ -178,7 +187,7 @@ def _mask_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
         word = (present & and_mask) | (or_mask & ~and_mask & 0xFFFF)
         return _write_status(unit, requester, address, [word], now) or pdu
     holding = unit.image.holding
-    refused = _apply(unit, requester, holding.masked(address, and_mask, or_mask), now)
+    refused = _apply(unit, requester, pdu, holding.masked(address, and_mask, or_mask), now)
     if refused is None and unit.plan.ignore_gaps:
         unit.ignored += holding.ignored(address, _WORD.pack(or_mask & ~and_mask & 0xFFFF))
     return refused or pdu
@@ -193,28 +202,30 @@ def _read_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
     table = unit.image.holding
     refused = _refuse_registers(unit, table, first, count)
     if refused is None:
-        refused = _write_registers(unit, requester, address, pdu[10:], now)
+        refused = _write_registers(unit, requester, pdu, (address, pdu[10:]), now)
     if refused is not None:
         return refused
     return bytes((pdu[0], 2 * count)) + _registers(unit, table, first, count, now)
 
 
 def _write_registers(
-    unit: Unit, requester: Requester, address: int, data: bytes, now: float
+    unit: Unit, requester: Requester, pdu: bytes, written: tuple[int, bytes], now: float
 ) -> ExceptionCode | None:
+    address, data = written
     if _of_status(address, len(data) // 2):
         words = struct.unpack(f">{len(data) // 2}H", data)
         return _write_status(unit, requester, address, words, now)
-    refused = _apply(unit, requester, unit.image.holding.changes(address, data), now)
+    refused = _apply(unit, requester, pdu, unit.image.holding.changes(address, data), now)
     if refused is None and unit.plan.ignore_gaps:
         unit.ignored += unit.image.holding.ignored(address, data)
     return refused
 
 
 def _apply_coils(
-    unit: Unit, requester: Requester, address: int, bits: Sequence[bool], now: float
+    unit: Unit, requester: Requester, pdu: bytes, written: tuple[int, Sequence[bool]], now: float
 ) -> ExceptionCode | None:
-    refused = _apply(unit, requester, unit.image.coils.changes(address, bits), now)
+    address, bits = written
+    refused = _apply(unit, requester, pdu, unit.image.coils.changes(address, bits), now)
     if refused is None and unit.plan.ignore_gaps:
         unit.ignored += unit.image.coils.ignored(address, len(bits))
     return refused
@@ -228,13 +239,13 @@ def _write_status(
 
 
 def _apply(
-    unit: Unit, requester: Requester, changes: list[Change] | Refusal, now: float
+    unit: Unit, requester: Requester, pdu: bytes, changes: list[Change] | Refusal, now: float
 ) -> ExceptionCode | None:
     """Hand all changes of one request to the cell at once, and every refusal of ours to its records."""
     refusal: Refusal | None
     value: Value | None = None
     if isinstance(changes, Refusal):
-        refusal = changes
+        refusal = named(changes, pdu, unit.places)
     elif requester.writer is None:
         # A peer that may write nothing is refused even if it wrote what is there already.
         variable, value = (changes[0].variable, changes[0].value) if changes else (None, None)

@@ -287,6 +287,11 @@ class RegisterImage:
             self.refresh(direction)
         cell.listeners.append(self.refresh)
 
+    def readable(self, area: Area) -> Readable:
+        """What of an area may be read."""
+        tables = {Area.HOLDING: self.holding, Area.INPUT: self.input, Area.COIL: self.coils}
+        return tables.get(area, self.discrete).readable
+
     def close(self) -> None:
         """Follow the cell no longer."""
         if self.refresh in self._cell.listeners:

@@ -13,7 +13,9 @@ from functools import cache
 from typing import Any
 
 from gatewayd.core.requester import Requester
+from gatewayd.core.unserved import Unserved
 from gatewayd.links.modbus_server.functions import Unit, exception, execute
+from gatewayd.links.modbus_server.unserved import unknown_unit
 from gatewayd.loop import clock
 from gatewayd.modbus.areas import MAX_READ_REGISTERS
 from gatewayd.modbus.exceptions import ExceptionCode
@@ -110,10 +112,19 @@ class ModbusSession:
     def _answer(self, unit: int, pdu: bytes, now: float, waited: float) -> bytes:
         access = self._accesses.get(unit)
         if access is None:
+            self._report_unit(unit, now)
             return exception(pdu[0], ExceptionCode.TARGET_FAILED)
         requester = replace(access.requester, waited=waited) if waited else access.requester
         access.writer_seen(requester, now)
         return execute(access.unit, requester, pdu, now)
+
+    def _report_unit(self, unit: int, now: float) -> None:
+        """Nobody answers for this unit: the cells that the peer writes to hear of it, or else all that it reaches."""
+        reached = {id(access): access for access in self._accesses.values()}.values()
+        writing = [access for access in reached if access.requester.writer is not None]
+        text = unknown_unit(unit, {access.unit.plan.unit for access in reached})
+        for access in writing or reached:
+            access.unit.cell.unserved(access.requester, Unserved.NO_SUCH_UNIT, text, now)
 
 
 @cache

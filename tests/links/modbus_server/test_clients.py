@@ -1,20 +1,16 @@
-"""Clients that others wrote: pyModbusTCP, pymodbus, libmodbus itself and mbpoll, which stands on it."""
+"""Clients that others wrote: pyModbusTCP and mbpoll (libmodbus)."""
 
 from __future__ import annotations
 
 import asyncio
-import ctypes
-import ctypes.util
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from ipaddress import ip_network
 
 import pytest
-from pymodbus.client import AsyncModbusTcpClient
 from pyModbusTCP.client import ModbusClient
 
-from gatewayd import __version__
 from gatewayd.core.cell import Cell
 from gatewayd.links.modbus_server.listener import ModbusListener
 from gatewayd.links.modbus_server.plan import ModbusPlan
@@ -101,50 +97,3 @@ async def test_mbpoll_writes_and_is_refused(everybody_writes: ModbusListener) ->
         everybody_writes, "-t", "4", "-r", "100", "127.0.0.1", "1", "2"
     )
     assert "Illegal data value" in await mbpoll(everybody_writes, "-t", "4", "-r", "11", "127.0.0.1", "1")
-
-
-async def test_mbpoll_reads_a_block_from_0_on_over_gaps(
-    everybody_writes: ModbusListener, live_cell: Cell, plan_of: Callable[..., ModbusPlan]
-) -> None:
-    """In all four areas, with the first and the last block of 125 and 2000."""
-    everybody_writes.serve([(plan_of(fill_gaps=True), live_cell)])
-    for kind, last, count in ("4", 59_875, 125), ("3", 59_875, 125), ("1", 59_875, 125), ("0", 59_875, 125):
-        for first in (0, last):
-            output = await mbpoll(
-                everybody_writes, "-t", kind, "-r", f"{first}", "-c", f"{count}", "127.0.0.1"
-            )
-            assert f"[{first + count - 1}]: \t0" in output
-    assert "Illegal data address" in await mbpoll(
-        everybody_writes, "-t", "4", "-r", "59876", "-c", "125", "127.0.0.1"
-    )
-
-
-async def test_pymodbus_uses_query_data_as_a_keep_alive(everybody_writes: ModbusListener) -> None:
-    async with AsyncModbusTcpClient("127.0.0.1", port=everybody_writes.port) as client:
-        answer = await client.diag_query_data(b"\x12\x34\x56\x78")
-        assert not answer.isError()
-        assert answer.encode() == b"\0\0\x12\x34\x56\x78"
-        identified = await client.report_device_id()
-        assert not identified.isError()
-        assert b"gatewayd " in identified.identifier
-
-
-LIBMODBUS = ctypes.util.find_library("modbus")
-
-
-@pytest.mark.skipif(LIBMODBUS is None, reason="libmodbus (Debian package) is not installed")
-async def test_libmodbus_reads_the_server_id_as_it_writes_its_own(everybody_writes: ModbusListener) -> None:
-    library = ctypes.CDLL(LIBMODBUS)
-    library.modbus_new_tcp.restype = ctypes.c_void_p
-    context = ctypes.c_void_p(library.modbus_new_tcp(b"127.0.0.1", everybody_writes.port))
-    content = ctypes.create_string_buffer(260)
-
-    def converse() -> int:
-        assert library.modbus_set_slave(context, 1) == 0
-        assert library.modbus_connect(context) == 0
-        return int(library.modbus_report_slave_id(context, len(content), content))
-
-    count = await asyncio.to_thread(converse)
-    library.modbus_close(context)
-    library.modbus_free(context)
-    assert content.raw[:count] == bytes((1, 0xFF)) + f"gatewayd {__version__} press-3".encode()

@@ -78,7 +78,11 @@ def test_every_refused_write_is_recorded(
     pdu, reason, variable = case
     ask(unit, pdu)
     assert cell.last_refusal is not None
-    assert cell.last_refusal.refusal == Refusal(reason, index_of(variable) if variable is not None else None)
+    refusal = cell.last_refusal.refusal
+    assert refusal == Refusal(
+        reason, index_of(variable) if variable is not None else None, None, refusal.request, refusal.hint
+    )
+    assert bool(refusal.request) is (variable is None)
     assert cell.last_refusal.writer == PLC
     assert cell.health.writes_refused == 1
 

@@ -30,6 +30,7 @@ from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
+from gatewayd.core.unserved import Unserved
 from gatewayd.links.canopen_node.pdo.parameters import Configuration
 
 
@@ -225,9 +226,11 @@ class ReceiveEngine:
         length = len(data)
         if length < pdo.size:
             self._raise(pdo, Fault.SHORT, now)
+            self._report_length(pdo, length, "dropped", now, requester)
             return
         if length > pdo.size:
             self._raise(pdo, Fault.LONG, now)
+            self._report_length(pdo, length, "the rest is ignored", now, requester)
             data = data[: pdo.size]
         if pdo.faults:
             good = {Fault.SHORT, Fault.LONG, Fault.TIMEOUT}
@@ -244,6 +247,12 @@ class ReceiveEngine:
             pdo.waited = requester.waited
         else:
             self._write(pdo, data, now, requester)
+
+    def _report_length(
+        self, pdo: ReceivePdo, length: int, what: str, now: float, requester: Requester
+    ) -> None:
+        text = f"sent RPDO {pdo.configuration.number} with {length} bytes instead of {pdo.size}: {what}"
+        self._cell.unserved(requester, Unserved.MALFORMED, text, now)
 
     def _write(self, pdo: ReceivePdo, data: bytes, now: float, requester: Requester) -> None:
         changes = pdo.meaning(data)

@@ -1,0 +1,173 @@
+"""What a first day with a PLC brings: wrong units, wrong addresses, wrong quantities, and the words for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from gatewayd.core.cell import Cell
+from gatewayd.core.events import EventKind
+from gatewayd.core.requester import Requester
+from gatewayd.core.unserved import Unserved
+from gatewayd.links.modbus_server.functions import Unit, execute
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
+from gatewayd.modbus.frames import encode
+from gatewayd.report.event_text import EventRecord
+
+PLC = 0
+NOW = 1000.0
+
+
+def texts(cell: Cell) -> list[str]:
+    kinds = (EventKind.UNSERVED, EventKind.REFUSED)
+    return [EventRecord.of(event, cell.definition).text() for event in cell.events if event.kind in kinds]
+
+
+@pytest.mark.parametrize(
+    "pdu, reason, text",
+    [
+        (
+            "03 000a 0009",
+            Unserved.NO_SUCH_ADDRESS,
+            "plc read holding 10-18: 18 is not mapped; nearest: speed 14",
+        ),
+        (
+            "03 0063 0001",
+            Unserved.NO_SUCH_ADDRESS,
+            "plc read holding 99: 99 is not mapped; nearest: int_0 100",
+        ),
+        (
+            "04 0bb8 0001",
+            Unserved.NO_SUCH_ADDRESS,
+            "plc read input 3000: 3000 is not mapped; nearest: int_23 46",
+        ),
+        (
+            "03 9ca5 0001",
+            Unserved.NO_SUCH_ADDRESS,
+            "plc read holding 40101: 40101 is not mapped; addresses count from 0: 40101 is 100 here",
+        ),
+        ("01 000b 0001", Unserved.NO_SUCH_ADDRESS, "plc read coil 11: 11 is not mapped; nearest: lamp 10"),
+        (
+            "03 ea5f 0002",
+            Unserved.NO_SUCH_ADDRESS,
+            "plc read holding 59999-60000: 59999 is not mapped; nearest: bit_16 501.0",
+        ),
+        (
+            "03 fb1f 0002",
+            Unserved.NO_SUCH_ADDRESS,
+            "plc read holding 64287-64288: the status block, 60000-64287, is asked for by itself",
+        ),
+        (
+            "03 ffff 0002",
+            Unserved.NO_SUCH_ADDRESS,
+            "plc read holding 65535-65536: 65535 is not mapped; nearest: bit_16 501.0",
+        ),
+        (
+            "07",
+            Unserved.NO_SUCH_FUNCTION,
+            "plc asked for function 7 (read exception status), which is not served",
+        ),
+        (
+            "03 0064 0000",
+            Unserved.MALFORMED,
+            "plc asked for function 3 (read holding registers): quantity 0 is not within 1 to 125",
+        ),
+        (
+            "10 000a 0002 02 0001",
+            Unserved.MALFORMED,
+            "plc asked for function 16 (write registers): its data is not the 4 bytes that quantity 2 needs",
+        ),
+        (
+            "17 0063 0001 000a 0001 02 0009",
+            Unserved.NO_SUCH_ADDRESS,
+            "plc read holding 99: 99 is not mapped; nearest: int_0 100",
+        ),
+        (
+            "2b 0e 09 00",
+            Unserved.MALFORMED,
+            "plc asked for function 43 (encapsulated interface) with wrong data",
+        ),
+    ],
+)
+def test_what_a_unit_does_not_serve_is_counted_and_said(
+    cell: Cell, unit: Unit, pdu: str, reason: Unserved, text: str
+) -> None:
+    answer = execute(unit, Requester(PLC), bytes.fromhex(pdu), NOW)
+    assert answer[0] & 0x80
+    assert texts(cell) == [text]
+    assert cell.health.unserved[reason] == sum(cell.health.unserved.values()) == 1
+    assert cell.health.writes_refused == 0
+
+
+@pytest.mark.parametrize(
+    "pdu, text",
+    [
+        (
+            "06 0065 0001",
+            "plc wrote holding 101: refused, never writable by this writer",
+        ),
+        (
+            "06 0001 0007",
+            "plc wrote holding 1: refused, no variable at this address (1 is not mapped; nearest: start 0.0)",
+        ),
+        (
+            "10 0008 0003 06 0000 0000 0000",
+            "plc wrote holding 8-10: refused, no variable at this address (8 is not mapped; nearest: part 10)",
+        ),
+        (
+            "05 000b ff00",
+            "plc wrote coil 11: refused, no variable at this address (11 is not mapped; nearest: lamp 10)",
+        ),
+        (
+            "16 0013 0000 0001",
+            "plc wrote holding 19: refused, no variable at this address (19 is not mapped; nearest: half 20.0)",
+        ),
+    ],
+)
+def test_a_refused_write_names_its_address(cell: Cell, unit: Unit, pdu: str, text: str) -> None:
+    execute(unit, Requester(PLC), bytes.fromhex(pdu), NOW)
+    (found,) = texts(cell)
+    if "no variable" in text:
+        assert found == text
+    assert sum(cell.health.unserved.values()) == 0, "it is a refused write, and counts once"
+
+
+def test_what_is_held_back_without_the_robot_is_said(cell: Cell, unit: Unit) -> None:
+    cell.robot_lost("unplugged", NOW)
+    execute(unit, Requester(PLC), bytes.fromhex("03 012c 0001"), NOW)
+    assert texts(cell) == ["plc read holding 300: held back while the robot does not report it"]
+    assert cell.health.unserved[Unserved.ROBOT_LOST] == 1
+
+
+def test_a_unit_that_is_not_there(
+    new_cell: Callable[[float], Cell], plan_of: Callable[..., ModbusPlan]
+) -> None:
+    """The cell that the peer writes to hears of it; for a peer that writes nowhere, all that it reaches."""
+    first, second = new_cell(NOW), new_cell(NOW)
+    units = {1: Unit(plan_of(1), first), 2: Unit(plan_of(2), second)}
+
+    def ask(writer: int | None) -> bytes:
+        session = ModbusSession()
+        session.serve(
+            {
+                1: UnitAccess(units[1], Requester(writer, "10.0.0.7")),
+                2: UnitAccess(units[2], Requester(None, "10.0.0.7")),
+            }
+        )
+        request = encode(1, 7, bytes.fromhex("03 0064 0001"))
+        session.buffer.data[: len(request)] = request
+        return session.received(len(request), NOW)
+
+    assert ask(PLC)[7:] == bytes((0x83, 0x0B))
+    assert texts(first) == ["plc asked unit 7; units here: 1, 2"]
+    assert texts(second) == []
+    ask(None)
+    assert texts(second) == ["undeclared peer 10.0.0.7 asked unit 7; units here: 1, 2"]
+
+
+def test_a_read_that_is_served_leaves_no_trace(cell: Cell, unit: Unit) -> None:
+    for pdu in ("03 0064 0004", "03 ea60 0010", "01 0000 0008", "06 000a 0001"):
+        execute(unit, Requester(PLC), bytes.fromhex(pdu), NOW)
+    assert sum(cell.health.unserved.values()) == 0
