@@ -113,7 +113,7 @@ def install() -> Facts:
         "mappings": oct(MAPPINGS.stat().st_mode & 0o7777) + " " + MAPPINGS.owner() + ":" + MAPPINGS.group(),
         "state": show(),
         "version": sh("gatewayd --version").stdout.strip(),
-        "verify": sh("systemd-analyze verify /usr/lib/systemd/system/gatewayd.service").stderr,
+        "verify": sh("systemd-analyze verify --man=no /usr/lib/systemd/system/gatewayd.service").stderr,
     }
 
 
