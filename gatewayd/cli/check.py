@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
-from gatewayd.cli.files import format_option, name_of, read_file, reason_of
+from gatewayd.cli.files import STDIN, format_option, name_of, read_file, reason_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -90,7 +90,7 @@ def command(
 
     Checked is all that can be known without the plant: the text, the Modbus addresses, the robot's fields, who may
     write, what happens when a side is lost, and what number conversions lose. `-` reads standard input, a directory
-    stands for its *.yaml files.
+    stands for its mapping files: *.yaml and *.yml, none that begins with a dot.
     """
     if explain is not None:
         click.echo(_explain(explain), nl=False)
@@ -124,23 +124,25 @@ def _check(files: tuple[str, ...], *, separately: bool) -> CheckOutcome:
 
 def _named(files: tuple[str, ...]) -> Iterator[str]:
     """The files meant: a directory stands for its mapping files, as in `gatewayd run`; an empty one for itself."""
-    from os.path import isdir
     from pathlib import Path
 
-    from gatewayd.mapping.compiled import PATTERN
+    from gatewayd.mapping.compiled import files_of
 
     for file in files:
-        inside = sorted(Path(file).glob(PATTERN)) if isdir(file) else []  # noqa: PTH112 - as in startup.py
+        try:
+            inside = files_of(Path(file)) if file != STDIN else []
+        except OSError:
+            inside = []
         yield from map(str, inside) if inside else (file,)
 
 
 def _read(file: str) -> bytes | Unreadable:
-    from gatewayd.mapping.compiled import Unreadable
+    from gatewayd.mapping.compiled import PATTERNS, Unreadable
 
     try:
         return read_file(file)
     except IsADirectoryError:
-        return Unreadable(name_of(file), "no mapping file (*.yaml) in this directory")
+        return Unreadable(name_of(file), f"no mapping file ({PATTERNS}) in this directory")
     except (OSError, ValueError) as error:
         return Unreadable(name_of(file), reason_of(error))
 

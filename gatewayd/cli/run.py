@@ -90,8 +90,9 @@ def command(
 ) -> int:
     """Serve the robot cells of mapping FILES until stopped.
 
-    A FILE may also be a directory: all its *.yaml files are meant. Cells with the same `modbus: listen:` share one
-    listener and differ by their unit id. Robots, PLCs and interfaces may come and go in any order.
+    A FILE may also be a directory: all its *.yaml and *.yml files are meant. Cells with the same
+    `modbus: listen:` share one listener and differ by their unit id. Robots, PLCs and
+    interfaces may come and go in any order.
     """
     from gatewayd.logs.records import Format, configure
     from gatewayd.logs.stream import LogStream

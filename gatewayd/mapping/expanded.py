@@ -42,7 +42,7 @@ class Defined:
     moves: bool = False
     """Writing it moves the robot, whatever the variable is called."""
     counterpart: str = ""
-    """What would be written to set it, where that can be said of an output."""
+    """What lies on the other side: the input to write for an output, the output that reports for an input; or empty."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

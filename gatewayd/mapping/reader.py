@@ -22,6 +22,7 @@ from gatewayd.mapping.language import FILE, VARIABLE, WRITER
 from gatewayd.mapping.model import ANY, FORMAT_VERSION, Group, VariableSpec, WriterSpec
 from gatewayd.mapping.scalars import CellName, Name
 from gatewayd.mapping.section import Section
+from gatewayd.mapping.slips import lookalike
 from gatewayd.mapping.source import Items, MappingText, Node, Scalar, Table, TableEntry, shown
 
 S = TypeVar("S", bound=Section)
@@ -113,9 +114,13 @@ class _Reader:
 
     def read(self, root: Table) -> Document:
         self._format_version(root)
-        for key, entry in root.entries.items():
+        for key, entry in list(root.entries.items()):
             if key not in FILE.model_fields:
-                self._unknown_key(FILE, key, entry.key.position)
+                meant = self._unknown_key(FILE, key, entry.key.position)
+                if meant not in root.entries:
+                    # Read on as what it is meant to be: a slip in one word makes no strangers of all writers.
+                    name = Scalar(meant, quoted=False, position=entry.key.position)
+                    root.entries[meant] = TableEntry(name, entry.value)
         for key, described in FILE.model_fields.items():
             if described.is_required() and key != "gatewayd" and key not in root.entries:
                 hint = f"add `{key}:`, {described.description}"
@@ -204,10 +209,10 @@ class _Reader:
             return None
         return Part(entry.key.text, spec, entry.key.position, entry.value)
 
-    def _has_value(self, key: str, entry: TableEntry) -> bool:
+    def _has_value(self, key: str, entry: TableEntry, before: TableEntry | None = None) -> bool:
         if isinstance(entry.value, Scalar) and entry.value.value is None:
             message = f"`{key}` has no value"
-            self._find(syntax.WRONG_TYPE, message, entry.key.position, _valueless_hint(key))
+            self._find(syntax.WRONG_TYPE, message, entry.key.position, _valueless_hint(entry.key, before))
             return False
         return True
 
@@ -219,10 +224,11 @@ class _Reader:
             case Items():
                 return [self._data(item) for item in node.items]
             case Table():
+                befores = (None, *node.entries.values())
                 return {
                     key: self._data(entry.value)
-                    for key, entry in node.entries.items()
-                    if self._has_value(key, entry)
+                    for before, (key, entry) in zip(befores, node.entries.items(), strict=False)
+                    if self._has_value(key, entry, before)
                 }
 
     def _translate(
@@ -256,7 +262,8 @@ class _Reader:
             self._find(syntax.OUT_OF_RANGE, message, value, _field_hint(inner, name))
         elif kind == "string_pattern_mismatch":
             message = f"{text} is not a host name or IP address"
-            self._find(syntax.BAD_NETWORK, message, value, "write 192.168.1.10")
+            host = text.strip("`").partition("//")[2].partition("/")[0]
+            self._find(syntax.BAD_NETWORK, message, value, f"write {host or '192.168.1.10'}")
         else:
             message = f"`{name}` is {text}: {_SIZES.get(kind, 'wrong number of values')}"
             self._find(syntax.WRONG_TYPE, message, value, _field_hint(inner, name))
@@ -267,13 +274,15 @@ class _Reader:
         message = f"{_article(model)} needs the key `{key}`"
         self._find(syntax.MISSING_KEY, message, parent, _field_hint(model, key))
 
-    def _unknown_key(self, model: type[Section], key: str, position: Position) -> None:
+    def _unknown_key(self, model: type[Section], key: str, position: Position) -> str:
+        """Report it; returns the key that it is most like, or the key itself."""
         message = f"{_article(model)} has no key `{key}`"
         hint = _of(_ELSEWHERE, model, key)
+        close = difflib.get_close_matches(key, model.model_fields, n=1, cutoff=0.6) if hint is None else []
         if hint is None:
-            close = difflib.get_close_matches(key, model.model_fields, n=1, cutoff=0.6)
             hint = f"did you mean `{close[0]}`?" if close else "known keys: " + ", ".join(model.model_fields)
         self._find(syntax.UNKNOWN_KEY, message, position, hint)
+        return close[0] if close else key
 
     def _choice(self, name: str, text: str, expected: str, position: Position) -> None:
         choices = [word.strip("' ") for word in expected.replace(" or ", ",").split(",")]
@@ -289,7 +298,7 @@ class _Reader:
         self._find(syntax.BAD_CHOICE, message, position, hint)
 
     def _find(self, rule: Rule, message: str, position: Position, hint: str) -> None:
-        self.findings.append(rule.at(position, message, hint=hint))
+        self.findings.append(rule.at(position, message, hint=lookalike(message) or hint))
 
 
 _BOUNDS = {
@@ -312,16 +321,19 @@ def _field_hint(model: type[Section], key: str) -> str:
     return f"`{key}`: {known.description}" if known is not None else "see the mapping reference"
 
 
-def _valueless_hint(key: str) -> str:
-    """Three slips of the pen look like a key without a value."""
-    if key.isascii() and key.isdigit():
-        return "a comma ends a value: in a number write a point, such as 0.1 or 100.3"
-    if not key.isprintable():
-        return "there is an invisible character in it, most often a no-break space: type the line anew"
-    name, colon, rest = key.partition(":")
+def _valueless_hint(key: Scalar, before: TableEntry | None) -> str:
+    """Four slips of the pen look like a key without a value; a character that only looks right is one more."""
+    name, colon, rest = key.text.partition(":")
     if colon:
         return f"write `{name}: {rest}`, with a space after the colon"
-    return "write a value, or remove the key; what belongs to it is indented below it"
+    beside = before is not None and before.key.position.line == key.position.line
+    bracketed = ""
+    if beside and before is not None and isinstance(before.value, Scalar):
+        bracketed = f"a list needs brackets: `{before.key.text}: [{before.value.text}, {key.text}]`"
+    if key.text.isascii() and key.text.isdigit():
+        point = "a comma ends a value: in a number write a point, such as 0.1 or 100.3"
+        return f"{point}; {bracketed}" if bracketed else point
+    return bracketed or "write a value, or remove the key; what belongs to it is indented below it"
 
 
 def _raw(node: Node) -> Any:

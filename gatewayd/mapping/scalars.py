@@ -25,6 +25,10 @@ from gatewayd.report.format import address as address_text
 
 _DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?")
 _NUMBER_LIKE = re.compile(r"[-+]?[0-9.][0-9a-fA-FxXoO_.,:+-]*")
+_MEASURED = re.compile(
+    r"(-?[0-9]{1,12}(?:\.[0-9]{1,12})?)[ ]?(?:([kKM])(?:bit(?:/s)?|bps|Bd|Hz)?|[A-Za-z%°][A-Za-z/%°]{0,9})"
+)
+_FACTORS: Final = {"k": 1000, "K": 1000, "M": 1_000_000}
 _DURATION = re.compile(r"([0-9]+(?:\.[0-9]+)?)[ ]?(ms|s|min|h)")
 _SECONDS: Final = {"ms": 0.001, "s": 1.0, "min": 60.0, "h": 3600.0}
 _MAX_SECONDS: Final = 24 * 3600.0
@@ -68,6 +72,10 @@ def _decimal(value: object) -> object:
     if isinstance(value, str):
         if _NUMBER_LIKE.fullmatch(value):
             refuse(syntax.BAD_NUMBER, f"`{value}` is not a plain decimal number", f"{hint}, without quotes")
+        measured = _MEASURED.fullmatch(value)
+        if measured is not None:
+            factor = _FACTORS.get(measured[2] or "", 1)
+            hint = f"write {float(measured[1]) * factor:.10g}, without the unit"
         refuse(syntax.WRONG_TYPE, f"`{value}` stands where a number is expected", hint)
     if isinstance(value, (WholeNumber, RealNumber)) and not _DECIMAL.fullmatch(value.text):
         refuse(syntax.BAD_NUMBER, f"`{value.text}` is not a plain decimal number", hint)
@@ -224,6 +232,8 @@ def one_or_many(value: object) -> object:
         return tuple(value) or refuse(
             syntax.WRONG_TYPE, "the list is empty", "name at least one, or remove the key"
         )
+    if isinstance(value, str) and "," in value:
+        refuse(syntax.WRONG_TYPE, f"`{value}` is no list", f"a list needs brackets: [{value}]")
     return (value,)
 
 
@@ -243,6 +253,9 @@ def _name(value: object) -> str:
     hint = "begin with a letter and go on with letters (a to z), digits and `_`"
     text = scalar(value, "a name", hint)
     if not _NAME.fullmatch(text):
+        joined = "_".join(re.findall(r"[A-Za-z0-9_]+", text))
+        if _NAME.fullmatch(joined):
+            hint = f"write {joined}: {hint}"
         refuse(syntax.BAD_NAME, f"`{text}` is not a name", hint)
     if len(text) > _MAX_NAME:
         refuse(syntax.BAD_NAME, f"the name `{text}` has {len(text)} characters", f"use at most {_MAX_NAME}")

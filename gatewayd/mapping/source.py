@@ -27,6 +27,7 @@ from ruamel.yaml.reader import ReaderError
 
 from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule
+from gatewayd.mapping.slips import slip_in
 
 MAX_BYTES: Final = 1 << 20
 """Greatest size of a mapping file."""
@@ -290,6 +291,13 @@ class _Reader:
         if error.context and error.context_mark and mark is not error.context_mark:
             context = _one_line(error.context)
             related = (Related(self._position(error.context_mark), _CONTEXTS.get(context, context)),)
+        if error.context_mark is not None or "mapping values" in (error.problem or ""):
+            first = self._position(error.context_mark).line if error.context_mark else position.line - 1
+            slip = slip_in(self._lines, max(first, position.line - 2, 1), position.line)
+            if slip is not None:
+                place = Position(self.name, slip.line, slip.column)
+                self._find(syntax.YAML_SYNTAX, slip.message, place, slip.hint)
+                return
         problem = _one_line(error.problem or error.context or "not YAML")
         problem = problem.replace("'<stream end>'", "the end of the file")
         if problem.startswith("expected <block end>"):

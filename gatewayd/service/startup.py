@@ -5,11 +5,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from os.path import isdir
 from pathlib import Path
 
 from gatewayd.logs.records import fields
-from gatewayd.mapping.compiled import PATTERN, CompiledFile
+from gatewayd.mapping.compiled import PATTERNS, CompiledFile, files_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.plan import Plan
 from gatewayd.service.compilation import Compilation
@@ -44,19 +43,17 @@ class Startup:
 
 
 def mapping_files(paths: Iterable[Path]) -> list[Path]:
-    """The files meant: a directory stands for its *.yaml files, by name."""
+    """The files meant: a directory stands for its mapping files, by name."""
     found: list[Path] = []
     for path in paths:
-        # Path.is_dir would raise for a name that no file can have; such a one is reported when it is opened.
-        if isdir(path):  # noqa: PTH112
-            inside = sorted(path.glob(PATTERN))
-            if not inside:
-                log.error(
-                    "no mapping file in the directory", extra=fields(directory=str(path), pattern=PATTERN)
-                )
-            found.extend(inside)
-        else:
-            found.append(path)
+        try:
+            inside = files_of(path)
+        except OSError:
+            # It is reported, with its reason, when it is opened.
+            inside = [path]
+        if not inside:
+            log.error("no mapping file in the directory", extra=fields(directory=str(path), pattern=PATTERNS))
+        found += inside
     return found
 
 

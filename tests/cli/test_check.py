@@ -70,7 +70,7 @@ def test_unreadable_files_hide_nothing(tmp_path: Path) -> None:
     done = check(tmp_path / "gone.yaml", tmp_path, BAD)
     assert done.exit_code == 2
     assert f"{tmp_path}/gone.yaml: cannot be read: No such file or directory" in done.output
-    assert f"{tmp_path}: cannot be read: no mapping file (*.yaml) in this directory" in done.output
+    assert f"{tmp_path}: cannot be read: no mapping file (*.yaml, *.yml) in this directory" in done.output
     assert "error GW214 register-overlap" in done.output
     assert done.output.endswith("1 file checked, 2 files not readable: 1 error\n")
 

@@ -734,7 +734,7 @@ def test_any_means_nobody_else_where_there_is_one_writer() -> None:
 
 
 def test_a_family_of_shared_bits_is_one_finding() -> None:
-    assert findings("  a: {robot: input_bit_register_0..31, modbus: 0.0}\n") == [("GW520", 1)]
+    assert findings("  a: {robot: input_bit_register_0..31, modbus: 0.0, owner: any}\n") == [("GW520", 1)]
 
 
 SUPERVISED = {

@@ -41,8 +41,10 @@ _SYNONYMS: Final = {
     ("type", "LWORD"): "uint64",
     ("type", "REAL"): "float32",
     ("type", "LREAL"): "float64",
+    ("type", "FLOAT"): "float32",
+    ("type", "DOUBLE"): "float64",
 }
-"""What the types of IEC 61131-3, which every PLC programmer has in the fingers, are called here."""
+"""What the types of IEC 61131-3, and those of C, are called here; to who asks for a float, it is a REAL."""
 
 
 class ModbusLanguage(LinkLanguage):

@@ -92,7 +92,7 @@ def _defined(target: Target, *, running: bool, usual: Range | None) -> Defined:
         valid_running=is_output and running,
         grows=field in _GROWING,
         moves=field in _MOVING,
-        counterpart=_counterpart(target) if is_output else "",
+        counterpart=_counterpart(target) if is_output else _reported(target),
     )
 
 
@@ -100,6 +100,11 @@ def _kind(data_type: DataType) -> ValueKind:
     if data_type is DataType.BOOL:
         return ValueKind.BOOL
     return ValueKind.INT if data_type.bits is not None else ValueKind.FLOAT
+
+
+def _reported(target: Target) -> str:
+    """The output register of the same number; empty for inputs that are no registers."""
+    return f"output_{target.name.removeprefix('input_')}" if target.name.startswith("input_") else ""
 
 
 def _counterpart(target: Target) -> str:

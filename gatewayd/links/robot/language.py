@@ -27,6 +27,13 @@ _PROGRAM_STATE: Final = "runtime_state"
 """The field that says whether the robot program runs."""
 _UNKNOWN: Final = Robot(host="unknown")
 
+_SERIES: Final = {
+    "cb3": ("UR3", "UR5", "UR10", "CB", "CB3.1", "CB-SERIES"),
+    "e": ("UR3E", "UR5E", "UR7E", "UR10E", "UR12E", "UR16E", "UR20", "UR30", "E-SERIES", "ESERIES"),
+    "x": ("POLYSCOPEX", "POLYSCOPE X", "PSX"),
+}
+"""Names on the robot's arm and in its manuals."""
+
 
 class RobotLanguage(DefiningLanguage):
     """Section `robot`, and the keys `robot` and `valid` of a variable."""
@@ -52,6 +59,9 @@ class RobotLanguage(DefiningLanguage):
         RobotField: "a field of the robot",
     }
     telling_keys = ("host", "frequency", "port", "series", "version", "adopt_for", "valid")
+    synonyms: ClassVar[Mapping[tuple[str, str], str]] = {
+        ("series", name): series for series, names in _SERIES.items() for name in names
+    }
     output_policies: ClassVar[Mapping[str, str]] = {"valid": "it says when an output is good"}
     unwritten: ClassVar[Mapping[str, object]] = {"adopt_for": ADOPT_FOR}
 

@@ -12,7 +12,7 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock
 from gatewayd.mapping.model import ANY, Group, VariableSpec
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.writers import is_supervised
-from gatewayd.report.wording import did_you_mean, seconds
+from gatewayd.report.wording import alternatives, did_you_mean, seconds
 
 _MIN_LEASE = 0.1
 _RESERVED = (ANY, "free", "gateway", "operator", "robot", "undeclared")
@@ -232,6 +232,18 @@ def reserved_writer_name(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
             yield rule.at(
                 writer.key, message, hint="give the writer another name, say what it is: plc, hmi, line"
             )
+
+
+@cell_rule("GW523", Severity.WARNING)
+def owner_left_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """Several writers, and a variable that names none of them as its owner."""
+    for lock in _distinct(cell.locks):
+        part = lock.group if lock.group is not None else cell.variables[lock.members[0]].part
+        if lock.is_any and part.spec.owner is None and len(lock.owners) > 1:
+            writers = alternatives(lock.owners[:4])
+            message = f"`{lock.name}` names no owner, so each of the writers may write it: {writers}"
+            hint = f"write `owner: {lock.owners[0]}`, a list by priority, or `owner: {ANY}` if each may"
+            yield rule.at(lock.position, message, hint=hint)
 
 
 def _owned(document: Document) -> Iterator[Part[Group] | Part[VariableSpec]]:

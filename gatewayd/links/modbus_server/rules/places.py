@@ -1,4 +1,4 @@
-"""Rules GW20x to GW215, GW220 and GW222, GW223 and GW229: where variables lie in the Modbus areas."""
+"""Rules GW20x to GW215, GW220, GW222, GW223, GW226 and GW229: where variables lie in the Modbus areas."""
 
 from __future__ import annotations
 
@@ -314,3 +314,42 @@ def no_modbus_section(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     first = placements[0]
     message = f"`{first.variable.name}` has a Modbus address, but the file has no section `modbus`"
     yield rule.at(first.position, message, hint="add `modbus: {listen: 127.0.0.1:1502}`")
+
+
+_OF_INPUTS = frozenset({"owner", "group", "lease", "takeover", "on_release", "limits", "clamp", "deadband"})
+"""Keys by which a line shows that an input is meant."""
+
+
+@cell_rule("GW226", Severity.WARNING)
+def input_among_outputs(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """An input that nothing is said of, between outputs."""
+    for area in (Area.HOLDING, Area.COIL):
+        inside = [item for item in placements_of(cell) if item.area is area and item.problem is None]
+        placed = sorted(inside, key=lambda item: (item.addresses.start, item.bit or 0))
+        for before, placement, after in zip((None, *placed), placed, (*placed[1:], None), strict=False):
+            beside = [item for item in (before, after) if item is not None]
+            if (
+                placement.variable.direction is Direction.INPUT
+                and placement.variable.counterpart
+                and not _OF_INPUTS & placement.variable.spec.model_fields_set
+                and beside
+                and all(item.variable.direction is Direction.OUTPUT for item in beside)
+                and any(_adjacent(item, placement) for item in beside)
+            ):
+                name, target = placement.variable.name, placement.variable.target
+                message = (
+                    f"`{name}` is written to the robot ({target}), but lies among what the robot reports"
+                )
+                related = tuple(
+                    Related(item.position, f"`{item.variable.name}` is reported") for item in beside
+                )
+                hint = (
+                    f"if the robot reports it, write {placement.variable.counterpart}; else name its `owner`"
+                )
+                yield rule.at(placement.position, message, hint=hint, related=related)
+
+
+def _adjacent(placement: ExpandedPlacement, other: ExpandedPlacement) -> bool:
+    """Whether no register lies between them."""
+    first, second = sorted((placement.addresses, other.addresses), key=lambda addresses: addresses.start)
+    return second.start <= first.stop
