@@ -16,6 +16,9 @@ from gatewayd.loop.lines import LineThread
 CAPACITY = 10_000
 """Lines that may wait for the reader."""
 
+HANGS = 5.0
+"""Seconds after which a reader that takes nothing is a trouble."""
+
 log = logging.getLogger("gatewayd.logs")
 
 
@@ -57,3 +60,12 @@ class LogStream(LineThread):
         if pending:
             self._reported += pending
             log.warning("log lines lost", extra=fields(lines=pending))
+
+
+def log_troubles(now: float) -> list[str]:
+    """What is wrong with the log as it is configured now: it cannot say so itself."""
+    streams = (getattr(handler, "stream", None) for handler in logging.getLogger().handlers)
+    hangs = any(isinstance(stream, LogStream) and stream.held_up(now) > HANGS for stream in streams)
+    return (
+        [f"nobody has read the log for more than {HANGS:g} s: lines wait, and then are lost"] if hangs else []
+    )

@@ -59,7 +59,8 @@ async def _serve(daemon: Daemon, found: Startup, options: Options) -> None:
     operating = asyncio.create_task(access.run())
     besides = [operating, asyncio.create_task(reloader.run())]
     if options.page is not None:
-        page = serve(options.page, daemon, (access.api, access.reload), lambda: reporter.notes)
+        api = access.api, access.reload
+        page = serve(options.page, daemon, api, lambda: reporter.notes, access.troubles)
         besides.append(asyncio.create_task(page))
     await daemon.run(stop)
     for task in besides:

@@ -12,6 +12,7 @@ from typing import Protocol
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import Endpoint, Reload
 from gatewayd.core.cell import Cell
+from gatewayd.logs.stream import log_troubles
 from gatewayd.loop import clock
 from gatewayd.loop.retry import keep_running
 from gatewayd.service.audit import Audit
@@ -80,7 +81,7 @@ class OperatorAccess:
         self._file = AuditFile(audit_file) if audit_file is not None else None
         self.audit = Audit(self._file.put if self._file is not None else None)
         daemon.observe(self.audit.watch)
-        self.api = Api(daemon, self.audit, lambda: (*notes(), *self._troubles()), stood_still)
+        self.api = Api(daemon, self.audit, lambda: (*notes(), *self.troubles()), stood_still)
 
     async def run(self) -> None:
         """Run until cancelled; then write what is still to be written."""
@@ -101,10 +102,11 @@ class OperatorAccess:
     def _is_serving(self) -> bool:
         return all(self._daemon.progress().values())
 
-    def _troubles(self) -> list[str]:
+    def troubles(self) -> list[str]:
+        """What is wrong with audit and log; the cells are served all the same."""
         trouble = self._file.trouble(clock.now()) if self._file is not None else ""
         of_file = [f"the audit file cannot be written: {trouble}"] if trouble else []
-        return [*of_file, *self.audit.troubles]
+        return [*of_file, *self.audit.troubles, *log_troubles(clock.now())]
 
     async def _watch(self, file: AuditFile) -> None:
         while True:

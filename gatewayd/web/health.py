@@ -13,12 +13,15 @@ def health(late: Sequence[str]) -> tuple[bool, dict[str, object]]:
 
 
 def readiness(
-    verdicts: Mapping[str, CellVerdict], late: Sequence[str], troubles: Iterable[str]
+    verdicts: Mapping[str, CellVerdict],
+    late: Sequence[str],
+    troubles: Iterable[str],
+    remarks: Iterable[str] = (),
 ) -> tuple[bool, dict[str, object]]:
     """Ready while every cell is served: no part hangs or has trouble, robots are fresh and can be written.
 
     `verdicts` are by name of the cell. Writers that are not connected, and single registers that the controller
-    refused, leave it ready.
+    refused, leave it ready; so do `remarks`, which are reasons to look all the same.
     """
     reasons = [f"hangs: {name}" for name in late] + [trouble for trouble in troubles if trouble]
     ready = not reasons and not any(verdict.unserved for verdict in verdicts.values())
@@ -26,4 +29,4 @@ def readiness(
         name: {"ready": not verdict.unserved, "reasons": list(verdict.unserved)}
         for name, verdict in verdicts.items()
     }
-    return ready, {"ready": ready, "reasons": reasons, "cells": cells}
+    return ready, {"ready": ready, "reasons": [*reasons, *remarks], "cells": cells}

@@ -35,9 +35,10 @@ async def serve(
     daemon: Daemon,
     api: tuple[Api, Reload | None] | None = None,
     notes: Callable[[], Iterable[str]] = lambda: (),
+    remarks: Callable[[], Iterable[str]] = lambda: (),
 ) -> None:
     """Measure and listen until cancelled. An address that cannot be had is said once and tried again."""
-    probes = Probes(daemon, notes)
+    probes = Probes(daemon, notes, remarks)
     measuring = asyncio.create_task(probes.run())
     try:
         await _until_serving(daemon)

@@ -25,7 +25,7 @@ from gatewayd.mapping.plan import Plan
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.web import view
 from gatewayd.web.guard import MAX_BODY, MAX_CONNECTIONS, Doors, is_local_name, middleware
-from gatewayd.web.health import health, readiness
+from gatewayd.web.health import health
 from gatewayd.web.metrics import CONTENT_TYPE, Exposition
 from gatewayd.web.probes import Probes
 
@@ -125,10 +125,7 @@ class StatusListener:
         return _json(answer, status=200 if healthy else 503)
 
     async def _readyz(self, request: web.Request) -> web.Response:
-        probes = self._probes
-        ready, answer = await self._done(
-            request, lambda: readiness(probes.verdicts(clock.now()), probes.late, probes.troubles())
-        )
+        ready, answer = await self._done(request, lambda: self._probes.readiness(clock.now()))
         return _json(answer, status=200 if ready else 503)
 
     async def _metrics(self, request: web.Request) -> web.Response:

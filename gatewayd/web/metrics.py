@@ -26,7 +26,6 @@ from gatewayd.links.registry import kind_of, kinds
 from gatewayd.loop import clock
 from gatewayd.report.printable import printable
 from gatewayd.service.cell_runtime import CellRuntime
-from gatewayd.web.health import readiness
 from gatewayd.web.histogram import Histogram
 from gatewayd.web.probes import CellProbe, Probes
 
@@ -225,7 +224,7 @@ class Exposition:
     def _read(self, now: float) -> Generator[None, None, tuple[_SamplesOf, _HistogramsOf]]:
         daemon, probes = self._probes.daemon, self._probes
         troubles = probes.troubles()
-        ready, _ = readiness(probes.verdicts(now), probes.late, troubles)
+        ready, _ = probes.readiness(now)
         samples: _SamplesOf = defaultdict(dict)
         samples["gatewayd_info"] = {(self._version,): 1}
         samples["gatewayd_ready"] = {(): ready}

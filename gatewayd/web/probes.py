@@ -18,6 +18,7 @@ from gatewayd.loop import clock
 from gatewayd.report.verdict import CellVerdict, verdict_of
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.liveness import Liveness
+from gatewayd.web.health import readiness
 from gatewayd.web.histogram import Histogram
 
 LAG_PERIOD = 0.1
@@ -90,11 +91,20 @@ class CellProbe:
 
 
 class Probes:
-    """Measures `daemon` while `run` runs. `notes` are standing troubles that no link reports."""
+    """Measures `daemon` while `run` runs. `notes` are standing troubles that no link reports.
 
-    def __init__(self, daemon: Daemon, notes: Callable[[], Iterable[str]] = lambda: ()) -> None:
+    `remarks` are such troubles, too, but with them every cell may be served.
+    """
+
+    def __init__(
+        self,
+        daemon: Daemon,
+        notes: Callable[[], Iterable[str]] = lambda: (),
+        remarks: Callable[[], Iterable[str]] = lambda: (),
+    ) -> None:
         self.daemon = daemon
         self._notes = notes
+        self._remarks = remarks
         self.lag = Histogram()
         """By how much the event loop came late."""
         self.late: tuple[str, ...] = ()
@@ -108,7 +118,13 @@ class Probes:
 
     def troubles(self) -> list[str]:
         """What concerns the gateway as a whole."""
-        return [*self._notes(), *self.daemon.troubles()]
+        return [*self._notes(), *self.daemon.troubles(), *self._remarks()]
+
+    def readiness(self, now: float) -> tuple[bool, dict[str, object]]:
+        """Whether every cell is served, with the reasons."""
+        return readiness(
+            self.verdicts(now), self.late, [*self._notes(), *self.daemon.troubles()], self._remarks()
+        )
 
     def verdicts(self, now: float) -> dict[str, CellVerdict]:
         """How each cell is, by name."""

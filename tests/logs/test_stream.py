@@ -7,11 +7,13 @@ import os
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 
 import pytest
 
 from gatewayd.logs.records import Format, configure
-from gatewayd.logs.stream import LogStream
+from gatewayd.logs.stream import HANGS, LogStream, log_troubles
+from gatewayd.loop import clock
 
 Pipe = tuple[int, int]
 
@@ -105,3 +107,26 @@ def test_a_reader_that_is_gone_costs_its_lines_alone(pipe: Pipe) -> None:
     stream.write("to nobody\n")
     stream.close(10)
     assert not stream._thread.is_alive()
+
+
+@pytest.mark.usefixtures("_root")
+def test_a_reader_that_has_stopped_is_a_trouble(pipe: Pipe) -> None:
+    reading, writing = pipe
+    fill(writing)
+    stream = LogStream(writing)
+    configure(Format.TEXT, logging.INFO, stream)
+    logging.getLogger("gatewayd.test").warning("robot lost")
+    end = time.monotonic() + 10
+    while not stream.held_up(clock.now()):
+        assert time.monotonic() < end
+        time.sleep(0.001)
+    assert log_troubles(clock.now()) == []
+    assert log_troubles(clock.now() + 2 * HANGS) == [
+        "nobody has read the log for more than 5 s: lines wait, and then are lost"
+    ]
+    os.set_blocking(reading, False)
+    while stream.held_up(clock.now()):
+        with suppress(BlockingIOError):
+            os.read(reading, 1 << 16)
+    assert log_troubles(clock.now() + 2 * HANGS) == []
+    stream.close()

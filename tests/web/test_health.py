@@ -45,3 +45,11 @@ def test_not_ready_with_a_part_that_hangs_or_a_listener_that_is_away(cell: Cell)
     ready, told = readiness(verdicts(cell), ("core of press",), ["not listening on :502", ""])
     assert not ready
     assert told["reasons"] == ["hangs: core of press", "not listening on :502"]
+
+
+def test_trouble_with_audit_or_log_is_told_and_the_cells_are_served(cell: Cell) -> None:
+    ready, told = readiness(
+        verdicts(cell), (), (), ["the audit file cannot be written: No space left on device"]
+    )
+    assert ready
+    assert told["reasons"] == ["the audit file cannot be written: No space left on device"]

@@ -118,3 +118,13 @@ def test_a_part_that_stands_still_is_late(runtime: CellRuntime, daemon: Daemon) 
 def test_troubles_are_those_of_the_start_and_of_the_listeners(daemon: Daemon) -> None:
     probes = Probes(daemon, lambda: ["1 mapping file not served"])
     assert probes.troubles() == ["1 mapping file not served", "not listening on 127.0.0.1:15020"]
+
+
+def test_troubles_of_audit_and_log_are_troubles(runtime: CellRuntime, daemon: Daemon) -> None:
+    assert runtime in daemon.runtimes
+    probes = Probes(daemon, lambda: ["1 mapping file not served"], lambda: ["nobody has read the log"])
+    assert {"1 mapping file not served", "nobody has read the log"} <= set(probes.troubles())
+    _, told = probes.readiness(time.monotonic())
+    reasons = told["reasons"]
+    assert isinstance(reasons, list)
+    assert {"1 mapping file not served", "nobody has read the log"} <= set(reasons)
