@@ -37,6 +37,7 @@ SLOW = (
     "kernel",
     "links/new_kind",
     "mapping/test_check_fuzz.py",
+    "service/test_reload_keys.py",
     "service/test_signals.py",
     "soak",
     "systemd",

@@ -232,10 +232,25 @@ class Dictionary:
         return found
 
     def resume(self, former: Dictionary) -> None:
-        """Take over every value that a client may have written."""
-        for key, entry in former._entries.items():
-            if entry.access.writable and entry.sink is None:
-                self._entries[key].value = entry.value
+        """Take over every value that a client may have written.
+
+        Where the defaults of an object are others now, it keeps these unless a client has changed the former ones.
+        """
+        for item in former:
+            present = self._objects.get(item.index)
+            if present is None:
+                continue
+            own = {entry.subindex: entry for entry in present.entries}
+            entries = [
+                entry
+                for entry in item.entries
+                if entry.access.writable and entry.sink is None and entry.subindex in own
+            ]
+            if all(entry.default == own[entry.subindex].default for entry in entries) or any(
+                entry.value != entry.default for entry in entries
+            ):
+                for entry in entries:
+                    own[entry.subindex].value = entry.value
 
     def read(self, index: int, subindex: int) -> bytes:
         """What an SDO upload returns. Raises Abort."""

@@ -56,8 +56,9 @@ class HeartbeatProducer:
         self._due = now + self._period.number / 1000 if self.enabled else math.inf
 
     def resume(self, former: HeartbeatProducer) -> None:
-        """Go on as another one: the next heartbeat comes when its next would have."""
-        self._due = former._due
+        """Go on as another one: the next heartbeat comes when its next would have, at once where there was none."""
+        if self.enabled:
+            self._due = former._due if former.enabled else -math.inf
 
     def tick(self, now: float) -> None:
         """Send what is due. Heartbeats that were missed are not made up for."""

@@ -99,3 +99,39 @@ def test_source_and_sink_stand_in_for_the_value() -> None:
 
 def test_objects_come_in_the_order_of_their_index() -> None:
     assert [item.index for item in dictionary(_step())] == [0x1000, 0x2000]
+
+
+def _mapping(first: int, second: int) -> Dictionary:
+    slots = [Entry(number, f"slot {number}", CanType.UNSIGNED8, Access.RW, bytes((value,)))
+             for number, value in ((1, first), (2, second))]  # fmt: skip
+    return dictionary(*slots)
+
+
+@pytest.mark.parametrize(
+    "written, defaults, found",
+    [
+        ((), (1, 2), (1, 2)),
+        (((1, 9),), (1, 2), (9, 2)),
+        ((), (1, 3), (1, 3)),
+        (((1, 9),), (1, 3), (9, 2)),
+    ],
+)
+def test_what_a_client_wrote_goes_on_whole_and_what_it_left_follows_new_defaults(
+    written: tuple[tuple[int, int], ...], defaults: tuple[int, int], found: tuple[int, int]
+) -> None:
+    """Half of an object as it was written and half as it is by default now would be neither."""
+    former, successor = _mapping(1, 2), _mapping(*defaults)
+    for subindex, value in written:
+        former.write(0x2000, subindex, bytes((value,)))
+    successor.resume(former)
+    assert tuple(successor.read(0x2000, subindex)[0] for subindex in (1, 2)) == found
+
+
+def test_a_successor_need_not_have_all_of_it() -> None:
+    former, successor = (
+        dictionary(_step(), Entry(2, "more", CanType.UNSIGNED8, Access.RW, b"\0")),
+        dictionary(_step()),
+    )
+    former.write(0x2000, 1, b"\5")
+    successor.resume(former)
+    assert successor.read(0x2000, 1) == b"\5"

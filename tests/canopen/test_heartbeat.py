@@ -218,3 +218,15 @@ def test_hostile_frames_do_no_harm(frames: list[tuple[int, bytes, bool]]) -> Non
         watcher.service.receive(Frame(can_id, b"" if remote else data, remote), float(now))
         watcher.service.tick(float(now))
     assert watcher.service.nodes == {1, 2}
+
+
+@pytest.mark.parametrize(
+    "before, after, due",
+    [(100, 100, 10.1), (100, 200, 10.1), (0, 100, -math.inf), (100, 0, math.inf)],
+)
+def test_another_producer_goes_on_at_its_own_time(before: int, after: int, due: float) -> None:
+    """At once where there was none, never where there is none any more."""
+    former, successor = Producer(before), Producer(after)
+    former.service.restart(10.0)
+    successor.service.resume(former.service)
+    assert successor.service.next_deadline(10.0) == pytest.approx(due)

@@ -109,6 +109,10 @@ class SdoServer:
         self._pending = Pending()
         self._confirmation = b""
 
+    def abandon(self) -> list[bytes]:
+        """The device cannot go on with the transfer; what to tell its client. Nothing without one."""
+        return self._abort(AbortCode.DEVICE_STATE) if self.state is not SdoState.IDLE else []
+
     def receive(self, data: bytes, now: float) -> list[bytes]:
         """The answers to a frame of the client; frames that are not 8 bytes long are ignored."""
         if len(data) != _FRAME:

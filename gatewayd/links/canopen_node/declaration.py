@@ -8,7 +8,8 @@ from dataclasses import asdict
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.core.status_layout import StatusField
-from gatewayd.links.canopen_node.description import by_name, description
+from gatewayd.links.canopen_node.continuity import goes_on, weakened
+from gatewayd.links.canopen_node.description import description
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.contract import Description, LinkKind, LinkMetric
 from gatewayd.mapping.plan import LinkPlan
@@ -63,17 +64,19 @@ class CanopenNode(LinkKind):
         return description(plan, cell)
 
     def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
-        """The same node goes on where nothing that the bus can see is different."""
+        """The same node goes on where nothing that its peers rely on is different."""
         assert isinstance(old, CanopenPlan)
         assert isinstance(new, CanopenPlan)
-        return by_name(old, before) == by_name(new, after) and not _identities(old, new, before, after)
+        return goes_on(old, new, before, after) and not _identities(old, new, before, after)
 
     def disturbs(
         self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
     ) -> Iterable[Objection]:
-        """Masters would not know the node again."""
+        """Masters would not know the node again, or could rely on it less."""
         assert isinstance(old, CanopenPlan)
         assert isinstance(new, CanopenPlan)
+        for text in weakened(old, new):
+            yield Objection(ObjectionKind.WEAKENING, text)
         changes = _identities(old, new, before, after)
         if changes:
             yield Objection(

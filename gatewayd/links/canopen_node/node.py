@@ -216,10 +216,10 @@ class Node:
             self.nmt.boot(now)
 
     def resume(self, former: Node, now: float) -> None:
-        """Instead of `start`: take the place of a node of the same plan, over the cell that succeeded its own.
+        """Instead of `start`: take the place of a node that `continuity` lets go on, over the succeeding cell.
 
         For the bus nothing happens: no boot-up, the same NMT state, parameters, errors, watched nodes and deadlines.
-        TPDOs are sent anew.
+        TPDOs are sent anew. A transfer by SDO that is under way is aborted: it was of the former objects.
         """
         self._now, self._started = now, True
         self.bus, self.counters = former.bus, former.counters
@@ -240,10 +240,16 @@ class Node:
         self.sync.resume(former.sync)  # from here on what entering the state has begun anew
         self.producer.resume(former.producer)
         self.receive_pdos.resume(former.receive_pdos)
+        self._answer(former.sdo.abandon())
 
     def writers(self) -> list[Requester]:
         """The writers on this bus that are alive."""
         return self._peers.living()
+
+    def end(self, reason: str, now: float) -> None:
+        """Another node takes its place: its writers are lost, a transfer by SDO is aborted."""
+        self.lose_writers(reason, now)
+        self._answer(self.sdo.abandon())
 
     def lose_writers(self, reason: str, now: float) -> None:
         """Nobody on this bus is a writer any more."""

@@ -656,3 +656,14 @@ def test_segments_and_blocks_are_confirmed_late_as_well() -> None:
     assert ask(slow.server, block_end(b"\1\2\3\4").hex()) == ""
     slow.pending.finish()
     assert slow.answers(0.0) == "a100000000000000"
+
+
+@pytest.mark.parametrize("begun, multiplexer", [("21 05 20 00 10", "052000"), ("40 04 20 00", "042000")])
+def test_a_transfer_that_the_device_cannot_go_on_with_is_aborted_at_once(
+    server: SdoServer, dictionary: Dictionary, begun: str, multiplexer: str
+) -> None:
+    dictionary.write(0x2004, 0, b"a text of two segments")
+    assert server.abandon() == []
+    ask(server, begun)
+    assert [frame.hex() for frame in server.abandon()] == [abort(multiplexer, AbortCode.DEVICE_STATE)]
+    assert (server.state, server.abandon()) == (SdoState.IDLE, [])

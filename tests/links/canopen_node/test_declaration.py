@@ -65,6 +65,13 @@ def test_the_same_identity_is_none_whatever_else_the_mapping_says(old: Plan, new
     assert fits(old, new)
 
 
-def test_objects_that_change_under_a_declared_identity_are_no_objection_of_this_kind() -> None:
+def test_more_at_the_end_under_a_declared_identity_is_the_same_node() -> None:
+    behind = FORCE + "  torque: {robot: output_double_register_1, canopen: auto}\n"
+    assert objections(plan(), plan(variables=behind)) == []
+    assert fits(plan(), plan(variables=behind))
+    assert not fits(plan(variables=behind), plan())
+
+
+def test_what_moves_other_pdos_is_another_node_and_no_objection_of_this_kind() -> None:
     assert objections(plan(), plan(variables=MORE)) == []
     assert not fits(plan(), plan(variables=MORE))

@@ -27,6 +27,7 @@ from gatewayd.core.refusal import Reason
 from gatewayd.core.requester import Requester, new_connection
 from gatewayd.core.succession import succeed
 from gatewayd.links.canopen_node.communication_errors import OVERRUN_TIME
+from gatewayd.links.canopen_node.continuity import goes_on
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
 from gatewayd.links.canopen_node.plan import (
@@ -1525,3 +1526,49 @@ def test_what_the_mapping_says_of_services_is_what_they_begin_with() -> None:
     plant.write(0x1015, 0, 1, 2)
     plant.hear(0, RESET_COMMUNICATION)
     assert plant.read(0x1015) == 500
+
+
+def _reload_with(plant: Plant, **changes: Any) -> None:
+    """The node goes on with another plan."""
+    former, plan = plant.node, replace(plant.node.plan, **changes)
+    assert goes_on(former.plan, plan, _CELL, _CELL)
+    plant.cell = succeed(plant.cell, _CELL, plant.now).cell
+    plant.node = Node(plan, plant.cell, plant.wire.send, Store(), lambda _now: True)
+    plant.node.resume(former, plant.now)
+
+
+def test_a_node_with_one_more_tpdo_keeps_its_writer_its_state_and_what_was_written() -> None:
+    plant = Plant().operational()
+    plant.part(7)
+    assert plant.write(0x1801, 5, 250, 2) == 0
+    more = replace(_pdo(3, Direction.OUTPUT, _OBJECTS[CYCLES], 255), cob_id=0x385)
+    _reload_with(plant, pdos=(*PLAN.pdos, more), heartbeat=700)
+    assert [frame.can_id for frame in plant.take() if frame.can_id >= 0x580] == [], "no boot-up"
+    assert (plant.state, _line_alive(plant), plant.cell.image.values[PART]) == (NmtState.OPERATIONAL, True, 7)
+    assert plant.read(0x1801, 5) == 250
+    assert plant.read(0x1017) == 700
+    assert plant.read(0x1802, 1) == 0x4000_0385
+    plant.cell.listeners.append(lambda direction: plant.node.image_changed(direction, plant.now))
+    assert 0x385 in {frame.can_id for frame in plant.show(CYCLES, 5)}
+
+
+@pytest.mark.parametrize("deadline, faults", [(0, []), (200, [0x8250]), (900, [])])
+def test_another_deadline_begins_at_the_reload(deadline: int, faults: list[int]) -> None:
+    first, *others = PLAN.pdos
+    plant = Plant(replace(PLAN, pdos=(replace(first, event=300), *others), consumers=())).operational()
+    plant.part(7)
+    plant.run(0.25)
+    _reload_with(plant, pdos=(replace(first, event=deadline), *others))
+    assert _emergencies(plant.run(0.15)) == []
+    assert _emergencies(plant.run(0.3)) == faults
+
+
+def test_a_segmented_transfer_is_aborted_by_a_reload_and_by_the_end_of_the_node() -> None:
+    aborted = b"\x80\x08\x10\x00\x22\x00\x00\x08"
+    plant = Plant().operational()
+    plant.hear(0x605, b"\x40\x08\x10\x00" + bytes(4))
+    _reload(plant)
+    assert Frame(0x585, aborted) in plant.take()
+    plant.hear(0x605, b"\x40\x08\x10\x00" + bytes(4))
+    plant.node.end("another node", plant.now)
+    assert plant.take() == [Frame(0x585, aborted)]

@@ -251,10 +251,10 @@ async def test_another_cell_takes_over_unnoticed_by_the_bus(station: Station) ->
         assert station.cell.ownership.owners[lock] is None
 
 
-def test_a_node_with_another_heartbeat_is_another_node(station: Station) -> None:
+def test_a_node_with_another_bit_rate_is_another_node(station: Station) -> None:
     plan = station.link.node.plan
     definition = station.cell.definition
-    assert not KIND.fits(plan, replace(plan, heartbeat=11), definition, definition)
+    assert not KIND.fits(plan, replace(plan, bitrate=11), definition, definition)
 
 
 async def test_what_waited_through_a_gap_is_read_before_anything_else_and_only_that(station: Station) -> None:

@@ -155,13 +155,19 @@ class ReceiveEngine:
         self._deadline = math.inf
 
     def resume(self, former: ReceiveEngine) -> None:
-        """Go on as another one with the same RPDOs: their deadlines run, what was wrong still is."""
+        """Go on as another one with the same RPDOs: their deadlines run, what was wrong still is.
+
+        A deadline of another length begins anew.
+        """
         for number, pdo in self._pdos.items():
             before = former._pdos.get(number)
             if before is not None:
                 pdo.faults = before.faults
                 pdo.latched, pdo.waited = before.latched, before.waited
                 pdo.due, pdo.spared = before.due, before.spared
+                event = pdo.configuration.event
+                if event != before.configuration.event and pdo.due < math.inf:
+                    pdo.due = self._now + event if event else math.inf
         self._deadline = None
 
     def receive(self, can_id: int, data: bytes, now: float) -> bool:
