@@ -60,11 +60,11 @@ class _Reported:
         return ", ".join(filter(None, (self.last.detail, "others among them" if self.various else "", *more)))
 
 
-_Key = tuple[int | None, str, int | None, Reason | Unserved | None]
+_Key = tuple[int | None, str, int | None, Reason | Unserved | None, int | None]
 
 
 class RefusalLog:
-    """Refusals are equal if writer, host of the peer, variable and reason are.
+    """Refusals are equal if writer, host of the peer, variable, reason and holder are.
 
     Each reported event stands for `1 + repeats` refusals, all of which it is true for. Where more than `MAX_PEERS`
     undeclared hosts are refused within one interval, those of further ones are counted together, under no address.
@@ -85,7 +85,7 @@ class RefusalLog:
                 self._peers.add(host)
             else:
                 host, event = "", replace(event, peer="", detail="one of many peers")
-        key = (event.writer, host, event.variable, event.reason)
+        key = (event.writer, host, event.variable, event.reason, event.other)
         reported = self._reported.get(key)
         if reported is not None and event.time - reported.time < REFUSAL_INTERVAL:
             reported.count(event)
@@ -110,18 +110,23 @@ class RefusalLog:
             detail = reported.details(f"the last {now - reported.last.time:.1f} s ago")
             self._report(replace(reported.last, time=now, repeats=reported.pending - 1, detail=detail))
             self._reported[key] = _Reported(now)
-        self._peers = {host for _, host, _, _ in self._reported if host}
+        self._peers = {host for _, host, _, _, _ in self._reported if host}
         self._next = min(
             (reported.time + REFUSAL_INTERVAL for reported in self._reported.values()), default=math.inf
         )
 
     def succeed(self, former: RefusalLog, match: Match) -> None:
         """Go on counting what `former` counts; of what is gone, report what was only counted."""
-        for (writer, host, variable, reason), reported in former._reported.items():
-            if (writer is None or writer in match.writers) and (
-                variable is None or variable in match.variables
-            ):
-                key = at(match.writers, writer), host, at(match.variables, variable), reason
+        for (writer, host, variable, reason, holder), reported in former._reported.items():
+            indices = (writer, match.writers), (variable, match.variables), (holder, match.writers)
+            if all(index is None or index in successors for index, successors in indices):
+                key = (
+                    at(match.writers, writer),
+                    host,
+                    at(match.variables, variable),
+                    reason,
+                    at(match.writers, holder),
+                )
                 reported.last = translated(reported.last, match) if reported.last is not None else None
                 self._reported[key] = reported
             elif reported.last is not None:

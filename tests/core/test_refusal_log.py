@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
 from gatewayd.core.refusal_log import MAX_PEERS, REFUSAL_INTERVAL, RefusalLog
@@ -83,6 +85,15 @@ def test_refusals_of_one_peer_are_never_told_of_another() -> None:
         ("192.168.1.30", 1), ("192.168.1.31", 1), ("[fe80::1]", 1),
         ("192.168.1.30", 9), ("192.168.1.31", 9), ("[fe80::1]", 9),
     ]  # fmt: skip
+
+
+def test_whoever_holds_it_is_named_for_the_refusals_that_were_his_doing() -> None:
+    told: list[Event] = []
+    log = RefusalLog(told.append)
+    for holder in (1, 2, 1, 2, 2):
+        log.add(replace(refusal(0.0), other=holder))
+    log.tick(REFUSAL_INTERVAL)
+    assert [(event.other, 1 + event.repeats) for event in told] == [(1, 1), (2, 1), (1, 1), (2, 2)]
 
 
 def test_peers_are_told_apart_up_to_a_bound_and_those_beyond_it_have_no_address() -> None:
