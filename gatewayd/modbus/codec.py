@@ -22,6 +22,7 @@ from typing import Final, TypeAlias
 
 from gatewayd.core.definition import Value, ValueKind
 from gatewayd.encoding.limits import Ends, LimitReader, Meaning, ends_of, read_limits
+from gatewayd.encoding.linear import meaning_of, saturated, whole
 
 Buffer: TypeAlias = bytes | bytearray | memoryview
 
@@ -206,7 +207,7 @@ def _plain_encoder(number: NumberFormat, pack: Pack, kind: ValueKind) -> Pack:
         return _real_packer(number, pack)
     low, high = int(number.low), int(number.high)
     if kind is ValueKind.FLOAT:
-        return lambda value: pack(_saturated(value, low, high))
+        return lambda value: pack(saturated(value, low, high))
 
     def encode(value: Value) -> bytes:
         return pack(low if value < low else high if value > high else int(value))
@@ -219,15 +220,7 @@ def _encoder(number: NumberFormat, pack: Pack, scale: float, offset: float) -> P
         pack_real = _real_packer(number, pack)
         return lambda value: pack_real((value - offset) / scale)
     low, high = int(number.low), int(number.high)
-    return lambda value: pack(_saturated((value - offset) / scale, low, high))
-
-
-def _saturated(value: float, low: int, high: int) -> int:
-    if value <= low:
-        return low
-    if value >= high:
-        return high
-    return round(value) if value == value else 0  # noqa: PLR0124 - NaN is what differs from itself
+    return lambda value: pack(saturated((value - offset) / scale, low, high))
 
 
 def _real_packer(number: NumberFormat, pack: Pack) -> Pack:
@@ -259,7 +252,7 @@ def _decoder(unpack: Unpack, scale: float, offset: float, kind: ValueKind) -> De
         return lambda data: unpack(data)[0] * scale + offset
     if kind is ValueKind.BOOL:
         return lambda data: unpack(data)[0] * scale + offset != 0
-    return lambda data: _whole(unpack(data)[0] * scale + offset)
+    return lambda data: whole(unpack(data)[0] * scale + offset)
 
 
 def _limited_decoder(
@@ -284,13 +277,7 @@ def _meaning(number: NumberFormat, scale: float, offset: float, kind: ValueKind)
     if number.name == "bool" and scale == 1 and offset == 0:
         truth = _TRUTH[kind]
         return lambda raw: truth[raw != 0]
-    if kind is ValueKind.BOOL:
-        return lambda raw: raw * scale + offset != 0
-    if kind is ValueKind.FLOAT:
-        return lambda raw: raw * scale + offset
-    if scale == 1 and offset == 0:
-        return _whole
-    return lambda raw: _whole(raw * scale + offset)
+    return meaning_of(kind, scale, offset)
 
 
 _TRUTH: Final[dict[ValueKind, tuple[Value, Value]]] = {
@@ -298,7 +285,3 @@ _TRUTH: Final[dict[ValueKind, tuple[Value, Value]]] = {
     ValueKind.INT: (0, 1),
     ValueKind.FLOAT: (0.0, 1.0),
 }
-
-
-def _whole(value: float) -> int | None:
-    return round(value) if math.isfinite(value) else None

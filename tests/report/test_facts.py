@@ -157,6 +157,7 @@ def test_whatever_differs_inside_a_node_is_told(part: str, name: str) -> None:
     known: dict[str, Any] = {
         "writer": 0,
         "variable": 1,
+        "linear": (2.0, 1.0),
         "type": CanType.REAL64,
         "revision": "auto",
         "serial": 5,

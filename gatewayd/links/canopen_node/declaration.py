@@ -54,7 +54,8 @@ class CanopenNode(LinkKind):
         ),
     )
     place = (
-        "null, or `object` (2010h:01), `type`, and `cob_id` of the PDO that carries it, null for SDO alone"
+        "null, or `object` (2010h:01), `type`, `scale`, `offset`, and `cob_id` of the PDO that carries it, "
+        "null for SDO alone"
     )
     has_one_place = True
 

@@ -35,13 +35,14 @@ def by_name(part: Any, cell: CellDefinition) -> dict[str, str]:
 
 def _place(placed: ObjectPlan, cob_id: int | None) -> Place:
     name = f"{placed.index:04X}h:{placed.subindex:02X}"
+    scale, offset = placed.linear or (1.0, 0.0)
     return Place(
-        text=f"{placed.index:04X}h sub {placed.subindex} {placed.type.name.lower()}",
-        fields={"object": name, "type": placed.type.name, "cob_id": cob_id},
+        text=f"{placed.index:04X}h sub {placed.subindex} {placed.type_text.lower()}",
+        fields={"object": name, "type": placed.type.name, "scale": scale, "offset": offset, "cob_id": cob_id},
         area="object",
         address=name,
         notation="by SDO" if cob_id is None else f"COB-ID 0x{cob_id:03X}",
-        type=placed.type.name,
+        type=placed.type_text,
     )
 
 
@@ -59,7 +60,7 @@ def _text(key: str, value: Any, cell: CellDefinition) -> str:
     if isinstance(value, Direction):
         return value.value
     if isinstance(value, tuple):
-        return "; ".join(_parts(item, cell) for item in value)
+        return "; ".join(_parts(item, cell) if is_dataclass(item) else str(item) for item in value)
     return _parts(value, cell) if is_dataclass(value) else str(value)
 
 

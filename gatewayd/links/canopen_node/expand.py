@@ -6,8 +6,10 @@ What cannot be laid out is kept for the rules to find (`CanopenCell.is_complete`
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
+from fractions import Fraction
+from functools import lru_cache
 from itertools import chain
 from typing import Final
 
@@ -35,6 +37,7 @@ from gatewayd.links.canopen_node.status_words import StatusWord, field_word, qua
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Part
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedLink, ExpandedVariable
+from gatewayd.mapping.reach import Reach, scaled
 
 _INTEGERS: Final = (
     CanType.UNSIGNED8,
@@ -47,6 +50,7 @@ _INTEGERS: Final = (
     CanType.INTEGER64,
 )
 """Types that a whole number gets where the file names none: the first that holds the robot's."""
+_MAX_REAL32: Final = float.fromhex("0x1.fffffep+127")
 _MANY: Final = 2048
 """So many variables that a PDO does not get are enough to be reported."""
 
@@ -210,6 +214,38 @@ def place_of(variable: ExpandedVariable) -> CanopenPlace | None:
     return variable.spec.by(CanopenPlaces).canopen
 
 
+Linear = tuple[float, float]
+"""Scale and offset."""
+
+
+def linear_of(place: CanopenPlace | None) -> Linear | None:
+    """Scale and offset that a line declares; None where it declares none, or none that does anything."""
+    if place is None:
+        return None
+    linear = (1.0 if place.scale is None else place.scale, place.offset or 0.0)
+    return None if linear == (1.0, 0.0) and place.scale is None else linear
+
+
+def scale_problem(variable: ExpandedVariable, linear: Linear | None) -> str | None:
+    """Why a scale cannot be: it cannot be undone, or there is nothing to scale."""
+    if linear is None:
+        return None
+    if variable.kind is ValueKind.BOOL:
+        return "is a bit and has a scale or offset"
+    return "has the scale 0" if linear[0] == 0 else None
+
+
+@lru_cache
+def reach_of(can_type: CanType, linear: Linear | None) -> Reach:
+    """What an object can show, in the robot's unit."""
+    if can_type is CanType.REAL64:
+        return Reach(None, None, is_real=True)
+    scale, offset = (Fraction(part) for part in linear or (1, 0))
+    if can_type is CanType.REAL32:
+        return scaled(-_MAX_REAL32, _MAX_REAL32, scale, offset, is_real=True)
+    return scaled(*can_type.bounds, scale, offset, is_real=False)
+
+
 def expand_canopen(part: Part[Canopen], variables: Sequence[ExpandedVariable]) -> CanopenCell:
     """Lay the node out. Never raises."""
     return _Layout(part, variables).finished()
@@ -286,7 +322,7 @@ class _Layout:
     def _placed(self) -> dict[int, MappedObject]:
         """The object of every variable that is on CANopen."""
         real = self.part.spec.pdo.real
-        chosen: list[tuple[ExpandedVariable, CanType, bool]] = []
+        chosen: list[tuple[ExpandedVariable, CanType, Linear | None, bool]] = []
         for variable in self.variables:
             place = place_of(variable)
             if place is None and variable.index not in self._of:
@@ -294,14 +330,15 @@ class _Layout:
             plain = default_type(variable, real)
             named = place.type if place is not None else None
             can_type = CanType[named] if named is not None else plain
-            fits = _fits(variable.kind, can_type)
-            chosen.append((variable, can_type if fits else plain, fits))
+            linear = linear_of(place)
+            fits = _fits(variable.kind, can_type, linear) and scale_problem(variable, linear) is None
+            chosen.append((variable, can_type if fits else plain, linear if fits else None, fits))
         plans = place_objects(
-            (variable.index, variable.direction, can_type) for variable, can_type, _ in chosen
+            (variable.index, variable.direction, can_type) for variable, can_type, _, _ in chosen
         )
         return {
-            variable.index: MappedObject(plan, variable.direction, fits)
-            for (variable, _, fits), plan in zip(chosen, plans, strict=True)
+            variable.index: MappedObject(replace(plan, linear=linear), variable.direction, fits)
+            for (variable, _, linear, fits), plan in zip(chosen, plans, strict=True)
         }
 
     def finished(self) -> CanopenCell:
@@ -374,9 +411,9 @@ def _given(spec: PdoSpec | PdoDefaults, defaults: PdoDefaults, key: str) -> floa
     return value
 
 
-def _fits(kind: ValueKind, can_type: CanType) -> bool:
+def _fits(kind: ValueKind, can_type: CanType, linear: Linear | None) -> bool:
     if kind is ValueKind.BOOL:
         return can_type is CanType.BOOLEAN
     if kind is ValueKind.FLOAT:
-        return can_type.is_real
+        return can_type.is_real or (linear is not None and can_type is not CanType.BOOLEAN)
     return can_type is not CanType.BOOLEAN and not can_type.is_real

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from typing import ClassVar, Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.links.canopen_node.compile import compile_canopen
 from gatewayd.links.canopen_node.declaration import KIND
-from gatewayd.links.canopen_node.expand import CanopenCell, expand_canopen, node_of, place_of
+from gatewayd.links.canopen_node.expand import CanopenCell, expand_canopen, node_of, place_of, reach_of
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.sections import (
     AUTO,
@@ -32,12 +31,11 @@ from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.model import VariableSpec, WriterSpec
-from gatewayd.mapping.reach import Reach, scaled
+from gatewayd.mapping.reach import Reach
 from gatewayd.mapping.section import Section
 
 _RPDO: Final = "RPDO"
 _SDO: Final = "SDO"
-_MAX_REAL32: Final = float.fromhex("0x1.fffffep+127")
 
 
 class CanopenLanguage(LinkLanguage):
@@ -140,7 +138,7 @@ class CanopenLanguage(LinkLanguage):
         node = node_of(cell)
         for placed in node.objects if node is not None else ():
             if placed.plan.type is not CanType.BOOLEAN:
-                yield placed.variable, _reach(placed.plan.type)
+                yield placed.variable, reach_of(placed.plan.type, placed.plan.linear)
 
     def expand(self, document: Document, variables: Sequence[ExpandedVariable]) -> CanopenCell | None:
         """The node, laid out."""
@@ -152,15 +150,6 @@ class CanopenLanguage(LinkLanguage):
         node = node_of(cell)
         assert node is not None
         return compile_canopen(cell, node)
-
-
-@lru_cache
-def _reach(can_type: CanType) -> Reach:
-    if can_type is CanType.REAL64:
-        return Reach(None, None, is_real=True)
-    if can_type is CanType.REAL32:
-        return scaled(-_MAX_REAL32, _MAX_REAL32, is_real=True)
-    return scaled(*can_type.bounds, is_real=False)
 
 
 LANGUAGE: Final = CanopenLanguage()

@@ -162,4 +162,4 @@ def _item(cell: ExpandedCell, run: list[tuple[int, MappedObject]]) -> PdoItem:
     if len(run) > 1:
         name = f"{name.removesuffix(']')}..{cell.variables[last.variable].member}]"
         place += f"-{last.plan.subindex:02X}"
-    return PdoItem(name, bit, sum(placed.plan.type.bits for _, placed in run), place, first.plan.type.name)
+    return PdoItem(name, bit, sum(placed.plan.type.bits for _, placed in run), place, first.plan.type_text)

@@ -14,6 +14,7 @@ from gatewayd.canopen.identity import revision as release_revision
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.mapping.plan import LinkPlan, Plan
+from gatewayd.report.wording import number
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,12 +30,12 @@ class IdentityPlan:
 
     def of(self, cell: CellDefinition, follows: Callable[[], int]) -> Identity:
         """The numbers for a cell; `follows` gives the revision that follows the dictionary."""
-        number = release_revision() if self.revision is None else self.revision
+        revision = release_revision() if self.revision is None else self.revision
         serial = zlib.crc32(cell.name.encode()) if self.serial is None else self.serial
         return Identity(
             self.vendor,
             self.product,
-            follows() if number == "auto" else number,
+            follows() if revision == "auto" else revision,
             cell.fingerprint if serial == "fingerprint" else serial,
         )
 
@@ -48,6 +49,17 @@ class ObjectPlan:
     index: int
     subindex: int
     type: CanType
+    linear: tuple[float, float] | None = None
+    """Scale and offset: value = raw * scale + offset; None: the raw number is the value."""
+
+    @property
+    def type_text(self) -> str:
+        """For people: `INTEGER16`, `INTEGER16 * 0.1`, `INTEGER16 * 0.1 + -5`."""
+        if self.linear is None:
+            return self.type.name
+        scale, offset = self.linear
+        text = f"{self.type.name} * {number(scale)}"
+        return f"{text} + {number(offset)}" if offset else text
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from gatewayd.links.canopen_node.scalars import (
     Word32,
 )
 from gatewayd.mapping import syntax
-from gatewayd.mapping.scalars import Duration, Name, Whole, refuse
+from gatewayd.mapping.scalars import Duration, Name, Real, Whole, refuse
 from gatewayd.mapping.section import Section
 
 AUTO = "auto"
@@ -221,6 +221,8 @@ class CanopenPlace(Section):
         default=AUTO, description="auto (default), none (object dictionary only), or the name of a PDO"
     )
     type: NumberType | None = Field(default=None, description="CiA 301 type; default: from the robot's type")
+    scale: Real | None = Field(default=None, description="robot value = raw value * scale + offset")
+    offset: Real | None = Field(default=None, description="robot value = raw value * scale + offset")
 
 
 def _place(value: Any) -> Any:

@@ -51,7 +51,7 @@ class CanopenTables(LinkTables):
             placed.variable: {
                 **empty,
                 "object": object_place(placed.plan.index, placed.plan.subindex),
-                "can_type": placed.plan.type.name,
+                "can_type": placed.plan.type_text,
             }
             for placed in node.objects
         }

@@ -10,6 +10,7 @@ import math
 import struct
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from itertools import groupby
 from typing import Final
@@ -22,7 +23,7 @@ from gatewayd.core.definition import Direction, Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.encoding.limits import LimitReader, Meaning
-from gatewayd.links.canopen_node.pdo.codec import fit, limits_of, native
+from gatewayd.links.canopen_node.pdo.codec import fit, limits_of, meaning
 from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan
 
 ABORT_OF: Final = {
@@ -75,10 +76,10 @@ class VariableObjects:
     def _entry(self, item: ObjectPlan) -> Entry:
         declared = self._cell.definition.variables[item.variable]
         name, source = declared.name, partial(self._read, item)
-        default = item.type.pack(fit(declared.kind.zero, item.type))
+        default = item.type.pack(fit(declared.kind.zero, item.type, item.linear))
         if declared.direction is Direction.OUTPUT:
             return Entry(item.subindex, name, item.type, Access.RO, default, pdo=Pdo.TRANSMIT, source=source)
-        low, high = _declared_bounds(declared, item.type)
+        low, high = _declared_bounds(declared, item)
         writable = self._is_writable(item.variable)
         return _Input(
             item.subindex,
@@ -90,7 +91,7 @@ class VariableObjects:
             high=high,
             pdo=Pdo.RECEIVE if writable else Pdo.NONE,
             source=source,
-            sink=partial(self._write, item, limits_of(declared, item.type)),
+            sink=partial(self._write, item, limits_of(declared, item.type, item.linear)),
         )
 
     def _is_writable(self, index: int) -> bool:
@@ -101,15 +102,15 @@ class VariableObjects:
         if item.variable in self._cell.unreadable:
             raise Abort(AbortCode.DEVICE_STATE)
         value = self._cell.image.values[item.variable]
-        try:
-            return item.type.pack(value)
-        except (struct.error, OverflowError):
-            return item.type.pack(fit(value, item.type))
+        if item.linear is None:
+            with suppress(struct.error, OverflowError):
+                return item.type.pack(value)
+        return item.type.pack(fit(value, item.type, item.linear))
 
     def _write(self, item: ObjectPlan, limits: LimitReader | None, data: bytes) -> None:
         declared = self._cell.definition.variables[item.variable]
         requester, now = self._requester(), self._clock()
-        read = limits.read if limits is not None else partial(native, kind=declared.kind)
+        read = limits.read if limits is not None else meaning(declared.kind, item.linear)
         refusal, value = self._meaning(item, data, read)
         if refusal is not None:
             self._cell.refuse(requester, refusal, now, value)
@@ -163,11 +164,23 @@ def _accepted(declared: Variable) -> tuple[float, float]:
     return max(low, limits.low), min(high, limits.high)
 
 
-def _declared_bounds(declared: Variable, can_type: CanType) -> tuple[float | None, float | None]:
-    """The limits for the EDS: those that do not follow from the type."""
+def _declared_bounds(declared: Variable, item: ObjectPlan) -> tuple[float | None, float | None]:
+    """The limits for the EDS, as raw numbers: those that do not follow from the type."""
     low, high = _accepted(declared)
+    can_type = item.type
+    if item.linear is not None:
+        scale, offset = item.linear
+        low, high = sorted(_even((end - offset) / scale) for end in (low, high))
     least, greatest = (-math.inf, math.inf) if can_type.is_real else can_type.bounds
     if not can_type.is_real:
         low = low if math.isinf(low) else math.ceil(low)
         high = high if math.isinf(high) else math.floor(high)
     return (low if low > least else None), (high if high < greatest else None)
+
+
+def _even(raw: float) -> float:
+    """Without what dividing by a decimal scale leaves: 2.9999999999999996 is 3."""
+    if math.isinf(raw):
+        return raw
+    near = round(raw)
+    return near if abs(raw - near) < 1e-9 * max(1.0, abs(raw)) else raw

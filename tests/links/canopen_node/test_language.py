@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
+
+from gatewayd.links.canopen_node.eds import objects_of
 from gatewayd.links.canopen_node.language import LANGUAGE
+from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.mapping.loader import load
 
 CELL = load(
@@ -45,3 +49,43 @@ def test_one_pdo_writes_what_it_carries() -> None:
     assert LANGUAGE.writes_whole(LINE, CELL.variables[:2], CELL)
     assert not LANGUAGE.writes_whole(LINE, CELL.variables[:3], CELL)
     assert not LANGUAGE.writes_whole(PLC, CELL.variables[:2], CELL)
+
+
+SCALED = """\
+gatewayd: 1
+cell: press-3
+robot: {host: 127.0.0.9}
+canopen: {channel: c, bitrate: 500000, node: 16}
+writers: {line: {canopen: any, node: 1, heartbeat: 1s}}
+variables:
+  speed:
+    {robot: input_double_register_0, canopen: {type: INTEGER16, scale: 0.1, offset: 5}, limits: [5, 5.3], owner: line}
+  force: {robot: output_double_register_0, canopen: {type: INTEGER16, scale: 0.01}}
+"""
+
+
+def test_a_scaled_variable_is_an_integer_on_the_bus_and_a_real_in_the_cell() -> None:
+    loaded = load(SCALED.encode(), "a.yaml")
+    assert loaded.plan is not None, loaded.diagnostics
+    node = loaded.plan.the(CanopenPlan)
+    assert [placed.type_text for placed in node.objects] == ["INTEGER16 * 0.1 + 5", "INTEGER16 * 0.01"]
+    entry = objects_of(node, loaded.plan.cell).entry(node.objects[0].index, 1)
+    assert (entry.low, entry.high) == (0, 3), "the limits, as raw numbers"
+
+
+@pytest.mark.parametrize(
+    "old, new, rule",
+    [
+        ("scale: 0.01", "scale: 0", "GW438"),
+        ("type: INTEGER16, scale: 0.01", "type: INTEGER16", "GW413"),
+        ("type: INTEGER16, scale: 0.01", "type: BOOLEAN, scale: 0.01", "GW413"),
+        ("robot: output_double_register_0, canopen: {type: INTEGER16, scale: 0.01}",
+         "robot: output_bit_register_0, canopen: {scale: 2}", "GW438"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_scaled_is_refused(old: str, new: str, rule: str) -> None:
+    loaded = load(SCALED.replace(old, new).encode(), "a.yaml")
+    assert loaded.plan is None
+    assert [finding.rule.id for finding in loaded.diagnostics if finding.rule.severity.name == "ERROR"] == [
+        rule
+    ]

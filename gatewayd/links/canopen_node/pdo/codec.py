@@ -4,8 +4,9 @@ Entries follow each other bit by bit, least significant bit of the first byte fi
 7.3.2 and 7.1.1). Only BOOLEANs may lie off a byte boundary, so a mapping is a row of numbers and of runs of bits:
 numbers go through one `struct`, each run of bits through one integer.
 
-A value that the type cannot hold becomes the nearest one that it can (`fit`): integers saturate, halves round to even,
-NaN becomes 0 in an integer, and a real beyond REAL32 becomes infinite.
+A scaled variable goes as raw number: value = raw * scale + offset, as in a register. A number that the type cannot
+hold becomes the nearest one that it can (`fit`): integers saturate, halves round to even, NaN becomes 0 in an integer,
+and a real beyond REAL32 becomes infinite.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, groupby
@@ -23,7 +25,8 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.admission import Change, contradiction
 from gatewayd.core.definition import Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
-from gatewayd.encoding.limits import LimitReader, ends_of, read_limits
+from gatewayd.encoding.limits import LimitReader, Meaning, ends_of, read_limits
+from gatewayd.encoding.linear import meaning_of, saturated, whole
 
 MAX_BITS: Final = 64
 """What one CAN frame carries."""
@@ -44,6 +47,8 @@ class Mapped:
     type: CanType
     offset: int | None = None
     """Where the status block has it."""
+    linear: tuple[float, float] | None = None
+    """Scale and offset of the variable; None: its values go as they are."""
 
     @property
     def is_dummy(self) -> bool:
@@ -51,16 +56,15 @@ class Mapped:
         return self.variable is None and self.offset is None
 
 
-def fit(value: Value, can_type: CanType) -> Value:
-    """The nearest value that `can_type` (a number or BOOLEAN) can hold; see the module's docstring."""
+def fit(value: Value, can_type: CanType, linear: tuple[float, float] | None = None) -> Value:
+    """The raw number of a value, or the nearest one that `can_type` can hold; see the module's docstring."""
+    if linear is not None:
+        value = (value - linear[1]) / linear[0]
     if can_type is CanType.BOOLEAN:
         return bool(value)
     if can_type.is_real:
         return _fit_real(value, can_type)
-    if math.isnan(value):
-        return 0
-    low, high = can_type.bounds
-    return low if value <= low else high if value >= high else round(value)
+    return saturated(value, *can_type.bounds)
 
 
 def _fit_real(value: Value, can_type: CanType) -> float:
@@ -77,16 +81,23 @@ def native(raw: Value, kind: ValueKind) -> Value | None:
         return bool(raw)
     if kind is ValueKind.FLOAT:
         return float(raw)
-    return round(raw) if math.isfinite(raw) else None
+    return whole(raw)
 
 
-def limits_of(declared: Variable, can_type: CanType) -> LimitReader | None:
-    """What reads received numbers, so that the one nearest to a limit is the limit; None where `native` does alone."""
+def meaning(kind: ValueKind, linear: tuple[float, float] | None) -> Meaning:
+    """What received numbers are as values of a variable of `kind`."""
+    return partial(native, kind=kind) if linear is None else meaning_of(kind, *linear)
+
+
+def limits_of(
+    declared: Variable, can_type: CanType, linear: tuple[float, float] | None = None
+) -> LimitReader | None:
+    """What reads received numbers, so that the one nearest to a limit is the limit; None where `meaning` does alone."""
     limits = (declared.limits.low, declared.limits.high) if declared.limits is not None else None
     ends = ends_of(declared.kind, limits, declared.low, declared.high)
     if can_type is CanType.BOOLEAN:
         return None
-    return read_limits(ends, can_type.char, lambda raw: native(raw, declared.kind))
+    return read_limits(ends, can_type.char, meaning(declared.kind, linear), *(linear or (1.0, 0.0)))
 
 
 def is_aligned(types: Iterable[CanType]) -> bool:
@@ -128,6 +139,7 @@ class Layout:
         self._unpack = compiled.unpack
         self._runs = tuple(_slices(runs)) if any(run.size for run in runs) else None
         self._receivers = tuple(run.receiver(variables) for run in runs if run.values)
+        self._is_scaled = any(entry.linear is not None for entry in mapping)
         self._is_repeated = len(set(self.variables)) < len(self.variables)
 
     @property
@@ -151,12 +163,12 @@ class Layout:
 
     def pack(self, content: Sequence[Value]) -> bytes:
         """The PDO's bytes for what `gather` returned."""
-        try:
-            return self._packed(content)
-        except (struct.error, OverflowError, ValueError, TypeError):
-            return self._packed(
-                [fit(value, entry.type) for value, entry in zip(content, self.content, strict=True)]
-            )
+        if not self._is_scaled:
+            with suppress(struct.error, OverflowError, ValueError, TypeError):
+                return self._packed(content)
+        return self._packed(
+            [fit(value, entry.type, entry.linear) for value, entry in zip(content, self.content, strict=True)]
+        )
 
     def changes(self, data: bytes) -> list[Change] | Refusal:
         """What `size` bytes mean for the cell. Every bit is meant: who maps it into an RPDO sends it on purpose.
@@ -219,7 +231,7 @@ class _Run:
         if self.size:
             return _bit_receiver(members, variables)
         if members:
-            return _number_receiver(members[0], self.mapped[0].type, variables[members[0]])
+            return _number_receiver(members[0], self.mapped[0], variables[members[0]])
         return lambda _raw, _changes: None  # a word of the status block, which is only sent
 
 
@@ -244,10 +256,11 @@ Receive = Callable[[Any, list[Change]], Refusal | None]
 """Appends what an item of the unpacked PDO means to the changes, or returns why not."""
 
 
-def _number_receiver(variable: int, can_type: CanType, declared: Variable) -> Receive:
-    kind, reader = declared.kind, limits_of(declared, can_type)
-    is_direct = kind is (ValueKind.FLOAT if can_type.is_real else ValueKind.INT)
-    read = reader.read if reader is not None else partial(native, kind=kind)
+def _number_receiver(variable: int, mapped: Mapped, declared: Variable) -> Receive:
+    can_type, linear = mapped.type, mapped.linear
+    kind, reader = declared.kind, limits_of(declared, can_type, linear)
+    is_direct = linear is None and kind is (ValueKind.FLOAT if can_type.is_real else ValueKind.INT)
+    read = reader.read if reader is not None else meaning(kind, linear)
     # Without limits to mind every number is between these; only infinities and NaN are read to come out the same.
     below, above = (reader.below, reader.above) if reader is not None else (-math.inf, math.inf)
 

@@ -330,7 +330,7 @@ class PdoTable:
     ) -> None:
         around = _Surroundings(
             objects={
-                (placed.index, placed.subindex): Mapped(placed.variable, placed.type)
+                (placed.index, placed.subindex): Mapped(placed.variable, placed.type, linear=placed.linear)
                 for placed in plan.objects
             },
             variables=variables,

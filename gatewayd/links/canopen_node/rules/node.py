@@ -1,4 +1,4 @@
-"""Rules GW401, GW413 to GW415, GW420 to GW425, GW432, GW435, GW437: the node, number types, who writes by CANopen."""
+"""Rules GW401, GW413 to GW415, GW420 to GW425, GW432, GW435, GW437, GW438: node, number types, writers by CANopen."""
 
 from __future__ import annotations
 
@@ -7,7 +7,15 @@ from collections.abc import Iterator
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Direction, ValueKind
 from gatewayd.links.canopen_node.bus_load import BIT_RATES, FIRST_EVENT_TYPE
-from gatewayd.links.canopen_node.expand import CanopenCell, MappedObject, place_of
+from gatewayd.links.canopen_node.expand import (
+    CanopenCell,
+    MappedObject,
+    linear_of,
+    place_of,
+    reach_of,
+    scale_problem,
+)
+from gatewayd.links.canopen_node.plan import ObjectPlan
 from gatewayd.links.canopen_node.rules.registry import first_at_each_place, node_rule
 from gatewayd.links.canopen_node.sections import CanopenPlaces, CanopenWriter
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
@@ -45,16 +53,34 @@ def canopen_type(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[
     """A CANopen type that does not suit the robot's type."""
     for variable, placed in _lines(cell, node):
         place = place_of(variable)
-        if not placed.fits and place is not None:
+        if not placed.fits and place is not None and scale_problem(variable, linear_of(place)) is None:
             message = f"`{variable.part.name}` ({variable.target}, {variable.type}) cannot be {place.type}"
             hint = f"write {_suited(variable)}, or leave `type` out"
             yield rule.at(variable.at("canopen", "type"), message, hint=hint)
 
 
+@node_rule("GW438")
+def canopen_scale(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
+    """A scale that cannot be: 0, or at a bit."""
+    for variable, _ in _lines(cell, node):
+        problem = scale_problem(variable, linear_of(place_of(variable)))
+        if problem is not None:
+            place = variable.at("canopen", "scale")
+            yield rule.at(place, f"`{variable.part.name}` {problem}", hint="leave `scale` and `offset` out")
+
+
+def _shown(plan: ObjectPlan) -> list[float]:
+    """The least and the greatest value that an integer object shows."""
+    scale, offset = plan.linear or (1, 0)
+    return sorted(end * scale + offset for end in plan.type.bounds)
+
+
 def _suited(variable: ExpandedVariable) -> str:
     if variable.kind is ValueKind.BOOL:
         return "BOOLEAN"
-    return "REAL64 or REAL32" if variable.kind is ValueKind.FLOAT else "an INTEGER or UNSIGNED type"
+    if variable.kind is ValueKind.FLOAT:
+        return "REAL64 or REAL32, or an integer type with `scale`"
+    return "an INTEGER or UNSIGNED type"
 
 
 @node_rule("GW437")
@@ -97,11 +123,14 @@ def narrow_canopen_type(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> It
             or placed.plan.type.is_real
         ):
             continue
-        low, high = placed.plan.type.bounds
-        if bounds[0] < low or bounds[1] > high:
+        reach = reach_of(placed.plan.type, placed.plan.linear)
+        if reach.low is None or reach.high is None or placed.plan.type.is_real:
+            continue
+        if bounds[0] < reach.low or bounds[1] > reach.high:
+            low, high = _shown(placed.plan)
             message = (
                 f"`{variable.part.name}` can be {number(bounds[0])} to {number(bounds[1])}, "
-                f"{placed.plan.type.name} shows {low} to {high}"
+                f"{placed.plan.type_text} shows {number(low)} to {number(high)}"
             )
             hint = "use a wider type, or state the range with `limits: [least, greatest]`"
             yield rule.at(_type_place(variable), message, hint=hint)

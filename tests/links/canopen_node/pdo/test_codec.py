@@ -233,3 +233,34 @@ def test_gathers_neighbours_and_others_alike() -> None:
         layout = Layout([Mapped(index, CanType.INTEGER8) for index in order], variables)
         assert list(layout.gather([10, 11, 12, 13])) == [10 + index for index in order]
         assert layout.pack(layout.gather([10, 11, 12, 13])) == bytes(10 + index for index in order)
+
+
+def _scaled(kind: ValueKind, linear: tuple[float, float], limits: Limits | None = None) -> Layout:
+    variable = Variable(1, "speed", Direction.INPUT, kind, "input_double_register_0", limits=limits)
+    plain = Variable(2, "count", Direction.INPUT, ValueKind.INT, "input_int_register_0")
+    mapping = [Mapped(0, CanType.INTEGER16, linear=linear), Mapped(1, CanType.INTEGER16)]
+    return Layout(mapping, [variable, plain])
+
+
+def test_a_scaled_value_goes_as_its_raw_number() -> None:
+    layout = _scaled(ValueKind.FLOAT, (0.1, 5.0))
+    assert layout.pack((7.5, 3)) == struct.pack("<hh", 25, 3)
+    changes = layout.changes(struct.pack("<hh", 25, 3))
+    assert changes == [Change(0, 7.5), Change(1, 3)]
+
+
+@pytest.mark.parametrize("value, raw", [(1e6, 32767), (-1e6, -32768), (math.nan, 0), (5.24, 2), (5.25, 2)])
+def test_a_scaled_value_saturates_and_rounds(value: float, raw: int) -> None:
+    assert _scaled(ValueKind.FLOAT, (0.1, 5.0)).pack((value, 0)) == struct.pack("<hh", raw, 0)
+
+
+def test_the_raw_number_nearest_to_a_limit_is_the_limit() -> None:
+    layout = _scaled(ValueKind.FLOAT, (0.1, 0.0), Limits(-0.3, 0.3))
+    assert layout.changes(struct.pack("<hh", 3, 0)) == [Change(0, 0.3), Change(1, 0)]
+    assert layout.changes(struct.pack("<hh", -3, 0)) == [Change(0, -0.3), Change(1, 0)]
+
+
+def test_whole_numbers_are_scaled_too() -> None:
+    layout = _scaled(ValueKind.INT, (10.0, 0.0))
+    assert layout.pack((120, 0)) == struct.pack("<hh", 12, 0)
+    assert layout.changes(struct.pack("<hh", 12, 0)) == [Change(0, 120), Change(1, 0)]
