@@ -246,14 +246,10 @@ class Node:
         """The writers on this bus that are alive."""
         return self._peers.living()
 
-    def end(self, reason: str, now: float) -> None:
-        """Another node takes its place: its writers are lost, a transfer by SDO is aborted."""
-        self.lose_writers(reason, now)
-        self._answer(self.sdo.abandon())
-
     def lose_writers(self, reason: str, now: float) -> None:
-        """Nobody on this bus is a writer any more."""
+        """Nobody on this bus is a writer any more; a transfer by SDO is aborted."""
         self._peers.lose_all(reason, now)
+        self._answer(self.sdo.abandon())
 
     def receive(self, frame: Frame, now: float) -> None:
         """A frame from the bus."""
@@ -281,7 +277,6 @@ class Node:
         if old.carries and not state.carries:
             self.lose_writers(f"bus {state.name.lower().replace('_', '-')}", now)
             self.receive_pdos.forget()
-            self.sdo.reset()
             self.errors.bus_lost(now)
         elif state.carries and not old.carries and self._started:
             self.errors.bus_back(now)

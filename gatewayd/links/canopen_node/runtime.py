@@ -182,7 +182,7 @@ class CanLink(Link, Observer):
     def release(self, plan: LinkPlan | None, after: CellDefinition, now: float) -> None:
         """Another node takes the place of this one: who wrote by it is lost."""
         if plan is None:
-            self.node.end("the new mapping needs another node", now)
+            self.node.lose_writers("the new mapping needs another node", now)
 
     def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
         """Go on, unnoticed by the bus, with the cell that succeeded the present one."""

@@ -1570,5 +1570,5 @@ def test_a_segmented_transfer_is_aborted_by_a_reload_and_by_the_end_of_the_node(
     _reload(plant)
     assert Frame(0x585, aborted) in plant.take()
     plant.hear(0x605, b"\x40\x08\x10\x00" + bytes(4))
-    plant.node.end("another node", plant.now)
+    plant.node.lose_writers("another node", plant.now)
     assert plant.take() == [Frame(0x585, aborted)]
