@@ -98,7 +98,7 @@ def _cell(cell: Answer, locks: list[Answer]) -> Iterator[str]:
         + f"  {cell['source']}, mapping {cell['fingerprint']}"
         + (f", the gateway stood still {counted(cell['gaps'], 'time')}" if cell["gaps"] else "")
     )
-    yield from _part("robot", _robot(cell["robot"]))
+    yield from _part("robot", _robot(cell["robot"], cell["problems"]))
     for link in cell["links"]:
         if link["name"] != "robot":
             yield from _part(link["name"], [_link(link)])
@@ -126,7 +126,7 @@ def _colour(level: str) -> str | None:
     return None if level == "idle" else LEVEL_COLOURS[Level[level.upper()]]
 
 
-def _robot(robot: Answer) -> list[str]:
+def _robot(robot: Answer, problems: list[str]) -> list[str]:
     from gatewayd.report.format import age
     from gatewayd.report.words import LEVEL_COLOURS, SOURCE_LEVELS, SOURCES, source
 
@@ -138,7 +138,7 @@ def _robot(robot: Answer) -> list[str]:
         if not robot["writable"]:
             first += click.style(", not writable yet", fg="yellow")
     first += f", last package {age(robot['age'])} ago" if robot["age"] is not None else ""
-    return [first, ", ".join(_counts(robot)), *_controller(robot)]
+    return [first, ", ".join(_counts(robot)), *_controller(robot, problems)]
 
 
 def _counts(robot: Answer) -> Iterator[str]:
@@ -166,14 +166,14 @@ def _counts(robot: Answer) -> Iterator[str]:
         yield "watchdog fed" if robot["watchdog"] else click.style("watchdog not fed", fg="red")
 
 
-def _controller(robot: Answer) -> Iterator[str]:
+def _controller(robot: Answer, problems: list[str]) -> Iterator[str]:
     """What is known of the controller itself; a gateway that was started before an upgrade does not say it."""
     from gatewayd.report.format import age
 
     if robot.get("controller") is not None:
         series = f" (series {robot['series']})" if robot["series"] is not None else ""
         yield f"software {robot['controller']}{series}, RTDE protocol {robot['protocol']}"
-    if robot.get("contradiction") is not None:
+    if robot.get("contradiction") is not None and robot["contradiction"] not in problems:
         yield click.style(robot["contradiction"], fg="yellow")
     said = robot.get("last_text")
     if said is not None:

@@ -419,6 +419,8 @@ class Connection(asyncio.Protocol):
     def gap(self) -> None:
         """The process stood still until now: what the controller sent meanwhile is still to be read."""
         self._heard = self._loop.time()
+        if self._pace is not None:
+            self._pace.gap(self._heard)
 
     def _watch(self) -> None:
         self._statistics.progress += 1

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from gatewayd.rtde.strange import StrangeCounts
 
 _LONGEST_GAP = 3600.0
 """Seconds between packages beyond which the timestamp is not believed; a connection does not live so long silent."""
+_EXCUSED = 1.0
+"""Seconds for which what waited while we stood still is read."""
 _PAUSE = 0.1
 _PAUSE_PERIODS = 5.5
 """A controller that skips is too busy for some packages; one that stays away for longer than both of these pauses."""
@@ -51,6 +54,7 @@ class Pace:
         self._window_start = now
         self._window_packages = 0
         self._resumed = False
+        self._excused_until = -math.inf
         self._pause = max(_PAUSE, _PAUSE_PERIODS * period)
         statistics.frequency = 0.0
 
@@ -67,7 +71,7 @@ class Pace:
         if not 0.0 <= elapsed <= _LONGEST_GAP:
             return False
         resumed, self._resumed = self._resumed, False
-        if elapsed > 1.5 * self._period and not resumed:
+        if elapsed > 1.5 * self._period and not resumed and now > self._excused_until:
             if elapsed > self._pause:
                 statistics.pauses += 1
             else:
@@ -79,6 +83,10 @@ class Pace:
     def resume(self) -> None:
         """The output was paused by us and goes on: nothing is missing before the next package."""
         self._resumed = True
+
+    def gap(self, now: float) -> None:
+        """We stood still until now: not all had room to wait, and what is missing was no fault of the controller."""
+        self._excused_until = now + _EXCUSED
 
     def measure(self, now: float) -> None:
         """Close the present window of the frequency measurement; call every second or so."""

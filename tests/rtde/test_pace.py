@@ -53,6 +53,18 @@ def test_what_was_not_sent_because_we_paused_the_output_is_not_missing(
     assert (statistics.skipped, statistics.pauses) == (2, 0)
 
 
+@pytest.mark.parametrize("gap", [3, 250])
+def test_what_had_no_room_while_we_stood_still_is_not_missing(
+    gap: int, pace: Pace, statistics: Statistics
+) -> None:
+    pace.gap(2.0)
+    for step in (1, 2, 2 + gap):
+        assert pace.package(40.0 + step * 0.008, 2.001)
+    assert (statistics.skipped, statistics.pauses) == (0, 0)
+    assert pace.package(40.0 + (4 + gap) * 0.008, 3.1)
+    assert (statistics.skipped, statistics.pauses) == (1, 0)
+
+
 def test_a_slow_rate_skips_several_packages_before_it_is_a_pause(statistics: Statistics) -> None:
     slow = Pace(0.1, statistics, 0.0)
     for timestamp in (40.0, 40.5, 41.1):
