@@ -37,11 +37,11 @@ def test_kinds_and_ranges_follow_the_robots_type() -> None:
         ("output_int_register_5", "input_int_register_5", True),
         ("target_speed_fraction", "speed_slider_fraction (with its mask)", False),
         ("robot_mode", "input_int_register_0", False),
-        ("input_int_register_3", "", False),
+        ("input_int_register_3", "output_int_register_3", False),
     ],
 )
-def test_counterparts_of_outputs(reference: str, counterpart: str, by_program: bool) -> None:
-    """What would be written in the place of what is read."""
+def test_counterparts(reference: str, counterpart: str, by_program: bool) -> None:
+    """What would be written in the place of what is read, and read in the place of what is written."""
     (variable,) = defined(f"a: {{robot: {reference}}}")
     assert (variable.counterpart, is_program_output(variable)) == (counterpart, by_program)
     field = field_of(variable)
