@@ -106,6 +106,7 @@ def command(
 
 def _check(files: tuple[str, ...], *, separately: bool) -> CheckOutcome:
     from gatewayd.mapping.loader import load, load_together
+    from gatewayd.mapping.remarks import remarks
     from gatewayd.report.findings import CheckOutcome
 
     readable: list[tuple[str, bytes]] = []
@@ -119,7 +120,9 @@ def _check(files: tuple[str, ...], *, separately: bool) -> CheckOutcome:
             unreadable.append(content)
     loaded = tuple(load(data, name) for name, data in readable) if separately else load_together(readable)
     findings = tuple(finding for mapping in loaded for finding in mapping.diagnostics)
-    return CheckOutcome(tuple(name for name, _ in readable), findings, tuple(unreadable))
+    sound = [mapping for mapping in loaded if mapping.plan is not None]
+    said = tuple((mapping.name, remark) for mapping in sound for remark in remarks(mapping.cell))
+    return CheckOutcome(tuple(name for name, _ in readable), findings, tuple(unreadable), said)
 
 
 def _named(files: tuple[str, ...]) -> Iterator[str]:

@@ -21,6 +21,8 @@ class CheckOutcome:
     findings: tuple[Diagnostic, ...]
     """By file, line and column."""
     unreadable: tuple[Unreadable, ...] = ()
+    remarks: tuple[tuple[str, str], ...] = ()
+    """File, and what its conversions do to numbers, as declared."""
 
     @property
     def errors(self) -> int:
@@ -41,12 +43,13 @@ def as_text(outcome: CheckOutcome, *, colour: bool = False) -> str:
     lines.extend(printable(f"{item.name}: cannot be read: {item.reason}") for item in outcome.unreadable)
     if lines:
         lines.append("")
+    lines.extend(printable(f"{name}: {remark}") for name, remark in outcome.remarks)
     lines.append(_summary(outcome))
     return "\n".join(lines) + "\n"
 
 
 def as_json(outcome: CheckOutcome) -> str:
-    """One JSON document: `version`, `files`, `errors`, `warnings`, `findings`, `unreadable`.
+    """One JSON document: `version`, `files`, `errors`, `warnings`, `findings`, `unreadable`, `remarks`.
 
     A finding has `rule`, `slug`, `family`, `severity`, `file`, `line`, `column`, `message`, `hint` (or null)
     and `related`, a list of `file`, `line`, `column`, `message`. Keys are only ever added within a version.
@@ -58,6 +61,7 @@ def as_json(outcome: CheckOutcome) -> str:
         "warnings": outcome.warnings,
         "findings": [_as_object(finding) for finding in outcome.findings],
         "unreadable": [{"file": item.name, "reason": item.reason} for item in outcome.unreadable],
+        "remarks": [{"file": name, "remark": remark} for name, remark in outcome.remarks],
     }
     return json_document(document)
 

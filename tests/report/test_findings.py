@@ -63,9 +63,16 @@ def test_text_escapes_control_characters() -> None:
     assert line == r"a.yaml:1:1: warning GW217 open-listener: `\x1b[2J\udc80`"
 
 
+def test_remarks_stand_before_the_summary() -> None:
+    """They are no findings, and change no exit code."""
+    outcome = CheckOutcome(("a.yaml",), (), remarks=(("a.yaml", "NaN reaches the robot"),))
+    assert as_text(outcome) == "a.yaml: NaN reaches the robot\n1 file checked: no findings\n"
+
+
 def test_json_is_complete() -> None:
     """The JSON form holds everything that the text form shows."""
-    document = json.loads(as_json(CheckOutcome(("a.yaml",), (_error(),), (Unreadable("c", "gone"),))))
+    remarks = (("a.yaml", "NaN reaches the robot"),)
+    document = json.loads(as_json(CheckOutcome(("a.yaml",), (_error(),), (Unreadable("c", "gone"),), remarks)))
     assert document == {
         "version": 1,
         "files": ["a.yaml"],
@@ -86,6 +93,7 @@ def test_json_is_complete() -> None:
             },
         ],
         "unreadable": [{"file": "c", "reason": "gone"}],
+        "remarks": [{"file": "a.yaml", "remark": "NaN reaches the robot"}],
     }
 
 
