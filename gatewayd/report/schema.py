@@ -210,6 +210,15 @@ class AuditRecord(TypedDict):
     bad: NotRequired[Annotated[bool, "somebody should look at it; not in the file either"]]
 
 
+def taken_names(*, has_places: bool) -> frozenset[str]:
+    """Names that no link may have: its object stands beside these fields of a cell.
+
+    `has_places`: there is one beside those of each variable, too.
+    """
+    found = (CellStatus, VariableDeclaration, VariableStatus) if has_places else (CellStatus,)
+    return frozenset(name for fields in found for name in _meanings(fields))
+
+
 def documented() -> dict[str, Mapping[str, str]]:
     """Every object that the control interface answers, by name: its fields and what they mean."""
     return {

@@ -25,7 +25,7 @@ from gatewayd.report.diff import Changes, as_text, compare
 from gatewayd.service.compilation import Compilation, CompilationError
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.objections import objections_of_change, objections_of_removal
-from gatewayd.service.startup import log_findings, mapping_files
+from gatewayd.service.startup import log_findings, mapping_files, misnamed
 
 SETTLING_TIME = 0.5
 """Seconds for which a swap waits for a link that is about to know more, a robot's that has just claimed registers."""
@@ -285,6 +285,8 @@ def _reasons(compiled: Compiled) -> Iterator[str]:
         yield f"{unread.name} cannot be read: {unread.reason}"
     for file in compiled.files:
         yield from map(_line, file.errors)
+    for source, reason in misnamed(compiled.plans):
+        yield f"{source}: {reason}"
 
 
 def _line(finding: Diagnostic) -> str:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gatewayd.links.registry import kind_of
 from gatewayd.logs.records import fields
 from gatewayd.mapping.compiled import PATTERNS, CompiledFile, files_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.plan import Plan
+from gatewayd.report.schema import taken_names
 from gatewayd.service.compilation import Compilation
 
 log = logging.getLogger("gatewayd.startup")
@@ -72,11 +74,30 @@ def load_plans(
     for unread in compiled.unreadable:
         log.error("cannot read the mapping file", extra=fields(file=unread.name, reason=unread.reason))
     log_findings(compiled.files)
+    wrong = dict(misnamed(compiled.plans))
+    for plan, reason in wrong.items():
+        log.error("cannot serve the cell", extra=fields(file=plan, reason=reason))
     broken = [file for file in compiled.files if file.plan is None]
     for file in broken:
         remedy = f"gatewayd check {file.name}"
         log.error("the cell is not served", extra=fields(file=file.name, remedy=remedy))
-    return Startup(compiled.plans, len(compiled.unreadable), len(broken))
+    plans = tuple(plan for plan in compiled.plans if plan.source not in wrong)
+    return Startup(plans, len(compiled.unreadable), len(broken) + len(wrong))
+
+
+def misnamed(plans: Iterable[Plan]) -> Iterator[tuple[str, str]]:
+    """Mapping files with a link whose name stands for something else in what the gateway says of a cell, and why."""
+    for plan in plans:
+        names = [
+            name
+            for name, link in plan.links.items()
+            if name in taken_names(has_places=bool(kind_of(link.kind).place))
+        ]
+        if names:
+            yield (
+                plan.source,
+                f"a link cannot be called {', '.join(names)}: a field of the status has this name",
+            )
 
 
 def log_findings(files: Iterable[CompiledFile]) -> None:

@@ -20,6 +20,7 @@ from gatewayd.core.status_layout import (
     StatusField,
     StatusTable,
 )
+from gatewayd.core.succession import succeed
 
 PLC, HMI, AUX = range(3)
 START, LAMP, PART, FORCE, SPEED, PATH, CYCLES = range(7)
@@ -159,6 +160,14 @@ def test_a_lock_is_taken_and_given_back_by_the_number_of_its_variable(status: St
     assert status.write(Requester(HMI), REQUEST, [0, PATH + 1], 1.0) is None
     assert words(status, "owner", 1.0, 6)[4:] == (0, 0)
     assert words(status, "request", 1.0, 2) == (0, 0)
+
+
+def test_requests_by_number_are_counted_and_a_release_of_all_is_none(cell: Cell, status: StatusBlock) -> None:
+    """A reload that gives the numbers to others has to know whether anybody uses them."""
+    assert status.write(Requester(HMI), RELEASE, [RELEASE_ALL], 1.0) is None
+    assert cell.health.lock_requests == 0
+    assert status.write(Requester(HMI), REQUEST, [PART + 1], 1.0) is None
+    assert succeed(cell, cell.definition, 2.0).cell.health.lock_requests == 1
 
 
 def test_release_all_gives_back_what_is_mine(cell: Cell, status: StatusBlock) -> None:

@@ -18,6 +18,7 @@ from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
+from gatewayd.core.objection import ObjectionKind
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.listener import ModbusListener
 from gatewayd.links.modbus_server.listeners import Listeners
@@ -180,6 +181,16 @@ async def read(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, addre
     head = await asyncio.wait_for(reader.readexactly(7), 5)
     body = await asyncio.wait_for(reader.readexactly(struct.unpack(">HHHB", head)[2] - 1), 5)
     return body[2:] if body[0] == 3 else body
+
+
+async def write(
+    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, address: int, value: int
+) -> bytes:
+    """Function 16 with an int32: the function code, or that and the exception."""
+    writer.write(struct.pack(">HHHBBHHBi", 7, 0, 11, 1, 16, address, 2, 4, value))
+    head = await asyncio.wait_for(reader.readexactly(7), 5)
+    body = await asyncio.wait_for(reader.readexactly(struct.unpack(">HHHB", head)[2] - 1), 5)
+    return body[:1] if body[0] == 16 else body
 
 
 async def test_nothing_changed_touches_nothing(rigged: Rigged) -> None:
@@ -404,6 +415,59 @@ async def test_a_writer_whose_peers_change_is_another_one(rigged: Rigged) -> Non
         assert rig.owners() == {}
         assert rig.cell.writers.alive == [False, False]
         await until(lambda: rig.robot.get("input_int_register_0") == 0)
+        writer.close()
+
+
+@pytest.mark.parametrize("early", [True, False])
+@pytest.mark.parametrize("grace", ["", ", grace: 5s"])
+async def test_what_a_writer_owned_is_not_handed_to_its_new_address_whoever_connected_first(
+    rigged: Rigged, early: bool, grace: str
+) -> None:
+    """The new station was connected before the old one, or after it: it owns nothing in either case."""
+    async with rigged() as rig:
+        path = rig.directory / "press.yaml"
+        path.write_text(
+            path.read_text().replace("plc: {modbus: 127.0.0.1}", f"plc: {{modbus: 127.0.0.1{grace}}}")
+        )
+        assert (await rig.reloader.reload(force=True)).result.is_good
+        wires = {}
+        for host in ("127.0.0.7", "127.0.0.1") if early else ("127.0.0.1", "127.0.0.7"):
+            wires[host] = await asyncio.open_connection("127.0.0.1", rig.port, local_addr=(host, 0))
+            await until(lambda: listeners(rig.daemon)[0].connections == len(wires))
+        assert await write(*wires["127.0.0.1"], 1, 42) == b"\x10"
+        assert await write(*wires["127.0.0.7"], 1, 43) == b"\x90\x02"
+        path.write_text(path.read_text().replace("plc: {modbus: 127.0.0.1", "plc: {modbus: 127.0.0.7"))
+        assert (await rig.reloader.reload()).kinds == (ObjectionKind.RELEASE,)
+        assert rig.owners() == {"number": "plc"}
+        assert (await rig.reloader.reload(accept=[ObjectionKind.RELEASE])).result is Result.APPLIED
+        assert rig.owners() == {}
+        assert rig.cell.writers.connections == [1, 0]
+        await until(lambda: rig.robot.get("input_int_register_0") == 0)
+        assert await write(*wires["127.0.0.1"], 1, 44) == b"\x90\x02"
+        assert await write(*wires["127.0.0.7"], 1, 45) == b"\x10"
+        assert rig.owners() == {"number": "plc"}
+        for _reader, writer in wires.values():
+            writer.close()
+
+
+async def test_a_shorter_idle_time_out_and_time_out_take_nothing_from_who_was_silent_for_longer(
+    rigged: Rigged,
+) -> None:
+    async with rigged() as rig:
+        reader, writer = await asyncio.open_connection("127.0.0.1", rig.port)
+        assert await write(reader, writer, 1, 42) == b"\x10"
+        await asyncio.sleep(0.3)  # silence is what this is about
+        path = rig.directory / "press.yaml"
+        short = path.read_text().replace(
+            "plc: {modbus: 127.0.0.1}", "plc: {modbus: 127.0.0.1, timeout: 250ms}"
+        )
+        path.write_text(short.replace("modbus: {listen", "modbus: {idle_timeout: 250ms, listen"))
+        outcome = await rig.reloader.reload()
+        assert (outcome.result, outcome.kinds) == (Result.APPLIED, ()), outcome.text
+        rig.cell.tick(time.monotonic())
+        assert rig.owners() == {"number": "plc"}
+        await until(lambda: rig.owners() == {})
+        assert rig.happened(EventKind.WRITER_LOST) == 1
         writer.close()
 
 

@@ -308,6 +308,8 @@ ROWS: dict[str, list[Row]] = {
         row("variables.level.canopen", "auto"),
         Row("variables.*.canopen", BY_SDO, "release", PLC, {"writers.line.canopen": "any"}),
         Row("variables.*.canopen.pdo", BY_SDO, "release", PLC, {"writers.line.canopen": "any"}),
+        row("variables.speed.canopen.scale", 2, "release", PLC),
+        row("variables.speed.canopen.offset", 2, "release", PLC),
         row("variables.speed.canopen.type", "INTEGER16", "release", PLC),
         row("variables.speed.owner", ["line", "plc"], "owned weakening"),
         Row("variables.*.owner", BY_MODBUS, "release weakening", PLC),

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from gatewayd.service.startup import load_plans, mapping_files
+from gatewayd.mapping.worker import compile_files
+from gatewayd.service import startup
+from gatewayd.service.startup import load_plans, mapping_files, misnamed
 
 GOOD = """\
 gatewayd: 1
@@ -97,3 +100,17 @@ def test_a_directory_named_like_a_mapping(tmp_path: Path) -> None:
     write(tmp_path / "cells" / "good.yaml")
     found = load_plans([tmp_path / "cells"])
     assert (len(found.plans), found.unreadable) == (1, 1)
+
+
+def test_a_link_has_no_name_that_the_status_has_for_something_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """No section has such a name; the instances of a kind will have names of their own."""
+    plan = compile_files([str(write(tmp_path / "one.yaml"))]).plans[0]
+    for name, wrong in (("writers", True), ("quality", True), ("lines", False)):
+        renamed = replace(plan, links={**plan.links, name: plan.links["modbus"]})
+        assert bool(list(misnamed([renamed]))) is wrong
+    monkeypatch.setattr(startup, "misnamed", lambda plans: ((each.source, "why") for each in plans))
+    found = load_plans([tmp_path])
+    assert (found.plans, found.broken) == ((), 1)
+    assert "cannot serve the cell" in texts(caplog)
