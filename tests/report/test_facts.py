@@ -79,6 +79,7 @@ OF_LINKS: dict[str, Any] = {
     "watchdog": None,
     "sync": SyncPlan(producer=True),
     "identity": IdentityPlan(product=5),
+    "guarded": (Consumer(0, 300, 0),),
     "rpdo_writer": 0,
     "sdo_writer": 0,
     "robot_away": ExceptionCode.BUSY,

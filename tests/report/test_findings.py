@@ -72,7 +72,9 @@ def test_remarks_stand_before_the_summary() -> None:
 def test_json_is_complete() -> None:
     """The JSON form holds everything that the text form shows."""
     remarks = (("a.yaml", "NaN reaches the robot"),)
-    document = json.loads(as_json(CheckOutcome(("a.yaml",), (_error(),), (Unreadable("c", "gone"),), remarks)))
+    document = json.loads(
+        as_json(CheckOutcome(("a.yaml",), (_error(),), (Unreadable("c", "gone"),), remarks))
+    )
     assert document == {
         "version": 1,
         "files": ["a.yaml"],

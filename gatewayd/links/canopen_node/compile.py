@@ -5,7 +5,7 @@ from __future__ import annotations
 from gatewayd.canopen.heartbeat import Consumer
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.links.canopen_node.expand import CanopenCell, ExpandedPdo
-from gatewayd.links.canopen_node.plan import CanopenPlan, IdentityPlan, PdoEntry, PdoPlan
+from gatewayd.links.canopen_node.plan import GUARDING, CanopenPlan, IdentityPlan, PdoEntry, PdoPlan
 from gatewayd.links.canopen_node.sections import ERROR_BEHAVIOURS, CanopenWriter
 from gatewayd.mapping.expanded import ExpandedCell
 
@@ -37,6 +37,11 @@ def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
         pdos=tuple(_pdo(pdo) for pdo in node.pdos),
         rpdo_writer=next((index for index, writer in enumerate(writers) if writer.by_rpdo), None),
         sdo_writer=next((index for index, writer in enumerate(writers) if writer.by_sdo), None),
+        guarded=tuple(
+            Consumer(GUARDING, _ticks(writer.guarding, 1000), index)
+            for index, writer in enumerate(writers)
+            if writer.guarding is not None
+        ),
         guard_time=_ticks(spec.guarding.time, 1000),
         life_time_factor=spec.guarding.factor if spec.guarding.time is not None else 0,
         emcy_inhibit=_ticks(spec.emcy.inhibit, 10_000),

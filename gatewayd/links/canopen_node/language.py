@@ -39,7 +39,7 @@ _SDO: Final = "SDO"
 
 
 class CanopenLanguage(LinkLanguage):
-    """Section `canopen`, the key `canopen` of variables, and `canopen`, `node` and `heartbeat` of writers."""
+    """Section `canopen`, the key `canopen` of variables; `canopen`, `node`, `heartbeat`, `guarding` of writers."""
 
     key = KIND.key
     section = Canopen
@@ -96,11 +96,14 @@ class CanopenLanguage(LinkLanguage):
         if spec.canopen is None:
             return ()
         services = "RPDO and SDO" if spec.canopen == "any" else spec.canopen.upper()
+        if spec.guarding is not None:
+            services += ", guarding"
         return (services if spec.node is None else f"{services}, heartbeat of node {spec.node}",)
 
     def silence(self, writer: WriterSpec) -> float | None:
-        """Its heartbeat time."""
-        return writer.by(CanopenWriter).heartbeat
+        """Its heartbeat time, or that of its guarding."""
+        spec = writer.by(CanopenWriter)
+        return min((time for time in (spec.heartbeat, spec.guarding) if time is not None), default=None)
 
     def ways_of_writer(self, writer: WriterSpec) -> frozenset[str]:
         """RPDO, SDO, or both."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
-from typing import Protocol
 
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.clock import TimeConsumer
@@ -30,12 +29,12 @@ from gatewayd.core.definition import Direction
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 from gatewayd.links.canopen_node.communication_errors import CommunicationErrors
-from gatewayd.links.canopen_node.observer import NodeCounters, Observer
+from gatewayd.links.canopen_node.observer import NodeCounters, Observer, Timed
 from gatewayd.links.canopen_node.pdo.parameters import Configuration, PdoTable
 from gatewayd.links.canopen_node.pdo.receive import ReceiveEngine
 from gatewayd.links.canopen_node.pdo.transmit import TransmitEngine
 from gatewayd.links.canopen_node.peers import Peers
-from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.canopen_node.plan import GUARDING, CanopenPlan
 from gatewayd.links.canopen_node.promise import Promises
 from gatewayd.links.canopen_node.robot_errors import RobotErrors
 from gatewayd.links.canopen_node.status_objects import StatusObjects
@@ -46,12 +45,6 @@ from gatewayd.links.canopen_node.variables import VariableObjects
 from gatewayd.links.registry import status_fields
 
 Handler = Callable[[Frame, float], None]
-
-
-class _Timed(Protocol):
-    def tick(self, now: float) -> None: ...
-
-    def next_deadline(self, now: float) -> float: ...
 
 
 class Node:
@@ -122,7 +115,7 @@ class Node:
             changed=self._watch_changed,
         )
         self.promises = Promises(
-            plan.consumers,
+            (*plan.consumers, *plan.guarded),
             also=self.consumer.time,
             broken=partial(self._lose_node, "no heartbeat of node {}"),
             booted=partial(self._lose_node, "node {} has restarted"),
@@ -171,7 +164,7 @@ class Node:
         self.dictionary = Dictionary((*objects, *self._identity_objects()), self._waiting.permit)
         self.parameters.bind(self.dictionary)
         self.sdo = SdoServer(self.dictionary, aborted=self._unserved.sdo)
-        self._timed: tuple[_Timed, ...] = (
+        self._timed: tuple[Timed, ...] = (
             self.sync,
             self.transmit,
             self.receive_pdos,
@@ -329,7 +322,7 @@ class Node:
             if time is not None:
                 routes[time] = (Service.TIME, self.time.receive)
             routes[self.sync.cob_id] = (Service.SYNC, self.sync.receive)
-            for node in self.consumer.nodes | self.promises.nodes:
+            for node in (self.consumer.nodes | self.promises.nodes) - {GUARDING}:
                 routes[Function.ERROR_CONTROL + node] = (Service.ERROR_CONTROL, self._peers.heartbeat)
             routes[Function.ERROR_CONTROL + self.node_id] = (Service.ERROR_CONTROL, self._receive_guarding)
             routes[Function.SDO_REQUEST + self.node_id] = (Service.SDO, self._receive_sdo)
@@ -367,6 +360,8 @@ class Node:
             if self.errors.doubled(now):
                 self._observer.report(f"another node on the bus has the node-ID {self.node_id} too")
             return
+        if not self.producer.enabled:
+            self._peers.guarded(now)
         self.guarding.receive(frame, now, late=self._waiting.seconds > 0)
 
     def _answer(self, answers: Iterable[bytes]) -> None:
@@ -430,6 +425,8 @@ class Node:
 
     def _lose_node(self, reason: str, node: int, now: float) -> None:
         """Its writers are lost; by the mapping's promise that is no communication error, whoever else is."""
+        if node == GUARDING:
+            reason = "the guarding stays away"
         for writer in self.promises.of(node):
             self._lose(writer, reason.format(node), now)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Protocol
 
 from gatewayd.canopen.nmt import NmtState
 
@@ -28,6 +29,16 @@ class Observer:
 
     def switch_bit_rate(self, bit_rate: int, delay: float, now: float) -> None:
         """An LSS master demands it: be silent for `delay` seconds, switch, be silent for as long again."""
+
+
+class Timed(Protocol):
+    """A service of the node that time moves on."""
+
+    def tick(self, now: float) -> None:
+        """Do what is due."""
+
+    def next_deadline(self, now: float) -> float:
+        """When that is; infinity if time alone brings nothing."""
 
 
 @dataclass(slots=True)

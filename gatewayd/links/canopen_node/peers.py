@@ -15,6 +15,7 @@ from gatewayd.canopen.gap import Waiting
 from gatewayd.canopen.heartbeat import HeartbeatConsumer, Watch
 from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester, new_connection
+from gatewayd.links.canopen_node.plan import GUARDING
 from gatewayd.links.canopen_node.promise import Promise, Promises
 
 
@@ -80,9 +81,16 @@ class Peers:
     def heartbeat(self, frame: Frame, now: float) -> None:
         """A watched node's heartbeat: its writers still live. It makes no writer of one who wrote nothing."""
         self._watch.receive(frame, now)
-        if not self._promises.receive(frame, now):
-            return
-        for writer in self._promises.of(frame.can_id - Function.ERROR_CONTROL):
+        if self._promises.receive(frame, now):
+            self._seen(frame.can_id - Function.ERROR_CONTROL, now)
+
+    def guarded(self, now: float) -> None:
+        """The master that guards this node asks it: so does a heartbeat."""
+        self._promises.heard(GUARDING, now)
+        self._seen(GUARDING, now)
+
+    def _seen(self, node: int, now: float) -> None:
+        for writer in self._promises.of(node):
             if writer in self._alive:
                 self._cell.writer_seen(self._requesters[writer], now)
 

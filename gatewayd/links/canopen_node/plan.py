@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.heartbeat import Consumer
@@ -15,6 +15,9 @@ from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.mapping.plan import LinkPlan, Plan
 from gatewayd.report.wording import number
+
+GUARDING: Final = 0
+"""Stands for the master that guards this node, which has no node-ID."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +125,8 @@ class CanopenPlan(LinkPlan):
     sdo_writer: int | None
     """The writer that SDO clients are; None: variables are read-only by SDO."""
     identity: IdentityPlan = IdentityPlan()
+    guarded: tuple[Consumer, ...] = ()
+    """Writers that promise to guard this node, and after how long they are missed; the node is `GUARDING`."""
     guard_time: int = 0
     """Milliseconds between two requests of a guarding master (100Ch); 0: not supervised."""
     life_time_factor: int = 0

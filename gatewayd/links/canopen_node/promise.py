@@ -4,7 +4,8 @@ It stands apart from the supervision by CiA 301 (`gatewayd.canopen.heartbeat`), 
 and leads to EMCY 8130h and 1029h. What a writer promised begins to bind it with its first write or lock request, and
 its breach costs the writer its locks, and its requests are refused until its heartbeat is back. A read begins nothing.
 
-1016h can be written from the bus. It can make the time shorter, but neither longer nor endless.
+1016h can be written from the bus. It can make the time shorter, but neither longer nor endless. A writer that promises
+to guard this node (`writers.*.guarding`) is held to it alike; its requests take the place of heartbeats.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.gap import spared
 from gatewayd.canopen.heartbeat import Consumer
 from gatewayd.canopen.nmt import NmtState
+from gatewayd.links.canopen_node.plan import GUARDING
 
 
 class Promise(Enum):
@@ -134,6 +136,12 @@ class Promises:
             self._booted(found.node, now)
         return not boots
 
+    def heard(self, node: int, now: float) -> None:
+        """Another sign of life than a heartbeat: what guards this node asks it."""
+        found = self._nodes.get(node)
+        if found is not None:
+            self._see(found, Sign.HEARTBEAT, now)
+
     def restart(self) -> None:
         """NMT reset: what was promised binds from the next write on."""
         for found in self._nodes.values():
@@ -155,7 +163,7 @@ class Promises:
         weaker = frozenset(
             (node, self._also(node))
             for node, found in self._nodes.items()
-            if self._also(node) > found.timeout
+            if node != GUARDING and self._also(node) > found.timeout
         )
         news, self._weaker = weaker - self._weaker, weaker
         return [self._comparison(self._nodes[node], time, names) for node, time in sorted(news)]

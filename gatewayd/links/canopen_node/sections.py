@@ -266,6 +266,12 @@ class CanopenWriter(Section):
         "and writes nothing by CANopen until it is heard",
     )
 
+    guarding: MillisecondTime = Field(
+        default=None,
+        description="time without a guarding request (remote frame to this node), from the writer's first sign on, "
+        "after which it is lost; for masters without a heartbeat, with `canopen: heartbeat: none`",
+    )
+
     @property
     def by_rpdo(self) -> bool:
         """Whether RPDOs are this writer's."""

@@ -31,6 +31,7 @@ from gatewayd.links.canopen_node.continuity import goes_on
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
 from gatewayd.links.canopen_node.plan import (
+    GUARDING,
     CanopenPlan,
     IdentityPlan,
     ObjectPlan,
@@ -1572,3 +1573,42 @@ def test_a_segmented_transfer_is_aborted_by_a_reload_and_by_the_end_of_the_node(
     plant.hear(0x605, b"\x40\x08\x10\x00" + bytes(4))
     plant.node.lose_writers("another node", plant.now)
     assert plant.take() == [Frame(0x585, aborted)]
+
+
+# -- a guarding master that is a writer -------------------------------------------------------------------------------
+
+GUARDED = replace(PLAN, heartbeat=0, consumers=(), guarded=(Consumer(GUARDING, 300, LINE),))
+
+
+def _guard(plant: Plant) -> list[Frame]:
+    plant.node.receive(Frame(0x705, remote=True, length=1), plant.now)
+    return plant.take()
+
+
+def test_a_writer_that_promised_to_guard_the_node_is_lost_without_it_and_refused_until_it_is_back() -> None:
+    plant = Plant(GUARDED).operational()
+    plant.part(7)
+    for _ in range(5):
+        plant.run(0.2)
+        assert _guard(plant)
+    assert plant.cell.writers.alive[LINE]
+    plant.run(0.4)
+    assert not plant.cell.writers.alive[LINE]
+    plant.part(8)
+    assert plant.cell.image.values[PART] != 8
+    _guard(plant)
+    plant.part(9)
+    assert plant.cell.image.values[PART] == 9
+
+
+def test_the_promise_of_guarding_binds_from_the_first_write_and_cannot_be_weakened_from_the_bus() -> None:
+    plant = Plant(GUARDED).operational()
+    assert plant.write(0x100C, 0, 60_000, 2) == 0
+    assert plant.write(0x100D, 0, 255, 1) == 0
+    plant.run(5.0)
+    plant.part(7)
+    plant.run(0.2)
+    assert plant.cell.writers.alive[LINE]
+    plant.run(0.2)
+    assert not plant.cell.writers.alive[LINE]
+    assert plant.notebook.reports == []

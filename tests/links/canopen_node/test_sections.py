@@ -182,3 +182,26 @@ def test_what_is_no_number_of_32_bits_is_refused(text: str) -> None:
     _, findings = read(f"canopen: {{channel: can0, bitrate: 500000, node: 16, identity: {{{text}}}}}")
     assert len(findings) == 1
     assert "32 bits" in f"{findings[0].message} {findings[0].hint}"
+
+
+GUARDED = """\
+gatewayd: 1
+cell: c
+robot: {host: 127.0.0.9}
+canopen: {channel: can0, bitrate: 500000, node: 16, heartbeat: %s}
+writers: {old: {canopen: rpdo, guarding: 300ms}}
+variables: {a: {robot: input_int_register_0, canopen: auto, owner: old}}
+"""
+
+
+def test_guarding_supervises_a_writer() -> None:
+    loaded = load((GUARDED % "none").encode(), "f")
+    assert loaded.plan is not None
+    assert loaded.diagnostics == (), "no GW521: it is supervised"
+    (guarded,) = loaded.plan.the(CanopenPlan).guarded
+    assert (guarded.timeout, guarded.writer) == (300, 0)
+
+
+def test_a_node_with_a_heartbeat_cannot_be_guarded() -> None:
+    loaded = load((GUARDED % "500ms").encode(), "f")
+    assert [finding.rule.id for finding in loaded.diagnostics] == ["GW437"]

@@ -91,6 +91,11 @@ def guarding_beside_heartbeat(rule: Rule, cell: ExpandedCell, node: CanopenCell)
         yield rule.at(
             node.part.key_at("guarding"), message, hint="write `heartbeat: none`, or remove `guarding`"
         )
+    for writer, spec in _writers(cell):
+        if spec.guarding is not None and node.part.spec.heartbeat is not None:
+            message = f"`{writer.name}` promises to guard a node that produces a heartbeat, which answers no guarding"
+            hint = "write `canopen: {heartbeat: none}`, or `node` and `heartbeat` in place of `guarding`"
+            yield rule.at(writer.key_at("guarding"), message, hint=hint)
 
 
 @node_rule("GW414", Severity.WARNING)
@@ -253,14 +258,14 @@ def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 def half_supervision(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A watched heartbeat without a node, a time, or CANopen."""
     for writer, spec in _writers(cell):
-        given = [key for key in ("node", "heartbeat") if getattr(spec, key) is not None]
+        given = [key for key in ("node", "heartbeat", "guarding") if getattr(spec, key) is not None]
         if not given:
             continue
         if spec.canopen is None:
             message = f"the writer `{writer.name}` has `{given[0]}`, but does not write by CANopen"
             hint = f"add `canopen: rpdo`, or remove `{given[0]}`"
             yield rule.at(writer.key_at(given[0]), message, hint=hint)
-        elif len(given) == 1:
+        elif ("node" in given) is not ("heartbeat" in given):
             other, hint = "node", "add `node: 1`, the node-ID of the writer"
             if given[0] == "node":
                 other, hint = "heartbeat", "add `heartbeat: 500ms`"
@@ -276,7 +281,8 @@ def timeout_of_silence(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Ite
         return
     for writer, spec in _writers(cell):
         timeout, only_here = writer.spec.timeout, len(known_by(writer.spec)) == 1
-        if spec.by_rpdo and only_here and timeout is not None and spec.heartbeat is None:
+        promised = spec.heartbeat if spec.heartbeat is not None else spec.guarding
+        if spec.by_rpdo and only_here and timeout is not None and promised is None:
             message = f"`{writer.name}` is lost after {seconds(timeout)} without a PDO, and none has to come"
             hint = "write `node: 1, heartbeat: 1s` in place of `timeout`, or give the PDOs a `deadline`"
             yield rule.at(writer.at("timeout"), message, hint=hint)
