@@ -89,3 +89,27 @@ def test_what_cannot_be_scaled_is_refused(old: str, new: str, rule: str) -> None
     assert [finding.rule.id for finding in loaded.diagnostics if finding.rule.severity.name == "ERROR"] == [
         rule
     ]
+
+
+@pytest.mark.parametrize(
+    "robot, place, found",
+    [
+        ("actual_q", "type: UNSIGNED16, scale: 0.001", True),
+        ("actual_q", "type: INTEGER16, scale: 0.001", False),
+        ("actual_q", "type: INTEGER16, scale: 0.0001", True),
+        ("actual_TCP_pose", "type: INTEGER16, scale: 0.00005", True),
+        ("actual_TCP_pose", "type: INTEGER16, scale: 0.0001", False),
+        ("speed_scaling", "type: UNSIGNED8, scale: 1", True),
+        ("speed_scaling", "type: UNSIGNED8, scale: 0.01", False),
+        ("speed_scaling", "type: REAL32", False),
+        ("output_double_register_0", "type: INTEGER16, scale: 0.1", False),
+    ],
+)
+def test_reals_that_an_object_can_never_show(robot: str, place: str, found: bool) -> None:
+    """Sign, range and resolution, element by element; once for each line."""
+    text = (
+        "gatewayd: 1\ncell: c\nrobot: {host: 127.0.0.10}\ncanopen: {channel: can0, bitrate: 500000, node: 16}\n"
+        f"variables:\n  a: {{robot: {robot}, canopen: {{{place}}}}}\n"
+    )
+    rules = [finding.rule.id for finding in load(text.encode(), "a.yaml").diagnostics]
+    assert rules.count("GW415") == found

@@ -27,6 +27,8 @@ from gatewayd.mapping.rules.writers import known_by, ways_of, ways_of_variable
 from gatewayd.report.wording import number, one_and_more, seconds
 
 _REAL32_DIGITS = 2**24
+_MIN_STEPS = 10
+"""Fewer values of a real are no measure of it."""
 _RPDO = "RPDO"
 
 
@@ -118,27 +120,30 @@ def real32_loss(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[D
 
 @node_rule("GW415", Severity.WARNING)
 def narrow_canopen_type(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
-    """An integer from the robot in a CANopen type too small for it."""
-    for variable, placed in _lines(cell, node):
-        bounds = variable.range
-        if (
-            variable.direction is Direction.INPUT
-            or bounds is None
-            or not placed.fits
-            or placed.plan.type.is_real
-        ):
+    """An integer object that can never show what the robot sends."""
+    reported: set[str] = set()
+    for placed in node.objects:
+        variable = cell.variables[placed.variable]
+        bounds, reach = variable.range, reach_of(placed.plan.type, placed.plan.linear)
+        if variable.direction is Direction.INPUT or bounds is None or not placed.fits:
             continue
-        reach = reach_of(placed.plan.type, placed.plan.linear)
-        if reach.low is None or reach.high is None or placed.plan.type.is_real:
+        if reach.low is None or reach.high is None or reach.is_real or variable.part.name in reported:
             continue
+        steps = (bounds[1] - bounds[0]) / abs((placed.plan.linear or (1, 0))[0])
         if bounds[0] < reach.low or bounds[1] > reach.high:
             low, high = _shown(placed.plan)
-            message = (
-                f"`{variable.part.name}` can be {number(bounds[0])} to {number(bounds[1])}, "
-                f"{placed.plan.type_text} shows {number(low)} to {number(high)}"
-            )
+            text = f"{placed.plan.type_text} shows {number(low)} to {number(high)}"
             hint = "use a wider type, or state the range with `limits: [least, greatest]`"
-            yield rule.at(_type_place(variable), message, hint=hint)
+        elif variable.kind is ValueKind.FLOAT and 0 < steps < _MIN_STEPS:
+            text = f"{placed.plan.type_text} leaves {number(int(steps) + 1)} values of it"
+            hint = "use a finer scale"
+        else:
+            continue
+        reported.add(variable.part.name)
+        # An integer is alike in all elements of a line, a real is not: a pose has metres and radians.
+        name = variable.name if variable.kind is ValueKind.FLOAT else variable.part.name
+        message = f"`{name}` can be {number(bounds[0])} to {number(bounds[1])}, {text}"
+        yield rule.at(_type_place(variable), message, hint=hint)
 
 
 @node_rule("GW420")
