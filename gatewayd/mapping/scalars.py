@@ -38,6 +38,8 @@ _MAX_NAME: Final = 64
 _LISTEN = re.compile(r"(?:\[(?P<six>[0-9A-Fa-f:.%a-z]+)\]|(?P<four>[^:\[\]\s]+)):(?P<port>[0-9]{1,5})")
 _NUMBERS = re.compile(r"[0-9.]+")
 _MAX_PORT: Final = 65535
+_MAPPED_PREFIX: Final = 96
+"""Bits in front of the IPv4 address in an IPv4-mapped one."""
 
 
 def refuse(rule: Rule, message: str, hint: str) -> NoReturn:
@@ -146,6 +148,11 @@ class ListenAddress:
         return address_text(self.host, self.port)
 
 
+def _unmapped(address: IPv4Address | IPv6Address) -> IPv4Address | IPv6Address:
+    """An IPv4-mapped address (`::ffff:192.168.1.20`) is an IPv4 address in the notation of IPv6."""
+    return (isinstance(address, IPv6Address) and address.ipv4_mapped) or address
+
+
 def _listen(value: object) -> ListenAddress:
     if isinstance(value, ListenAddress):
         return value
@@ -161,6 +168,7 @@ def _listen(value: object) -> ListenAddress:
         refuse(syntax.BAD_NETWORK, f"`{host}` is not an IP address", "names are not resolved here; " + hint)
     if (match["six"] is not None) != isinstance(address, IPv6Address):
         refuse(syntax.BAD_NETWORK, f"`{text}` is not a listen address", hint)
+    address = _unmapped(address)
     port = int(match["port"])
     if not 0 < port <= _MAX_PORT:
         refuse(syntax.OUT_OF_RANGE, f"port {port} is not between 1 and 65535", hint)
@@ -189,7 +197,7 @@ def _host(text: str) -> str:
             refuse(syntax.BAD_NETWORK, f"`{text}` is not an IP address", hint)
     elif ":" in text:
         try:
-            IPv6Address(text)
+            return str(_unmapped(IPv6Address(text)))
         except ValueError:
             host, _, port = text.partition(":")
             hint = (
@@ -214,9 +222,14 @@ def _network(value: object) -> Network:
     hint = "write an address (192.168.1.20) or a network (192.168.1.0/28)"
     text = scalar(value, "an IP address or network", hint)
     try:
-        return ip_network(text)
+        network = ip_network(text)
     except ValueError:
         pass
+    else:
+        mapped = _unmapped(network.network_address)
+        if network.version == mapped.version or network.prefixlen < _MAPPED_PREFIX:
+            return network
+        return ip_network(f"{mapped}/{network.prefixlen - _MAPPED_PREFIX}")
     try:
         network = ip_network(text, strict=False)
     except ValueError:

@@ -330,12 +330,63 @@ def test_finer_points(lines: str, expected: list[tuple[str, int]]) -> None:
     assert findings(lines) == expected
 
 
-def test_wildcards_of_both_ip_versions_clash() -> None:
-    """`::` takes the port of 0.0.0.0 too."""
-    first = HEAD.replace("'192.168.1.2:1502'", "'[::]:1502', allow: [192.168.1.0/24]")
-    second = first.replace("[::]", "0.0.0.0").replace("press-3", "press-4").replace("1.10}", "1.11}")
-    loaded = load_together([("a.yaml", first.encode()), ("b.yaml", second.encode())])
-    assert [finding.rule.id for one in loaded for finding in one.diagnostics] == ["GW207"]
+@pytest.mark.parametrize(
+    "first, second, clash",
+    [
+        ("0.0.0.0", "192.168.1.2", True),
+        ("[::]", "[fd00::2]", True),
+        ("[::]", "0.0.0.0", False),
+        ("[::]", "192.168.1.2", False),
+        ("[::ffff:192.168.1.2]", "0.0.0.0", True),
+        ("[::1]", "127.0.0.1", False),
+    ],
+)
+def test_a_wildcard_takes_the_port_of_its_own_family_alone(first: str, second: str, *, clash: bool) -> None:
+    """tests/links/modbus_server/test_listener.py opens both wildcards on one port."""
+    texts = [
+        HEAD.replace("192.168.1.2:1502", f"{host}:1502").replace("press-3", cell).replace("1.10}", f"{end}}}")
+        for host, cell, end in ((first, "press-3", "1.10"), (second, "press-4", "1.11"))
+    ]
+    loaded = load_together([(f"{number}.yaml", text.encode()) for number, text in enumerate(texts)])
+    found = [finding.rule.id for file in loaded for finding in file.diagnostics]
+    assert ("GW207" in found) is clash
+
+
+@pytest.mark.parametrize(
+    "listen, peer, reaches",
+    [
+        ("192.168.1.2:502", "192.168.1.20", True),
+        ("192.168.1.2:502", "fd00::20", False),
+        ("192.168.1.2:502", "['fd00::20', 192.168.1.20]", True),
+        ("192.168.1.2:502", "'::ffff:192.168.1.20'", True),
+        ("192.168.1.2:502", "'::ffff:192.168.1.0/120'", True),
+        ("0.0.0.0:502", "fd00::/64", False),
+        ("[::]:502", "fd00::/64", True),
+        ("[::]:502", "192.168.1.20", False),
+        ("[::]:502", "'::/0'", True),
+        ("[::ffff:192.168.1.2]:502", "192.168.1.20", True),
+        ("127.0.0.1:502", "'::1'", False),
+        ("127.0.0.1:502", "127.0.0.40", True),
+        ("[::1]:502", "127.0.0.1", False),
+        ("[::1]:502", "'::1'", True),
+        ("0.0.0.0:502", "0.0.0.0", False),
+        ("0.0.0.0:502", "224.0.0.1", False),
+    ],
+)
+def test_a_writer_that_can_never_connect_is_a_finding(listen: str, peer: str, *, reaches: bool) -> None:
+    mapping = (
+        f"gatewayd: 1\ncell: press\nrobot: {{host: 192.168.1.10}}\nmodbus: {{listen: '{listen}'}}\n"
+        f"writers:\n  plc:\n    modbus: {peer}\n    timeout: 1s\n"
+        "variables:\n  go: {robot: input_bit_register_0, modbus: 0.0, owner: plc}\n"
+    )
+    found = [finding.rule.id for finding in load(mapping.encode(), "cell.yaml").diagnostics]
+    assert ("GW219" not in found) is reaches
+
+
+def test_an_access_list_that_lets_nobody_in_is_a_finding() -> None:
+    head = HEAD.replace("'192.168.1.2:1502'", "'[::]:1502', allow: [192.168.1.0/24]")
+    found = load(head.encode(), "cell.yaml").diagnostics
+    assert any("the access list lets nobody in" in finding.message for finding in found)
 
 
 def test_cells_on_different_ports_do_not_clash() -> None:
@@ -358,7 +409,7 @@ def test_an_owner_of_an_output_is_told_the_input() -> None:
     ]
 
 
-@pytest.mark.parametrize("peer", ["127.0.0.1", "127.0.0.40", "::1", "0.0.0.0/0"])
+@pytest.mark.parametrize("peer", ["127.0.0.1", "127.0.0.40", "0.0.0.0/0"])
 def test_writers_on_this_machine_reach_a_loopback_listener(peer: str) -> None:
     """So do networks that hold it."""
     head = (

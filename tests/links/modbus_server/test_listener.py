@@ -69,6 +69,19 @@ async def test_a_port_that_is_taken_is_reported_with_a_remedy(listener: ModbusLi
     await second.close()
 
 
+async def test_the_wildcards_of_both_families_share_a_port() -> None:
+    """So `[::]` has IPv6 peers alone: rules GW207 and GW219 say so."""
+    everywhere = ModbusListener("0.0.0.0", 0)
+    await everywhere.start()
+    beside = ModbusListener("::", everywhere.port)
+    try:
+        await beside.start()
+        assert beside.listening
+    finally:
+        await beside.close()
+        await everywhere.close()
+
+
 async def test_an_address_of_another_machine_is_reported_with_a_remedy() -> None:
     listener = ModbusListener("203.0.113.1", 0)
     with pytest.raises(ListenError, match="no such address"):

@@ -13,6 +13,8 @@ from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 
 _LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
+_EXAMPLES = {4: "192.168.1.2:502", 6: "[fd00::2]:502"}
+_EVERYWHERE = (ip_network("0.0.0.0/0"), ip_network("::/0"))
 _SHARED = ("connections", "connections_per_peer", "idle_timeout")
 
 
@@ -93,19 +95,28 @@ def open_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 @cell_rule("GW219", Severity.WARNING)
 def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """A writer elsewhere, and a listener that only this machine reaches."""
+    """A writer elsewhere, and a listener that it cannot reach."""
     modbus = cell.document.part(Modbus)
-    if modbus is None or not ip_address(modbus.spec.listen.host).is_loopback:
+    if modbus is None:
         return
+    listen = ip_address(modbus.spec.listen.host)
+    near = _LOOPBACK if listen.is_loopback else _EVERYWHERE
+    reached = [network for network in near if network.version == listen.version]
+    who = "this machine" if listen.is_loopback else f"peers with an address of IPv{listen.version}"
+    if modbus.spec.allow and not _meet(modbus.spec.allow, reached):
+        message = f"the access list lets nobody in: {modbus.spec.listen} is only for {who}"
+        yield rule.at(
+            modbus.at("allow"), message, hint="name networks of peers that can reach it, or remove the list"
+        )
     for writer in cell.document.writers.values():
         networks = writer.spec.by(ModbusWriter).modbus
-        if networks and not _meet(networks, _LOOPBACK):
+        if networks and not _meet(networks, reached):
             message = (
                 f"the writer `{writer.name}` ({network_text(networks[0])}) cannot reach {modbus.spec.listen}, "
-                "which only this machine can"
+                f"which is only for {who}"
             )
             related = (Related(modbus.at("listen"), f"the listener is {modbus.spec.listen}"),)
-            hint = "listen on the address of the machine network, for example 192.168.1.2:502"
+            hint = f"listen on this machine's address in that network, for example {_EXAMPLES[networks[0].version]}"
             yield rule.at(writer.at("modbus"), message, hint=hint, related=related)
 
 
@@ -160,13 +171,15 @@ def _clash(host: str, other: str) -> bool:
     if host == other:
         return False
     first, second = ip_address(host), ip_address(other)
-    # An IPv6 wildcard takes the port of IPv4 too.
-    wide = [address for address in (first, second) if address.is_unspecified]
-    return any(address.version == 6 for address in wide) or (bool(wide) and first.version == second.version)
+    # The wildcard of IPv6 leaves the ports of IPv4 alone: asyncio opens it for IPv6 only.
+    return first.version == second.version and (first.is_unspecified or second.is_unspecified)
 
 
 def _meet(networks: Sequence[Network], allowed: Sequence[Network]) -> bool:
-    """Whether any of them has an address that is allowed."""
+    """Whether any of them has an address of a peer that is allowed."""
     return any(
-        item.version == network.version and item.overlaps(network) for network in networks for item in allowed
+        item.version == network.version and item.overlaps(network)
+        for network in networks
+        if not (network.is_multicast or (network.is_unspecified and network.num_addresses == 1))
+        for item in allowed
     )
