@@ -22,6 +22,7 @@ COMMANDS = {
     "watch": "Watch the variables of the running gateway live.",
     "locks": "Print who owns what; take and release locks.",
     "events": "Print what has happened, and what happens.",
+    "trace": "Print what passes the links of the running gateway, in words.",
     "force": "Put a value in a variable's place for commissioning.",
     "unforce": "End a force before its time.",
     "completion": "Print the completion script of a shell.",

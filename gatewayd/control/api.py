@@ -15,6 +15,7 @@ from typing import Any, Protocol, TypeVar
 
 from gatewayd import __version__
 from gatewayd.control.names import NamePattern
+from gatewayd.control.trace import TracedGateway, Traces
 from gatewayd.control.views import (
     Declarations,
     cell_view,
@@ -98,12 +99,16 @@ class Api:
         audit: Audit,
         notes: Callable[[], Sequence[str]] = lambda: (),
         stood_still: Callable[[], float] = lambda: 0.0,
+        *,
+        traced: TracedGateway | None = None,
     ) -> None:
         self._stood_still = stood_still
         self._gateway = gateway
         self._audit = audit
         self._notes = notes
         self._declarations = Declarations()
+        self.traces = Traces(traced) if traced is not None else None
+        """What passes the links of `traced`; for the control socket alone."""
         self.share = LoopShare()
         """Of the loop's time, for answers."""
 

@@ -11,7 +11,7 @@ import struct
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
 from contextlib import asynccontextmanager, suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 from aiohttp import web
@@ -19,6 +19,7 @@ from aiohttp.typedefs import Middleware
 
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
+from gatewayd.control.trace import MAX_TRACES, Traces
 from gatewayd.core.objection import ObjectionKind
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
@@ -35,6 +36,9 @@ FOLLOWERS = 16
 ALIVE_PERIOD = 10.0
 """Seconds after which a follower gets an empty line where nothing happens."""
 _FOLLOW_PERIOD = 0.1
+MAX_ROWS = 2000
+"""Passages of a trace that are sent at a time."""
+_DAY = 24 * 3600
 _BODY_TIME = 5.0
 _WRITE_TIME = 30.0
 """Seconds for which a follower may leave what it asked for unread."""
@@ -51,6 +55,8 @@ _Question = Callable[[Mapping[str, str], Moment], Generator[None, None, Mapping[
 async def serving(listening: socket.socket, api: Api, reload: Reload | None) -> AsyncIterator[None]:
     """Serve on the socket while the context lasts."""
     served = application(api, reload)
+    if api.traces is not None:
+        served.router.add_get("/v1/trace", partial(_trace, api.traces, api.share))
     served.middlewares.insert(0, _in_turn(api.share))
     runner = web.AppRunner(served, access_log=None, handle_signals=False, shutdown_timeout=0.1)
     await runner.setup()
@@ -200,6 +206,51 @@ class _Routes:
                 if self._api.has_news(cursor, request.query):
                     lines = await self._api.share.done(asker(request), news())
         return response
+
+
+async def _trace(traces: Traces, share: LoopShare, request: web.Request) -> web.StreamResponse:
+    """What passes the links from now on, for `seconds` or until `count` passages were sent, then the totals."""
+    query = request.query
+    seconds, left = _number(query, "seconds", _DAY), _number(query, "count", _DAY)
+    unknown = traces.unknown(query)
+    if unknown:
+        raise ApiError(404, "no_such_link", unknown)
+    trace = traces.open(query)
+    if trace is None:
+        raise ApiError(503, "busy", f"{MAX_TRACES} trace already")
+    response = web.StreamResponse(
+        headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"}
+    )
+    try:
+        await response.prepare(request)
+        until, sent_at, dropped = clock.now() + seconds, clock.now(), 0
+        with suppress(ConnectionError, TimeoutError):
+            while left and clock.now() < until:
+                await asyncio.sleep(min(_FOLLOW_PERIOD, max(0.0, until - clock.now())))
+                traces.refresh()
+                rows: list[Mapping[str, object]] = []
+                with suppress(Busy):
+                    work = trace.rows(min(left, MAX_ROWS), time.time() - clock.now())
+                    rows += await share.done(asker(request), work)
+                left -= len(rows)
+                if trace.dropped != dropped:
+                    dropped = trace.dropped
+                    rows.append({"dropped": dropped})
+                if rows or clock.now() - sent_at >= ALIVE_PERIOD:
+                    sent_at = clock.now()
+                    async with asyncio.timeout(_WRITE_TIME):
+                        await response.write("".join(map(_line, rows)).encode() or b"\n")
+            await response.write(_line({"passed": trace.passed, "dropped": trace.dropped}).encode())
+    finally:
+        traces.close(trace)
+    return response
+
+
+def _number(query: Mapping[str, str], name: str, default: int) -> int:
+    text = query.get(name, str(default))
+    if not (text.isascii() and text.isdigit()) or not 0 < len(text) <= 9 or not int(text):
+        raise ApiError(400, "bad_query", f"`{name}` must be a whole number from 1 on")
+    return int(text)
 
 
 def _accepted(kinds: object) -> frozenset[ObjectionKind]:

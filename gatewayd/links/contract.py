@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import Enum, IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
@@ -107,6 +107,8 @@ class LinkKind:
     status_fields: ClassVar[tuple[StatusField, ...]] = ()
     """Words of the status block that its links report (`Cell.health.words`), at addresses that nobody else has."""
     metrics: ClassVar[tuple[LinkMetric, ...]] = ()
+    traffic: ClassVar[str] = ""
+    """Module whose `DECODER` makes what puts its links' traffic into words (`links.traffic`); empty: there is none."""
     usual: ClassVar[bool] = False
     """Nearly every cell has one: its runtime is imported while the mapping files are read."""
 
@@ -133,6 +135,62 @@ class LinkKind:
     ) -> Iterable[Objection]:
         """What else must not happen unasked. Owners that would lose their way are not its matter: `Link.departing`."""
         return ()
+
+
+# -- traffic ------------------------------------------------------------------------------------------------------
+# What passes a link, while somebody traces. A link hands its tap the raw bytes; words are made by whoever reads the
+# trace, in another process, so that a trace costs the gateway as little as can be. Without one it costs nothing.
+
+
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """One frame, or one piece of a stream."""
+
+    time: float
+    """Monotonic seconds."""
+    data: bytes
+    """As `TrafficDecoder.medium` has it."""
+    outgoing: bool
+    """The gateway sent it."""
+    peer: str = ""
+    """Address and port of the other end; empty on a bus."""
+    own: str = ""
+    """Address and port of our end; on a bus the name of the interface."""
+    cell: str | None = ""
+    """Of a part that several cells share: the cell that it concerns; None: none, or any. Empty: that of the link."""
+
+
+Tap = Callable[[Passage], None]
+"""Takes what passes. It must not raise, and never waits."""
+
+
+TapOf = Callable[[str, str, str], Tap]
+"""The tap for a link: cell (empty where several share it), name, and key of the kind. The same one for the same."""
+
+
+class Medium(Enum):
+    """How bytes are carried, so that a file for other tools can be written."""
+
+    CAN = "can"
+    """One frame as SocketCAN has it: big-endian identifier with flags, length, 3 bytes, 8 bytes of data."""
+    TCP_SERVER = "tcp server"
+    """Bytes of a TCP connection that the peer has opened."""
+    TCP_CLIENT = "tcp client"
+    """Bytes of a TCP connection that the gateway has opened."""
+    OTHER = "other"
+    """No file of other tools has it."""
+
+
+class TrafficDecoder:
+    """Puts what passed the links of one kind into words. May remember: requests, for their answers."""
+
+    medium: ClassVar[Medium] = Medium.OTHER
+    port: ClassVar[int] = 0
+    """Port of the server by which other tools know the protocol."""
+
+    def words(self, data: bytes, peer: str, *, outgoing: bool) -> str:
+        """One passage in words, on one line. Never raises, whatever the bytes are."""
+        return f"{len(data)} bytes: {data[:16].hex(' ')}" + (" ..." if len(data) > 16 else "")
 
 
 # -- runtime -----------------------------------------------------------------------------------------------------
@@ -216,6 +274,9 @@ class Link:
     async def close(self) -> None:
         """Send what is still due; `run` is cancelled afterwards."""
 
+    def trace(self, tap: Tap | None) -> None:
+        """Hand `tap` what passes from now on; None: nobody traces any more. Called again and again with the same."""
+
     def health(self) -> LinkHealth:
         """How it is now."""
         return LinkHealth()
@@ -262,6 +323,9 @@ class SharedPart:
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`; called before anything that waited is served."""
+
+    def trace(self, tap: Tap | None) -> None:
+        """See `Link.trace`: of what passes this part and not a link of one cell."""
 
     async def prepare(self, plans: Sequence[Plan]) -> Prepared:
         """Have ready what these plans need besides what there is. Raises PrepareError."""

@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 from gatewayd.core.status_layout import FIELDS, StatusField
-from gatewayd.links.contract import LinkKind, LinkRuntime
+from gatewayd.links.contract import LinkKind, LinkRuntime, TrafficDecoder
 
 if TYPE_CHECKING:
     from gatewayd.links.exports import Export
@@ -80,6 +80,14 @@ def exports() -> Mapping[str, Export]:
     """What all kinds write for other tools, by name."""
     modules = [import_module(language.exports) for language in languages() if language.exports]
     return {export.name: export for module in modules for export in module.EXPORTS}
+
+
+def decoder_of(key: str) -> TrafficDecoder:
+    """What puts the traffic of links with this key into words; a new one, which remembers nothing yet."""
+    module = kind_of(key).traffic
+    found = import_module(module).DECODER() if module else TrafficDecoder()
+    assert isinstance(found, TrafficDecoder)
+    return found
 
 
 @cache

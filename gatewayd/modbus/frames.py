@@ -6,10 +6,13 @@ A frame is transaction id, protocol id (0), length (unit id and PDU, 2..254), un
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from typing import NamedTuple
 
 HEADER_SIZE = 7
 """Bytes before the PDU."""
+UNIT = 6
+"""Position of the unit id."""
 MAX_PDU = 253
 """Bytes (Application Protocol V1.1b3, 4.1)."""
 MAX_FRAME = HEADER_SIZE + MAX_PDU
@@ -61,6 +64,17 @@ def split(data: bytearray, start: int, end: int) -> ModbusFrame | None:
     return ModbusFrame(
         data[start] << 8 | data[start + 1], data[start + 6], bytes(data[start + HEADER_SIZE : behind]), behind
     )
+
+
+def whole_frames(data: bytes) -> Iterator[bytes]:
+    """Each complete frame of a stream, with its header. Bytes that are no frame come as they are."""
+    stream, start = bytearray(data), 0
+    try:
+        while (frame := split(stream, start, len(stream))) is not None:
+            yield data[start : frame.end]
+            start = frame.end
+    except FramingError:
+        yield data[start:]
 
 
 class FrameBuffer:

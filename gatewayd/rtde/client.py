@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from gatewayd.loop.progress import wait_with_progress
 from gatewayd.rtde.claims import InputRecipe
-from gatewayd.rtde.connection import ClientHandler, Connection
+from gatewayd.rtde.connection import ClientHandler, Connection, StreamTap
 from gatewayd.rtde.lists import ListMemory
 from gatewayd.rtde.loss import Loss, connect_failure
 from gatewayd.rtde.pace import Statistics
@@ -36,6 +36,7 @@ class RtdeClient:
         self._settings = settings
         self._handler = handler
         self._connection: Connection | None = None
+        self._tap: StreamTap | None = None
         self._lists = ListMemory()
         self._paused = not settings.running
 
@@ -68,6 +69,12 @@ class RtdeClient:
         False if nothing was asked: without a session, and while the last question is open.
         """
         return self._connection is not None and self._connection.probe()
+
+    def trace(self, tap: StreamTap | None) -> None:
+        """Hand `tap` the bytes of this connection and of those to come; None: no more."""
+        self._tap = tap
+        if self._connection is not None:
+            self._connection.tap = tap
 
     def gap(self) -> None:
         """The process stood still until now: for that time nobody is taken for silent."""
@@ -135,11 +142,16 @@ class RtdeClient:
             connected = await self._open_socket(loop)
             try:
                 _, connection = await loop.create_connection(
-                    lambda: Connection(settings, self._handler, self.statistics), sock=connected
+                    lambda: self._new_connection(settings), sock=connected
                 )
             except BaseException:
                 connected.close()
                 raise
+        return connection
+
+    def _new_connection(self, settings: ClientSettings) -> Connection:
+        connection = Connection(settings, self._handler, self.statistics)
+        connection.tap = self._tap
         return connection
 
     async def _open_socket(self, loop: asyncio.AbstractEventLoop) -> socket.socket:

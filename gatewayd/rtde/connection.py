@@ -36,6 +36,10 @@ _PERIODS_OF_PATIENCE = 5
 _GOODBYE = 0.2
 
 
+StreamTap = Callable[[bytes, bool, tuple[str, int] | None], None]
+"""Takes bytes, whether we sent them, and our end of the connection as its socket has it."""
+
+
 class ClientHandler(Protocol):
     """What the user of a client gets to know, by synchronous calls from the event loop. They must not block.
 
@@ -78,6 +82,9 @@ class Connection(asyncio.Protocol):
         """What was agreed; None before the set-up is complete and after the end."""
         self.started_at: float | None = None
         """When the set-up was complete."""
+        self.tap: StreamTap | None = None
+        """Gets all bytes as they pass, while somebody traces."""
+        self._own: tuple[str, int] | None = None
         self._loop = loop
         self._settings = settings
         self._handler = handler
@@ -177,11 +184,14 @@ class Connection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """See asyncio.Protocol."""
         self._transport = cast("asyncio.Transport", transport)
+        self._own = transport.get_extra_info("sockname")
         self._request(self._negotiation.begin())
         self._watch()
 
     def data_received(self, data: bytes) -> None:
         """See asyncio.Protocol."""
+        if self.tap is not None:
+            self.tap(data, False, self._own)
         self._guarded(lambda: self._receive(data))
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -364,7 +374,10 @@ class Connection(asyncio.Protocol):
     def _write(self, message: ExecutableMessage) -> None:
         transport = self._transport
         assert transport is not None
-        transport.write(self._codec.send(message))
+        package = self._codec.send(message)
+        if self.tap is not None:
+            self.tap(package, True, self._own)
+        transport.write(package)
         waiting = transport.get_write_buffer_size()
         if waiting > self._settings.write_buffer:
             self._fail(

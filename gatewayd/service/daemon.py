@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 
 from gatewayd.core.cell import Cell
-from gatewayd.links.contract import Link, SharedPart
+from gatewayd.links.contract import Link, SharedPart, TapOf
 from gatewayd.loop import clock
 from gatewayd.loop.retry import keep_running
 from gatewayd.mapping.plan import Plan
@@ -74,6 +74,18 @@ class Daemon:
     def troubles(self) -> list[str]:
         """What concerns the gateway as a whole."""
         return self.shared.troubles()
+
+    def trace(self, tap_of: TapOf | None) -> None:
+        """Have everything that passes links and shared parts go through these taps; None: through none any more.
+
+        To be called again where a reload may have brought others.
+        """
+        for runtime in self.runtimes:
+            for name, link in runtime.links.items():
+                kind = runtime.plan.links[name].kind
+                link.trace(None if tap_of is None else tap_of(runtime.plan.cell.name, name, kind))
+        for kind, part in self.shared.items():
+            part.trace(None if tap_of is None else tap_of("", kind, kind))
 
     async def run(self, stop: asyncio.Event) -> None:
         """Serve until `stop` is set; then release every lock, give the robots the fallbacks, and close."""

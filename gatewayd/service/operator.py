@@ -11,6 +11,7 @@ from typing import Protocol
 
 from gatewayd.control.api import Api
 from gatewayd.control.endpoint import Endpoint, Reload
+from gatewayd.control.trace import TracedGateway
 from gatewayd.core.cell import Cell
 from gatewayd.logs.stream import log_troubles
 from gatewayd.loop import clock
@@ -51,7 +52,7 @@ class Standstill:
         return self._until - self._since if awake <= JUST_NOW else 0.0
 
 
-class Operated(Watched, Protocol):
+class Operated(Watched, TracedGateway, Protocol):
     """What is needed of the daemon."""
 
     @property
@@ -81,7 +82,7 @@ class OperatorAccess:
         self._file = AuditFile(audit_file) if audit_file is not None else None
         self.audit = Audit(self._file.put if self._file is not None else None)
         daemon.observe(self.audit.watch)
-        self.api = Api(daemon, self.audit, lambda: (*notes(), *self.troubles()), stood_still)
+        self.api = Api(daemon, self.audit, lambda: (*notes(), *self.troubles()), stood_still, traced=daemon)
 
     async def run(self) -> None:
         """Run until cancelled; then write what is still to be written."""

@@ -40,6 +40,10 @@ class SharedParts:
             self._parts[kind] = runtime_of(kind).share()
         return self._parts[kind]
 
+    def items(self) -> Iterator[tuple[str, SharedPart]]:
+        """The parts, each with the key of its kind."""
+        return ((kind, part) for kind, part in self._parts.items() if part is not None)
+
     def __iter__(self) -> Iterator[SharedPart]:
         return (part for part in self._parts.values() if part is not None)
 

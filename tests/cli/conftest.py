@@ -24,6 +24,7 @@ class Running:
     cell: Cell
     loop: asyncio.AbstractEventLoop
     served: Served
+    fixed: FixedGateway
 
     def do(self, act: Callable[[Cell], object]) -> None:
         """Do something to the cell, in its own thread."""
@@ -50,16 +51,17 @@ def gateway(tmp_path: Path) -> Iterator[Running]:
     loop = asyncio.new_event_loop()
     stop = asyncio.Event()
     ready = threading.Event()
+    fixed = FixedGateway([served])
 
     async def serve() -> None:
-        async with server.serving(bind(path), Api(FixedGateway([served]), audit), None):
+        async with server.serving(bind(path), Api(fixed, audit, traced=fixed), None):
             ready.set()
             await stop.wait()
 
     thread = threading.Thread(target=loop.run_until_complete, args=(serve(),))
     thread.start()
     assert ready.wait(10)
-    yield Running(path, served.cell, loop, served)
+    yield Running(path, served.cell, loop, served, fixed)
     loop.call_soon_threadsafe(stop.set)
     thread.join(10)
     loop.close()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from gatewayd.control.api import Moment
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
-from gatewayd.links.contract import Link, LinkHealth
+from gatewayd.links.contract import Link, LinkHealth, TapOf
 from gatewayd.mapping.loader import load_together
 from gatewayd.mapping.plan import Plan
 
@@ -75,9 +75,14 @@ class FixedGateway:
 
     runtimes: Sequence[Served]
     wrong: list[str] = field(default_factory=list)
+    tap_of: TapOf | None = None
+    """The taps that it has."""
 
     def troubles(self) -> Sequence[str]:
         return self.wrong
+
+    def trace(self, tap_of: TapOf | None) -> None:
+        self.tap_of = tap_of
 
 
 def plan(name: str = "press", port: int = 1502, extra: str = "cycles") -> Plan:

@@ -8,7 +8,8 @@ from inspect import getmembers, isclass
 import pytest
 
 from gatewayd.core.status_layout import FIELDS, HEADER_WORDS
-from gatewayd.links.registry import LINK_KINDS, kind_of, kinds, status_fields
+from gatewayd.links.contract import Link, Medium, SharedPart, TrafficDecoder
+from gatewayd.links.registry import LINK_KINDS, decoder_of, kind_of, kinds, status_fields
 from gatewayd.mapping.plan import LinkPlan
 
 
@@ -45,3 +46,21 @@ def test_a_kind_that_is_none_is_an_error(monkeypatch: pytest.MonkeyPatch) -> Non
     kinds.cache_clear()
     with pytest.raises(TypeError, match=r"gatewayd\.links\.robot\.declaration\.KIND is no LinkKind"):
         kinds()
+
+
+def test_every_kind_has_a_decoder_of_its_own() -> None:
+    assert {kind.key: decoder_of(kind.key).medium for kind in kinds()} == {
+        "robot": Medium.TCP_CLIENT,
+        "modbus": Medium.TCP_SERVER,
+        "canopen": Medium.CAN,
+    }
+    assert decoder_of("modbus") is not decoder_of("modbus"), (
+        "what one remembers is none of the other's business"
+    )
+
+
+def test_a_kind_need_not_offer_a_tap() -> None:
+    Link().trace(lambda _passage: None)
+    SharedPart().trace(None)
+    assert TrafficDecoder().words(b"\1\2", "", outgoing=True) == "2 bytes: 01 02"
+    assert TrafficDecoder().words(bytes(20), "", outgoing=True).endswith("00 ...")

@@ -39,6 +39,9 @@ class Gateway:
     def runtimes(self) -> Sequence[ServedCell]:
         return ()
 
+    def trace(self, tap_of: object) -> None:
+        """Nothing passes here."""
+
     def observe(self, observer: Callable[[Cell], None]) -> None:
         observer(self.cell)
 

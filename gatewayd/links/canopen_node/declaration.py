@@ -29,6 +29,7 @@ class CanopenNode(LinkKind):
 
     key = CanopenPlan.kind
     title = "CANopen node"
+    traffic = "gatewayd.links.canopen_node.traffic"
     fields = {  # noqa: RUF012 - never changed
         "channel": "interface:channel of the bus",
         "node": "node-ID of the mapping",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from datetime import datetime
@@ -30,7 +30,8 @@ from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.store import BackgroundStore, Store
-from gatewayd.links.contract import Context, Level, Link, LinkHealth, LinkRuntime
+from gatewayd.links.canopen_node.traffic import packed
+from gatewayd.links.contract import Context, Level, Link, LinkHealth, LinkRuntime, Passage, Tap
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.loop.progress import wait_with_progress
@@ -59,6 +60,7 @@ class CanLink(Link, Observer):
         self.plan = plan
         self._cell = cell
         self._bus: SupervisedBus | None = None
+        self._tap: Tap | None = None
         self._transmitter = Transmitter(
             self._offer,
             lambda can_id: self.node.renew(can_id, clock.now()),
@@ -219,6 +221,8 @@ class CanLink(Link, Observer):
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
         """Received frames."""
+        if self._tap is not None:
+            self._pass(self._tap, frames, now, outgoing=False)
         receive = self.node.receive
         for frame in frames:
             receive(frame, now)
@@ -354,7 +358,21 @@ class CanLink(Link, Observer):
         self._other_bit_rate = actual
 
     def _offer(self, frame: Frame) -> bool:
-        return self._bus is not None and self._bus.send(frame)
+        return self._bus is not None and self._give(self._bus, frame)
+
+    def _give(self, bus: SupervisedBus, frame: Frame) -> bool:
+        taken = bus.send(frame)
+        if taken and self._tap is not None:
+            self._pass(self._tap, (frame,), clock.now(), outgoing=True)
+        return taken
+
+    def trace(self, tap: Tap | None) -> None:
+        """The frames that the node receives and sends; what it does not listen to does not reach it."""
+        self._tap = tap
+
+    def _pass(self, tap: Tap, frames: Iterable[Frame], now: float, *, outgoing: bool) -> None:
+        for frame in frames:
+            tap(Passage(now, packed(frame), outgoing, own=self.plan.channel))
 
     @property
     def _is_catching_up(self) -> bool:
@@ -377,7 +395,7 @@ class CanLink(Link, Observer):
     def _offer_at_once(self, frame: Frame) -> bool:
         """A frame that may not be late: not where older ones still wait in the kernel."""
         bus = self._bus
-        return bus is not None and not bus.lags(self.node.bit_rate) and bus.send(frame)
+        return bus is not None and not bus.lags(self.node.bit_rate) and self._give(bus, frame)
 
     def _close_bus(self, reason: str) -> None:
         bus, self._bus = self._bus, None

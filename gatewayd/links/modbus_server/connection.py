@@ -10,9 +10,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+from collections.abc import Callable
+from functools import partial
 from typing import Protocol, cast
 
 from gatewayd.core.requester import new_connection
+from gatewayd.links.contract import Passage, Tap
 from gatewayd.links.modbus_server.peers import Address, address_of
 from gatewayd.links.modbus_server.plan import Network
 from gatewayd.links.modbus_server.polling import ReadPoller
@@ -21,6 +24,7 @@ from gatewayd.links.modbus_server.sockets import has_unread, seconds_since_estab
 from gatewayd.links.modbus_server.waiting import WaitedInput
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
+from gatewayd.modbus.frames import UNIT, whole_frames
 from gatewayd.report.format import address as address_text
 
 _log = logging.getLogger("gatewayd.modbus")
@@ -49,8 +53,9 @@ class PeerConnection(asyncio.BufferedProtocol):
         self.admission = admission
         self.poller = poller
         self.session = ModbusSession()
-        self.receive = self.session.received
-        """What takes the bytes that came in; another function while they may have waited."""
+        self.receive: Callable[[int, float], bytes] = self.session.received
+        """What takes the bytes that came in; another function while they may have waited, or while somebody traces."""
+        self._tap: Tap | None = None
         self.waiting: WaitedInput | None = None
         self.number = new_connection()
         self.peer = ""
@@ -147,14 +152,40 @@ class PeerConnection(asyncio.BufferedProtocol):
         """What is in the socket may have waited from `since` to `until`."""
         unread = bool(self.session.buffer.end) or has_unread(self.descriptor)
         self.waiting = WaitedInput(since, until, unread=unread, former=self.waiting)
-        self.receive = self._receive_late
+        self._receive_by(self._receive_late)
+
+    def trace(self, tap: Tap | None) -> None:
+        """Hand `tap` every frame from now on; None: no more."""
+        if tap is not self._tap:
+            self._tap = tap
+            self._receive_by(self.session.received if self.waiting is None else self._receive_late)
+
+    def _receive_by(self, receive: Callable[[int, float], bytes]) -> None:
+        self.receive = receive if self._tap is None else partial(self._receive_traced, receive, self._tap)
+
+    def _receive_traced(
+        self, receive: Callable[[int, float], bytes], tap: Tap, count: int, now: float
+    ) -> bytes:
+        """In place of `receive`: requests and answers pass the tap as well."""
+        buffer = self.session.buffer
+        self._pass(bytes(buffer.data[: buffer.end + count]), tap, now, outgoing=False)
+        answers = receive(count, now)
+        self._pass(answers, tap, clock.now(), outgoing=True)
+        return answers
+
+    def _pass(self, stream: bytes, tap: Tap, now: float, *, outgoing: bool) -> None:
+        own = self.wire.get_extra_info("sockname")
+        for frame in whole_frames(stream):
+            cell = self.session.cell_of(frame[UNIT]) if len(frame) > UNIT else None
+            tap(Passage(now, frame, outgoing, self.peer, address_text(own[0], own[1]), cell))
 
     def _receive_late(self, count: int, now: float) -> bytes:
         """In place of `session.received`, until all that waited was read."""
         session, waiting = self.session, self.waiting
         waited = waiting.seconds(now) if waiting is not None else 0.0
         if waiting is None or not waited:
-            self.waiting, self.receive = None, session.received
+            self.waiting = None
+            self._receive_by(session.received)
             return session.received(count, now)
         asked = len(session.buffer.space[0])
         answers = session.received_late(count, now, waited)

@@ -18,6 +18,7 @@ class ModbusServer(LinkKind):
 
     key = ModbusPlan.kind
     title = "Modbus TCP server"
+    traffic = "gatewayd.links.modbus_server.traffic"
     usual = True
     fields = {  # noqa: RUF012 - never changed
         "listen": "host:port of the listener",

@@ -15,6 +15,7 @@ from types import MappingProxyType
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
+from gatewayd.links.contract import Tap
 from gatewayd.links.modbus_server.connection import PeerConnection
 from gatewayd.links.modbus_server.functions import Unit
 from gatewayd.links.modbus_server.limits import idle_timeout, overdue
@@ -73,6 +74,7 @@ class ModbusListener:
         self._peer_log = PeerLog()
         self.refusals = {kind.name.lower(): 0 for kind in PeerEventKind if kind.refused}
         """How many connections never began, by reason."""
+        self._tap: Tap | None = None
         self._server: asyncio.Server | None = None
         self._poller: ReadPoller | None = None
         self._sweeper: asyncio.TimerHandle | None = None
@@ -203,6 +205,13 @@ class ModbusListener:
             if its is cell
         ]
 
+    def trace(self, tap: Tap | None) -> None:
+        """Hand `tap` the frames of all connections, those to come as well; None: no more."""
+        if tap is not self._tap:
+            self._tap = tap
+            for connection in self._connections:
+                connection.trace(tap)
+
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`: what is in the sockets may have waited that long."""
         self._gap = since, now
@@ -230,6 +239,7 @@ class ModbusListener:
             former.abort(f"made room for {address}")
             self.disconnected(former)
         self._connections[connection] = None
+        connection.trace(self._tap)
         since, until = self._gap
         if connection.established <= until + SETTLING:
             connection.wait(min(since, connection.established), until)

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from gatewayd.core.cell import Cell
-from gatewayd.links.contract import Link, PrepareError, SharedPart
+from gatewayd.links.contract import Link, PrepareError, SharedPart, Tap
 from gatewayd.links.modbus_server.link import ModbusUnit
 from gatewayd.links.modbus_server.listener import ListenError, ModbusListener
 from gatewayd.links.modbus_server.peers import PeerEvent
@@ -62,6 +62,11 @@ class Listeners(SharedPart):
         """What is in the sockets may have waited."""
         for listener in self.listeners:
             listener.gap(since, now)
+
+    def trace(self, tap: Tap | None) -> None:
+        """All frames, with the cells that their units are."""
+        for listener in self.listeners:
+            listener.trace(tap)
 
     async def prepare(self, plans: Sequence[Plan]) -> _Opened:
         """Open the addresses that are new; they serve nobody yet. Raises PrepareError, all closed again.

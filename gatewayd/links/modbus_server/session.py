@@ -118,6 +118,11 @@ class ModbusSession:
         access.writer_seen(requester, now)
         return execute(access.unit, requester, pdu, now)
 
+    def cell_of(self, unit: int) -> str | None:
+        """Name of the cell that answers for the unit; None if nobody does."""
+        access = self._accesses.get(unit)
+        return access.unit.cell.definition.name if access is not None else None
+
     def _report_unit(self, unit: int, now: float) -> None:
         """Nobody answers for this unit: the cells that the peer writes to hear of it, or else all that it reaches."""
         reached = {id(access): access for access in self._accesses.values()}.values()

@@ -18,6 +18,7 @@ class RobotKind(LinkKind):
 
     key = RobotPlan.kind
     title = "Universal Robots controller"
+    traffic = "gatewayd.links.robot.traffic"
     usual = True
     fields = {  # noqa: RUF012 - never changed
         "address": "host:port of the controller",

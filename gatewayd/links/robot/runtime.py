@@ -18,7 +18,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, FallbackKind, Value
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
-from gatewayd.links.contract import Context, Level, LinkHealth, LinkRuntime, SourceLink
+from gatewayd.links.contract import Context, Level, LinkHealth, LinkRuntime, Passage, SourceLink, Tap
 from gatewayd.links.robot.availability import unavailable
 from gatewayd.links.robot.companions import Driven, all_inputs, all_outputs
 from gatewayd.links.robot.controller import ControllerNotes
@@ -193,6 +193,18 @@ class RobotLink(SourceLink):
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`. The packages that waited have their own time."""
         self._client.gap()
+
+    def trace(self, tap: Tap | None) -> None:
+        """What is said to the controller and by it."""
+        if tap is None:
+            self._client.trace(None)
+            return
+        peer = address(self.plan.host, self.plan.port)
+
+        def passed(data: bytes, outgoing: bool, own: tuple[str, int] | None) -> None:
+            tap(Passage(clock.now(), data, outgoing, peer, address(own[0], own[1]) if own else ""))
+
+        self._client.trace(passed)
 
     def flush(self, now: float) -> None:
         """Send what is still due at once."""

@@ -1,0 +1,28 @@
+"""RTDE messages of a trace in words."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+from gatewayd.links.contract import Medium, TrafficDecoder
+from gatewayd.rtde.describe import MessageStream, package_text
+
+
+class RtdeTraffic(TrafficDecoder):
+    """Cuts the streams of both directions into messages."""
+
+    medium = Medium.TCP_CLIENT
+    port = 30004
+
+    def __init__(self) -> None:
+        self._streams: defaultdict[tuple[str, bool], MessageStream] = defaultdict(MessageStream)
+
+    def words(self, data: bytes, peer: str, *, outgoing: bool) -> str:
+        """All messages that it completes."""
+        packages = self._streams[peer, outgoing].feed(data)
+        texts = [package_text(package, from_controller=not outgoing) for package in packages]
+        return "; ".join(texts) or f"the beginning of a message, {len(data)} bytes"
+
+
+DECODER = RtdeTraffic
+"""Makes what puts the traffic of this kind of link into words."""
