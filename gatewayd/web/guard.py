@@ -28,6 +28,8 @@ FAIR = 8
 """Connections of one peer that nobody takes from it. It may have more while there is room."""
 PATIENCE = 20.0
 """Seconds after which a connection that has not finished a request is closed: idle, slow, or not reading its answer."""
+BUSY_DELAY = 1.0
+"""Seconds before who asks too much is told so."""
 MAX_BODY = 4096
 """Bytes of a request's body."""
 HEADERS = {
@@ -61,13 +63,19 @@ class Doors:
         """Connections with the time of their last finished request, or of their beginning."""
 
     def __call__(self) -> asyncio.Protocol:
-        """The protocol of a new connection."""
+        """The protocol of a new connection, before it is known whose it is."""
+        return _Entrance(self)
+
+    def come_in(self, transport: asyncio.Transport) -> None:
+        """A peer has connected: it is served, or its connection is closed at once."""
         self._forget_closed()
-        if len(self._seen) >= MAX_CONNECTIONS and not self._make_room():
-            return _Full()
+        if len(self._seen) >= MAX_CONNECTIONS and not self._make_room(_peer(transport)):
+            transport.abort()
+            return
         handler = self._server()
+        transport.set_protocol(handler)
+        handler.connection_made(transport)
         self._seen[handler] = clock.now()
-        return handler
 
     def finished(self, handler: RequestHandler) -> None:
         """A request of the connection was answered."""
@@ -85,34 +93,42 @@ class Doors:
                 if transport is not None:
                     transport.abort()
 
-    def _make_room(self) -> bool:
-        """The peer with the most connections, if they are more than `FAIR`, loses the one answered longest ago."""
+    def _make_room(self, peer: object) -> bool:
+        """The peer with the most connections, if they are more than `FAIR`, loses the one answered longest ago.
+
+        Only to one who has fewer than that, so that nobody drives out himself again and again.
+        """
         of_peer: defaultdict[object, list[RequestHandler]] = defaultdict(list)
         for handler in self._seen:
-            peer = handler.transport.get_extra_info("peername") if handler.transport is not None else None
-            of_peer[peer and peer[0]].append(handler)
+            of_peer[_peer(handler.transport)].append(handler)
         most = max(of_peer.values(), key=len)
-        if len(most) <= FAIR:
+        if len(most) <= FAIR or len(of_peer[peer]) >= FAIR:
             return False
         longest = min(most, key=self._seen.__getitem__)
         del self._seen[longest]
-        if longest.transport is not None:
-            longest.transport.abort()
+        assert longest.transport is not None
+        longest.transport.abort()
         return True
 
     def _forget_closed(self) -> None:
-        now = clock.now()
-        # A connection of this very moment may not have its transport yet.
-        for handler, seen in list(self._seen.items()):
-            if handler.transport is None and now - seen > _SWEEP / 2:
-                del self._seen[handler]
+        for handler in [handler for handler in self._seen if handler.transport is None]:
+            del self._seen[handler]
 
 
-class _Full(asyncio.Protocol):
-    """Closes the connection."""
+class _Entrance(asyncio.Protocol):
+    """A connection until it is made."""
+
+    def __init__(self, doors: Doors) -> None:
+        self._doors = doors
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        cast("asyncio.Transport", transport).abort()
+        self._doors.come_in(cast("asyncio.Transport", transport))
+
+
+def _peer(transport: asyncio.BaseTransport | None) -> object:
+    """The address of the other side."""
+    name = transport.get_extra_info("peername") if transport is not None else None
+    return name and name[0]
 
 
 def is_local_name(host: str) -> bool:
@@ -143,8 +159,11 @@ def middleware(
         try:
             if refusal is not None or request.method in _READING:
                 await share.request(asker(request))
+            if request.transport is None:
+                return _plain(503, "gone while waiting")  # nobody reads it, and nothing is done for it
             response = _plain(*refusal) if refusal is not None else await _answer(request, handler)
         except Busy:
+            await asyncio.sleep(BUSY_DELAY)  # who asks again at once would cost more than what was refused
             response = _plain(503, "too many ask at once: ask again, and more seldom")
         for name, value in HEADERS.items():
             response.headers.setdefault(name, value)

@@ -64,6 +64,11 @@ async def full(*_arguments: object) -> None:
     raise Busy
 
 
+@pytest.fixture(autouse=True)
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "BUSY_DELAY", 0.0)
+
+
 @pytest.mark.parametrize("path", READ)
 async def test_whoever_reads_waits_for_his_turn(
     session: aiohttp.ClientSession, monkeypatch: pytest.MonkeyPatch, path: str
@@ -192,6 +197,16 @@ async def test_one_peer_keeps_nobody_out(listener: StatusListener) -> None:
         writer.write(b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
         assert (await asyncio.wait_for(reader.readuntil(b"}"), 10)).startswith(b"HTTP/1.1 200")
         many += [await connect(listener, "127.0.0.2") for _ in range(guard.MAX_CONNECTIONS)]
+    for connection in (writer, *many):
+        connection.close()
+
+
+async def test_who_has_many_connections_does_not_drive_out_himself(listener: StatusListener) -> None:
+    """Those that were first are served, whatever else the same peer tries."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", listener.port, local_addr=("127.0.0.2", 0))
+    many = [await connect(listener, "127.0.0.2") for _ in range(3 * guard.MAX_CONNECTIONS)]
+    writer.write(b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+    assert (await asyncio.wait_for(reader.readuntil(b"}"), 10)).startswith(b"HTTP/1.1 200")
     for connection in (writer, *many):
         connection.close()
 
