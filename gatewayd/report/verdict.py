@@ -22,7 +22,9 @@ from gatewayd.report.format import counted, listed, span
 from gatewayd.report.words import SOURCE_LEVELS, SOURCES
 
 RECENT = 10.0
-"""Seconds for which a refusal or a differing read-back colours its part."""
+"""Seconds for which a part tells of a refusal or a read-back that differed."""
+PRESENT = 3.0
+"""Seconds for which it colours its part: what is over must not outshine how things are."""
 _LISTED = 3
 """Names listed by name."""
 
@@ -62,7 +64,13 @@ class CellVerdict:
     @property
     def level(self) -> Level:
         """That of the worst part."""
-        return max(part.level for part in (self.robot, self.gateway, *self.links.values(), *self.writers))
+        return self.worst.level
+
+    @property
+    def worst(self) -> PicturePart:
+        """The part to look at first: of those with the worst level, the nearest to the robot."""
+        parts = (self.robot, self.gateway, *self.links.values(), *self.writers)
+        return max(parts, key=lambda part: part.level)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +78,7 @@ class _Finding:
     level: Level
     text: str
     passing: bool = False
-    """It goes by itself, and is no problem."""
+    """It goes by itself, and is no problem; GOOD: it is over."""
 
 
 class ServedCell(Protocol):
@@ -136,11 +144,14 @@ def gateway_part(verdict: CellVerdict, hanging: Sequence[str], troubles: Sequenc
 
 
 def _part(name: str, findings: Sequence[_Finding], well: str, detail: str) -> PicturePart:
-    """The part with its findings, the worst first; without any it is `well`."""
-    if not findings:
-        return PicturePart(name, Level.GOOD, well, detail)
-    ordered = sorted(findings, key=lambda finding: -finding.level)
-    return PicturePart(name, ordered[0].level, "; ".join(finding.text for finding in ordered), detail)
+    """The part with its findings, the worst first; without any, or with what is over alone, it is `well`."""
+    ordered = sorted((*findings, _Finding(Level.GOOD, well)), key=lambda finding: -finding.level)
+    level = ordered[0].level
+    if level is Level.GOOD:
+        ordered.insert(0, ordered.pop())
+    else:
+        ordered.pop()
+    return PicturePart(name, level, "; ".join(finding.text for finding in ordered), detail)
 
 
 # -- the robot ---------------------------------------------------------------------------------------------------
@@ -191,9 +202,10 @@ def _of_gateway(cell: Cell, now: float) -> Iterator[_Finding]:
     if held:
         names = [cell.definition.locks[lock].name for lock in held]
         yield _Finding(Level.WARN, f"locks held by the local operator: {listed(names, _LISTED)}")
-    differs = _recent(cell, EventKind.READ_BACK_DIFFERS, now)
-    if differs:
-        yield _Finding(Level.WARN, f"read-back differs: {differs}", passing=True)
+    differed = cell.events.latest.get(EventKind.READ_BACK_DIFFERS)
+    if differed is not None and now - differed.time <= RECENT and differed.detail:
+        level, ago = _past(now - differed.time)
+        yield _Finding(level, f"read-back differed {ago}: {differed.detail}", passing=True)
     if cell.health.adoption:
         left = span(cell.health.adoption)
         yield _Finding(Level.WARN, f"adopted values without an owner fall back in {left}", passing=True)
@@ -204,9 +216,10 @@ def _good(cell: Cell) -> str:
     return f"{quality.count(Quality.GOOD)} of {len(quality)} values good"
 
 
-def _recent(cell: Cell, kind: EventKind, now: float) -> str:
-    event = cell.events.latest.get(kind)
-    return "" if event is None or now - event.time > RECENT else event.detail
+def _past(duration: float) -> tuple[Level, str]:
+    """How what happened so long ago colours its part, and when that was, in words."""
+    level = Level.WARN if duration <= PRESENT else Level.GOOD
+    return level, f"{span(duration)} ago" if duration >= 1 else "just now"
 
 
 # -- writers -----------------------------------------------------------------------------------------------------
@@ -226,22 +239,24 @@ def _writer(cell: Cell, index: int, lost: _Finding | None, now: float) -> Pictur
     refused = _refused(cell, index, now)
     if lost is not None:
         return PicturePart(name, lost.level, lost.text, detail)
-    if refused:
-        return PicturePart(name, Level.WARN, refused, detail)
-    if cell.writers.alive[index]:
-        return PicturePart(name, Level.GOOD, "connected", detail)
-    return PicturePart(name, Level.IDLE, "has not come yet", detail)
+    alive = cell.writers.alive[index]
+    words, level = ("connected", Level.GOOD) if alive else ("has not come yet", Level.IDLE)
+    if refused is not None:
+        words, level = f"{words}; {refused.text}", max(level, refused.level)
+    return PicturePart(name, level, words, detail)
 
 
-def _refused(cell: Cell, index: int, now: float) -> str:
+def _refused(cell: Cell, index: int, now: float) -> _Finding | None:
     last = cell.last_refusal
     if last is None or last.writer != index or now - last.time > RECENT:
-        return ""
+        return None
     refusal = last.refusal
-    what = f" {cell.definition.variables[refusal.variable].name}" if refusal.variable is not None else ""
+    level, ago = _past(now - last.time)
+    what = f"{cell.definition.variables[refusal.variable].name} " if refusal.variable is not None else ""
+    why = refusal.reason.text
     if refusal.holder is not None:
-        return f"refused{what}: held by {cell.definition.writer_name(refusal.holder)}"
-    return f"refused{what}: {refusal.reason.text}"
+        why = f"held by {cell.definition.writer_name(refusal.holder)}"
+    return _Finding(level, f"{what}refused {ago}: {why}", passing=True)
 
 
 # -- words -------------------------------------------------------------------------------------------------------

@@ -34,6 +34,7 @@ PAGE = {
     "/style.css": ("style.css", "text/css"),
     "/icon.svg": ("icon.svg", "image/svg+xml"),
     "/app.js": ("app.js", "text/javascript"),
+    "/cells.js": ("cells.js", "text/javascript"),
     "/picture.js": ("picture.js", "text/javascript"),
     "/variables.js": ("variables.js", "text/javascript"),
     "/history.js": ("history.js", "text/javascript"),
@@ -134,7 +135,7 @@ class StatusListener:
 
     async def _overview(self, request: web.Request) -> web.Response:
         body = await self._done(
-            request, lambda: view.as_json(view.overview(self._probes.daemon, __version__))
+            request, lambda: view.as_json(view.overview(self._probes, __version__, clock.now()))
         )
         return web.Response(body=body, content_type="application/json")
 

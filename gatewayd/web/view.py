@@ -21,7 +21,6 @@ from gatewayd.report.event_text import EventRecord
 from gatewayd.report.printable import json_text
 from gatewayd.report.verdict import PicturePart, gateway_part, verdict_of
 from gatewayd.service.cell_runtime import CellRuntime
-from gatewayd.service.daemon import Daemon
 from gatewayd.web.probes import Probes
 
 EVENTS = 100
@@ -64,11 +63,24 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def overview(daemon: Daemon, version: str) -> dict[str, object]:
-    """Every cell that is served, by name."""
+def overview(probes: Probes, version: str, now: float) -> dict[str, object]:
+    """Every cell that is served: its name, how it is, and why."""
     return {
         "gatewayd": version,
-        "cells": [{"name": cell.definition.name, "fingerprint": _fingerprint(cell)} for cell in daemon.cells],
+        "cells": [_glance(runtime, probes, now) for runtime in probes.daemon.runtimes],
+    }
+
+
+def _glance(runtime: CellRuntime, probes: Probes, now: float) -> dict[str, object]:
+    verdict = verdict_of(runtime, now)
+    gateway = gateway_part(verdict, probes.late, probes.troubles())
+    worst = max((verdict.worst, gateway), key=lambda part: part.level)
+    named = worst.name.lower() in worst.words.lower()
+    return {
+        "name": runtime.cell.definition.name,
+        "fingerprint": _fingerprint(runtime.cell),
+        "level": worst.level.name.lower(),
+        "words": worst.words if named else f"{worst.name}: {worst.words}",
     }
 
 

@@ -11,7 +11,7 @@ from gatewayd.core.image import Quality
 from gatewayd.core.requester import Requester
 from gatewayd.links.contract import Level, LinkHealth
 from gatewayd.mapping.loader import load
-from gatewayd.report.verdict import RECENT, CellVerdict, PicturePart, gateway_part, judge
+from gatewayd.report.verdict import PRESENT, RECENT, CellVerdict, PicturePart, gateway_part, judge
 from tests.web.press import CYCLES, FORCE_LIMIT, HMI, LINE, MAPPING, PLC, SPARE, START
 
 ADDRESS = "10.0.0.1:30004"
@@ -109,8 +109,12 @@ def test_gateway_tells_the_worst_first(cell: Cell) -> None:
     cell.operator.force(CYCLES, 5, NOW, NOW + 60)
     assert gateway(cell).words == "forced by the local operator: cycles"
     cell.events.append(Event(NOW, EventKind.READ_BACK_DIFFERS, detail="int 0: 1, not 2"))
-    assert gateway(cell).words == "forced by the local operator: cycles; read-back differs: int 0: 1, not 2"
+    assert gateway(cell).words == (
+        "forced by the local operator: cycles; read-back differed just now: int 0: 1, not 2"
+    )
     assert not any("read-back" in problem for problem in verdict(cell).problems), "it passes by itself"
+    over = "forced by the local operator: cycles; read-back differed 5 s ago: int 0: 1, not 2"
+    assert gateway(cell, now=NOW + 5).words == over
     hangs = gateway(cell, ("core",), ("not listening",))
     assert hangs.level is Level.BAD
     assert hangs.words.startswith("hangs: core; forced")
@@ -140,9 +144,15 @@ def test_what_the_robot_holds_colours_it(cell: Cell) -> None:
 def test_writers_by_their_last_deeds(cell: Cell) -> None:
     plc, hmi, line = verdict(cell).writers
     assert (plc.level, plc.words, plc.detail) == (Level.GOOD, "connected", "holds 2 locks")
-    assert (hmi.level, hmi.words) == (Level.WARN, "refused start: never writable by this writer")
+    assert (hmi.level, hmi.words) == (
+        Level.WARN,
+        "connected; start refused just now: never writable by this writer",
+    )
+    past = verdict(cell, NOW + PRESENT + 1).writers[HMI]
+    assert past.level is Level.GOOD, "what is over does not outshine how it is"
+    assert past.words == "connected; start refused 4 s ago: never writable by this writer"
     assert (line.level, line.words) == (Level.IDLE, "has not come yet")
-    assert verdict(cell, NOW + RECENT + 1).writers[HMI].level is Level.GOOD
+    assert verdict(cell, NOW + RECENT + 1).writers[HMI].words == "connected"
     cell.writer_disconnected(Requester(PLC), NOW, "closed")
     lost = verdict(cell, NOW + 5).writers[PLC]
     assert (lost.level, lost.words, lost.detail) == (Level.BAD, "writer plc lost for 5 s", "holds no lock")

@@ -98,7 +98,10 @@ async def test_values_owners_and_events_are_live(plant: Plant) -> None:
         assert await page.run(row("start", "td.address")) == "0.0coil 5"
         hmi = plant.plc(HMI)
         assert hmi.write(10, [5]) == 2
-        await page.wait("document.querySelectorAll('.writers .node')[1].dataset.level === 'warn'")
+        refused = "document.querySelectorAll('.writers .node')[1]"
+        await page.wait(f"{refused}.dataset.level === 'warn'")
+        await page.wait(f"{refused}.dataset.level === 'good'")
+        assert " ago: never writable" in await page.run(f"{refused}.textContent")
         await page.wait(f"{text('#happened')}.includes('hmi wrote part = 5: refused')")
         assert page.problems == []
 
@@ -127,14 +130,18 @@ async def test_each_bus_has_its_columns(plant: Plant) -> None:
     """Modbus by both addresses, CANopen by object and COB-ID, under headings that say which is which."""
     async with showing(plant, WIDE, mapping=BOTH_BUSES) as shown:
         page = shown.page
-        await page.wait(f"{text('.node.bus:nth-child(2) strong')} === 'CAN page'")
+        await page.wait(f"{text('#picture .bus:nth-of-type(4) strong')} === 'CAN page'")
         assert await page.run(row("part", "td.object")) == "2010h:01"
         assert await page.run(row("part", "td.cob-id")) == "by SDO"
         assert await page.run(row("start", "td.cob-id")) == "0x210"
         assert await page.run(row("start", "td.modbus")) == ""
         assert await page.run(row("force", "td.notation")) == "400105"
-        await page.wait(f"{text('.node.bus:nth-child(2) .state')}.includes('until a master starts the node')")
+        await page.wait(
+            f"{text('#picture .bus:nth-of-type(4) .state')}.includes('until a master starts the node')"
+        )
         assert await page.run(text("#worst")) == "▲ CAN page"
+        lines = "[...document.querySelectorAll('.buses .link')].map((link) => link.dataset.level).join()"
+        assert await page.run(lines) == "good,warn", "each line fails for itself"
         for width in WIDTHS:
             await page.resize(width, 800)
             assert await page.run("document.documentElement.scrollWidth") <= width
@@ -190,25 +197,33 @@ async def test_a_reloaded_mapping_is_shown_without_reloading_the_page(plant: Pla
         await shown.page.wait(f"{row('made', 'span.quality')}.startsWith('good')")
 
 
-async def test_one_page_shows_several_cells(plant: Plant) -> None:
-    simulator, port = plant.simulator(), free_port()
+async def test_one_page_shows_all_cells_at_a_glance(plant: Plant) -> None:
+    """A robot that is dead in a cell that nobody looks at is seen from every other one."""
+    simulators, port = [plant.simulator(), plant.simulator()], free_port()
     outputs = "variables:\n  {name}: {{robot: output_int_register_0, modbus: 110}}\n"
     files = [
         plant.mapping(outputs.format(name=f"cycles_{unit}"), simulator.port, name=f"cell-{unit}", unit=unit)
-        for unit in (1, 2)
+        for unit, simulator in enumerate(simulators, 1)
     ]
     plant.daemon(*files, "--status", f"{HOST}:{port}").wait_for_line("status page")
     async with browsing(plant.directory) as page:
         await page.open(f"http://{HOST}:{port}/", *NARROW)
         await page.wait(f"{LIVE} && {text('button.name')} === 'cycles_1'")
-        assert await page.run("[...document.getElementById('cells').options].map((one) => one.value)") == [
-            "cell-1",
-            "cell-2",
-        ]
-        await page.run("location.hash = 'cell-2'")
-        await page.wait(f"{LIVE} && {text('button.name')} === 'cycles_2'")
-        assert await page.run("document.getElementById('cells').value") == "cell-2"
+        levels = "[...document.querySelectorAll('#cells a')].map((link) => link.dataset.level).join()"
+        await page.wait(f"{levels} === 'good,good'")
+        assert await page.run("document.title") == "● cell-1 - gatewayd"
+        simulators[1].kill()
+        await page.wait(f"{levels} === 'good,bad'")
+        await page.wait(f"{text('#cells li:nth-child(2) .why')}.startsWith('robot not connected')")
+        await page.wait("document.title === '■ cell-1 - gatewayd'")
+        assert await page.run(text("#worst")) == "■ cell-2"
+        assert await page.run("document.querySelector('.node.robot').dataset.level") == "good"
         assert await page.run("document.documentElement.scrollWidth") <= NARROW[0]
+        await page.run("document.querySelector('#cells li:nth-child(2) a').click()")
+        await page.wait(f"{LIVE} && {text('button.name')} === 'cycles_2'")
+        assert await page.run(text("#cells [aria-current] strong")) == "cell-2"
+        assert await page.run(CONTRASTS) == []
+        assert page.problems == []
 
 
 async def test_filter_and_details_by_keyboard_alone(plant: Plant) -> None:

@@ -24,8 +24,13 @@ def told(runtime: CellRuntime, probes: Probes, since: int = 0) -> Any:
     return json.loads(as_json(state(runtime, probes, since, time.monotonic())))
 
 
-def test_overview_names_the_cells(daemon: Daemon) -> None:
-    assert [cell["name"] for cell in json.loads(as_json(overview(daemon, "1")))["cells"]] == ["press"]
+def test_overview_names_the_cells_and_tells_how_they_are(runtime: CellRuntime, probes: Probes) -> None:
+    [cell] = json.loads(as_json(overview(probes, "1", time.monotonic())))["cells"]
+    assert (cell["name"], cell["level"]) == ("press", "bad")
+    assert cell["words"] == "Modbus 127.0.0.1:15020: not listening, see the log"
+    runtime.cell.robot_lost("refused", time.monotonic())
+    [cell] = json.loads(as_json(overview(probes, "1", time.monotonic())))["cells"]
+    assert cell["words"].startswith("robot not connected")
 
 
 def test_layout_has_both_addresses_of_every_place(runtime: CellRuntime) -> None:

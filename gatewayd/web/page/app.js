@@ -1,17 +1,20 @@
 // Asks the gateway four times a second and shows what it says. What is not answered in time is shown as old, at once.
 
+import { Cells, worstOf } from "./cells.js";
 import { LEVELS, MARKS, Picture } from "./picture.js";
 import { Variables } from "./variables.js";
 import { OPERATOR, clock, count, make, printable, put, span } from "./words.js";
 
 const PERIOD = 250;
 const PATIENCE = 1500;                // without an answer for so long, nothing on the page is believed
+const GLANCE = 4;                     // looks at this cell for each look at all of them
 const EVENTS = 200;
 const byId = (id) => document.getElementById(id);
 
 const picture = new Picture(byId("picture"));
+const cells = new Cells(byId("cells"));
 const variables = new Variables(1000 / PERIOD);
-let layout = null, cell = null, events = 0;
+let layout = null, cell = null, events = 0, looks = 0;
 let answered = -Infinity, answeredAt = null, trouble = "";
 
 async function ask(path) {
@@ -21,15 +24,15 @@ async function ask(path) {
 }
 
 async function choose() {
-  const { cells, gatewayd } = await ask("page/cells");
-  const names = cells.map((one) => one.name);
+  const { cells: found, gatewayd } = await ask("page/cells");
+  const names = found.map((one) => one.name);
   const wanted = decodeURIComponent(location.hash.slice(1));
   cell = names.includes(wanted) ? wanted : names[0];
   if (cell === undefined) throw new Error("the gateway serves no cell");
-  byId("cells").replaceChildren(...names.map((name) => new Option(name, name, false, name === cell)));
-  byId("chooser").hidden = names.length < 2;
-  put(byId("cell"), names.length < 2 ? cell : "");
-  byId("cells").title = `gatewayd ${gatewayd}`;
+  cells.show(found, cell);
+  put(byId("cell"), cell);
+  byId("cell").title = `gatewayd ${gatewayd}`;
+  looks = 0;
   layout = await ask(`page/cells/${encodeURIComponent(cell)}`);
   events = 0;
   byId("happened").replaceChildren();
@@ -39,6 +42,9 @@ async function choose() {
 async function look() {
   if (layout === null) await choose();
   const asked = layout;
+  looks += 1;
+  if (looks % GLANCE === 0) cells.show((await ask("page/cells")).cells, cell);
+  if (asked !== layout) return;
   const state = await ask(`page/cells/${encodeURIComponent(cell)}/state?since=${events}`);
   if (asked !== layout) return;
   if (state.fingerprint !== layout.fingerprint) {
@@ -51,7 +57,8 @@ async function look() {
   variables.update(state, now);
   showLocks(state);
   showEvents(state.events);
-  document.title = `${MARKS[state.picture.level]} ${cell} - gatewayd`;
+  const level = worstOf([state.picture.level, ...cells.others(cell).map((other) => other.level)]);
+  document.title = `${MARKS[level]} ${cell} - gatewayd`;
   answered = now;
   answeredAt = new Date();
   trouble = "";
@@ -60,7 +67,7 @@ async function look() {
 
 // In the header, so that trouble stays in sight below the picture and on the other tabs of a phone.
 function showWorst({ robot, gateway, buses, writers }) {
-  const nodes = [robot, gateway, ...buses, ...writers];
+  const nodes = [robot, gateway, ...buses, ...writers, ...cells.others(cell)];
   const level = ["bad", "warn"].find((one) => nodes.some((node) => node.level === one));
   const worst = byId("worst");
   worst.hidden = level === undefined;
@@ -137,9 +144,6 @@ async function run() {
 }
 
 function start() {
-  byId("cells").addEventListener("change", (event) => {
-    location.hash = encodeURIComponent(event.target.value);
-  });
   byId("worst").addEventListener("click", () => scrollTo({ top: 0 }));
   addEventListener("hashchange", () => { layout = null; });
   for (const button of document.querySelectorAll(".tabs button")) {

@@ -17,9 +17,8 @@ export class Picture {
     if (shape !== this.shape) this.build(picture, shape);
     const told = [picture.robot, picture.gateway, ...picture.buses, ...picture.writers];
     told.forEach((one, index) => this.fill(this.parts[index], one));
-    this.robotLink.dataset.level = picture.robot.level;
-    const flows = picture.buses.every((bus) => bus.level === "good");
-    this.busLink.dataset.level = flows ? "good" : "bad";
+    this.mark(this.robotLink, picture.robot.level);
+    picture.buses.forEach((bus, index) => this.mark(this.busLinks[index], bus.level));
   }
 
   build(picture, shape) {
@@ -27,9 +26,12 @@ export class Picture {
     this.parts = [];
     const robot = this.node("robot"), gateway = this.node("gateway");
     this.robotLink = this.link("RTDE");
-    this.busLink = this.link(picture.buses.map((bus) => bus.name.split(" ")[0]).join(", ") || "no bus");
     const buses = make("div", "buses");
-    picture.buses.forEach(() => buses.append(this.node("bus")));
+    this.busLinks = picture.buses.map((bus) => {
+      const link = this.link(bus.name.split(" ")[0]);
+      buses.append(link, this.node("bus"));
+      return link;
+    });
     const writers = make("ul", "writers plain");
     writers.setAttribute("aria-label", "Writers");
     picture.writers.forEach(() => {
@@ -38,7 +40,7 @@ export class Picture {
       writers.append(item);
     });
     buses.append(writers);
-    this.place.replaceChildren(robot, this.robotLink, gateway, this.busLink, buses);
+    this.place.replaceChildren(robot, this.robotLink, gateway, buses);
   }
 
   node(icon) {
@@ -61,9 +63,16 @@ export class Picture {
 
   link(label) {
     const link = make("div", "link");
-    link.append(make("span", "wire"), make("span", "label", label));
+    const words = make("span", "label"), mark = make("span", "mark");
+    words.append(mark, label);
+    link.append(make("span", "wire"), words);
     link.setAttribute("aria-hidden", "true");
     return link;
+  }
+
+  mark(link, level) {
+    link.dataset.level = level;
+    put(link.querySelector(".mark"), MARKS[level]);
   }
 
   fill(part, told) {
