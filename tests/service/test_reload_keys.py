@@ -11,10 +11,9 @@ import asyncio
 import json
 import re
 import socket
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager, closing, suppress
 from copy import deepcopy
-from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -34,304 +33,21 @@ from gatewayd.service.reload import Reloader, Result
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.server import SimulatedController
 from tests.contracts import language
+from tests.service.reload_table import (
+    BASE,
+    BOTH,
+    CHANNEL,
+    LINE,
+    MODBUS_PORT,
+    OTHER_PORT,
+    PLC,
+    REMOVED,
+    ROBOT_PORT,
+    ROWS,
+    Changes,
+    Row,
+)
 from tests.service.test_reload import CompiledHere
-
-REMOVED = object()
-Changes = Mapping[str, Any]
-ROBOT_PORT, MODBUS_PORT, OTHER_PORT, CHANNEL = "ROBOT_PORT", "MODBUS_PORT", "OTHER_PORT", "CHANNEL"
-
-BASE: dict[str, Any] = {
-    "gatewayd": 1,
-    "cell": "press",
-    "robot": {"host": "127.0.0.1", "port": ROBOT_PORT, "stale_after": "5s", "adopt_for": "100s"},
-    "modbus": {"listen": MODBUS_PORT},
-    "canopen": {
-        "interface": "virtual",
-        "channel": CHANNEL,
-        "bitrate": 500000,
-        "node": 5,
-        "autostart": True,
-        "cob_ids": {"tpdo": "0x1A0..0x1A3", "rpdo": "0x220..0x223"},
-        "pdos": {
-            "command": {"cob_id": "0x205", "deadline": "30s", "variables": ["speed"]},
-            "report": {"cob_id": "0x185", "variables": ["count"]},
-        },
-    },
-    "writers": {
-        "plc": {"modbus": "127.0.0.1", "timeout": "20s", "grace": "1s"},
-        "hmi": {"modbus": "127.0.0.3"},
-        "line": {"canopen": "rpdo", "node": 7, "heartbeat": "20s"},
-    },
-    "groups": {"motion": {"owner": ["plc", "hmi"], "lease": "20s"}},
-    "variables": {
-        "number": {"robot": "input_int_register_0", "modbus": {"holding": 1}, "group": "motion"},
-        "other": {"robot": "input_int_register_2", "modbus": 3, "group": "motion"},
-        "speed": {"robot": "input_int_register_1", "owner": "line", "canopen": {"pdo": "command"}},
-        "free": {"robot": "input_double_register_0", "modbus": 10, "owner": "plc", "limits": [0, 150]},
-        "list": {"robot": "input_int_register_3", "modbus": 14, "owner": ["plc", "hmi"], "lease": "5s"},
-        "bit": {"robot": "input_bit_register_0", "modbus": 16.0, "owner": "plc"},
-        "count": {"robot": "output_int_register_0", "modbus": 100, "canopen": {"pdo": "report"}},
-        "level": {"robot": "output_double_register_0", "modbus": {"holding": 110}},
-        "lamp": {"robot": "output_bit_register_0", "modbus": {"discrete": 7}},
-    },
-}
-WATCHED = {"robot.watchdog": {"field": "input_int_register_20", "frequency": 20, "requires": ["plc", "hmi"]}}
-CLEARING = {"robot.adopt_for": REMOVED, "robot.on_connect": "fallback"}
-SWAPPED = {"writers.plc.modbus": "127.0.0.3", "writers.hmi.modbus": "127.0.0.1"}
-LONGER_RPDO = {
-    "canopen.pdos.command.variables": ["speed", "more"],
-    "variables.more": {"robot": "input_int_register_9", "owner": "line", "canopen": {"pdo": "command"}},
-}
-BY_SDO = {"canopen.pdos.command": REMOVED, "variables.speed.canopen": {"pdo": "none"}}
-BY_MODBUS = {
-    "canopen.pdos.command": REMOVED,
-    "variables.speed": {"robot": "input_int_register_1", "owner": "plc", "modbus": 40},
-}
-GUARDING = {"time": "100ms", "factor": 3}
-GUARDED = {"canopen.heartbeat": "none", "canopen.guarding": GUARDING}
-TOMORROW = {"field": "output_of_today", "type": "DOUBLE", "direction": "output"}
-NEWER = {"variables.level.robot": TOMORROW}
-BOTH, PLC, LINE, NOBODY = "plc line", "plc", "line", ""
-
-
-@dataclass(frozen=True)
-class Row:
-    """A change of one key, and what comes of it."""
-
-    key: str
-    changes: Changes
-    kinds: str = ""
-    """Of its objections, in their order."""
-    kept: str = BOTH
-    """Who still owns what it owned."""
-    given: Changes = field(default_factory=dict)
-    """What is otherwise from the start."""
-
-
-def row(path: str, value: Any, kinds: str = "", kept: str = BOTH, given: Changes | None = None) -> Row:
-    return Row(_key(path), {path: value}, kinds, kept, given or {})
-
-
-def _key(path: str) -> str:
-    """`writers.plc.timeout` -> `writers.*.timeout`."""
-    parts = path.split(".")
-    named = 2 if parts[:2] == ["canopen", "pdos"] else 1
-    if parts[0] in ("writers", "groups", "variables") or named == 2:
-        parts[named:] = ["*", *parts[named + 1 :]] if len(parts) > named + 1 else []
-    return ".".join(parts)
-
-
-ROWS: dict[str, list[Row]] = {
-    "file": [
-        # The version has one value; a file of another one is refused by `check`.
-        row("gatewayd", 1),
-        row("cell", "stamp", "release gone", NOBODY),
-    ],
-    "robot": [
-        Row("robot", {"robot.host": "127.0.0.9"}, "release", NOBODY),
-        row("robot.host", "127.0.0.9", "release", NOBODY),
-        row("robot.port", 1, "release", NOBODY),
-        row("robot.series", "e"),
-        row("robot.version", "5.12"),
-        row("robot.frequency", 100),
-        row("robot.frequency", 100, "watchdog", given=WATCHED),
-        row("robot.stale_after", "6s", "weakening"),
-        row("robot.stale_after", "4s"),
-        row("robot.on_connect", "fallback", given={"robot.adopt_for": REMOVED}),
-        row(
-            "robot.on_connect",
-            "adopt",
-            "weakening",
-            given=CLEARING,
-        ),
-        row("robot.adopt_for", "none", "weakening"),
-        row("robot.adopt_for", "50s"),
-        row("robot.verify", False, "weakening"),
-        row("robot.valid", "running"),
-        row("robot.valid", REMOVED, "weakening", given={"robot.valid": "running"}),
-        row("robot.watchdog", WATCHED["robot.watchdog"]),
-        row("robot.watchdog", REMOVED, "weakening", given=WATCHED),
-        row("robot.watchdog.field", "input_int_register_21", "watchdog weakening", given=WATCHED),
-        row("robot.watchdog.frequency", 10, "watchdog weakening", given=WATCHED),
-        row("robot.watchdog.requires", ["plc"], "weakening", given=WATCHED),
-        row("robot.watchdog.requires", ["plc", "hmi", "line"], given=WATCHED),
-    ],
-    "modbus": [
-        Row("modbus", {"modbus.listen": OTHER_PORT}, "release", LINE),
-        row("modbus.listen", OTHER_PORT, "release", LINE),
-        row("modbus.unit", 2, "release", LINE),
-        row("modbus.allow", ["127.0.0.0/8"]),
-        row("modbus.allow", ["127.0.0.0/8"], "weakening", given={"modbus.allow": ["127.0.0.1", "127.0.0.3"]}),
-        row("modbus.default_unit", True),
-        row("modbus.default_unit", False, "release", LINE, given={"modbus.default_unit": True}),
-        row("modbus.connections", 2),
-        row("modbus.connections_per_peer", 1),
-        row("modbus.idle_timeout", "1s"),
-        row("modbus.gaps", "zero"),
-        row("modbus.write_gaps", "ignore"),
-        row("modbus.robot_away", "busy"),
-        row("modbus.order", "CDAB", "owned"),
-    ],
-    "canopen": [
-        Row("canopen", {"canopen.node": 6}, "release", PLC),
-        row("canopen.interface", "udp_multicast", "release", PLC),
-        row("canopen.channel", "elsewhere", "release", PLC),
-        row("canopen.bitrate", 250000, "release", PLC),
-        row("canopen.node", 6, "release", PLC),
-        row("canopen.autostart", False),
-        row("canopen.heartbeat", "1s", "weakening"),
-        row("canopen.heartbeat", "200ms"),
-        row("canopen.identity", {"vendor": 1}, "release identity", PLC),
-        row("canopen.identity.vendor", 1, "release identity", PLC),
-        row("canopen.identity.product", 1, "release identity", PLC),
-        row("canopen.identity.revision", 7, "release identity", PLC),
-        row("canopen.identity.serial", 7, "release identity", PLC),
-        row("canopen.sync", {"period": "100ms"}, "release", PLC),
-        row("canopen.sync.cob_id", "0x81", "release", PLC),
-        row("canopen.sync.producer", True, "release", PLC, given={"canopen.sync.period": "100ms"}),
-        row("canopen.sync.period", "200ms", "release", PLC, given={"canopen.sync.period": "100ms"}),
-        row(
-            "canopen.sync.counter",
-            10,
-            "release",
-            PLC,
-            given={"canopen.sync": {"producer": True, "period": "100ms"}},
-        ),
-        row("canopen.sync.window", "50ms", "release", PLC),
-        row("canopen.guarding", GUARDING, "release", PLC, {"canopen.heartbeat": "none"}),
-        row("canopen.guarding.time", "200ms", "release", PLC, GUARDED),
-        row("canopen.guarding.factor", 4, "release", PLC, GUARDED),
-        row("canopen.emcy", {"inhibit": "50ms"}),
-        row("canopen.emcy.inhibit", "50ms"),
-        row("canopen.on_communication_error", "stay", "release", PLC),
-        row("canopen.pdo", {"inhibit": "10ms"}),
-        row("canopen.pdo.transmission", "sync", "release", PLC),
-        row("canopen.pdo.inhibit", "10ms"),
-        row("canopen.pdo.event", "1s"),
-        row("canopen.pdo.deadline", "20s"),
-        row("canopen.pdo.real", "REAL32"),
-        row("canopen.cob_ids", {"tpdo": "0x1A0"}),
-        row("canopen.cob_ids.tpdo", "0x1A0"),
-        row("canopen.cob_ids.rpdo", "0x220"),
-        Row("canopen.pdos", {"canopen.pdos.more": {"cob_id": "0x1A0", "variables": ["level"]}}),
-        row("canopen.pdos.command.cob_id", "0x220", "release", PLC),
-        row("canopen.pdos.command.transmission", 1, "release", PLC),
-        row("canopen.pdos.report.inhibit", "10ms"),
-        row("canopen.pdos.report.event", "1s"),
-        row("canopen.pdos.command.deadline", "60s", "weakening"),
-        row("canopen.pdos.command.deadline", "20s"),
-        row(
-            "canopen.pdos.report.sync_start", 3, "release", PLC, given={"canopen.pdos.report.transmission": 1}
-        ),
-        row("canopen.pdos.report.status", ["flags"], "release", PLC),
-        Row("canopen.pdos.*.variables", LONGER_RPDO, "release", PLC),
-        row("canopen.pdos.report.variables", ["count", "lamp"]),
-        row("canopen.pdos.report.comment", "for people"),
-    ],
-    "writers": [
-        Row("writers", {"writers.more": {"modbus": "127.0.0.4"}}),
-        row("writers.plc.modbus", "127.0.0.5", "release", LINE),
-        row("writers.plc.modbus", ["127.0.0.1", "127.0.0.5"]),
-        Row(
-            "writers.*.modbus",
-            {"writers.plc.modbus": "127.0.0.3", "writers.hmi.modbus": "127.0.0.1"},
-            "release",
-            LINE,
-        ),
-        row("writers.line.canopen", "any", "release", PLC),
-        row("writers.line.node", 8, "release", PLC),
-        row("writers.line.heartbeat", "10s"),
-        row("writers.line.heartbeat", "30s", "weakening"),
-        row("writers.plc.timeout", "10s"),
-        row("writers.plc.timeout", "30s", "weakening"),
-        row("writers.plc.timeout_counts", "writes"),
-        row(
-            "writers.plc.timeout_counts",
-            "requests",
-            "weakening",
-            given={"writers.plc.timeout_counts": "writes"},
-        ),
-        row("writers.plc.grace", "500ms"),
-        row("writers.plc.grace", "2s", "weakening"),
-    ],
-    "groups": [
-        Row(
-            "groups",
-            {"groups.motion": REMOVED, "variables.number.group": REMOVED, "variables.other.group": REMOVED},
-            "release weakening",
-            LINE,
-        ),
-        row("groups.motion.owner", ["hmi", "plc"], "owned weakening"),
-        row("groups.motion.owner", ["hmi"], "release", LINE),
-        row("groups.motion.lease", "10s", "owned"),
-        row("groups.motion.lease", "40s", "owned weakening"),
-        row("groups.motion.takeover", False, "owned weakening"),
-        row("groups.motion.whole", True, "owned"),
-        row("groups.motion.comment", "for people"),
-    ],
-    "variables": [
-        Row("variables", {"variables.more": {"robot": "output_int_register_1", "canopen": "auto"}}),
-        Row("variables", {"variables.more": {"robot": "input_int_register_9", "modbus": 30, "owner": "plc"}}),
-        Row(
-            "variables",
-            {"variables.level": REMOVED, "variables.lamp": REMOVED, "variables.bit": REMOVED},
-            "gone",
-        ),
-        row("variables.number.robot", "input_int_register_5", "release", LINE),
-        row("variables.level.robot", {"field": "output_of_tomorrow", "type": "DOUBLE"}),
-        Row(
-            "variables.*.robot.field",
-            {"variables.level.robot": {**TOMORROW, "field": "output_of_tomorrow"}},
-            given=NEWER,
-        ),
-        Row("variables.*.robot.type", {"variables.level.robot": {**TOMORROW, "type": "UINT32"}}, given=NEWER),
-        Row(
-            "variables.*.robot.direction",
-            {"variables.level.robot": {**TOMORROW, "direction": "input"}},
-            "direction",
-            given=NEWER,
-        ),
-        row("variables.count.robot", "input_int_register_5", "release direction", PLC),
-        row("variables.number.modbus", 20, "owned"),
-        row("variables.number.modbus.holding", 20, "owned"),
-        row("variables.level.modbus", {"input": 3}),
-        Row("variables.*.modbus.input", {"variables.level.modbus": {"input": 3}}),
-        Row("variables.*.modbus.coil", {"variables.bit.modbus": {"coil": 3}}),
-        row("variables.lamp.modbus.discrete", 9),
-        row("variables.number.modbus.type", "int16", "owned"),
-        row("variables.number.modbus.order", "CDAB", "owned"),
-        row("variables.number.modbus.scale", 2, "owned"),
-        row("variables.number.modbus.offset", 2, "owned"),
-        row("variables.number.canopen", "object", "release owned", PLC),
-        row("variables.free.canopen", "object"),
-        row("variables.level.canopen", "object"),
-        row("variables.level.canopen", "auto"),
-        Row("variables.*.canopen", BY_SDO, "release", PLC, {"writers.line.canopen": "any"}),
-        Row("variables.*.canopen.pdo", BY_SDO, "release", PLC, {"writers.line.canopen": "any"}),
-        row("variables.speed.canopen.scale", 2, "release", PLC),
-        row("variables.speed.canopen.offset", 2, "release", PLC),
-        row("variables.speed.canopen.type", "INTEGER16", "release", PLC),
-        row("variables.speed.owner", ["line", "plc"], "owned weakening"),
-        Row("variables.*.owner", BY_MODBUS, "release weakening", PLC),
-        row("variables.list.takeover", False, "weakening"),
-        row("variables.speed.lease", "30s", "owned"),
-        row("variables.list.lease", "10s", "weakening"),
-        row("variables.other.group", REMOVED, "release weakening", LINE),
-        row("variables.free.limits", [0, 200], "weakening"),
-        row("variables.free.limits", [0, 100]),
-        row("variables.number.limits", [0, 100], "owned"),
-        row("variables.free.clamp", True, "weakening"),
-        row("variables.number.on_release", 5, "owned"),
-        row("variables.free.on_release", "hold", "weakening"),
-        row("variables.level.on_stale", "hold", "weakening"),
-        row("variables.level.on_stale", 3),
-        row("variables.level.valid", "running"),
-        row("variables.level.valid", REMOVED, "weakening", given={"variables.level.valid": "running"}),
-        row("variables.level.deadband", 1, given={"variables.level.canopen": "auto"}),
-        row("variables.number.unit", "mm"),
-        row("variables.number.comment", "for people"),
-    ],
-}
 
 
 def put(mapping: dict[str, Any], changes: Changes) -> None:
@@ -489,7 +205,7 @@ def test_every_key_of_the_language_is_decided() -> None:
     known = language()
     assert isinstance(known, dict)
     assert known.keys() - {each.key for each in _rows()} == set(), (
-        "add a row that says what a reload does with it"
+        "add a row to reload_table.py: what does a reload do?"
     )
 
 
