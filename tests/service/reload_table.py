@@ -61,6 +61,10 @@ GUARDING = {"time": "100ms", "factor": 3}
 GUARDED = {"canopen.heartbeat": "none", "canopen.guarding": GUARDING}
 TOMORROW = {"field": "output_of_today", "type": "DOUBLE", "direction": "output"}
 NEWER = {"variables.level.robot": TOMORROW}
+GUARDING_LINE = {
+    "canopen.heartbeat": "none",
+    "writers.line": {"canopen": "rpdo", "guarding": "20s"},
+}
 BOTH, PLC, LINE, NOBODY = "plc line", "plc", "line", ""
 
 
@@ -212,6 +216,9 @@ ROWS: dict[str, list[Row]] = {
         row("writers.line.node", 8, "release", PLC),
         row("writers.line.heartbeat", "10s"),
         row("writers.line.heartbeat", "30s", "weakening"),
+        row("writers.line.guarding", "10s", given=GUARDING_LINE),
+        row("writers.line.guarding", "30s", "weakening", given=GUARDING_LINE),
+        row("writers.line.guarding", REMOVED, "release weakening", PLC, GUARDING_LINE),
         row("writers.plc.timeout", "10s"),
         row("writers.plc.timeout", "30s", "weakening"),
         row("writers.plc.timeout_counts", "writes"),

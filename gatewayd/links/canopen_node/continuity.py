@@ -5,7 +5,7 @@
 | objects of variables | more of them |
 | TPDOs | more of them; more at the end of one (whoever receives it uses its first bytes); inhibit and event time |
 | RPDOs | more of them; the deadline |
-| heartbeats | how long, ours and those that are watched; not whose |
+| heartbeats, guarding of writers | how long, ours and those that are watched; not whose |
 | autostart, inhibit time of EMCY | yes |
 | everything else | no: the node boots anew, so that its master looks at it again |
 """
@@ -19,7 +19,7 @@ from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.links.canopen_node.description import by_name
 from gatewayd.links.canopen_node.plan import CanopenPlan, PdoPlan
 
-_JUDGED = ("objects", "pdos", "consumers", "heartbeat", "autostart", "emcy_inhibit")
+_JUDGED = ("objects", "pdos", "consumers", "guarded", "heartbeat", "autostart", "emcy_inhibit")
 """Fields of a plan that are looked into; all others have to be the same."""
 
 Pdos = Mapping[tuple[Direction, int], PdoPlan]
@@ -57,7 +57,7 @@ def _rest(plan: CanopenPlan, cell: CellDefinition) -> dict[str, str]:
 
 
 def _watched(plan: CanopenPlan, cell: CellDefinition) -> list[dict[str, str]]:
-    return [by_name(replace(consumer, timeout=0), cell) for consumer in plan.consumers]
+    return [by_name(replace(consumer, timeout=0), cell) for consumer in (*plan.consumers, *plan.guarded)]
 
 
 def _objects(plan: CanopenPlan, cell: CellDefinition) -> set[tuple[str, ...]]:
