@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from gatewayd.core.cell import Cell
+from gatewayd.links.contract import Passage
 from gatewayd.links.modbus_server import limits
 from gatewayd.links.modbus_server import listener as server
 from gatewayd.links.modbus_server.listener import ListenError, ModbusListener
@@ -287,3 +288,35 @@ async def test_an_ipv6_address_is_for_ipv6_peers_alone(live_cell: Cell, plan_of:
     assert await reader.readexactly(len(ANSWER)) == ANSWER
     writer.close()
     await listener.close()
+
+
+async def test_what_passes_is_handed_to_a_tap_while_there_is_one(listener: ModbusListener) -> None:
+    """Whole frames, however they come in; without a tap nothing stands between socket and session."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", listener.port)
+
+    async def exchange(data: bytes) -> None:
+        writer.write(data[:5])
+        await writer.drain()
+        writer.write(data[5:])
+        assert await reader.readexactly(len(ANSWER)) == ANSWER
+
+    await exchange(READ)
+    (connection,) = listener._connections
+    assert connection.receive == connection.session.received
+    passed: list[Passage] = []
+    listener.trace(passed.append)
+    await exchange(READ)
+    own, peer = writer.get_extra_info("peername"), writer.get_extra_info("sockname")
+    ends = f"{peer[0]}:{peer[1]}", f"{own[0]}:{own[1]}"
+    assert [(one.data, one.outgoing) for one in passed] == [(READ, False), (ANSWER, True)]
+    assert {(one.peer, one.own, one.cell) for one in passed} == {(*ends, "press-3")}
+    later_reader, later = await asyncio.open_connection("127.0.0.1", listener.port)
+    later.write(READ)
+    await later_reader.readexactly(len(ANSWER))
+    assert len(passed) == 4, "who connects later is traced as well"
+    listener.trace(None)
+    await exchange(READ)
+    assert len(passed) == 4
+    assert connection.receive == connection.session.received
+    for stream in (writer, later):
+        stream.close()
