@@ -55,7 +55,7 @@ class CommunicationErrors:
         counters: NodeCounters,
         *,
         lose_node: Callable[[str, int, float], None],
-        lose_rpdo: Callable[[str, float], None],
+        lose_rpdo: Callable[[int, str, float], None],
         behaviour: int = 0,
     ) -> None:
         self.behaviour = ErrorBehaviour(behaviour)
@@ -94,7 +94,7 @@ class CommunicationErrors:
         """Something is wrong with an RPDO."""
         self._emergency.raise_error(fault.value, now, number.to_bytes(2, "little"), instance=number)
         if fault is Fault.TIMEOUT:
-            self._lose_rpdo(f"RPDO {number} stays away", now)
+            self._lose_rpdo(number, f"RPDO {number} stays away", now)
 
     def fault_cleared(self, fault: Fault, number: int, now: float) -> None:
         """It is right again."""

@@ -14,6 +14,7 @@ def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
     """The plan of a node without errors."""
     spec = node.part.spec
     writers = [part.spec.by(CanopenWriter) for part in cell.document.writers.values()]
+    own = {name: index for index, writer in enumerate(writers) for name in writer.pdos}
     return CanopenPlan(
         interface=spec.interface,
         channel=spec.channel,
@@ -34,8 +35,10 @@ def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
             if writer.node is not None and writer.heartbeat is not None
         ),
         objects=tuple(placed.plan for placed in node.objects),
-        pdos=tuple(_pdo(pdo) for pdo in node.pdos),
-        rpdo_writer=next((index for index, writer in enumerate(writers) if writer.by_rpdo), None),
+        pdos=tuple(_pdo(pdo, own.get(pdo.name)) for pdo in node.pdos),
+        rpdo_writer=next(
+            (index for index, writer in enumerate(writers) if writer.by_rpdo and not writer.pdos), None
+        ),
         sdo_writer=next((index for index, writer in enumerate(writers) if writer.by_sdo), None),
         guarded=tuple(
             Consumer(GUARDING, _ticks(writer.guarding, 1000), index)
@@ -50,7 +53,7 @@ def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
     )
 
 
-def _pdo(pdo: ExpandedPdo) -> PdoPlan:
+def _pdo(pdo: ExpandedPdo, writer: int | None) -> PdoPlan:
     assert pdo.slot.cob_id is not None
     return PdoPlan(
         number=pdo.slot.number,
@@ -71,6 +74,7 @@ def _pdo(pdo: ExpandedPdo) -> PdoPlan:
             ),
         ),
         sync_start=pdo.sync_start,
+        writer=writer,
         name=pdo.name,
     )
 

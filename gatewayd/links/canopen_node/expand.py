@@ -30,6 +30,7 @@ from gatewayd.links.canopen_node.sections import (
     Canopen,
     CanopenPlace,
     CanopenPlaces,
+    CanopenWriter,
     PdoDefaults,
     PdoSpec,
 )
@@ -212,6 +213,15 @@ def default_type(variable: ExpandedVariable, real: str) -> CanType:
 def place_of(variable: ExpandedVariable) -> CanopenPlace | None:
     """What the line of a variable says of CANopen."""
     return variable.spec.by(CanopenPlaces).canopen
+
+
+def writes_by(writer: CanopenWriter, pdo: ExpandedPdo, cell: ExpandedCell) -> bool:
+    """Whether a PDO towards the robot is this writer's: it names it, or nobody does and it names none."""
+    if not writer.by_rpdo:
+        return False
+    if writer.pdos:
+        return pdo.name in writer.pdos
+    return not any(pdo.name in part.spec.by(CanopenWriter).pdos for part in cell.document.writers.values())
 
 
 Linear = tuple[float, float]

@@ -8,7 +8,14 @@ from typing import ClassVar, Final
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.links.canopen_node.compile import compile_canopen
 from gatewayd.links.canopen_node.declaration import KIND
-from gatewayd.links.canopen_node.expand import CanopenCell, expand_canopen, node_of, place_of, reach_of
+from gatewayd.links.canopen_node.expand import (
+    CanopenCell,
+    expand_canopen,
+    node_of,
+    place_of,
+    reach_of,
+    writes_by,
+)
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.sections import (
     AUTO,
@@ -126,7 +133,11 @@ class CanopenLanguage(LinkLanguage):
         return (
             node is not None
             and writer.by(CanopenWriter).by_rpdo
-            and any(wanted <= {entry.variable for entry in pdo.entries} for pdo in node.pdos)
+            and any(
+                wanted <= {entry.variable for entry in pdo.entries}
+                and writes_by(writer.by(CanopenWriter), pdo, cell)
+                for pdo in node.pdos
+            )
         )
 
     def places_of(self, line: Part[VariableSpec], document: Document) -> bool:

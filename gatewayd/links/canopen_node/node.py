@@ -69,6 +69,7 @@ class Node:
         self.cell = cell
         self.bus = BusState.ABSENT
         self.counters = NodeCounters()
+        self._rpdo_writers = plan.rpdo_writers
         self._link = send
         self._observer = observer if observer is not None else Observer()
         self._now = 0.0
@@ -104,7 +105,7 @@ class Node:
             self.transmit,
             self.counters,
             lose_node=self._lose_node,
-            lose_rpdo=partial(self._lose, plan.rpdo_writer),
+            lose_rpdo=lambda number, reason, now: self._lose(self._writer_of(number), reason, now),
             behaviour=plan.error_behaviour,
         )
         self.producer = HeartbeatProducer(self._send, self.nmt, alive, plan.heartbeat)
@@ -142,7 +143,8 @@ class Node:
         self.time = TimeConsumer(on_time=self._observer.time_received, changed=self._route)
         self.receive_pdos = ReceiveEngine(
             cell,
-            partial(self._peers.requester, plan.rpdo_writer),
+            lambda number, now: self._peers.by_rpdo(self._writer_of(number), now),
+            lambda number: self._peers.requester(self._writer_of(number)),
             self.errors.fault_raised,
             self.errors.fault_cleared,
         )
@@ -346,8 +348,6 @@ class Node:
         if frame.can_id in self.receive_pdos.synchronous_ids and not self.sync.window_open(now):
             self.counters.outside_window += 1
             return
-        self.promises.write(self.plan.rpdo_writer, now)
-        self._peers.connect(self.plan.rpdo_writer, "RPDO", now)
         self.receive_pdos.receive(frame.can_id, frame.data, now)
 
     def _receive_sdo(self, frame: Frame, now: float) -> None:
@@ -356,13 +356,12 @@ class Node:
             self._answer(self.sdo.receive(frame.data, now))
 
     def _receive_guarding(self, frame: Frame, now: float) -> None:
-        if not frame.remote:
-            if self.errors.doubled(now):
-                self._observer.report(f"another node on the bus has the node-ID {self.node_id} too")
-            return
-        if not self.producer.enabled:
-            self._peers.guarded(now)
-        self.guarding.receive(frame, now, late=self._waiting.seconds > 0)
+        if frame.remote:
+            if not self.producer.enabled:
+                self._peers.guarded(now)
+            self.guarding.receive(frame, now, late=self._waiting.seconds > 0)
+        elif self.errors.doubled(now):
+            self._observer.report(f"another node on the bus has the node-ID {self.node_id} too")
 
     def _answer(self, answers: Iterable[bytes]) -> None:
         for data in answers:
@@ -384,7 +383,9 @@ class Node:
             self.sdo.reset()
             self._lose(self.plan.sdo_writer, f"NMT state {new.name}", now)
         if old is NmtState.OPERATIONAL:
-            self._lose(self.plan.rpdo_writer, f"NMT state {new.name}", now)
+            for writer in {self.plan.rpdo_writer, *self._rpdo_writers.values()}:
+                self._peers.lose(writer, f"NMT state {new.name}", now)
+            self.receive_pdos.forget()
         self.receive_pdos.nmt(operational, now)
         self.transmit.nmt(operational, now)
         self.robot_errors.tick(now)
@@ -420,15 +421,16 @@ class Node:
 
     def _lose(self, writer: int | None, reason: str, now: float) -> None:
         self._peers.lose(writer, reason, now)
-        if writer == self.plan.rpdo_writer:
-            self.receive_pdos.forget()
+        self.receive_pdos.forget_of(writer)
+
+    def _writer_of(self, number: int) -> int | None:
+        return self._rpdo_writers.get(number, self.plan.rpdo_writer)
 
     def _lose_node(self, reason: str, node: int, now: float) -> None:
         """Its writers are lost; by the mapping's promise that is no communication error, whoever else is."""
-        if node == GUARDING:
-            reason = "the guarding stays away"
+        reason = "the guarding stays away" if node == GUARDING else reason.format(node)
         for writer in self.promises.of(node):
-            self._lose(writer, reason.format(node), now)
+            self._lose(writer, reason, now)
 
     def _watch_changed(self) -> None:
         """1016h is another one: it may watch more, but what the mapping says of writers holds whatever it says."""

@@ -62,6 +62,12 @@ class Peers:
         self._promises.write(writer, now)
         return self.requester(writer)
 
+    def by_rpdo(self, writer: int | None, now: float) -> Requester:
+        """The writer as the sender of an RPDO, which is a sign of its life."""
+        self._promises.write(writer, now)
+        self.connect(writer, "RPDO", now)
+        return self.requester(writer)
+
     def connect(self, writer: int | None, service: str, now: float) -> bool:
         """The writer uses a service: it is alive from now on, if it is believed. Returns whether it is."""
         if writer is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -97,6 +97,8 @@ class PdoPlan:
     """TPDO: longest distance of two transmissions; RPDO: deadline; in ms; 0: none."""
     entries: tuple[PdoEntry, ...]
     sync_start: int = 0
+    writer: int | None = None
+    """RPDO: the writer that it is; None: the one that all others are (`CanopenPlan.rpdo_writer`)."""
     name: str = ""
     """As the mapping calls it; empty for a PDO of the automatic layout."""
 
@@ -121,7 +123,7 @@ class CanopenPlan(LinkPlan):
     objects: tuple[ObjectPlan, ...]
     pdos: tuple[PdoPlan, ...]
     rpdo_writer: int | None
-    """The writer that RPDOs are; None: nobody writes by PDO."""
+    """The writer that RPDOs are which have none of their own; None: nobody."""
     sdo_writer: int | None
     """The writer that SDO clients are; None: variables are read-only by SDO."""
     identity: IdentityPlan = IdentityPlan()
@@ -135,6 +137,11 @@ class CanopenPlan(LinkPlan):
     """Least distance of two EMCY in 100 us (1015h)."""
     error_behaviour: int = 0
     """What a communication error does to the NMT state (1029h): 0 leave OPERATIONAL, 1 nothing, 2 stop."""
+
+    @property
+    def rpdo_writers(self) -> Mapping[int, int | None]:
+        """Number of each RPDO with a writer of its own -> that writer."""
+        return {pdo.number: pdo.writer for pdo in self.pdos if pdo.writer is not None}
 
 
 def canopen_of(plan: Plan) -> CanopenPlan | None:

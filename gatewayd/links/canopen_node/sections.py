@@ -21,7 +21,7 @@ from gatewayd.links.canopen_node.scalars import (
     Word32,
 )
 from gatewayd.mapping import syntax
-from gatewayd.mapping.scalars import Duration, Name, Real, Whole, refuse
+from gatewayd.mapping.scalars import Duration, Name, Names, Real, Whole, refuse
 from gatewayd.mapping.section import Section
 
 AUTO = "auto"
@@ -256,6 +256,10 @@ class CanopenWriter(Section):
 
     canopen: Literal["rpdo", "sdo", "any"] | None = Field(
         default=None, description="services of the CANopen node by which it writes: rpdo, sdo, or any (both)"
+    )
+    pdos: Names = Field(
+        default=(),
+        description="PDOs towards the robot, by name, that are this writer's alone; default: those of nobody else",
     )
     node: Whole | None = Field(
         default=None, ge=1, le=127, description="node-ID whose heartbeat tells whether it lives (CANopen)"

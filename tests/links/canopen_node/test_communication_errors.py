@@ -38,7 +38,7 @@ class Bench:
             TransmitEngine(Cell(CellDefinition("test", 1, (), (), (), 0.1)), wire.send),
             self.counters,
             lose_node=lambda reason, node, _now: self.lost.append(reason.format(node)),
-            lose_rpdo=lambda reason, _now: self.lost.append(reason),
+            lose_rpdo=lambda _number, reason, _now: self.lost.append(reason),
         )
 
 

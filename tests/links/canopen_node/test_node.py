@@ -1612,3 +1612,53 @@ def test_the_promise_of_guarding_binds_from_the_first_write_and_cannot_be_weaken
     plant.run(0.2)
     assert not plant.cell.writers.alive[LINE]
     assert plant.notebook.reports == []
+
+
+# -- several writers by RPDO ------------------------------------------------------------------------------------------
+
+TWO_WRITERS = replace(
+    PLAN,
+    sdo_writer=None,
+    error_behaviour=1,  # else the loss of one ends OPERATIONAL, and with it the other
+    consumers=(Consumer(MASTER, 500, LINE), Consumer(2, 500, TOOL)),
+    pdos=tuple(
+        replace(pdo, writer=TOOL, transmission=255) if pdo.cob_id == 0x300 + NODE else pdo
+        for pdo in PLAN.pdos
+    ),
+)
+
+
+def _speed(plant: Plant, value: float) -> None:
+    plant.hear(0x305, CanType.REAL32.pack(value))
+
+
+def _both_write() -> Plant:
+    plant = Plant(TWO_WRITERS).operational()
+    plant.heartbeat()
+    plant.hear(0x702, b"\5")
+    plant.part(7)
+    _speed(plant, 0.5)
+    return plant
+
+
+def test_writers_by_rpdo_are_told_apart_by_their_pdo() -> None:
+    plant = _both_write()
+    assert (plant.cell.image.values[PART], plant.cell.image.values[SPEED]) == (7, 0.5)
+    assert list(plant.cell.ownership.owners) == [LINE, TOOL]
+
+
+def test_the_loss_of_one_leaves_the_other_its_locks() -> None:
+    plant = _both_write()
+    for _ in range(4):
+        plant.run(0.2)
+        plant.heartbeat()
+    assert list(plant.cell.writers.alive) == [True, False]
+    assert list(plant.cell.ownership.owners) == [LINE, None]
+    _speed(plant, 0.7)
+    assert plant.cell.image.values[SPEED] != CanType.REAL32.unpack(CanType.REAL32.pack(0.7))
+
+
+def test_both_are_lost_with_operational() -> None:
+    plant = _both_write()
+    plant.hear(0, PRE_OPERATIONAL)
+    assert list(plant.cell.writers.alive) == [False, False]

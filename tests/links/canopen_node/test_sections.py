@@ -205,3 +205,44 @@ def test_guarding_supervises_a_writer() -> None:
 def test_a_node_with_a_heartbeat_cannot_be_guarded() -> None:
     loaded = load((GUARDED % "500ms").encode(), "f")
     assert [finding.rule.id for finding in loaded.diagnostics] == ["GW437"]
+
+
+TWO_WRITERS = """\
+gatewayd: 1
+cell: c
+robot: {host: 127.0.0.9}
+canopen:
+  channel: can0
+  bitrate: 500000
+  node: 16
+  pdos:
+    command: {cob_id: 0x210, variables: start}
+    jog: {cob_id: 0x310, variables: speed}
+writers:
+  line: {canopen: rpdo, node: 1, heartbeat: 1s}
+  hand: {canopen: rpdo, pdos: jog, node: 2, heartbeat: 1s}
+variables:
+  start: {robot: input_bit_register_0, owner: line}
+  speed: {robot: input_double_register_0, owner: hand}
+"""
+
+
+def test_a_writer_has_the_pdos_that_it_names_and_another_one_the_rest() -> None:
+    loaded = load(TWO_WRITERS.encode(), "f")
+    assert loaded.plan is not None
+    assert loaded.diagnostics == ()
+    node = loaded.plan.the(CanopenPlan)
+    assert (node.rpdo_writer, node.rpdo_writers) == (0, {2: 1})
+
+
+@pytest.mark.parametrize(
+    "old, new",
+    [
+        ("pdos: jog,", "pdos: fast,"),
+        ("owner: hand", "owner: line"),
+        ("{canopen: rpdo, pdos: jog,", "{canopen: sdo, pdos: jog,"),
+    ],
+)
+def test_pdos_that_a_writer_cannot_have(old: str, new: str) -> None:
+    loaded = load(TWO_WRITERS.replace(old, new).encode(), "f")
+    assert "GW439" in [finding.rule.id for finding in loaded.diagnostics]

@@ -94,17 +94,24 @@ class ReceivePdo:
 class ReceiveEngine:
     """All RPDOs of a node.
 
-    They write as `requester()`, asked anew for each frame. Each frame of the right length is a sign of life of a
-    trusted writer, whether its write is refused or not. `raised` and `cleared` are called for each fault of each PDO.
+    An RPDO writes as `asking(number, now)` when a frame of it comes, and as `requester(number)` with SYNC. Each frame
+    of the right length is a sign of life of a trusted writer, whether its write is refused or not. `raised` and
+    `cleared` are called for each fault of each PDO.
     """
 
     def __init__(
-        self, cell: Cell, requester: Callable[[], Requester], raised: ReportFault, cleared: ReportFault
+        self,
+        cell: Cell,
+        asking: Callable[[int, float], Requester],
+        requester: Callable[[int], Requester],
+        raised: ReportFault,
+        cleared: ReportFault,
     ) -> None:
         self.is_operational = False
         self.synchronous_ids: frozenset[int] = frozenset()
         """The identifiers of RPDOs that all wait for SYNC."""
         self._cell = cell
+        self._asking = asking
         self._requester = requester
         self._raised = raised
         self._cleared = cleared
@@ -177,27 +184,31 @@ class ReceiveEngine:
             return False
         self._now = now
         if self.is_operational:
-            requester = self._requester()
             for pdo in pdos:
-                self._take(pdo, data, now, requester)
+                self._take(pdo, data, now, self._asking(pdo.configuration.number, now))
         return True
 
     def on_sync(self, now: float) -> None:
         """A SYNC was received: write what was kept for it, unless the writer was lost meanwhile."""
         self._now = now
-        requester = self._requester()
-        if requester.writer is not None and not self._cell.writers.alive[requester.writer]:
-            self.forget()
-            return
         for pdo in self._synchronous:
             if pdo.latched is not None:
                 data, pdo.latched = pdo.latched, None
+                requester = self._requester(pdo.configuration.number)
+                if requester.writer is not None and not self._cell.writers.alive[requester.writer]:
+                    continue
                 self._write(pdo, data, now, replace(requester, waited=pdo.waited))
 
     def forget(self) -> None:
-        """The writer is lost: what it left for the next SYNC is nobody's any more."""
+        """Nobody is heard any more: what was left for the next SYNC is nobody's."""
         for pdo in self._synchronous:
             pdo.latched = None
+
+    def forget_of(self, writer: int | None) -> None:
+        """The writer is lost: what it left for the next SYNC is nobody's any more."""
+        for pdo in self._synchronous:
+            if pdo.latched is not None and self._requester(pdo.configuration.number).writer == writer:
+                pdo.latched = None
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still: what is kept for SYNC has waited, and deadlines count anew."""

@@ -1,4 +1,4 @@
-"""Rules GW401, GW413 to GW415, GW420 to GW425, GW432, GW435, GW437, GW438: node, number types, writers by CANopen."""
+"""Rules GW401, GW413 to GW415, GW420 to GW425, GW432, GW435, GW437 to GW439: node, number types, writers by CANopen."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from gatewayd.links.canopen_node.expand import (
     place_of,
     reach_of,
     scale_problem,
+    writes_by,
 )
 from gatewayd.links.canopen_node.plan import ObjectPlan
 from gatewayd.links.canopen_node.rules.registry import first_at_each_place, node_rule
@@ -248,15 +249,53 @@ def _inputs(cell: ExpandedCell) -> Iterator[ExpandedVariable]:
 def two_canopen_writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Two writers for one service of the node."""
     for service in ("by_rpdo", "by_sdo"):
-        found = [(writer, spec) for writer, spec in _writers(cell) if getattr(spec, service)]
+        found = [
+            (writer, spec)
+            for writer, spec in _writers(cell)
+            if getattr(spec, service) and not (service == "by_rpdo" and spec.pdos)
+        ]
         for other, spec in found[1:]:
             first, former = found[0]
             if service == "by_sdo" and spec.by_rpdo and former.by_rpdo:
                 continue
             message = f"`{other.name}` writes by {service[3:].upper()} too, like `{first.name}`"
             related = (Related(first.at("canopen"), f"`{first.name}` is here"),)
-            hint = "make one writer of the two, or let one write by rpdo and the other by sdo"
+            hint = "make one writer of the two, let one write by sdo, or name its PDOs: `pdos: command`"
             yield rule.at(other.at("canopen"), message, hint=hint, related=related)
+
+
+@node_rule("GW439")
+def writer_of_pdo(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
+    """A PDO that a writer cannot have, or that its variables' owner does not send."""
+    towards = {pdo.name: pdo for pdo in node.pdos if pdo.name and pdo.direction is Direction.INPUT}
+    first: dict[str, Part[WriterSpec]] = {}
+    for writer, spec in _writers(cell):
+        for name in spec.pdos:
+            message = ""
+            if not spec.by_rpdo:
+                message = f"`{writer.name}` has `pdos`, but does not write by RPDO"
+            elif name not in towards:
+                message = f"there is no PDO `{name}` towards the robot"
+            elif first.setdefault(name, writer) is not writer:
+                message = f"the PDO `{name}` is `{first[name].name}`'s already"
+            if message:
+                yield rule.at(
+                    writer.at("pdos"),
+                    message,
+                    hint="name PDOs that are this writer's alone",
+                )
+    for pdo in node.pdos if first else ():
+        for entry in pdo.entries if pdo.direction is Direction.INPUT else ():
+            variable = cell.variables[entry.variable]
+            owners = [(name, writer.by(CanopenWriter)) for name, writer in _owners(cell, variable)]
+            senders = [name for name, spec in owners if spec.by_rpdo]
+            if senders and not any(writes_by(spec, pdo, cell) for _, spec in owners):
+                message = (
+                    f"`{variable.name}` is in {pdo.label}, which is not its owner {one_and_more(senders)}'s"
+                )
+                yield rule.at(
+                    variable.position, message, hint="put it into a PDO of its owner, or name another owner"
+                )
 
 
 @cell_rule("GW425")

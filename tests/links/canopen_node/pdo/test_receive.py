@@ -32,7 +32,8 @@ class Receiver:
         self.requester = Requester(writer)
         self.engine = ReceiveEngine(
             bench.cell,
-            lambda: self.requester,
+            lambda _number, _now: self.requester,
+            lambda _number: self.requester,
             lambda fault, number, _now: self.reported.append(f"+{fault.name} {number}"),
             lambda fault, number, _now: self.reported.append(f"-{fault.name} {number}"),
         )
