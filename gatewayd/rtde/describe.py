@@ -11,12 +11,45 @@ from collections.abc import Iterator
 
 from gatewayd.rtde import messages, payloads
 from gatewayd.rtde.messages import PackageType, TextLevel
+from gatewayd.rtde.recipe import Recipe
+from gatewayd.rtde.types import DataType
 
 _HEADER = struct.Struct(">HB")
 _KINDS = frozenset(PackageType)
 _SHOWN = 6
 """Names of one list in one line."""
 _BYTES = 16
+
+
+class Recipes:
+    """The recipes of one connection, as far as its set-up was seen: they say what is in data packages."""
+
+    def __init__(self) -> None:
+        self._asked: dict[PackageType, tuple[str, ...]] = {}
+        self._known: dict[tuple[bool, int | None], Recipe] = {}
+
+    def note(self, message: object, *, from_controller: bool) -> str:
+        """Learn from a message of the set-up; of data the first values, `timestamp = 12.5, ...`, if they are known."""
+        match message:
+            case messages.SetupOutputs(names, _):
+                self._asked[PackageType.SETUP_OUTPUTS] = names
+            case messages.SetupInputs(names):
+                self._asked[PackageType.SETUP_INPUTS] = names
+            case messages.OutputsSetup(recipe, types):
+                self._learn(PackageType.SETUP_OUTPUTS, recipe, types)
+            case messages.InputsSetup(recipe, types):
+                self._learn(PackageType.SETUP_INPUTS, recipe, types)
+            case messages.DataPackage(number, payload):
+                known = self._known.get((from_controller, number))
+                if known is not None and known.size == len(payload):
+                    return _values(known, payload)
+        return ""
+
+    def _learn(self, kind: PackageType, number: int | None, types: tuple[str, ...]) -> None:
+        key, names = (kind is PackageType.SETUP_OUTPUTS, number), self._asked.get(kind, ())
+        self._known.pop(key, None)
+        if len(names) == len(types) and all(word in DataType.__members__ for word in types):
+            self._known[key] = Recipe(names, [DataType.from_word(word) for word in types])
 
 
 class MessageStream:
@@ -42,8 +75,8 @@ class MessageStream:
         self._rest = data[position:]
 
 
-def package_text(package: bytes, *, from_controller: bool) -> str:
-    """One package: `set up outputs at 500 Hz: timestamp, actual_q and 38 more`."""
+def package_text(package: bytes, recipes: Recipes | None = None, *, from_controller: bool) -> str:
+    """One package: `set up outputs at 500 Hz: timestamp, actual_q and 38 more`. `recipes`: those of its connection."""
     if len(package) < _HEADER.size:
         return _bytes(package)
     size, kind = _HEADER.unpack_from(package)
@@ -51,11 +84,10 @@ def package_text(package: bytes, *, from_controller: bool) -> str:
     if kind not in _KINDS or size != len(package):
         return f"unknown package, type {kind}, {_bytes(payload)}"
     found = _decoded(PackageType(kind), payload, from_controller=from_controller)
-    return (
-        f"{PackageType(kind).name.lower().replace('_', ' ')} {_bytes(payload)}"
-        if found is None
-        else _text(found)
-    )
+    if found is None:
+        return f"{PackageType(kind).name.lower().replace('_', ' ')} {_bytes(payload)}"
+    values = recipes.note(found, from_controller=from_controller) if recipes is not None else ""
+    return _text(found) + (f": {values}" if values else "")
 
 
 def _decoded(kind: PackageType, payload: bytes, *, from_controller: bool) -> object | None:
@@ -108,6 +140,15 @@ _BARE: dict[type, str] = {
     messages.Start: "start",
     messages.Pause: "pause",
 }
+
+
+def _values(recipe: Recipe, payload: bytes) -> str:
+    flat = recipe.unpack(payload)
+    shown = [
+        f"{name} = {' '.join(f'{value:g}' for value in flat[recipe.slots[name]])}"
+        for name in recipe.names[:_SHOWN]
+    ]
+    return _list((*shown, *recipe.names[_SHOWN:]))
 
 
 def _recipe(recipe: int | None) -> str:

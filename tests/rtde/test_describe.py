@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import struct
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.rtde import messages
 from gatewayd.rtde.codec import ClientProtocol, ControllerProtocol
-from gatewayd.rtde.describe import MessageStream, package_text
+from gatewayd.rtde.describe import MessageStream, Recipes, package_text
 
 
 @pytest.mark.parametrize(
@@ -57,9 +59,33 @@ def test_a_stream_is_cut_into_packages_wherever_its_pieces_end() -> None:
         assert [*stream.feed(whole[:cut]), *stream.feed(whole[cut:])] == packages
 
 
+def test_data_is_told_by_the_recipes_of_its_connection() -> None:
+    client, controller, recipes = ClientProtocol(), ControllerProtocol(), Recipes()
+    for endpoint in (client, controller):
+        endpoint._speak(2)
+
+    def said(message: messages.ControllerMessage) -> str:
+        return package_text(controller.send(message), recipes, from_controller=True)
+
+    data = messages.DataPackage(1, struct.pack(">d3d", 12.5, 1.0, -2.0, 0.25))
+    assert said(data) == "data of recipe 1, 32 bytes"
+    asked = client.send(messages.SetupOutputs(("timestamp", "actual_tool_accelerometer"), 125.0))
+    package_text(asked, recipes, from_controller=False)
+    said(messages.OutputsSetup(1, ("DOUBLE", "VECTOR3D")))
+    values = "timestamp = 12.5, actual_tool_accelerometer = 1 -2 0.25"
+    assert said(data) == f"data of recipe 1, 32 bytes: {values}"
+    assert said(messages.DataPackage(1, bytes(8))) == "data of recipe 1, 8 bytes", "another length"
+    package_text(client.send(messages.SetupInputs(("input_int_register_0",))), recipes, from_controller=False)
+    said(messages.InputsSetup(1, ("INT32",)))
+    sent = client.send(messages.DataPackage(1, struct.pack(">i", -7)))
+    assert package_text(sent, recipes, from_controller=False).endswith(": input_int_register_0 = -7")
+    said(messages.InputsSetup(1, ("IN_USE",)))
+    assert package_text(sent, recipes, from_controller=False) == "data of recipe 1, 4 bytes"
+
+
 @given(st.lists(st.binary(max_size=300), max_size=5), st.booleans())
 def test_any_bytes_have_a_description(pieces: list[bytes], from_controller: bool) -> None:
-    stream = MessageStream()
+    stream, recipes = MessageStream(), Recipes()
     for piece in pieces:
         for package in stream.feed(piece):
-            assert package_text(package, from_controller=from_controller)
+            assert package_text(package, recipes, from_controller=from_controller)

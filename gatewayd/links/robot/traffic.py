@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from gatewayd.links.contract import Medium, TrafficDecoder
-from gatewayd.rtde.describe import MessageStream, package_text
+from gatewayd.rtde.describe import MessageStream, Recipes, package_text
 
 
 class RtdeTraffic(TrafficDecoder):
@@ -16,11 +16,13 @@ class RtdeTraffic(TrafficDecoder):
 
     def __init__(self) -> None:
         self._streams: defaultdict[tuple[str, bool], MessageStream] = defaultdict(MessageStream)
+        self._recipes: defaultdict[str, Recipes] = defaultdict(Recipes)
 
     def words(self, data: bytes, peer: str, *, outgoing: bool) -> str:
         """All messages that it completes."""
         packages = self._streams[peer, outgoing].feed(data)
-        texts = [package_text(package, from_controller=not outgoing) for package in packages]
+        recipes = self._recipes[peer]
+        texts = [package_text(package, recipes, from_controller=not outgoing) for package in packages]
         return "; ".join(texts) or f"the beginning of a message, {len(data)} bytes"
 
 
