@@ -91,9 +91,9 @@ class FrameBuffer:
         """Where the next bytes are to be written, as `os.readv` takes it; never empty after `discard`."""
 
     def discard(self, start: int, end: int) -> None:
-        """What has come in reaches to `end`; forget what lies before `start`.
+        """What has come in reaches to `end`; forget what lies before `start`. The rest moves to the front.
 
-        The rest must be less than a frame; it moves to the front.
+        Without `start` the rest must be less than a frame.
         """
         rest = end - start
         if rest:

@@ -97,21 +97,34 @@ class PeerConnection(asyncio.BufferedProtocol):
         """Have the poller read in asyncio's place."""
         if not self.wire.is_closing():
             self.wire.pause_reading()
-            self.poller.add(self.descriptor, self.readable)
+            self._watch()
 
-    def readable(self) -> None:
-        """The socket has something to read: the hot path."""
+    def _watch(self) -> None:
+        preferred, again = bool(self.places), self.session.pending
+        self.poller.add(self.descriptor, self.readable, preferred=preferred, again=again)
+
+    def fill(self, places: frozenset[Network]) -> None:
+        """Fill these places of declared writers, whose requests come first."""
+        self.places = places
+        self.poller.prefer(self.descriptor, preferred=bool(places))
+
+    def readable(self) -> bool:
+        """The socket has something to read, or requests that were read are pending: the hot path.
+
+        Returns whether any are pending after it.
+        """
         session = self.session
-        try:
-            count = os.readv(self.descriptor, session.buffer.space)
-        except (BlockingIOError, InterruptedError):
-            return
-        except OSError as error:
-            self.abort(str(error))
-            return
-        if not count:
-            self.drop("closed by the peer")
-            return
+        count = 0
+        if not session.pending:
+            try:
+                count = os.readv(self.descriptor, session.buffer.space)
+            except OSError as error:
+                if not isinstance(error, (BlockingIOError, InterruptedError)):
+                    self.abort(str(error))
+                return False
+            if not count:
+                self.drop("closed by the peer")
+                return False
         # Only now: until the bytes were read they may have waited, and others of this turn were served before.
         now = clock.judged_now()
         try:
@@ -120,20 +133,25 @@ class PeerConnection(asyncio.BufferedProtocol):
             received = bytes(session.buffer.data[: session.buffer.end + count]).hex(" ")
             _log.exception("a request could not be answered", extra=fields(peer=self.peer, received=received))
             self.abort("internal error")
-            return
+            return False
         if answers:
             self.last_request = now
-            try:
-                sent = os.write(self.descriptor, answers)
-            except (BlockingIOError, InterruptedError):
-                sent = 0
-            except OSError as error:
-                self.abort(str(error))
-                return
-            if sent < len(answers):
-                self.wire.write(answers[sent:])
+            self._send(answers)
         if session.broken:
             self.drop(f"no Modbus TCP: {session.broken}")
+        return session.pending
+
+    def _send(self, answers: bytes) -> None:
+        """What the socket does not take at once is asyncio's to keep; no more requests are served until it has gone."""
+        try:
+            sent = os.write(self.descriptor, answers)
+        except (BlockingIOError, InterruptedError):
+            sent = 0
+        except OSError as error:
+            self.abort(str(error))
+            return
+        if sent < len(answers):
+            self.wire.write(answers[sent:])
 
     def forget(self, unit: int) -> None:
         """It may do nothing with this unit any more."""
@@ -202,7 +220,7 @@ class PeerConnection(asyncio.BufferedProtocol):
         """See asyncio; the peer has caught up."""
         self.stalled_since = None
         if not self.wire.is_closing():
-            self.poller.add(self.descriptor, self.readable)
+            self._watch()
 
     def drop(self, reason: str) -> None:
         """Close the connection after what was answered already."""

@@ -275,7 +275,7 @@ class ModbusListener:
         """
         address = connection.address
         accesses = {} if address is None else self._accesses(address, connection.number)
-        connection.places = frozenset() if address is None else self._shares.places_of(address)
+        connection.fill(frozenset() if address is None else self._shares.places_of(address))
         before, after = succeeded(writers_of(connection.accesses), successors), writers_of(accesses)
         connection.accesses = accesses
         connection.session.serve(accesses)

@@ -28,6 +28,8 @@ _READ_LENGTH = 6
 _unpack_read = struct.Struct(">2sHHHHH").unpack_from
 """Transaction id, protocol id, length, unit id and function, address, quantity."""
 _HEAD = struct.Struct(">HHBBB")
+_AT_ONCE = 8
+"""Requests of one connection that are answered before others have their turn, however many have come in."""
 _THIS_DEVICE = (0, 255)
 """Unit ids by which a client on TCP means the device itself (Messaging on TCP/IP Guide V1.0b, 4.4.2.3)."""
 
@@ -51,6 +53,8 @@ class ModbusSession:
         self.buffer = FrameBuffer()
         self.broken = ""
         """Why the connection must be closed, once something came in that is no Modbus frame."""
+        self.pending = False
+        """Whether requests in the buffer still have to be answered, by calls with a count of 0."""
         self._accesses: dict[int, UnitAccess] = {}
         self._reads: dict[int, tuple[Any, bytearray, tuple[bytes, ...], UnitAccess]] = {}
 
@@ -69,7 +73,7 @@ class ModbusSession:
                 self._reads[key] = (table.readable.reach, table.image, _heads(key), access)
 
     def received(self, count: int, now: float) -> bytes:
-        """`count` bytes were written to `buffer.space`; returns the answers to all requests that are complete."""
+        """`count` bytes were written to `buffer.space`; returns the answers to the next requests that are complete."""
         buffer = self.buffer
         if count == _READ_FRAME and not buffer.end:
             transaction, protocol, length, key, address, quantity = _unpack_read(buffer.data)
@@ -91,9 +95,10 @@ class ModbusSession:
         return self._answers(self.buffer.end + count, now, waited)
 
     def _answers(self, end: int, now: float, waited: float = 0.0) -> bytes:
-        """The answers to all requests that are complete before `end` of the buffer."""
-        answers = []
+        """The answers to the next requests that are complete before `end` of the buffer."""
+        answers: list[bytes] = []
         start = 0
+        self.pending = False
         try:
             while (frame := split(self.buffer.data, start, end)) is not None:
                 start = frame.end
@@ -104,6 +109,9 @@ class ModbusSession:
                 answers.append(
                     encode(frame.transaction, frame.unit, self._answer(frame.unit, frame.pdu, now, waited))
                 )
+                if len(answers) == _AT_ONCE:
+                    self.pending = True
+                    break
         except FramingError as error:
             self.broken = str(error)
         self.buffer.discard(start, end)

@@ -18,8 +18,10 @@ from itertools import islice, pairwise
 import pytest
 
 from gatewayd.core.cell import Cell
-from gatewayd.links.modbus_server import limits, shares
+from gatewayd.core.requester import Requester
+from gatewayd.links.modbus_server import limits, session, shares
 from gatewayd.links.modbus_server import listener as server
+from gatewayd.links.modbus_server.functions import Unit, execute
 from gatewayd.links.modbus_server.listener import ListenError, ModbusListener
 from gatewayd.links.modbus_server.peers import PeerEvent, PeerEventKind
 from gatewayd.links.modbus_server.plan import ModbusPlan
@@ -199,6 +201,31 @@ async def test_a_reader_with_many_connections_keeps_no_writer_out(
     assert PeerEvent(PeerEventKind.CROWDED, "127.0.0.1", repeats=23) in events
     for _reader, writer in (*greedy, *others):
         writer.close()
+
+
+async def test_a_reader_that_floods_keeps_no_writer_waiting(
+    listener: ModbusListener, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All that its connections sent at once took its time, hundreds of milliseconds, before anybody else had a turn."""
+    requests = bytes.fromhex("0001 0000 0006 01 03 f320 007d") * 80
+    answered: list[bytes] = []
+
+    def counted(unit: Unit, requester: Requester, pdu: bytes, now: float) -> bytes:
+        answered.append(pdu)
+        return execute(unit, requester, pdu, now)
+
+    monkeypatch.setattr(session, "execute", counted)
+    floods = [await dial(listener) for _ in range(8)]
+    plc = await dial(listener, "127.0.0.2")
+    assert await is_served(*plc)
+    for _reader, flood in floods:
+        flood.write(requests)
+    assert await is_served(*plc)
+    assert len(answered) < 320
+    for reader, flood in floods:
+        assert len(await reader.readexactly(80 * (9 + 250))) > 0
+        flood.close()
+    plc[1].close()
 
 
 async def test_a_writer_that_is_declared_later_takes_the_place_of_the_reader_unused_longest(

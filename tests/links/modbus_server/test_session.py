@@ -74,6 +74,8 @@ def feed(session: ModbusSession, data: bytes, sizes: list[int] | None = None) ->
         piece = data[position : position + size]
         session.buffer.space[0][: len(piece)] = piece
         answers += session.received(len(piece), NOW)
+        while session.pending:
+            answers += session.received(0, NOW)
         position += len(piece)
         turn += 1
     return answers
@@ -126,6 +128,18 @@ def test_answers_of_one_segment_are_joined(session: ModbusSession) -> None:
     data = stream("03 000a 0001", "03 000a 0001")
     session.buffer.space[0][: len(data)] = data
     assert len(session.received(len(data), NOW)) == 2 * 11
+
+
+def test_a_few_requests_are_answered_at_a_time(session: ModbusSession) -> None:
+    """However many came in at once, so that others have their turn; in order, to the last."""
+    data = stream(*["03 000a 0001", "06 000a 0000"] * 20)
+    session.buffer.space[0][: len(data)] = data
+    parts = [session.received(len(data), NOW)]
+    while session.pending:
+        assert session.buffer.space[0]
+        parts.append(session.received(0, NOW))
+    assert [part.count(bytes.fromhex("0000 0005 01 03 02")) for part in parts] == [4] * 5 + [0]
+    assert b"".join(parts) == feed(session, data)
 
 
 def test_what_is_no_frame_is_reported_after_the_answers_before_it(session: ModbusSession) -> None:
