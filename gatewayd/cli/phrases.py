@@ -8,16 +8,34 @@ from typing import Any
 
 from gatewayd.links.registry import kinds
 from gatewayd.report.format import age
+from gatewayd.report.format import value as with_unit
+
+
+def value(variable: Mapping[str, Any]) -> str:
+    """`12.5 N`, `7 running`: the value with its unit, and what it means where it stands for a state."""
+    shown = with_unit(variable["value"], variable["unit"])
+    meaning = (variable.get("meanings") or {}).get(str(variable["value"]))
+    return f"{shown} {meaning}" if meaning else shown
 
 
 def owner(variable: Mapping[str, Any]) -> str:
     """`plc, 4.2 s left`; `robot` for outputs."""
     if variable["forced"] is not None:
-        return f"forced, {age(variable['forced']['remaining'])} left"
+        return f"forced, {age(variable['forced']['remaining'])} left{_reported(variable)}"
     if variable["direction"] == "output":
         return "robot"
     name = variable["owner"] or "free"
     return name if variable["lease"] is None else f"{name}, {age(variable['lease'])} left"
+
+
+def _reported(variable: Mapping[str, Any]) -> str:
+    """What the source of a forced output reports meanwhile: `; reports 0.2 m`, `; reports 3 N, stale`."""
+    forced = variable["forced"]
+    if forced.get("reported_quality") is None:
+        return ""
+    shown = value({**variable, "value": forced["reported"]})
+    good = forced["reported_quality"] == "good"
+    return f"; reports {shown}" + ("" if good else f", {quality(forced['reported_quality'])}")
 
 
 def quality(name: str) -> str:

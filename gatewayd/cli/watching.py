@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from gatewayd.cli import phrases
-from gatewayd.report.format import age, value
+from gatewayd.report.format import age
 from gatewayd.report.words import LEVEL_COLOURS, QUALITY_COLOURS, SOURCE_LEVELS, quality, source
 
 Answer = Mapping[str, Any]
@@ -156,7 +156,7 @@ def plain(glimpse: Glimpse, view: View) -> str:
         lines.append("  no variable fits")
     for variable in variables:
         arrow = "->" if variable["direction"] == "input" else "<-"
-        shown = f"{variable['name']:<20} {value(variable['value'], variable['unit']):>14}"
+        shown = f"{variable['name']:<20} {phrases.value(variable):>14}"
         state = f"{phrases.quality(variable['quality']):<12} {age(variable['age']):>9}"
         lines.append(f"  {arrow} {shown}  {state}  {phrases.owner(variable)}".rstrip())
     return "\n".join([*lines, ""])
@@ -222,7 +222,7 @@ def _cells(variable: Answer, old: Mapping[Any, Any], width: int, *, several: boo
     name = f"{variable['cell']}:{variable['name']}" if several else variable["name"]
     yield Text(" → " if towards else " ← ", f"bold {colour}").append(name, "bold default")
     changed = old.get((variable["cell"], variable["name"]), variable["value"]) != variable["value"]
-    yield Text(value(variable["value"], variable["unit"]), "bold yellow" if changed else "bold")
+    yield Text(phrases.value(variable), "bold yellow" if changed else "bold")
     yield Text(phrases.quality(variable["quality"]), QUALITY_COLOURS[quality(variable["quality"])])
     yield Text(age(variable["age"]), "dim")
     style = (

@@ -35,8 +35,10 @@ from gatewayd.report.schema import (
 from gatewayd.report.verdict import CellVerdict, PicturePart, ServedCell, verdict_of
 from gatewayd.service.audit_record import Record, plain_value, utc
 
-VariableState = tuple[Value, Quality, float, str | None, float | None, tuple[Value, float] | None]
-"""Value, quality and age, the owner and its lease, the forced value and its time left; None: there is none."""
+ForceState = tuple[Value, float, tuple[Value, Quality] | None]
+"""The forced value, its time left, and what the source reports meanwhile."""
+VariableState = tuple[Value, Quality, float, str | None, float | None, ForceState | None]
+"""Value, quality and age, the owner and its lease, the force; None: there is none."""
 _QUALITIES = tuple(quality.name.lower() for quality in Quality)
 
 
@@ -68,13 +70,15 @@ def declare(plan: Plan) -> Declared:
     """What the plan says."""
     links = described(plan)
     variables = tuple(
-        _declaration(plan, index) | _places(plan, links, index) for index in range(len(plan.cell.variables))
+        _declaration(plan, links, index) | _places(plan, links, index)
+        for index in range(len(plan.cell.variables))
     )
     return Declared(plan, links, variables)
 
 
-def _declaration(plan: Plan, index: int) -> Json:
+def _declaration(plan: Plan, links: Mapping[str, Description], index: int) -> Json:
     variable = plan.cell.variables[index]
+    meanings = next((link.meanings[index] for link in links.values() if index in link.meanings), {})
     is_input = variable.direction is Direction.INPUT
     found = VariableDeclaration(
         cell=plan.cell.name,
@@ -88,6 +92,7 @@ def _declaration(plan: Plan, index: int) -> Json:
         limits=None if variable.limits is None else [variable.limits.low, variable.limits.high],
         fallback=_fallback(variable.on_release if is_input else variable.on_stale),
         comment=variable.comment,
+        meanings={str(number): words for number, words in meanings.items()} or None,
     )
     return cast("Json", found)
 
@@ -188,7 +193,7 @@ def variable_state(cell: Cell, index: int, now: float) -> VariableState:
         cell.image.age(index, now),
         None if owner is None else cell.definition.writer_name(owner),
         None if lock is None or owner is None else cell.ownership.remaining(lock, now),
-        None if force is None else (force.value, force.until - now),
+        None if force is None else (force.value, force.until - now, cell.forcing.reported(index)),
     )
 
 
@@ -202,11 +207,19 @@ def variable_view(declared: Json, state: VariableState) -> Json:
         "age": _seconds(age),
         "owner": owner,
         "lease": None if lease is None else _seconds(lease),
-        "forced": None
-        if force is None
-        else {"value": plain_value(force[0]), "remaining": _seconds(force[1])},
+        "forced": None if force is None else _forced(force),
     }
     return {**declared, **found}
+
+
+def _forced(force: ForceState) -> Json:
+    value, left, reported = force
+    return {
+        "value": plain_value(value),
+        "remaining": _seconds(left),
+        "reported": None if reported is None else plain_value(reported[0]),
+        "reported_quality": None if reported is None else _QUALITIES[reported[1]],
+    }
 
 
 def lock_view(cell: Cell, index: int, now: float) -> LockStatus:

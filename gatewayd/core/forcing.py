@@ -49,6 +49,15 @@ class Forcing:
         self.holds[lock] = until
         self.next_due = min(self.next_due, until)
 
+    def reported(self, variable: int) -> tuple[Value, Quality] | None:
+        """What the source of a forced output reports meanwhile. None: it is not forced, or an input.
+
+        What would be written to a forced input is refused: nobody reports it.
+        """
+        if self._image.variables[variable].direction is Direction.INPUT:
+            return None
+        return self._truth.get(variable)
+
     def until(self, lock: int, members: Iterable[int]) -> float | None:
         """How long the operator needs the lock of these variables; None: no longer."""
         ends = [self.forces[member].until for member in members if member in self.forces]

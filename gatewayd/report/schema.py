@@ -123,6 +123,10 @@ class VariableDeclaration(TypedDict):
         "what is seen when owner (inputs) or robot (outputs) are lost: `clear`, `hold`, `exception` or a value",
     ]
     comment: Annotated[str, "comment of the mapping, may be empty"]
+    meanings: Annotated[
+        dict[str, str] | None,
+        'what its numbers mean where they stand for states (`{"7": "running"}`), or null',
+    ]
 
 
 class VariableStatus(TypedDict):
@@ -137,7 +141,11 @@ class VariableStatus(TypedDict):
     age: Annotated[float | None, "seconds since its source reported it, or null if it never did"]
     owner: Annotated[str | None, "name of the writer that owns it now, `operator`, or null"]
     lease: Annotated[float | None, "seconds of the owner's lease left, or null without an owner or end"]
-    forced: Annotated[Json | None, "null, or `value` and `remaining` seconds of a force"]
+    forced: Annotated[
+        Json | None,
+        "null, or `value` and `remaining` seconds of a force, and of a forced output `reported` and "
+        "`reported_quality`: what its source reports meanwhile (null for an input)",
+    ]
 
 
 class LockStatus(TypedDict):

@@ -5,7 +5,9 @@ From the newer guide (valid for 5.25.0, 10.12.0 and later, smaller sets before);
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import IntEnum
+from types import MappingProxyType
 
 
 class RobotMode(IntEnum):
@@ -49,6 +51,30 @@ class SafetyStatus(IntEnum):
     PROFISAFE_SAFEGUARD_STOP = 19
     PROFISAFE_EMERGENCY_STOP = 20
     SAFETY_API_SAFEGUARD_STOP = 22
+
+
+class SafetyMode(IntEnum):
+    """`safety_mode`, of Universal Robots' client library."""
+
+    NORMAL = 1
+    REDUCED = 2
+    PROTECTIVE_STOP = 3
+    RECOVERY = 4
+    SAFEGUARD_STOP = 5
+    SYSTEM_EMERGENCY_STOP = 6
+    ROBOT_EMERGENCY_STOP = 7
+    VIOLATION = 8
+    FAULT = 9
+    VALIDATE_JOINT_ID = 10
+    UNDEFINED = 11
+
+
+class ToolMode(IntEnum):
+    """`tool_mode`, of Universal Robots' client interface."""
+
+    BOOTLOADER = 249
+    RUNNING = 253
+    IDLE = 255
 
 
 class JointMode(IntEnum):
@@ -101,3 +127,28 @@ class TimeScaleSource(IntEnum):
     TOOL_WRENCH_LIMIT = 13
     EXTERNAL_AXIS_SPEED_LIMIT = 14
     EXTERNAL_AXIS_STOPPING = 15
+
+
+_SPELLED = {"tp": "TP", "immi": "IMMI", "profisafe": "PROFIsafe", "api": "API"}
+
+
+def _words(state: IntEnum) -> str:
+    """`PROFIsafe safeguard stop`."""
+    return " ".join(_SPELLED.get(word, word) for word in state.name.lower().split("_"))
+
+
+MEANINGS: Mapping[str, Mapping[int, str]] = MappingProxyType(
+    {
+        field: MappingProxyType({int(state): _words(state) for state in states})
+        for field, states in {
+            "robot_mode": RobotMode,
+            "safety_status": SafetyStatus,
+            "safety_mode": SafetyMode,
+            "joint_mode": JointMode,
+            "tool_mode": ToolMode,
+            "runtime_state": ProgramState,
+            "time_scale_source": TimeScaleSource,
+        }.items()
+    }
+)
+"""Field -> number -> what it means, in words."""

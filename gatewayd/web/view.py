@@ -40,7 +40,7 @@ _IN_RUNS = frozenset(
     }
 )
 """Kinds of events that happen to many variables in one moment."""
-_DECLARED = ("number", "name", "direction", "kind", "robot", "limits", "unit", "comment")
+_DECLARED = ("number", "name", "direction", "kind", "robot", "limits", "unit", "comment", "meanings")
 """What the page has of a variable's declaration as it is."""
 
 
@@ -150,10 +150,19 @@ def state(runtime: CellRuntime, probes: Probes, since: int, now: float) -> dict[
         "quality": list(map(int, image.quality)),
         "ages": _ages(cell, now),
         "owned": owned,
+        "forced": [_forced(cell, index, now) for index in cell.forcing.forces],
         "accepted": health.writes_accepted,
         "refused": health.writes_refused,
         "events": {"count": cell.events.count, "latest": _events(cell, since, now)},
     }
+
+
+def _forced(cell: Cell, index: int, now: float) -> list[object]:
+    """Variable, milliseconds left, and what its source reports meanwhile with its quality (outputs)."""
+    reported = cell.forcing.reported(index)
+    value, quality = reported if reported is not None else (None, None)
+    left = _milliseconds(cell.forcing.forces[index].until - now)
+    return [index, left, None if value is None else _number(value), None if quality is None else int(quality)]
 
 
 def _number(value: float) -> float:

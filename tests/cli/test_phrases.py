@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from gatewayd.cli.phrases import clock, owner, places
+from gatewayd.cli.phrases import clock, owner, places, value
 
 FREE = {"direction": "input", "owner": None, "lease": None, "forced": None}
 
@@ -24,6 +24,22 @@ FREE = {"direction": "input", "owner": None, "lease": None, "forced": None}
 )
 def test_owners(variable: dict[str, Any], text: str) -> None:
     assert owner(variable) == text
+
+
+def test_a_forced_value_has_its_truth_beside_it() -> None:
+    reported = {"remaining": 30.0, "reported": 7, "reported_quality": "good"}
+    variable = {**FREE, "direction": "output", "unit": "", "meanings": {"7": "running"}, "forced": reported}
+    assert owner(variable) == "forced, 30.0 s left; reports 7 running"
+    reported["reported_quality"] = "stale"
+    assert owner(variable) == "forced, 30.0 s left; reports 7 running, stale"
+    input_forced = {"remaining": 30.0, "reported": None, "reported_quality": None}
+    assert owner({**FREE, "forced": input_forced}) == "forced, 30.0 s left"
+
+
+def test_a_state_has_its_number_and_its_word() -> None:
+    assert value({"value": 5, "unit": "", "meanings": {"5": "safeguard stop"}}) == "5 safeguard stop"
+    assert value({"value": 6, "unit": "", "meanings": {"5": "safeguard stop"}}) == "6"
+    assert value({"value": 2.5, "unit": "N", "meanings": None}) == "2.5 N"
 
 
 def test_places() -> None:

@@ -50,10 +50,13 @@ def test_every_listed_value_has_a_name(enum: type, members: int) -> None:
         ("joint_mode", enums.JointMode),
         ("runtime_state", enums.ProgramState),
         ("time_scale_source", enums.TimeScaleSource),
+        ("safety_mode", enums.SafetyMode),
+        ("tool_mode", enums.ToolMode),
     ],
 )
 def test_the_field_reference_lists_every_value(field: str, enum: type[IntEnum]) -> None:
     text = REFERENCE.read_text().partition("## Modes, states and status bits")[2]
     (row,) = (line for line in text.splitlines() if line.startswith(f"| `{field}` |"))
-    listed = row.split("|")[2].strip().lower()
-    assert listed == ", ".join(f"{member.value} {member.name.lower().replace('_', ' ')}" for member in enum)
+    listed = row.split("|")[2].strip()
+    assert listed == ", ".join(f"{number} {words}" for number, words in enums.MEANINGS[field].items())
+    assert list(enums.MEANINGS[field]) == list(enum)

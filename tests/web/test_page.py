@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from urllib.parse import quote
+from urllib.request import Request, urlopen
 
 import pytest
 
@@ -39,6 +42,25 @@ variables:
   part:   {robot: input_int_register_0, modbus: 10, canopen: object, owner: plc}
   force:  {robot: output_double_register_0, modbus: {holding: 104, type: float32}, canopen: auto, unit: N}
 """
+CROWDED = """\
+canopen: {interface: virtual, channel: page, bitrate: 500000, node: 16}
+groups:
+  motion: {owner: plc}
+writers:
+  plc: {modbus: 127.0.0.2}
+  hmi_at_the_operator_panel_left: {modbus: 127.0.0.3}
+variables:
+  start: {robot: input_bit_register_0, modbus: [0.0, {coil: 5}], canopen: object, group: motion}
+  speed_of_the_conveyor_belt_at_infeed:
+    {robot: input_double_register_3, modbus: {holding: 20, type: float32}, group: motion, unit: mm/s}
+  part: {robot: input_int_register_0, modbus: [10, {holding: 12}], owner: hmi_at_the_operator_panel_left}
+  mode: {robot: robot_mode, modbus: 100}
+  safety: {robot: safety_status, modbus: 102, canopen: auto}
+  force: {robot: output_double_register_0, modbus: [{holding: 104, type: float32}, {input: 104, type: float32}],
+          canopen: auto, unit: N}
+  q: {robot: actual_q, modbus: {holding: 200, type: float32}, unit: rad}
+"""
+TOKEN = "test-token-0123456789"  # noqa: S105 - for tests
 LIVE = "document.body.dataset.contact === 'live'"
 LOST = "document.body.dataset.contact === 'lost'"
 NARROW, WIDE = (360, 740), (1280, 800)
@@ -62,7 +84,11 @@ async def showing(
 ) -> AsyncIterator[Shown]:
     simulator = plant.simulator()
     port = free_port()
-    daemon = plant.daemon(plant.mapping(mapping, simulator.port), "--status", f"{HOST}:{port}")
+    token = plant.directory / "token"
+    token.write_text(f"{TOKEN}\n")
+    token.chmod(0o600)
+    file = plant.mapping(mapping, simulator.port)
+    daemon = plant.daemon(file, "--status", f"{HOST}:{port}", "--token-file", token)
     plc = plant.ready_plc(PLC)
     daemon.wait_for_line("status page")
     async with browsing(plant.directory) as page:
@@ -70,6 +96,16 @@ async def showing(
         await page.open(url, *size, dark=dark)
         await page.wait(LIVE)
         yield Shown(page, simulator, daemon, plc, url)
+
+
+def force(shown: Shown, name: str, value: float) -> None:
+    request = Request(  # noqa: S310 - loopback
+        f"{shown.url}api/v1/variables/{quote(name)}/force",
+        json.dumps({"value": value, "for": 60}).encode(),
+        {"Authorization": f"Bearer {TOKEN}"},
+    )
+    with urlopen(request, timeout=10) as answer:  # noqa: S310 - loopback
+        assert answer.status == 200
 
 
 def text(selector: str) -> str:
@@ -154,6 +190,34 @@ async def test_each_bus_has_its_columns(plant: Plant) -> None:
         labels = "getComputedStyle(document.querySelector('td.object'), '::before').content"
         assert await page.run(labels) == '"CANopen"'
         assert page.problems == []
+
+
+async def test_the_table_stays_in_its_card_at_every_width(plant: Plant) -> None:
+    """Names that do not break, several places, states in words, a force with its truth: all at once."""
+    async with showing(plant, WIDE, mapping=CROWDED) as shown:
+        page = shown.page
+        await page.wait(f"{row('mode', '.meaning')} === 'running'")
+        force(shown, "q[2]", 1.5)
+        await page.wait(f"{row('q[2]', '.truth')}.startsWith('reports ')")
+        for width in range(360, 1921, 40):
+            await page.resize(width, 900)
+            await page.wait(f"innerWidth === {width}")
+            assert await page.run("document.documentElement.scrollWidth") <= width
+            assert await page.run(OUTSIDE) == [], width
+
+
+async def test_a_forced_value_shows_its_truth_and_the_time_left(plant: Plant) -> None:
+    async with showing(plant, WIDE, mapping=CROWDED) as shown:
+        page = shown.page
+        force(shown, "mode", 3)
+        await page.wait(f"{row('mode', 'span.value')} === '3'")
+        await page.wait(f"{row('mode', '.meaning')} === 'power off'")
+        await page.wait(f"{row('mode', '.truth')} === 'reports 7 running'")
+        left = await page.run(row("mode", "span.quality"))
+        assert left.startswith("forced, 5"), left
+        assert left.endswith(" s left"), left
+        shown.simulator.kill()
+        await page.wait(f"{row('mode', '.truth')}.endsWith(', stale')")
 
 
 async def test_a_thumb_finds_what_it_wants(plant: Plant) -> None:
@@ -261,6 +325,15 @@ async def test_nothing_sticks_out_and_everything_can_be_read(plant: Plant) -> No
 
 
 HEADINGS = "[...document.querySelectorAll('thead th')].filter((one) => one.checkVisibility()).length"
+OUTSIDE = """
+(() => {
+  const card = document.getElementById("variables").getBoundingClientRect();
+  return [...document.querySelectorAll("#variables td, #variables td *, #variables th")]
+    .filter((one) => one.checkVisibility() && getComputedStyle(one.closest("thead") ?? one).position !== "absolute")
+    .filter((one) => one.getBoundingClientRect().right > card.right + 0.5)
+    .map((one) => `${one.className} ${one.textContent}`);
+})()
+"""
 CONTRASTS = """
 (() => {
   const parts = (color) => color.match(/[\\d.]+/g).map(Number);

@@ -86,6 +86,9 @@ def test_a_forced_output_tells_the_age_of_its_force(runtime: CellRuntime, probes
     found = told(runtime, probes)
     assert (found["values"][CYCLES], found["quality"][CYCLES]) == (77, 4)
     assert found["ages"][CYCLES] >= 1000
+    [[index, left, reported, quality]] = found["forced"]
+    assert (index, reported, quality) == (CYCLES, 0, 0), "the truth beside it"
+    assert 0 < left <= 60_000
 
 
 def test_picture_is_as_bad_as_its_worst_part(runtime: CellRuntime, probes: Probes) -> None:

@@ -11,6 +11,7 @@ from gatewayd.links.robot.companions import all_inputs, all_outputs
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address, exact, seconds
+from gatewayd.rtde.enums import MEANINGS
 
 
 class RobotKind(LinkKind):
@@ -94,6 +95,11 @@ class RobotKind(LinkKind):
                 "declared types": Names(" ".join(f"{name}:{word}" for name, word in sorted(plan.types))),
                 "subscribed": Names(" ".join(sorted(plan.outputs))),
                 "claimed": Names(" ".join(sorted(plan.inputs))),
+            },
+            meanings={
+                index: MEANINGS[variable.field]
+                for index, variable in enumerate(cell.variables)
+                if variable.field in MEANINGS and variable.bit is None
             },
             address=where,
             fields={"address": where},

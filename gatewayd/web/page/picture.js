@@ -39,8 +39,7 @@ export class Picture {
       item.append(this.node("writer"));
       writers.append(item);
     });
-    buses.append(writers);
-    this.place.replaceChildren(robot, this.robotLink, gateway, buses);
+    this.place.replaceChildren(robot, this.robotLink, gateway, buses, writers);
   }
 
   node(icon) {

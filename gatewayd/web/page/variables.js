@@ -75,12 +75,13 @@ export class Variables {
   }
 
   update(state, now) {
+    const forces = new Map(state.forced.map(([index, ...force]) => [index, force]));
     const owners = new Map(state.owned.map(([lock, owner, left]) => [lock, [owner, left]]));
     this.history.add(now, state.values, state.quality);
     for (const [index, row] of this.rows.entries()) {
       const [owner, left] = owners.get(row.variable.lock) ?? [null, null];
       const name = owner === null ? "" : owner === OPERATOR ? "operator" : this.layout.writers[owner].name;
-      row.update(state.values[index], state.quality[index], state.ages[index], name, left);
+      row.update(state.values[index], state.quality[index], state.ages[index], name, left, forces.get(index));
     }
     const odd = this.rows.reduce((sum, row) => sum + (row.code !== 0), 0);
     put(this.odd, odd ? `Not good ${odd}` : "Not good");
@@ -143,11 +144,13 @@ class Row {
     this.canvas = make("canvas", "spark");
     this.canvas.setAttribute("aria-hidden", "true");
     this.quality = make("span", "quality");
+    this.meaning = make("span", "meaning");
+    this.truth = make("span", "truth");
     this.holder = make("span", "owner");
     const modbus = placesOn("modbus", variable), objects = placesOn("canopen", variable);
     const cells = [
       ["name", this.button, make("span", "robot muted", `${variable.direction === "input" ? "→" : "←"}\u00a0${variable.robot}`)],
-      ["value right", this.value, make("span", "unit muted", variable.unit)],
+      ["value right", this.value, make("span", "unit muted", variable.unit), this.meaning, this.truth],
       ["plot", this.canvas],
       ["quality", this.quality],
       ["owner", this.holder],
@@ -163,9 +166,15 @@ class Row {
     }));
   }
 
-  update(value, code, age, owner, left) {
-    put(this.value, number(value, this.variable.kind));
-    put(this.quality, quality(code, age));
+  update(value, code, age, owner, left, force) {
+    const { kind, unit, meanings } = this.variable;
+    put(this.value, number(value, kind));
+    put(this.meaning, meanings?.[value] ?? "");
+    const [rest, reported, its] = force ?? [null, null, null];
+    put(this.quality, force ? `${quality(code, age)}, ${span(rest)} left` : quality(code, age));
+    // The truth beside the force: what the source reports, and how good that is.
+    const truth = its === null ? "" : `reports ${number(reported, kind)} ${meanings?.[reported] ?? unit}`.trimEnd();
+    put(this.truth, truth && its > 0 ? `${truth}, ${quality(its, null)}` : truth);
     const words = owner && left !== null ? `${owner}, ${span(left)}` : owner;
     const source = code === FORCED ? "operator" : "robot";
     put(this.holder, this.variable.direction === "input" ? words || "free" : source);
@@ -224,6 +233,7 @@ function factsOf(variable, layout) {
     ["Modbus", modbus.map((place) => `${place.area} ${place.address} = ${place.notation}, ${place.type}`).join("; ")],
     ["CANopen", objects.map((place) => `object ${place.address}, ${place.type}, ${place.notation}`).join("; ")],
     ...others.map((place) => [place.link, `${place.area} ${place.address}, ${place.type}, ${place.notation}`]),
+    ["values", Object.entries(variable.meanings ?? {}).map(([value, words]) => `${value} ${words}`).join(", ")],
     ["limits", variable.limits ? `${variable.limits.join(" to ")} ${variable.unit}`.trim() : ""],
     [input ? "owner lost" : "robot lost", variable.fallback],
     ["may own", lock ? lock.owners.join(lock.takeover ? " before " : ", ") || "nobody" : ""],
