@@ -11,7 +11,9 @@ import sys
 from contextlib import suppress
 from typing import NoReturn
 
+from gatewayd.service import standard_streams
 from gatewayd.service.signals import SIGNALS
+from gatewayd.service.standard_streams import OutputError
 
 INTERNAL_ERROR = 70
 """Exit code of a defect of gatewayd itself (EX_SOFTWARE of sysexits.h)."""
@@ -19,11 +21,14 @@ INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells count it: 128 + SIGINT."""
 READER_GONE = 1
 """Exit code when the reader of a pipe went away; click's own, wherever in the output that is noticed."""
+UNWRITTEN = 1
+"""Exit code when standard output was closed or is full."""
 
 
 def main() -> NoReturn:
     """Run `sys.argv` and exit. GATEWAYD_TRACEBACK=1 shows where an internal error came from."""
     is_daemon = sys.argv[1:2] == ["run"]
+    standard_streams.prepare()
     if is_daemon:
         SIGNALS.install()
     try:
@@ -39,26 +44,36 @@ def main() -> NoReturn:
 
 def _run() -> int:
     """The exit code of the command."""
+    try:
+        code = _command()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        standard_streams.forget_output()
+        return READER_GONE
+    except OutputError as error:
+        standard_streams.forget_output()
+        print(f"gatewayd: cannot write the output: {error.strerror}", file=sys.stderr)  # noqa: T201 - as click does
+        return UNWRITTEN
+    except Exception as defect:  # noqa: BLE001 - the last line of defence: no traceback reaches a user
+        if _was_interrupted(defect):
+            return INTERRUPTED
+        _report(defect)
+        return INTERNAL_ERROR
+    return code
+
+
+def _command() -> int:
     import click
 
     from gatewayd.cli import command
 
     try:
         result = command.main(prog_name="gatewayd", standalone_mode=False)
-        sys.stdout.flush()
     except click.ClickException as problem:
         problem.show()
         return problem.exit_code
     except click.Abort:
         return INTERRUPTED
-    except BrokenPipeError:
-        _forget_stdout()
-        return READER_GONE
-    except Exception as defect:  # noqa: BLE001 - the last line of defence: no traceback reaches a user
-        if _was_interrupted(defect):
-            return INTERRUPTED
-        _report(defect)
-        return INTERNAL_ERROR
     return result if isinstance(result, int) else 0
 
 
@@ -74,11 +89,6 @@ def _leave(code: int) -> NoReturn:
         with suppress(AttributeError, OSError, ValueError):
             stream.flush()
     os._exit(code)
-
-
-def _forget_stdout() -> None:
-    """Point stdout at nothing, so that the interpreter's own flush at exit does not complain."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _report(defect: Exception) -> None:

@@ -160,7 +160,7 @@ LAYERS: dict[str, set[str]] = {
         "simulator",
         "web.settings",
     },
-    "__main__": {"cli", "report.printable", "service.signals"},
+    "__main__": {"cli", "report.printable", "service.signals", "service.standard_streams"},
 }
 """Module or package -> what it and everything in it may import; the longest name that fits decides."""
 

@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 PIPE_WIDTH = 120
 """Columns of the table where neither a terminal nor COLUMNS says how wide it is."""
 
-_WIDE = 100
-_NAME_WIDTH = 20
+_EDGES = 2
+"""Blanks beside a table."""
+_EXPENDABLE = ("no.", "lost", "owner", "robot", "value", "type", "address")
+"""Columns that a narrow screen can do without, the first ones first."""
 
 
 @click.command(
@@ -83,13 +85,16 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
     known = sys.stdout.isatty() or "COLUMNS" in os.environ
     console = Console(width=None if known else PIPE_WIDTH, markup=False, highlight=False)
     console.print(printable(_heading(plan)), style="bold")
-    console.print(_table(entries, wide=console.width >= _WIDE))
+    table, dropped = _table(entries, console.width)
+    console.print(table)
     for link in tables():
         further = link.screen_table(loaded.cell) if link.key in plan.links else None
         if further is not None:
-            console.print(_further_table(further))
+            console.print(_further_table(further, console.width))
             for line in further.notes:
                 console.print(line, soft_wrap=True)
+    if dropped:
+        click.echo(f"left out, as the screen is narrow: {', '.join(dropped)}; --format csv has all columns")
     for line in _notes(loaded, plan, shortened=any(first is not last for first, last in entries)):
         console.print(printable(line), style="dim", soft_wrap=True)
 
@@ -130,42 +135,43 @@ def _notes(loaded: Loaded, plan: Plan, *, shortened: bool) -> list[str]:
     return notes
 
 
-def _table(entries: Sequence[tuple[Row, Row]], *, wide: bool) -> Table:
+def _table(entries: Sequence[tuple[Row, Row]], width: int) -> tuple[Table, tuple[str, ...]]:
+    """The table in so many columns of the screen, and the names of its own columns that have no room there."""
     from rich.text import Text
 
     from gatewayd.links.registry import tables
+    from gatewayd.report.fitting import fitted, folded
     from gatewayd.report.layout import Column, arranged
 
-    own = [Column(name, whole=name in ("no.", "lost")) for name in ("no.", "name", "value", "owner", "lost")]
+    own = [Column(name) for name in ("no.", "name", "value", "owner", "lost")]
     further = (
         column for link in tables() for column in (link.columns if link.screen is None else link.screen)
     )
     columns = arranged(own, further)
+    rows = [_texts(first, last) for first, last in entries]
+    texts = {column.name: [column.name, *(row.get(column.name, "") for row in rows)] for column in columns}
+    fit = fitted(texts, width - _EDGES, _EXPENDABLE)
+    columns = tuple(column for column in columns if column.name in fit.widths)
     table = _empty_table()
     for column in columns:
         justify: Literal["left", "right"] = "right" if column.name == "no." else "left"
-        least = min(_NAME_WIDTH, max((len(last.name) for _, last in entries), default=0))
-        table.add_column(
-            column.name,
-            justify=justify,
-            no_wrap=column.whole and wide,
-            overflow="fold",
-            min_width=least if column.name == "name" and wide else None,
-        )
+        table.add_column(column.name, justify=justify, no_wrap=True, width=fit.widths[column.name])
     previous = entries[0][0].direction if entries else ""
-    for first, last in entries:
+    for (first, _), row in zip(entries, rows, strict=True):
         if first.direction != previous:
             table.add_section()
             previous = first.direction
         colour = "cyan" if first.direction == "input" else "green"
-        texts = _texts(first, last)
         table.add_row(
             *(
-                Text(texts.get(column.name, ""), colour if column.coloured else _STYLES.get(column.name, ""))
+                Text(
+                    folded(row.get(column.name, ""), fit.widths[column.name]),
+                    colour if column.coloured else _STYLES.get(column.name, ""),
+                )
                 for column in columns
             )
         )
-    return table
+    return table, fit.dropped
 
 
 _STYLES = {"no.": "dim", "name": "bold"}
@@ -197,12 +203,24 @@ def _empty_table() -> Table:
     return Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False)
 
 
-def _further_table(content: ReportTable) -> Table:
+def _further_table(content: ReportTable, width: int) -> Table:
     from rich.text import Text
 
+    from gatewayd.report.fitting import fitted, folded
+
     table = _empty_table()
-    for title in content.head:
-        table.add_column(title, overflow="fold")
+    # Beside the number of a column, since several may have one head.
+    plain = [[cell if isinstance(cell, str) else cell[0] for cell in row] for row in content.rows]
+    texts = {str(at): [title, *(row[at] for row in plain)] for at, title in enumerate(content.head)}
+    widths = list(fitted(texts, width - _EDGES, ()).widths.values())
+    for title, wide in zip(content.head, widths, strict=True):
+        table.add_column(folded(title, wide), width=wide, overflow="fold")
     for row in content.rows:
-        table.add_row(*(Text(cell) if isinstance(cell, str) else Text(*cell) for cell in row))
+        cells = zip(row, widths, strict=True)
+        table.add_row(
+            *(
+                Text(folded(cell, wide)) if isinstance(cell, str) else Text(folded(cell[0], wide), cell[1])
+                for cell, wide in cells
+            )
+        )
     return table

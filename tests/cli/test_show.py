@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -159,3 +160,21 @@ variables: {mode: {robot: robot_mode}}
     assert "TPDO 1 (state) 0x190 event (254) 0-15 <- status: flags 5F00h:02 UNSIGNED16" in lines
     assert "16-31 <- status: quality of mode 5F40h:01 UNSIGNED16" in lines
     assert "32-63 <- mode 2410h:01 INTEGER32" in lines
+
+
+@pytest.mark.parametrize("path", MAPPINGS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_a_screen_of_any_width_breaks_no_number_and_names_what_it_leaves_out(path: Path, width: int) -> None:
+    done = show(path, COLUMNS=str(width))
+    lines = done.output.splitlines()
+    end = next(
+        n for n, line in enumerate(lines) if line.startswith(("writer ", "left out", "by SDO", "worst-case"))
+    )
+    assert max(map(len, lines[:end])) <= width
+    wide = show(path, COLUMNS="200").output
+    numbers = set(re.findall(r"\b[0-9]{6}\b", wide))
+    assert set(re.findall(r"\b[0-9]{6}\b", done.output)) == numbers
+    head = next(line for line in lines if "name" in line and "4xxxxx" in line)
+    left_out = "".join(line for line in lines if line.startswith("left out"))
+    for column in ("no.", "robot", "address", "type", "value", "owner", "lost"):
+        assert (column in head) != (column in left_out)
