@@ -216,6 +216,8 @@ ROWS: dict[str, list[Row]] = {
         row("writers.line.node", 8, "release", PLC),
         row("writers.line.heartbeat", "10s"),
         row("writers.line.heartbeat", "30s", "weakening"),
+        row("writers.line.pdos", ["command"], "release", PLC),
+        row("writers.line.pdos", REMOVED, "release", PLC, {"writers.line.pdos": ["command"]}),
         row("writers.line.guarding", "10s", given=GUARDING_LINE),
         row("writers.line.guarding", "30s", "weakening", given=GUARDING_LINE),
         row("writers.line.guarding", REMOVED, "release weakening", PLC, GUARDING_LINE),
