@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import gzip
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Generator
 from contextlib import suppress
 from importlib.resources import files
 from typing import TypeVar
@@ -119,6 +119,7 @@ class StatusListener:
             web.get("/page/cells", self._overview),
             web.get("/page/cells/{cell}", self._layout),
             web.get("/page/cells/{cell}/state", self._state),
+            web.get("/page/cells/{cell}/history", self._history),
         ]
 
     async def _healthz(self, _request: web.Request) -> web.Response:
@@ -160,6 +161,13 @@ class StatusListener:
             return view.as_json(view.state(self._runtime(request), self._probes, since, clock.now()))
 
         return web.Response(body=await self._done(request, state, since), content_type="application/json")
+
+    async def _history(self, request: web.Request) -> web.Response:
+        def history() -> Generator[None, None, bytes]:
+            return view.past(self._runtime(request), self._probes, clock.now())
+
+        body = await self._share.done_once(request.path, asker(request), history)
+        return await _packed(request, body, {"Content-Type": "application/json"})
 
     async def _done(self, request: web.Request, work: Callable[[], _Result], what: object = None) -> _Result:
         """The result of a short work, in its turn, once for all who ask for the same meanwhile."""

@@ -20,10 +20,11 @@ from gatewayd.service.daemon import Daemon
 from gatewayd.service.liveness import Liveness
 from gatewayd.web.health import readiness
 from gatewayd.web.histogram import Histogram
+from gatewayd.web.history import PERIOD, LastMinute
 
 LAG_PERIOD = 0.1
 """Seconds between two looks at the loop's lag."""
-_LOOKS_PER_ROUND = 5
+_LOOKS_PER_ROUND = round(PERIOD / LAG_PERIOD)
 """Looks at the lag for each look at the daemon's cells and parts."""
 
 
@@ -35,6 +36,7 @@ class CellProbe:
         """From the arrival of a package's bytes to its values standing in every fieldbus's image."""
         self.write_to_package = Histogram()
         """From the arrival of a write to the package with it; the wait for the control cycle is part of it."""
+        self.history = LastMinute()
         self.events: Counter[EventKind] = Counter()
         self.refusals: Counter[Reason] = Counter()
         """Equal ones are reported every `REFUSAL_INTERVAL` seconds, so these may lag behind `Health.writes_refused`."""
@@ -143,7 +145,9 @@ class Probes:
         """Find the cells that are served now and the parts that hang."""
         self.late = self._liveness.late(self.daemon.progress(), now)
         for runtime in self.daemon.runtimes:
-            self.of(runtime.cell).attach(runtime.cell, runtime.source)
+            probe = self.of(runtime.cell)
+            probe.attach(runtime.cell, runtime.source)
+            probe.history.look(runtime.cell, now)
         served = {cell.definition.name for cell in self.daemon.cells}
         for name in self._cells.keys() - served:
             del self._cells[name]

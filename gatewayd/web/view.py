@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from collections.abc import Generator
 from itertools import groupby, islice
 from typing import Any
 
@@ -155,6 +156,17 @@ def state(runtime: CellRuntime, probes: Probes, since: int, now: float) -> dict[
         "refused": health.writes_refused,
         "events": {"count": cell.events.count, "latest": _events(cell, since, now)},
     }
+
+
+def past(runtime: CellRuntime, probes: Probes, now: float) -> Generator[None, None, bytes]:
+    """The last minute: milliseconds from sample to sample, and samples, the oldest first; one in each step."""
+    history = probes.of(runtime.cell).history
+    samples = []
+    for sample in history.samples:
+        age, values = _milliseconds(now - sample.time), list(map(_number, sample.values))
+        samples.append(as_json({"age": age, "values": values, "quality": list(sample.quality)}))
+        yield
+    return b'{"period":%d,"samples":[%b]}' % (round(1000 * history.period), b",".join(samples))
 
 
 def _forced(cell: Cell, index: int, now: float) -> list[object]:

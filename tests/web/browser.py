@@ -96,6 +96,13 @@ class Page:
             assert time.monotonic() - start < _PATIENCE, f"waited in vain for {condition}; {self.problems}"
             await asyncio.sleep(0.05)
 
+    async def wait_for(self, promise: str) -> None:
+        """Return when what the JavaScript promise brings is true."""
+        start = time.monotonic()
+        while not await self.run(promise):
+            assert time.monotonic() - start < _PATIENCE, f"waited in vain for {promise}; {self.problems}"
+            await asyncio.sleep(0.05)
+
     async def press(self, key: str, code: int = 0) -> None:
         """One key, down and up."""
         text = {"text": key} if len(key) == 1 else {"text": "\r"} if key == "Enter" else {}

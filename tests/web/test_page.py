@@ -254,6 +254,24 @@ async def test_without_the_gateway_the_page_greys_and_says_since_when(plant: Pla
             await page.wait("document.getElementById('alarm').hidden")
 
 
+async def test_the_plots_begin_before_the_page_was_opened(plant: Plant) -> None:
+    """The gateway keeps a minute: a peak that nobody looked at is there."""
+    async with showing(plant, WIDE) as shown:
+        page = shown.page
+        assert shown.plc.write(10, [900]) == 0
+        await page.wait(f"{row('part', 'span.value')} === '900'")
+        peak = f"fetch('{shown.url}page/cells/cell/history').then((answer) => answer.json())"
+        await page.wait_for(f"{peak}.then(({{samples}}) => samples.some(({{values}}) => values[1] === 900))")
+        assert shown.plc.write(10, [5]) == 0
+        await page.wait(f"{row('part', 'span.value')} === '5'")
+        await page.open(shown.url, *WIDE)
+        await page.wait(f"{LIVE} && {row('part', 'span.value')} === '5'")
+        await page.run(
+            "[...document.querySelectorAll('button.name')].find((one) => one.textContent === 'part').click()"
+        )
+        await page.wait(f"{text('.detail .axis')}.includes('highest 900')")
+
+
 async def test_a_reloaded_mapping_is_shown_without_reloading_the_page(plant: Plant) -> None:
     async with showing(plant, WIDE) as shown:
         plant.mapping(MAPPING.replace("cycles:", "made:"), shown.simulator.port)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,20 @@ from gatewayd.mapping.loader import load
 from gatewayd.service.cell_runtime import CellRuntime
 from gatewayd.service.daemon import Daemon
 from gatewayd.web.probes import Probes
-from gatewayd.web.view import EVENTS, as_json, layout, overview, state
+from gatewayd.web.view import EVENTS, as_json, layout, overview, past, state
 from tests.control.served import plan
 from tests.web.press import CYCLES, FORCE_LIMIT, PLC, SPARE, START
+
+
+def ran(steps: Generator[None, None, bytes]) -> list[bytes]:
+    """What the steps return."""
+    found: list[bytes] = []
+
+    def collect() -> Generator[None, None, None]:
+        found.append((yield from steps))
+
+    list(collect())
+    return found
 
 
 def told(runtime: CellRuntime, probes: Probes, since: int = 0) -> Any:
@@ -89,6 +101,20 @@ def test_a_forced_output_tells_the_age_of_its_force(runtime: CellRuntime, probes
     [[index, left, reported, quality]] = found["forced"]
     assert (index, reported, quality) == (CYCLES, 0, 0), "the truth beside it"
     assert 0 < left <= 60_000
+
+
+def test_the_last_minute_is_told_from_the_oldest_sample_on(runtime: CellRuntime, probes: Probes) -> None:
+    start = time.monotonic()
+    runtime.cell.image.values[CYCLES] = 42
+    probes.look(start + 1.0)
+    runtime.cell.image.values[CYCLES] = float("nan")
+    probes.look(start + 1.5)
+    [answer] = ran(past(runtime, probes, start + 3.0))
+    found = json.loads(answer)
+    assert found["period"] == 500
+    values = [(sample["age"], sample["values"][CYCLES]) for sample in found["samples"]]
+    assert values[-2:] == [(2000, 42.0), (1500, "NaN")]
+    assert all(len(sample["quality"]) == len(runtime.cell.image.values) for sample in found["samples"])
 
 
 def test_picture_is_as_bad_as_its_worst_part(runtime: CellRuntime, probes: Probes) -> None:

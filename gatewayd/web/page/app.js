@@ -14,7 +14,7 @@ const byId = (id) => document.getElementById(id);
 const picture = new Picture(byId("picture"));
 const cells = new Cells(byId("cells"));
 const variables = new Variables(1000 / PERIOD);
-let layout = null, cell = null, events = 0, looks = 0;
+let layout = null, cell = null, events = 0, looks = 0, missed = true;
 let answered = -Infinity, answeredAt = null, trouble = "";
 
 async function ask(path) {
@@ -34,6 +34,7 @@ async function choose() {
   byId("cell").title = `gatewayd ${gatewayd}`;
   looks = 0;
   layout = await ask(`page/cells/${encodeURIComponent(cell)}`);
+  missed = true;
   events = 0;
   byId("happened").replaceChildren();
   variables.build(layout);
@@ -42,6 +43,12 @@ async function choose() {
 async function look() {
   if (layout === null) await choose();
   const asked = layout;
+  if (missed) {
+    const history = await ask(`page/cells/${encodeURIComponent(cell)}/history`);
+    if (asked !== layout) return;
+    variables.history.refill(history, performance.now());
+    missed = false;
+  }
   looks += 1;
   if (looks % GLANCE === 0) cells.show((await ask("page/cells")).cells, cell);
   if (asked !== layout) return;
@@ -153,7 +160,10 @@ function start() {
       for (const one of document.querySelectorAll(".tabs button")) one.setAttribute("aria-pressed", String(one === button));
     });
   }
-  document.addEventListener("visibilitychange", judge);
+  document.addEventListener("visibilitychange", () => {
+    missed = true;
+    judge();
+  });
   setInterval(judge, PERIOD);
   run();
 }

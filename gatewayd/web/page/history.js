@@ -1,14 +1,24 @@
 // The last 60 seconds of every variable, and their plots. A time without an answer is a gap, never a line.
+// What was before the page was opened, or while it was hidden, comes from the gateway.
 
 export const SECONDS = 60;
 
 export class History {
   constructor(variables, samplesPerSecond) {
     this.length = Math.ceil(SECONDS * samplesPerSecond * 1.1);
+    this.gap = 4000 / samplesPerSecond;
     this.next = 0;
     this.times = new Float64Array(this.length).fill(-Infinity);
     this.values = Array.from({ length: variables }, () => new Float64Array(this.length));
     this.good = Array.from({ length: variables }, () => new Uint8Array(this.length));
+  }
+
+  // What the gateway kept, in place of all that is here.
+  refill({ period, samples }, now) {
+    this.times.fill(-Infinity);
+    this.next = 0;
+    this.gap = Math.max(this.gap, 2.5 * period);
+    for (const { age, values, quality } of samples) this.add(now - age, values, quality);
   }
 
   // `now` in milliseconds of performance.now().
@@ -33,7 +43,7 @@ export class History {
     return low <= high ? [low, high] : [0, 0];
   }
 
-  draw(canvas, index, now, kind, gap) {
+  draw(canvas, index, now, kind) {
     const scale = devicePixelRatio || 1;
     const width = canvas.clientWidth, height = canvas.clientHeight;
     if (!width || !height) return;
@@ -55,7 +65,7 @@ export class History {
       const time = this.times[at], value = this.values[index][at];
       if (now - time > SECONDS * 1000 + 500 || !Number.isFinite(value)) continue;
       const good = this.good[index][at];
-      if (last !== null && time - last.time <= gap) {
+      if (last !== null && time - last.time <= this.gap) {
         context.beginPath();
         context.strokeStyle = good ? style.color : style.outlineColor;
         context.setLineDash(good ? [] : [2, 3]);

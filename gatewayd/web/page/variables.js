@@ -91,14 +91,13 @@ export class Variables {
   }
 
   draw(now) {
-    const gap = 4000 / this.samplesPerSecond;
     for (const row of this.seen) {
-      if (!row.element.hidden) this.history.draw(row.canvas, row.variable.number - 1, now, row.variable.kind, gap);
+      if (!row.element.hidden) this.history.draw(row.canvas, row.variable.number - 1, now, row.variable.kind);
     }
     if (this.open) {
       const { variable, detail } = this.open;
       const [low, high] = this.history.range(variable.number - 1, now);
-      this.history.draw(detail.canvas, variable.number - 1, now, variable.kind, gap);
+      this.history.draw(detail.canvas, variable.number - 1, now, variable.kind);
       put(detail.range, `lowest ${number(low, variable.kind)}, highest ${number(high, variable.kind)} ${variable.unit}`.trim());
     }
   }
