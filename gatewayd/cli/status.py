@@ -69,7 +69,6 @@ def _narrowed(answer: Answer, cell: str) -> dict[str, Any]:
 
 
 def _lines(answer: Answer, locks: list[Answer], events: list[Answer]) -> Iterator[str]:
-    from gatewayd.cli.phrases import clock
     from gatewayd.report.format import span
 
     healthy = answer["healthy"]
@@ -87,7 +86,7 @@ def _lines(answer: Answer, locks: list[Answer], events: list[Answer]) -> Iterato
         for event in events:
             where = f"{event['cell']}: " if several else ""
             text = click.style(f"{where}{event['text']}", fg="yellow" if event["bad"] else None)
-            yield f"  {clock(event['time'])} {text}"
+            yield f"  {event['time']} {text}"
 
 
 def _cell(cell: Answer, locks: list[Answer]) -> Iterator[str]:

@@ -20,6 +20,7 @@ from gatewayd.report.event_text import BAD, UNDECLARED_PEER, EventRecord
 from gatewayd.report.format import age, value
 from gatewayd.report.layout import Row
 from gatewayd.report.words import SOURCES
+from gatewayd.service.audit_record import utc
 
 REFUSAL_SHOWN = 5.0
 """Seconds for which a refusal of a Modbus client stands beside its variable."""
@@ -192,4 +193,5 @@ def _refused(cell: Cell, index: int, can_writer: int | None, now: float) -> str:
 
 
 def _clock(at: float) -> str:
-    return time.strftime("%H:%M:%S", time.localtime(at))
+    """`02:15:07.042Z`, as the log and the commands have it."""
+    return utc(at).partition("T")[2]
