@@ -101,9 +101,9 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
 
 def _heading(plan: Plan) -> str:
     from gatewayd.links.registry import tables
+    from gatewayd.report.format import counted
 
-    count = len(plan.cell.variables)
-    parts = [f"{plan.cell.name}: {count} variable{'' if count == 1 else 's'}"]
+    parts = [f"{plan.cell.name}: {counted(len(plan.cell.variables), 'variable')}"]
     here = (link.headline(plan) for link in tables() if link.key in plan.links)
     parts += [headline for headline in here if headline]
     parts.append(f"fingerprint {plan.cell.fingerprint:08X}")

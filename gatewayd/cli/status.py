@@ -126,7 +126,7 @@ def _colour(level: str) -> str | None:
 
 
 def _robot(robot: Answer, problems: list[str]) -> list[str]:
-    from gatewayd.report.format import age
+    from gatewayd.report.format import ago
     from gatewayd.report.words import LEVEL_COLOURS, SOURCE_LEVELS, SOURCES, source
 
     state = source(robot["state"])
@@ -136,7 +136,7 @@ def _robot(robot: Answer, problems: list[str]) -> list[str]:
         first += f" at {robot['frequency']:g} Hz" if robot["frequency"] else ""
         if not robot["writable"]:
             first += click.style(", not writable yet", fg="yellow")
-    first += f", last package {age(robot['age'])} ago" if robot["age"] is not None else ""
+    first += f", last package {ago(robot['age'])}" if robot["age"] is not None else ""
     return [first, ", ".join(_counts(robot)), *_controller(robot, problems)]
 
 
@@ -167,7 +167,7 @@ def _counts(robot: Answer) -> Iterator[str]:
 
 def _controller(robot: Answer, problems: list[str]) -> Iterator[str]:
     """What is known of the controller itself; a gateway that was started before an upgrade does not say it."""
-    from gatewayd.report.format import age
+    from gatewayd.report.format import ago
 
     if robot.get("controller") is not None:
         series = f" (series {robot['series']})" if robot["series"] is not None else ""
@@ -176,22 +176,25 @@ def _controller(robot: Answer, problems: list[str]) -> Iterator[str]:
         yield click.style(robot["contradiction"], fg="yellow")
     said = robot.get("last_text")
     if said is not None:
-        yield f"last text {age(said['age'])} ago, {said['level']}: {said['text']}"
+        yield f"last text {ago(said['age'])}, {said['level']}: {said['text']}"
 
 
 def _writer(writer: Answer, locks: int) -> str:
-    from gatewayd.report.format import age
+    from gatewayd.report.format import ago, counted, verb
 
     if writer["alive"]:
-        state, colour = f"there, last request {age(writer['age'])} ago", "green"
+        state, colour = f"there, last request {ago(writer['age'])}", "green"
     elif writer["age"] is None:
-        return f"{writer['name']} has not come yet"
+        return f"{writer['name']} {verb('have', writer['name'])} not come yet"
     else:
-        state, colour = f"lost, last request {age(writer['age'])} ago", "red"
-    return f"{writer['name']} {click.style(state, fg=colour)}, owns {writer['locks']} of {locks} locks"
+        state, colour = f"lost, last request {ago(writer['age'])}", "red"
+    owned = f"{verb('own', writer['name'])} {writer['locks']} of {counted(locks, 'lock')}"
+    return f"{writer['name']} {click.style(state, fg=colour)}, {owned if locks else 'there are no locks'}"
 
 
 def _variables(counts: Answer) -> str:
+    if not counts["total"]:
+        return "none"
     if counts["good"] == counts["total"]:
         return f"{counts['total']}, all good"
     from gatewayd.cli.phrases import quality
@@ -205,7 +208,7 @@ def _variables(counts: Answer) -> str:
 
 
 def _locks(locks: list[Answer]) -> list[str]:
-    from gatewayd.report.format import age
+    from gatewayd.report.format import age, counted
 
     held = [
         f"{lock['name']}: {lock['owner']}"
@@ -214,19 +217,17 @@ def _locks(locks: list[Answer]) -> list[str]:
         if lock["owner"] is not None
     ]
     shown = held[:_EVENTS] + ([f"and {len(held) - _EVENTS} more"] if len(held) > _EVENTS else [])
-    return shown or [f"none of {len(locks)} owned"]
+    return shown or [counted(len(locks), "lock") + (", none owned" if locks else "")]
 
 
 def _writes(cell: Answer) -> list[str]:
-    from gatewayd.report.format import age, counted
+    from gatewayd.report.format import ago, counted
 
     writes, last = cell["writes"], cell["last_refusal"]
     lines = [f"{writes['accepted']} accepted, {writes['refused']} refused"]
     if last is not None:
-        lines.append(f"last refusal {age(last['age'])} ago: {last['text']}")
+        lines.append(f"last refusal {ago(last['age'])}: {last['text']}")
     count, asked = sum(cell["unserved"].values()), cell["last_unserved"]
     if asked is not None:
-        lines.append(
-            f"{counted(count, 'request')} not served, the last {age(asked['age'])} ago: {asked['text']}"
-        )
+        lines.append(f"{counted(count, 'request')} not served, the last {ago(asked['age'])}: {asked['text']}")
     return lines

@@ -16,6 +16,8 @@ MAX_PEERS = 64
 """Hosts without a writer whose refusals are told apart."""
 REFUSAL_INTERVAL = 10.0
 """Seconds in which equal refusals are counted instead of reported again: a PLC may retry a hundred times a second."""
+_SHOWN = 0.05
+"""Seconds that tenths can show."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,11 @@ class _Reported:
 _Key = tuple[int | None, str, int | None, Reason | Unserved | None, int | None]
 
 
+def _ago(duration: float) -> str:
+    """`8.0 s ago`; `just now` where the figure would be 0."""
+    return f"{duration:.1f} s ago" if duration >= _SHOWN else "just now"
+
+
 class RefusalLog:
     """Refusals are equal if writer, host of the peer, variable, reason and holder are.
 
@@ -107,7 +114,7 @@ class RefusalLog:
             if reported.last is None:
                 del self._reported[key]
                 continue
-            detail = reported.details(f"the last {now - reported.last.time:.1f} s ago")
+            detail = reported.details(f"the last {_ago(now - reported.last.time)}")
             self._report(replace(reported.last, time=now, repeats=reported.pending - 1, detail=detail))
             self._reported[key] = _Reported(now)
         self._peers = {host for _, host, _, _, _ in self._reported if host}

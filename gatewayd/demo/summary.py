@@ -5,6 +5,7 @@ from __future__ import annotations
 from gatewayd.demo.master import CHECKS
 from gatewayd.demo.plc import CHECKS_PER_HANDSHAKE
 from gatewayd.demo.scene import Scene
+from gatewayd.report.format import counted
 
 _LONG_ENOUGH = 3
 """Handshakes within which the CANopen side must have come to work."""
@@ -19,18 +20,18 @@ def summary(scene: Scene, *, asked_for: bool) -> tuple[bool, str]:
     program, health = scene.plc.program, scene.cell.health
     master, feeder = scene.master, scene.master.feeder
     counts = (
-        f"{health.packages} packages from the robot ({health.skipped} skipped), "
-        f"{program.handshakes} handshakes, {program.verified} values checked both ways, "
-        f"{health.writes_refused} {'write' if health.writes_refused == 1 else 'writes'} refused.\n"
-        f"CANopen: {master.heartbeats} heartbeats, {master.received} PDOs received, {master.sent} sent, "
-        f"{feeder.verified} values checked, {feeder.refusals} "
-        f"{'order' if feeder.refusals == 1 else 'orders'} overruled by the PLC."
+        f"{counted(health.packages, 'package')} from the robot ({health.skipped or 'none'} skipped), "
+        f"{counted(program.handshakes, 'handshake')}, {counted(program.verified, 'value')} checked both ways, "
+        f"{counted(health.writes_refused, 'write')} refused.\n"
+        f"CANopen: {counted(master.heartbeats, 'heartbeat')}, {counted(master.received, 'PDO')} received, "
+        f"{master.sent or 'none'} sent, {counted(feeder.verified, 'value')} checked, "
+        f"{counted(feeder.refusals, 'order')} overruled by the PLC."
     )
     silent = ["the CANopen node fell silent"] if master.gone else []
     wrong = [*program.wrong, *feeder.wrong, *silent, *scene.problems]
     if wrong:
         reasons = "; ".join(wrong)
-        return False, f"{counts}\nThat is not how it should be: {reasons}"
+        return False, f"{counts}\nSomething went wrong: {reasons}"
     if program.handshakes == 0 or program.verified < CHECKS_PER_HANDSHAKE:
         what = "The PLC and the robot never shook hands" + ("." if asked_for else ": it was over too soon.")
         return not asked_for, f"{counts}\n{what}"
@@ -40,8 +41,8 @@ def summary(scene: Scene, *, asked_for: bool) -> tuple[bool, str]:
         )
         return not (asked_for or program.handshakes >= _LONG_ENOUGH), f"{counts}\n{what}"
     parts = program.handshakes
-    made = "1 part ordered, 1 part made" if parts == 1 else f"{parts} parts ordered, {parts} parts made"
+    made = f"{counted(parts, 'part')} ordered, {counted(parts, 'part')} made"
     return True, (
-        f"{counts}\n{made}, 0 excuses. The robot counted the same as the PLC.\n"
-        "Next: docs/tutorial leads from here to your own robot."
+        f"{counts}\n{made}: the robot counted the same as the PLC.\n"
+        "Next: docs/tutorial takes you from here to your own robot."
     )

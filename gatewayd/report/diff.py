@@ -17,6 +17,7 @@ from gatewayd.links.contract import Names
 from gatewayd.mapping.plan import Plan
 from gatewayd.report import facts
 from gatewayd.report.facts import Facts
+from gatewayd.report.format import counted
 from gatewayd.report.printable import json_document, printable
 from gatewayd.report.weakening import weakened
 from gatewayd.report.wording import family
@@ -235,7 +236,7 @@ def as_text(changes: Changes) -> str:
     if changes.renumbered:
         first, count = changes.renumbered[0], len(changes.renumbered)
         lines.append(
-            f"note: the status block counts {count} variable{'' if count == 1 else 's'} anew, from `{first.name}` "
+            f"note: the status block counts {counted(count, 'variable')} anew, from `{first.name}` "
             f"({first.old} -> {first.new}) on; what is added at the end of the file moves none"
         )
     return "".join(f"{printable(line, None)}\n" for line in lines)

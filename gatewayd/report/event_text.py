@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from gatewayd.core.definition import CellDefinition, Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
-from gatewayd.report.format import value
+from gatewayd.report.format import YOU, counted, value, verb
 from gatewayd.report.printable import printable
 
 ACCEPTED = "write accepted"
@@ -43,15 +43,15 @@ _TEXTS = {
     EventKind.FALLBACK.value: "{variable} fell back from {old} to {new}",
     EventKind.ACQUIRED.value: "{writer} took {lock}",
     EventKind.TAKEN_OVER.value: "{writer} took {lock} over from {holder}",
-    EventKind.RELEASED.value: "{writer} no longer holds {lock}",
+    EventKind.RELEASED.value: "{writer} no longer {hold} {lock}",
     EventKind.FORCED.value: "{writer} forced {variable} to {new}",
     EventKind.UNFORCED.value: "{variable} {are} no longer forced",
-    EventKind.WRITER_CONNECTED.value: "writer {writer} connected",
-    EventKind.WRITER_LOST.value: "writer {writer} lost",
+    EventKind.WRITER_CONNECTED.value: "{the_writer} connected",
+    EventKind.WRITER_LOST.value: "{the_writer} {lost}",
     EventKind.UNAVAILABLE.value: "{variable} {are} unavailable",
     EventKind.AVAILABLE.value: "{variable} {are} available",
     EventKind.READ_BACK_DIFFERS.value: "read-back of {variable} differs",
-    EventKind.FOLLOWED.value: "{variable} follows the robot: {old} -> {new}",
+    EventKind.FOLLOWED.value: "{variable} {follow} the robot: {old} -> {new}",
     EventKind.ADOPTION_ENDS.value: "{variable} {fall} back soon: adopted, and owned by nobody",
 }
 """Of those kinds that name and detail alone do not say."""
@@ -154,7 +154,7 @@ class EventRecord:
             text = self._usual()
         if self.what not in _IN_PARENTHESES:
             return f"{text}: {self.detail}" if self.detail else text
-        often = f"{self.times} {'changes' if self.what == ACCEPTED else 'times'}" if self.times > 1 else ""
+        often = counted(self.times, "change" if self.what == ACCEPTED else "time") if self.times > 1 else ""
         inside = ", ".join(filter(None, (often, self.detail)))
         return f"{text} ({inside})" if inside else text
 
@@ -171,9 +171,12 @@ class EventRecord:
     def _usual(self) -> str:
         others = f" and {self.others} more" if self.others else ""
         known = {
-            "are": "are" if others else "is",
-            "fall": "fall" if others else "falls",
-            "follow": "follow" if others else "follows",
+            "are": verb("be", count=1 + self.others),
+            "fall": verb("fall", count=1 + self.others),
+            "follow": verb("follow", count=1 + self.others),
+            "hold": verb("hold", self.writer or ""),
+            "the_writer": self.writer and (YOU if self.writer == YOU else f"writer {self.writer}"),
+            "lost": "left" if self.writer == YOU else "lost",
             "writer": self.writer,
             "variable": self.variable and self.variable + others,
             "lock": self.lock and self.lock + others,

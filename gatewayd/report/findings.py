@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from gatewayd.mapping.compiled import Unreadable
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Severity
+from gatewayd.report.format import counted
 from gatewayd.report.printable import json_document, printable
 
 _BOLD, _RED, _YELLOW, _DIM, _PLAIN = "\x1b[1m", "\x1b[31m", "\x1b[33m", "\x1b[2m", "\x1b[0m"
@@ -91,17 +92,13 @@ def _finding_lines(finding: Diagnostic, *, colour: bool) -> list[str]:
 
 
 def _summary(outcome: CheckOutcome) -> str:
-    parts = [f"{_count(len(outcome.files), 'file')} checked"]
+    parts = [f"{counted(len(outcome.files), 'file')} checked"]
     if outcome.unreadable:
-        parts.append(f"{_count(len(outcome.unreadable), 'file')} not readable")
-    found = [_count(outcome.errors, "error")] if outcome.errors else []
+        parts.append(f"{counted(len(outcome.unreadable), 'file')} not readable")
+    found = [counted(outcome.errors, "error")] if outcome.errors else []
     if outcome.warnings:
-        found.append(_count(outcome.warnings, "warning"))
+        found.append(counted(outcome.warnings, "warning"))
     return f"{', '.join(parts)}: {', '.join(found) or 'no findings'}"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _as_object(finding: Diagnostic) -> dict[str, object]:

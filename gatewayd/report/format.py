@@ -9,6 +9,12 @@ import math
 from collections.abc import Sequence
 
 _DIGITS = 3
+_JUST_NOW = 0.0005
+"""Seconds below which an age has no figure."""
+YOU = "you"
+"""Who takes part in the demonstration."""
+_PLURALS = {"be": "are"}
+_SINGULARS = {"be": "is", "have": "has", "do": "does", "go": "goes"}
 
 
 def value(found: object, unit: str = "") -> str:
@@ -55,9 +61,35 @@ def span(duration: float) -> str:
     return " ".join(parts[:2])
 
 
+def ago(duration: float | None) -> str:
+    """`12 ms ago`, `5 min ago`; `just now` where no figure would be left, `never` for None or infinity."""
+    if duration is None or duration == math.inf:
+        return "never"
+    return "just now" if duration < _JUST_NOW else f"{age(duration)} ago"
+
+
 def counted(count: int, noun: str) -> str:
-    """`1 lock`, `2 locks`, `no locks`."""
-    return f"{count or 'no'} {noun}{'' if count == 1 else 's'}"
+    """`1 lock`, `2 locks`, `no locks`; `noun` is in the singular."""
+    return f"{count or 'no'} {noun if count == 1 else plural(noun)}"
+
+
+def plural(noun: str) -> str:
+    """`locks`, `entries`, `switches`: of a regular noun, or of one that ends in such a word."""
+    if noun.endswith(("s", "x", "z", "ch", "sh")):
+        return f"{noun}es"
+    if noun.endswith("y") and noun[-2:-1] not in "aeiou":
+        return f"{noun[:-1]}ies"
+    return f"{noun}s"
+
+
+def verb(base: str, subject: str = "", count: int = 1) -> str:
+    """The present tense that agrees: `holds` for `plc`, `hold` for `you` and for several; of `be` `is` and `are`.
+
+    A writer may be called `you`, as whoever takes part in the demonstration is.
+    """
+    if count != 1 or subject.casefold() == YOU:
+        return _PLURALS.get(base, base)
+    return _SINGULARS.get(base) or plural(base)
 
 
 def address(host: str, port: int) -> str:

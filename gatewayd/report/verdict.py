@@ -18,7 +18,7 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.links.contract import Level, Link, LinkHealth
 from gatewayd.mapping.plan import Plan
-from gatewayd.report.format import counted, listed, span
+from gatewayd.report.format import counted, listed, span, verb
 from gatewayd.report.words import SOURCE_LEVELS, SOURCES
 
 RECENT = 10.0
@@ -213,7 +213,9 @@ def _of_gateway(cell: Cell, now: float) -> Iterator[_Finding]:
 
 def _good(cell: Cell) -> str:
     quality = cell.image.quality
-    return f"{quality.count(Quality.GOOD)} of {len(quality)} values good"
+    if not quality:
+        return "no values"
+    return f"{quality.count(Quality.GOOD)} of {counted(len(quality), 'value')} good"
 
 
 def _past(duration: float) -> tuple[Level, str]:
@@ -235,12 +237,12 @@ def _lost(cell: Cell, index: int, now: float) -> Iterator[_Finding]:
 
 def _writer(cell: Cell, index: int, lost: _Finding | None, now: float) -> PicturePart:
     name, held = cell.definition.writers[index].name, len(cell.ownership.held_by(index))
-    detail = f"holds {counted(held, 'lock')}" if held else "holds no lock"
+    detail = f"{verb('hold', name)} {counted(held, 'lock') if held else 'no lock'}"
     refused = _refused(cell, index, now)
     if lost is not None:
         return PicturePart(name, lost.level, lost.text, detail)
     alive = cell.writers.alive[index]
-    words, level = ("connected", Level.GOOD) if alive else ("has not come yet", Level.IDLE)
+    words, level = ("connected", Level.GOOD) if alive else (f"{verb('have', name)} not come yet", Level.IDLE)
     if refused is not None:
         words, level = f"{words}; {refused.text}", max(level, refused.level)
     return PicturePart(name, level, words, detail)
@@ -271,7 +273,9 @@ def _with_quality(cell: Cell, quality: Quality, level: Level, words: str) -> Ite
             for variable, its in zip(cell.definition.variables, qualities, strict=True)
             if its is quality
         ]
-        yield _Finding(level, f"{count} of {len(qualities)} variables {words}: {listed(names, _LISTED)}")
+        yield _Finding(
+            level, f"{count} of {counted(len(qualities), 'variable')} {words}: {listed(names, _LISTED)}"
+        )
 
 
 def _since(duration: float) -> str:

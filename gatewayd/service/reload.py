@@ -22,6 +22,7 @@ from gatewayd.mapping.compiled import Compiled
 from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.diff import Changes, as_text, compare
+from gatewayd.report.format import counted
 from gatewayd.service.compilation import Compilation, CompilationError
 from gatewayd.service.daemon import Daemon
 from gatewayd.service.objections import objections_of_change, objections_of_removal
@@ -235,7 +236,7 @@ class Reloader:
         for plan in plans:
             former = running.pop(plan.cell.name, None)
             if former is None:
-                found.append(f"{plan.cell.name}: new cell, {len(plan.cell.variables)} variables")
+                found.append(f"{plan.cell.name}: new cell, {counted(len(plan.cell.variables), 'variable')}")
                 continue
             changes = compare(former, plan)
             if changes:

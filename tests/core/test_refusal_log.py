@@ -55,6 +55,15 @@ def test_what_was_counted_is_told_even_if_no_other_follows() -> None:
     assert len(told) == 2
 
 
+def test_the_last_one_just_before_the_report_was_just_now() -> None:
+    told: list[Event] = []
+    log = RefusalLog(told.append)
+    for time in (0.0, REFUSAL_INTERVAL - 0.001):
+        log.add(refusal(time))
+    log.tick(REFUSAL_INTERVAL)
+    assert told[1].detail == "the last just now"
+
+
 def test_each_interval_tells_one_at_most_and_all_are_accounted_for() -> None:
     told: list[Event] = []
     log = RefusalLog(told.append)

@@ -99,6 +99,28 @@ def test_an_event_is_one_sentence(cell: Cell, event: Event, text: str) -> None:
     assert EventRecord.of(event, cell.definition).text() == text
 
 
+def test_whoever_takes_part_in_the_demonstration_is_you() -> None:
+    def text(kind: EventKind, detail: str = "") -> str:
+        return EventRecord(kind.value, "you", lock="speed", holder="plc", detail=detail).text()
+
+    assert text(EventKind.RELEASED, "lease ended") == "you no longer hold speed: lease ended"
+    assert text(EventKind.ACQUIRED) == "you took speed"
+    assert text(EventKind.TAKEN_OVER) == "you took speed over from plc"
+    assert text(EventKind.WRITER_CONNECTED) == "you connected"
+    assert text(EventKind.WRITER_LOST, "closed") == "you left: closed"
+
+
+@pytest.mark.parametrize("others", [0, 1, 2])
+@pytest.mark.parametrize("writer", ["plc", "you"])
+@pytest.mark.parametrize("kind", EventKind)
+def test_subject_and_verb_agree(kind: EventKind, writer: str, others: int) -> None:
+    record = EventRecord(kind.value, writer, "start", lock="start", holder="hmi", old=1, new=2)
+    words = record.of_several(others).text().split()
+    assert not {"holds", "has", "is"} & set(words) or (writer != "you" and not others) or "you" not in words
+    if others and "more" in words:
+        assert not {"is", "falls", "follows"} & set(words)
+
+
 def test_an_accepted_write_is_one_too() -> None:
     accepted = EventRecord(ACCEPTED, "plc", "x", "N", old=1, new=2)
     assert accepted.text() == "plc wrote x: 1 -> 2 N"

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from gatewayd.report.format import age, counted, exact, listed, seconds, span, value
+from gatewayd.report.format import age, ago, counted, exact, listed, plural, seconds, span, value, verb
 
 
 @pytest.mark.parametrize(
@@ -42,6 +44,48 @@ def test_spans_have_two_units_at_most(seconds: float, text: str) -> None:
 
 def test_nouns_agree_with_their_count() -> None:
     assert [counted(count, "lock") for count in (0, 1, 2)] == ["no locks", "1 lock", "2 locks"]
+
+
+NOUNS = st.sampled_from(
+    ["lock", "entry", "key", "switch", "index", "bus", "strange package", "PDO", "mapping file"]
+)
+VERBS = {
+    "hold": "holds",
+    "own": "owns",
+    "be": "is",
+    "have": "has",
+    "fall": "falls",
+    "go": "goes",
+    "pass": "passes",
+}
+
+
+@given(st.integers(0, 10**9), NOUNS)
+def test_a_count_of_one_alone_has_the_singular(count: int, noun: str) -> None:
+    words = counted(count, noun).split(" ", 1)
+    assert words == [str(count) if count else "no", noun if count == 1 else plural(noun)]
+    assert plural(noun) != noun
+
+
+def test_plurals() -> None:
+    nouns = ["lock", "entry", "key", "switch", "bus", "index"]
+    assert [plural(noun) for noun in nouns] == ["locks", "entries", "keys", "switches", "buses", "indexes"]
+
+
+@given(st.sampled_from(sorted(VERBS)), st.text(), st.integers(0, 100))
+def test_verbs_agree_with_names_and_counts(base: str, name: str, count: int) -> None:
+    """Third person for one of any name but `you`; the plural for `you`, for none and for several."""
+    if count == 1 and name.casefold() != "you":
+        assert verb(base, name, count) == VERBS[base]
+    else:
+        assert verb(base, name, count) == {"be": "are"}.get(base, base)
+    assert verb(base, "you") == verb(base, name, 2)
+
+
+@given(st.floats(allow_nan=False) | st.none())
+def test_no_age_is_a_zero(duration: float | None) -> None:
+    text = ago(duration)
+    assert text in ("just now", "never") or (text.endswith(" ago") and float(text.split()[0]) > 0)
 
 
 def test_many_names_are_a_few_and_a_number() -> None:

@@ -325,7 +325,7 @@ async def test_cells_come_and_go_with_their_files(rigged: Rigged) -> None:
         first = rig.cell
         rig.write("  count: {robot: output_int_register_5, modbus: 0}\n", name="stamp", unit=2)
         outcome = await rig.reloader.reload()
-        assert outcome.text == "reloaded: stamp: new cell, 1 variables"
+        assert outcome.text == "reloaded: stamp: new cell, 1 variable"
         assert rig.cell is first, "who did not change is not touched"
         stamp = rig.daemon.runtimes[1]
         await until(lambda: stamp.cell.freshness.state is Source.FRESH)
