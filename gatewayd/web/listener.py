@@ -37,6 +37,7 @@ PAGE = {
     "/cells.js": ("cells.js", "text/javascript"),
     "/picture.js": ("picture.js", "text/javascript"),
     "/variables.js": ("variables.js", "text/javascript"),
+    "/operate.js": ("operate.js", "text/javascript"),
     "/history.js": ("history.js", "text/javascript"),
     "/words.js": ("words.js", "text/javascript"),
 }
@@ -67,6 +68,8 @@ class StatusListener:
         self._host, self._port = host, port
         self._probes = probes
         self._exposition = Exposition(probes, __version__)
+        self._acts = token is not None and api is not None
+        """Whether whoever has the token can change anything."""
         self._doors: Doors | None = None
         self._share = api[0].share if api is not None else LoopShare()
         self._layouts: dict[str, tuple[Plan, bytes]] = {}
@@ -135,10 +138,12 @@ class StatusListener:
         return await _packed(request, body, {"Content-Type": CONTENT_TYPE})
 
     async def _overview(self, request: web.Request) -> web.Response:
-        body = await self._done(
-            request, lambda: view.as_json(view.overview(self._probes, __version__, clock.now()))
-        )
+        body = await self._done(request, self._overview_now)
         return web.Response(body=body, content_type="application/json")
+
+    def _overview_now(self) -> bytes:
+        acts = {"acts": self._acts}
+        return view.as_json(view.overview(self._probes, __version__, clock.now()) | acts)
 
     async def _layout(self, request: web.Request) -> web.Response:
         body = await self._done(request, lambda: self._layout_of(self._runtime(request)))

@@ -176,8 +176,15 @@ async def test_each_bus_has_its_columns(plant: Plant) -> None:
             f"{text('#picture .bus:nth-of-type(4) .state')}.includes('until a master starts the node')"
         )
         assert await page.run(text("#worst")) == "▲ CAN page"
+        # What a CAN controller with a cut wire reports; no virtual bus gets there.
+        await page.run(BUS_OFF)
         lines = "[...document.querySelectorAll('.buses .link')].map((link) => link.dataset.level).join()"
-        assert await page.run(lines) == "good,warn", "each line fails for itself"
+        await page.wait(f"{lines} === 'good,bad'")
+        assert await page.run(text(".buses .link:nth-of-type(1) .label")) == "●Modbus"
+        assert await page.run("[...document.querySelectorAll('.buses .label')][1].textContent") == "■CAN"
+        assert await page.run(text("#worst")) == "■ CAN page"
+        await page.open(shown.url, *WIDE)
+        await page.wait(f"{lines} === 'good,warn'")
         for width in WIDTHS:
             await page.resize(width, 800)
             assert await page.run("document.documentElement.scrollWidth") <= width
@@ -228,8 +235,8 @@ async def test_a_thumb_finds_what_it_wants(plant: Plant) -> None:
         await page.run("document.querySelector('#rows td.value').scrollIntoView({block: 'center'})")
         hit = "(({x, y}) => document.elementFromPoint(x + 3, y + 3).className)"
         assert await page.run(f"{hit}(document.querySelector('td.value').getBoundingClientRect())") == "name"
-        small = "[...document.querySelectorAll('.kind, .tabs button, #filter')].filter((one) => one.clientHeight < 36)"
-        assert await page.run(f"{small}.length") == 0
+        used = "[...document.querySelectorAll('.kind, .tabs button, #filter')].filter((one) => one.checkVisibility())"
+        assert await page.run(f"{used}.filter((one) => one.clientHeight < 36).length") == 0
         size = "parseFloat(getComputedStyle(document.getElementById('filter')).fontSize)"
         assert await page.run(size) >= 16
         assert await page.run("getComputedStyle(document.querySelector('td.object')).display") == "none"
@@ -252,6 +259,73 @@ async def test_without_the_gateway_the_page_greys_and_says_since_when(plant: Pla
             daemon.popen.send_signal(18)
             await page.wait(LIVE)
             await page.wait("document.getElementById('alarm').hidden")
+
+
+async def test_force_and_release_need_the_token_and_a_second_click(plant: Plant) -> None:
+    async with showing(plant, NARROW) as shown:
+        page, plc = shown.page, shown.plc
+        assert plc.write(10, [17]) == 0
+        await page.wait(f"{row('part', 'span.owner')} === 'plc'")
+        await open_act(page, "part", "Force …")
+        await page.wait("document.activeElement.id === 'act-value'")
+        assert await page.run(NAMELESS) == []
+        assert await page.run(DIALOG_CONTRASTS) == []
+        await fill(page, value="4,5", token=TOKEN)
+        await page.run("document.getElementById('act-go').click()")
+        await page.wait(f"{text('#act-error')} === 'The value has to be a number, with a point: 1.5.'")
+        await fill(page, value="55", token=f"not {TOKEN}")
+        await confirm(page, "Force part from 17 to 55 for 60 s. The robot gets it at once.")
+        await page.wait(f"{text('#act-error')}.startsWith('The token is not')")
+        await fill(page, value="1000", token=TOKEN)
+        await confirm(page, "Force part from 17 to 1000")
+        await page.wait(f"{text('#act-error')}.includes('out of limits')")
+        assert plc.read(10) == [17], "nothing was forced so far"
+        await fill(page, value="55", token=TOKEN)
+        await page.run("document.getElementById('act-go').click()")
+        await fill(page, value="56", token=TOKEN)
+        await page.wait(f"{text('#act-go')} === 'Next'")
+        await confirm(page, "Force part from 17 to 56 for 60 s.")
+        await page.wait("!document.getElementById('act').open")
+        await page.wait(f"{row('part', 'span.value')} === '56'")
+        await open_act(page, "part", "End force …")
+        await confirm(page, "End the force on part.")
+        await page.wait(f"{row('part', 'span.owner')} === 'free'")
+        assert plc.write(10, [18]) == 0
+        await open_act(page, "part", "Release lock …")
+        await confirm(page, "Take the lock part from plc.")
+        await page.wait(f"{row('part', 'span.owner')} === 'free'")
+        shown.daemon.kill()
+        await page.wait(LOST)
+        await open_act(page, "part", "Force …")
+        await fill(page, value="1", token=TOKEN)
+        await confirm(page, "Force part")
+        await page.wait(f"{text('#act-error')} === 'The gateway does not answer: nothing was sent.'")
+
+
+async def open_act(page: Page, name: str, act: str) -> None:
+    """Open the variable's details, if they are not, and the dialog of an act."""
+    await page.run(
+        f"(([button]) => button.ariaExpanded === 'true' || button.click())"
+        f"([...document.querySelectorAll('button.name')].filter((one) => one.textContent === '{name}'))"
+    )
+    button = (
+        f"[...document.querySelectorAll('.detail .acts button')].find((one) => one.textContent === '{act}')"
+    )
+    await page.wait(f"{button}.checkVisibility()")
+    await page.run(f"{button}.click()")
+
+
+async def fill(page: Page, **fields: str) -> None:
+    for name, value in fields.items():
+        field = f"document.getElementById('act-{name}')"
+        await page.run(f"{field}.value = {json.dumps(value)}; {field}.dispatchEvent(new Event('input'))")
+
+
+async def confirm(page: Page, says: str) -> None:
+    """The first click says it, the second does it."""
+    await page.run("document.getElementById('act-go').click()")
+    await page.wait(f"{text('#act-says')}.startsWith({json.dumps(says)})")
+    await page.run("document.getElementById('act-go').click()")
 
 
 async def test_the_plots_begin_before_the_page_was_opened(plant: Plant) -> None:
@@ -342,6 +416,17 @@ async def test_nothing_sticks_out_and_everything_can_be_read(plant: Plant) -> No
                 assert await page.run(NAMELESS) == []
 
 
+BUS_OFF = """
+(() => {
+  const { json } = Response.prototype;
+  Response.prototype.json = async function () {
+    const found = await json.call(this);
+    const off = { level: "bad", words: "bus-off: wiring, termination or bit rate" };
+    if (found.picture) Object.assign(found.picture.buses[1], off);
+    return found;
+  };
+})()
+"""
 HEADINGS = "[...document.querySelectorAll('thead th')].filter((one) => one.checkVisibility()).length"
 OUTSIDE = """
 (() => {
@@ -377,9 +462,10 @@ CONTRASTS = """
   return [...bad];
 })()
 """
+DIALOG_CONTRASTS = CONTRASTS.replace("main *, header *", "dialog *")
 NAMELESS = """
 [...document.querySelectorAll("button, input, select, a, [tabindex]")]
   .filter((element) => element.checkVisibility())
-  .filter((element) => !(element.textContent.trim() || element.getAttribute("aria-label")))
+  .filter((element) => !(element.textContent.trim() || element.getAttribute("aria-label") || element.labels?.length))
   .map((element) => element.outerHTML)
 """

@@ -1,6 +1,7 @@
 // Asks the gateway four times a second and shows what it says. What is not answered in time is shown as old, at once.
 
 import { Cells, worstOf } from "./cells.js";
+import { Operate } from "./operate.js";
 import { LEVELS, MARKS, Picture } from "./picture.js";
 import { Variables } from "./variables.js";
 import { OPERATOR, clock, count, make, printable, put, span } from "./words.js";
@@ -13,7 +14,8 @@ const byId = (id) => document.getElementById(id);
 
 const picture = new Picture(byId("picture"));
 const cells = new Cells(byId("cells"));
-const variables = new Variables(1000 / PERIOD);
+const operate = new Operate();
+const variables = new Variables(1000 / PERIOD, operate);
 let layout = null, cell = null, events = 0, looks = 0, missed = true;
 let answered = -Infinity, answeredAt = null, trouble = "";
 
@@ -24,11 +26,13 @@ async function ask(path) {
 }
 
 async function choose() {
-  const { cells: found, gatewayd } = await ask("page/cells");
+  const { cells: found, gatewayd, acts } = await ask("page/cells");
   const names = found.map((one) => one.name);
   const wanted = decodeURIComponent(location.hash.slice(1));
   cell = names.includes(wanted) ? wanted : names[0];
   if (cell === undefined) throw new Error("the gateway serves no cell");
+  operate.allowed = acts;
+  operate.close();
   cells.show(found, cell);
   put(byId("cell"), cell);
   byId("cell").title = `gatewayd ${gatewayd}`;

@@ -13,7 +13,8 @@ const KINDS = [
 const byId = (id) => document.getElementById(id);
 
 export class Variables {
-  constructor(samplesPerSecond) {
+  constructor(samplesPerSecond, operate) {
+    this.operate = operate;
     this.samplesPerSecond = samplesPerSecond;
     this.rows = [];
     this.kind = "all";
@@ -81,6 +82,7 @@ export class Variables {
     for (const [index, row] of this.rows.entries()) {
       const [owner, left] = owners.get(row.variable.lock) ?? [null, null];
       const name = owner === null ? "" : owner === OPERATOR ? "operator" : this.layout.writers[owner].name;
+      row.keep(name, forces.has(index), state.values[index]);
       row.update(state.values[index], state.quality[index], state.ages[index], name, left, forces.get(index));
     }
     const odd = this.rows.reduce((sum, row) => sum + (row.code !== 0), 0);
@@ -120,7 +122,7 @@ export class Variables {
   toggle(row) {
     if (this.open) this.open.close();
     this.open = this.open === row ? null : row;
-    if (this.open) row.expand(this.layout);
+    if (this.open) row.expand(this.layout, this.operate);
     this.draw(performance.now());
   }
 }
@@ -130,6 +132,7 @@ class Row {
     this.variable = variable;
     this.owner = "";
     this.code = -1;
+    this.state = { owner: "", forced: false, value: 0 };
     this.detail = null;
     this.text = [variable.name, variable.robot, variable.comment,
       ...variable.places.flatMap((place) => [place.address, place.notation])].join(" ").toLowerCase();
@@ -184,7 +187,13 @@ class Row {
     this.owner = owner;
   }
 
-  expand(layout) {
+  // What acts on it have to know of its present state.
+  keep(owner, forced, value) {
+    Object.assign(this.state, { owner, forced, value });
+    if (this.detail) this.detail.operate.refresh(this.detail.acts, this.detail.subject);
+  }
+
+  expand(layout, operate) {
     const { variable } = this;
     const element = make("tr", "detail"), cell = make("td");
     cell.colSpan = this.element.children.length;
@@ -197,10 +206,14 @@ class Row {
     for (const [term, text] of factsOf(variable, layout)) {
       if (text) facts.append(make("dt", "muted", term), make("dd", "", text));
     }
-    cell.append(canvas, axis, facts);
+    const lock = variable.lock === null ? null : layout.locks[variable.lock];
+    const subject = { cell: layout.cell, variable, lock, state: this.state };
+    const acts = operate.buttons(subject);
+    operate.refresh(acts, subject);
+    cell.append(canvas, axis, facts, acts);
     element.append(cell);
     this.element.after(element);
-    this.detail = { element, canvas, range };
+    this.detail = { element, canvas, range, operate, acts, subject };
     this.button.setAttribute("aria-expanded", "true");
   }
 

@@ -1,0 +1,147 @@
+// Force and release from the page, for whoever has the token. Nothing is sent before it was said in full and confirmed.
+
+import { make, number, printable, put } from "./words.js";
+
+const PATIENCE = 5000;
+const DEFAULT_SECONDS = 60;
+const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
+const byId = (id) => document.getElementById(id);
+
+// Each act: its button, whether it applies, what it asks for, where it goes, and what it does, in words.
+const ACTS = {
+  force: {
+    title: "Force", asks: ["value", "seconds"], fits: () => true,
+    path: ({ variable }) => `variables/${encodeURIComponent(variable.name)}/force`,
+    says: ({ variable, state }, { value, for: seconds }) =>
+      `Force ${variable.name} from ${number(state.value, variable.kind)} to ${value} ${variable.unit}`.trimEnd() + ` for ${seconds} s. ` +
+      (variable.direction === "input"
+        ? `The robot gets it at once. Who writes it meanwhile is refused; afterwards it takes its fallback: ${variable.fallback}.`
+        : "The fieldbus sees it instead of what the robot reports."),
+  },
+  unforce: {
+    title: "End force", asks: [], fits: ({ state }) => state.forced,
+    path: ({ variable }) => `variables/${encodeURIComponent(variable.name)}/unforce`,
+    says: ({ variable }) => `End the force on ${variable.name}. ` + (variable.direction === "input"
+      ? `It takes its fallback at once: ${variable.fallback}.` : "The fieldbus sees what the robot reports again."),
+  },
+  release: {
+    title: "Release lock", asks: [], fits: ({ state, lock }) => lock !== null && state.owner !== "",
+    path: ({ lock }) => `locks/${encodeURIComponent(lock.name)}/release`,
+    says: ({ lock, state }) => `Take the lock ${lock.name} from ${state.owner}. ` +
+      `What it guards takes its fallback at once: ${lock.variables.join(", ")}.`,
+  },
+};
+
+export class Operate {
+  constructor() {
+    this.dialog = byId("act");
+    this.allowed = false;
+    this.token = "";                  // kept while the page is open, and nowhere else
+    byId("act-go").addEventListener("click", () => this.go());
+    byId("act-cancel").addEventListener("click", () => this.dialog.close());
+    for (const field of ["act-value", "act-seconds", "act-token"]) {
+      byId(field).addEventListener("input", () => this.ask());
+      byId(field).addEventListener("keydown", (event) => { if (event.key === "Enter") this.go(); });
+    }
+  }
+
+  // Buttons for a variable; `subject` has the cell, the variable, its lock or null, and its state, kept up to date.
+  buttons(subject) {
+    const place = make("p", "acts");
+    place.hidden = !this.allowed;
+    for (const [name, act] of Object.entries(ACTS)) {
+      const button = make("button", "kind", `${act.title} …`);
+      button.type = "button";
+      button.addEventListener("click", () => this.open(name, subject));
+      place.append(button);
+    }
+    return place;
+  }
+
+  refresh(place, subject) {
+    Object.values(ACTS).forEach((act, index) => { place.children[index].hidden = !act.fits(subject); });
+  }
+
+  open(name, subject) {
+    Object.assign(this, { act: ACTS[name], subject });
+    const { variable, cell } = subject;
+    put(byId("act-title"), `${this.act.title}: ${name === "release" ? subject.lock.name : variable.name} of ${cell}`);
+    for (const field of ["value", "seconds"]) byId(`act-${field}`).parentElement.hidden = !this.act.asks.includes(field);
+    byId("act-value").value = "";
+    byId("act-seconds").value = String(DEFAULT_SECONDS);
+    byId("act-token").value = this.token;
+    this.ask();
+    this.dialog.showModal();
+  }
+
+  close() {
+    if (this.dialog.open) this.dialog.close();
+  }
+
+  // Back to what is asked for; what was confirmed before is no longer.
+  ask() {
+    this.sure = null;
+    put(byId("act-says"), "");
+    put(byId("act-error"), "");
+    put(byId("act-go"), "Next");
+  }
+
+  body() {
+    const body = { cell: this.subject.cell };
+    if (!this.act.asks.length) return body;
+    const { kind } = this.subject.variable;
+    const value = byId("act-value").value.trim(), seconds = byId("act-seconds").value.trim();
+    if (!NUMBER.test(value)) throw new Error(`The value has to be a number${value.includes(",") ? ", with a point: 1.5" : ""}.`);
+    if (kind === "bool" && !["0", "1"].includes(value)) throw new Error("A bit is 0 or 1.");
+    if (!NUMBER.test(seconds) || !(Number(seconds) > 0)) throw new Error("The time has to be a number of seconds.");
+    return { ...body, value: Number(value), for: Number(seconds) };
+  }
+
+  // The first time says what will happen; the second time, unless something was changed, does it.
+  async go() {
+    try {
+      const body = this.body();
+      this.token = byId("act-token").value.trim();
+      if (!this.token) throw new Error("The token is missing: it is in the file that the gateway was started with.");
+      if (this.sure === null) {
+        this.sure = JSON.stringify(body);
+        this.owner = this.subject.state.owner;
+        put(byId("act-says"), this.act.says(this.subject, body));
+        put(byId("act-go"), `Yes, ${this.act.title.toLowerCase()}`);
+        return;
+      }
+      const sent = this.sure;
+      this.ask();
+      if (this.owner !== this.subject.state.owner) throw new Error("The owner has changed meanwhile: look again.");
+      await this.send(sent);
+      this.dialog.close();
+    } catch (error) {
+      this.ask();
+      put(byId("act-error"), printable(error.message));
+    }
+  }
+
+  async send(body) {
+    if (document.body.dataset.contact !== "live") throw new Error("The gateway does not answer: nothing was sent.");
+    byId("act-go").disabled = true;
+    let response;
+    try {
+      response = await fetch(`api/v1/${this.act.path(this.subject)}`, {
+        method: "POST", body, headers: { Authorization: `Bearer ${this.token}` }, signal: AbortSignal.timeout(PATIENCE),
+      });
+    } catch {
+      throw new Error("No answer. Whether it was done is not known: look at the value.");
+    } finally {
+      byId("act-go").disabled = false;
+    }
+    if (response.ok) return;
+    if (response.status === 401) this.token = "";
+    if (response.status === 401) throw new Error("The token is not the gateway's. Nothing was done.");
+    const text = await response.text();
+    let words = text.trim();
+    try {
+      words = JSON.parse(text).error.message;
+    } catch { /* a plain line, as the listener itself answers */ }
+    throw new Error(`Refused: ${words}.`);
+  }
+}
