@@ -91,7 +91,7 @@ def _port(wanted: int | None) -> tuple[int, str]:
     except OSError as error:
         if error.errno != errno.EADDRINUSE:
             raise
-        return free_port(HOST), f" ({PORT} is taken by another program)"
+        return free_port(HOST), f"\nport {PORT} is taken by another program"
 
 
 async def _play(console: Console, port: int, note: str, seconds: float | None, *, live: bool) -> int:
@@ -104,8 +104,8 @@ async def _play(console: Console, port: int, note: str, seconds: float | None, *
     scene.listen_to_logs()
     async with scene.playing():
         console.print(
-            f"[bold]gatewayd demo[/]: simulated robot on port {scene.robot.port}, "
-            f"gateway on Modbus TCP [bold]{HOST}:{port}[/]{note}, PLC at {PLC_ADDRESS}",
+            f"[bold]gatewayd demo[/]: robot on port {scene.robot.port}, "
+            f"Modbus TCP [bold]{HOST}:{port}[/], PLC {PLC_ADDRESS}{note}",
             soft_wrap=True,
         )
         if live:

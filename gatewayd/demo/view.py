@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from gatewayd.demo.snapshot import Line, Snapshot
+from gatewayd.report.format import counted
 from gatewayd.report.words import QUALITY_COLOURS
 
 Poke = tuple[str, str]
@@ -48,16 +49,18 @@ def screen(shot: Snapshot, before: Snapshot | None, pokes: Sequence[Poke], width
     wide, spacious = width >= _WIDE, width >= _SPACIOUS
     table = _table(shot.lines, old, wide=wide, spacious=spacious)
     fixed = _LINES_OF_LINKS + _FRAME_OF_TABLE + len(shot.lines)
-    shown = list(pokes) if height >= fixed + _MIN_EVENTS + len(pokes) + _FRAME_OF_POKES else []
+    tall = height >= fixed + _MIN_EVENTS + len(pokes) + _FRAME_OF_POKES
+    shown = list(pokes) if tall and width >= _width_of(pokes) else []
     room = height - fixed - (len(shown) + _FRAME_OF_POKES if shown else 0) - _ABOVE
     # A small window gives one event's line to the hint.
     events = min(max(room, _MIN_EVENTS) - (not shown), _MOST_EVENTS)
-    links = _links(shot, wide=spacious), _canopen(shot)
+    links = _links(shot, spacious=spacious), _canopen(shot, spacious=spacious)
+    left_out = "" if spacious else "4xxxxx" if wide else "4xxxxx, CANopen, PDO"
     parts: list[RenderableType] = [*links, table, *_events(shot, events)]
     if shown:
-        parts.extend(_hints(shown))
+        parts.extend(_hints(shown, left_out))
     else:
-        parts.append(_hint(pokes[1]))
+        parts.append(_hint(pokes[1], left_out))
     return Group(*parts)
 
 
@@ -65,12 +68,13 @@ def plain(shot: Snapshot) -> str:
     """One block of lines."""
     health, program, master = shot.health, shot.plc.program, shot.master
     links = (
-        f"{shot.elapsed:6.1f} s  robot {shot.robot}, {health.frequency:.1f} Hz, {health.packages} packages, "
-        f"{health.skipped} skipped | plc {program.phase.value}, {program.handshakes} handshakes, "
-        f"{program.verified} values verified | "
+        f"{shot.elapsed:6.1f} s  robot {shot.robot}, {health.frequency:.1f} Hz, {counted(health.packages, 'package')}, "
+        f"{health.skipped} skipped | plc {program.phase.value}, {counted(program.handshakes, 'handshake')}, "
+        f"{counted(program.verified, 'value')} verified | "
         f"writes {health.writes_accepted} accepted, {health.writes_refused} refused\n"
-        f"          node {shot.node}, {master.heartbeats} heartbeats, {shot.pdo_rate} PDOs/s | "
-        f"line {master.sent} RPDOs, {master.feeder.verified} values verified, {master.emergencies} EMCY"
+        f"          node {shot.node}, {counted(master.heartbeats, 'heartbeat')}, {shot.pdo_rate} PDOs/s | "
+        f"line {counted(master.sent, 'RPDO')}, {counted(master.feeder.verified, 'value')} verified, "
+        f"{master.emergencies} EMCY"
     )
     lines = [
         f"  {'->' if line.row.direction == 'input' else '<-'} {line.row.name:<12} {line.row['robot']:<25} "
@@ -82,24 +86,23 @@ def plain(shot: Snapshot) -> str:
     return "\n".join([links, *lines, *(f"  {event.clock} {event.text}" for event in shot.events[-3:]), ""])
 
 
-def _links(shot: Snapshot, *, wide: bool) -> Text:
+def _links(shot: Snapshot, *, spacious: bool) -> Text:
     health, program = shot.health, shot.plc.program
     rate = f"{health.frequency:.1f} Hz" if shot.fresh and health.frequency else shot.robot
-    text = _party(
-        " ● ", "robot", f"{rate}, {health.packages} packages, {health.skipped} skipped", good=shot.fresh
-    )
-    right = f"{program.handshakes} handshakes, {program.verified} values right"
+    packages = f", {counted(health.packages, 'package')}, {health.skipped} skipped" if spacious else ""
+    text = _party(" ● ", "robot", rate + packages, good=shot.fresh)
+    right = f"{counted(program.handshakes, 'handshake')}, {counted(program.verified, 'value')} right"
     text += _party("   ● ", "PLC", right, len(program.wrong), good=shot.plc.connected)
-    text.append(f"   {health.writes_accepted} writes, " if wide else "   ")
+    text.append(f"   {counted(health.writes_accepted, 'write')}, " if spacious else "   ")
     return text.append(f"{health.writes_refused} refused", "bold red" if health.writes_refused else "")
 
 
-def _canopen(shot: Snapshot) -> Text:
+def _canopen(shot: Snapshot, *, spacious: bool) -> Text:
     master, good, wrong = shot.master, shot.operational, len(shot.master.feeder.wrong)
-    text = _party(
-        " ● ", "CANopen", f"{shot.node}, {master.heartbeats} heartbeats, {shot.pdo_rate} PDOs/s", good=good
-    )
-    right = f"{master.sent} RPDOs, {master.feeder.verified} values right"
+    beats = f"{counted(master.heartbeats, 'heartbeat')}, " if spacious else ""
+    text = _party(" ● ", "CANopen", f"{shot.node}, {beats}{shot.pdo_rate} PDOs/s", good=good)
+    sent = f"{counted(master.sent, 'RPDO')}, " if spacious else ""
+    right = f"{sent}{counted(master.feeder.verified, 'value')} right"
     text += _party("   ● ", "line", right, wrong, good=good and not wrong)
     return text.append("   ").append(f"{master.emergencies} EMCY", "bold red" if master.emergencies else "")
 
@@ -114,7 +117,7 @@ def _party(dot: str, name: str, words: str, wrong: int = 0, *, good: bool) -> Te
 def _table(lines: Sequence[Line], old: dict[int, str], *, wide: bool, spacious: bool) -> Table:
     table = Table(box=box.SIMPLE_HEAD, padding=(0, int(spacious), 0, 0), pad_edge=False)
     table.add_column("   variable", no_wrap=True, min_width=14)
-    table.add_column("robot register", no_wrap=True, max_width=None if wide else 18)
+    table.add_column("robot register", no_wrap=True)
     table.add_column("Modbus", justify="right", no_wrap=True, min_width=6)
     if spacious:
         table.add_column("4xxxxx", no_wrap=True)
@@ -139,7 +142,8 @@ def _cells(line: Line, *, changed: bool, wide: bool, spacious: bool) -> Iterator
     towards = line.row.direction == "input"
     colour = "cyan" if towards else "green"
     yield Text(" → " if towards else " ← ", f"bold {colour}").append(line.row.name, "bold default")
-    yield Text(line.row["robot"], colour)
+    # Where there is no room for all of the name, its number must not be what is cut.
+    yield Text(line.row["robot"] if wide else line.row["robot"].replace("_register_", " "), colour)
     yield Text(line.address)
     if spacious:
         yield Text(line.row["notation"], "dim")
@@ -170,16 +174,27 @@ def _events(shot: Snapshot, count: int) -> Iterator[Text]:
     yield from (Text("") for _ in range(count - len(latest)))
 
 
-def _hint(poke: Poke) -> Text:
-    """What a small window has room for."""
-    text = Text(" take part: ", "dim", no_wrap=True, overflow="ellipsis")
-    return text.append(poke[1], "bold cyan").append("   more in a taller window", "dim")
+def _hint(poke: Poke, left_out: str) -> Text:
+    """What a small window has room for, and the columns for which it has none."""
+    text = Text(" try: ", "dim", no_wrap=True, overflow="ellipsis")
+    return text.append(poke[1], "bold cyan").append(
+        f"   wider: {left_out}" if left_out else "   more in a taller window", "dim"
+    )
 
 
-def _hints(pokes: Sequence[Poke]) -> Iterator[Text]:
-    yield Text("")
+def _hints(pokes: Sequence[Poke], left_out: str) -> Iterator[Text]:
+    yield Text(f" In a window of {_SPACIOUS} columns: {left_out}" if left_out else "", "dim")
     yield Text(" From another terminal (mbpoll: apt install mbpoll), Ctrl-C ends:", "dim")
-    wide = max(len(meaning) for meaning, _ in pokes)
+    wide = _widest(pokes)
     for meaning, command in pokes:
         text = Text(f" {meaning:<{wide}}  ", no_wrap=True, overflow="ellipsis")
         yield text.append(command, "bold cyan")
+
+
+def _widest(pokes: Sequence[Poke]) -> int:
+    return max(len(meaning) for meaning, _ in pokes)
+
+
+def _width_of(pokes: Sequence[Poke]) -> int:
+    """Columns of a window in which no command is cut."""
+    return _widest(pokes) + 3 + max(len(command) for _, command in pokes)

@@ -28,7 +28,7 @@ def drawn(shot: Snapshot, width: int, height: int) -> list[str]:
     return captured.get().splitlines()
 
 
-@pytest.mark.parametrize("width,height", [(100, 30), (140, 40), (80, 24)])
+@pytest.mark.parametrize("width,height", [(100, 30), (140, 40), (80, 24), (80, 50)])
 async def test_picture_fits(shot: Snapshot, width: int, height: int) -> None:
     picture = drawn(shot, width, height)
     assert len(picture) < height
@@ -39,7 +39,21 @@ async def test_picture_fits(shot: Snapshot, width: int, height: int) -> None:
     assert ("2030h:01" in text and "0x210" in text) is (width >= 100)
     assert ("400001.0" in text) is (width >= 115)
     assert "mbpoll -0 -p 1502 -r 10 127.0.0.1 50" in text, "how to take part, in every window"
-    assert ("taller window" in text) is (height < 30)
+    assert (" try: " in text) is (height < 30 or (width, height) == (80, 50))
+    assert "\u2026" not in text or width > 80, "nothing is cut in the smallest one"
+
+
+@pytest.mark.parametrize("width,height", [(80, 24), (80, 50), (100, 24), (100, 50)])
+async def test_what_a_window_leaves_out_is_named(shot: Snapshot, width: int, height: int) -> None:
+    """Columns do not vanish silently, and the links' lines end with what they have to say."""
+    picture = drawn(shot, width, height)
+    hint = next(line for line in picture if "wider: " in line or "In a window of 115 columns: " in line)
+    assert ("4xxxxx, CANopen, PDO" if width < 98 else "4xxxxx") in hint
+    assert picture[0].rstrip().endswith("refused")
+    assert picture[1].rstrip().endswith("EMCY")
+    for line in shot.lines:
+        number = line.row["robot"].rpartition("_")[2]
+        assert any(line.row.name in drawn_line and number in drawn_line for drawn_line in picture)
 
 
 async def test_plain_lines_tell_the_same(shot: Snapshot) -> None:
