@@ -8,6 +8,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from gatewayd import __version__
+from gatewayd.cli.help_text import FittingFormatter
 
 COMMANDS = {
     "demo": "Simulator, gateway, a PLC and a CANopen master in one terminal.",
@@ -52,6 +53,10 @@ Exit codes:
   70   a defect of gatewayd itself; GATEWAYD_TRACEBACK=1 shows where
   130  interrupted by Ctrl-C
 """
+
+
+# Of all commands, those of groups among them, which make contexts of their own.
+click.Context.formatter_class = FittingFormatter
 
 
 class LazyGroup(click.Group):

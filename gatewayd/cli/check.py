@@ -40,7 +40,7 @@ Examples:
   gatewayd check my-cell.yaml
   gatewayd check cells/*.yaml               cells of one gateway: what they share is checked too
   gatewayd check /etc/gatewayd              the same for all of a directory
-  gatewayd check --separately a.yaml b.yaml two mappings that never run together
+  gatewayd check --separately a.yaml b.yaml  two mappings that never run together
   gatewayd check --strict my-cell.yaml      warnings count as errors
   gatewayd check --format github *.yaml     annotations in a pull request
   gatewayd check --explain GW214            why a rule exists and what to do
