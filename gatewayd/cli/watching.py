@@ -22,8 +22,8 @@ KEYS = "q quit   / filter   Esc clear   d direction   b only bad   space pause  
 _FRAME = 6
 """Lines that are neither links nor variables nor events: heads, rules, keys."""
 _EVENTS = 4
-_WIDE, _SPACIOUS = 96, 124
-"""Columns from which on the places, and the robot's name, have room."""
+_NARROW, _WIDE, _SPACIOUS = 80, 96, 124
+"""Columns from which on generous columns, the places, and the robot's name, have room."""
 
 
 class Show(Enum):
@@ -143,7 +143,7 @@ def screen(glimpse: Glimpse, before: Glimpse | None, view: View, width: int) -> 
     parts: list[RenderableType] = [_head(glimpse, view), *_links(glimpse)]
     parts.append(_table(shown, old, glimpse, width))
     parts += [Text("")] * (room - len(shown))
-    parts += [_range(top, len(shown), len(variables), view), *_events(glimpse), _keys(view)]
+    parts += [_range(top, len(shown), len(variables), view, width), *_events(glimpse), _keys(view)]
     return Group(*parts)
 
 
@@ -200,13 +200,23 @@ def _link_words(cell: Answer) -> str:
 
 
 def _table(shown: Sequence[Answer], old: Mapping[Any, Any], glimpse: Glimpse, width: int) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 2, 0, 0), pad_edge=False, expand=False, show_edge=False)
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1 if width < _NARROW else 2, 0, 0),
+        pad_edge=False,
+        expand=False,
+        show_edge=False,
+    )
     several = len(glimpse.status.get("cells", ())) > 1
-    table.add_column("   variable", no_wrap=True, min_width=18, max_width=32)
-    table.add_column("value", justify="right", no_wrap=True, min_width=10)
-    table.add_column("quality", no_wrap=True, min_width=12)
-    table.add_column("age", justify="right", no_wrap=True, min_width=7)
-    table.add_column("owner", no_wrap=True, min_width=18)
+    narrow = width < _NARROW
+    longest = max((len(phrases.value(variable)) for variable in shown), default=0)
+    table.add_column(
+        "   variable", no_wrap=True, min_width=None if narrow else 18, max_width=16 if narrow else 32
+    )
+    table.add_column("value", justify="right", no_wrap=True, min_width=max(5 if narrow else 10, longest))
+    table.add_column("quality", no_wrap=True, min_width=6 if narrow else 12)
+    table.add_column("age", justify="right", no_wrap=True, min_width=6 if narrow else 7)
+    table.add_column("owner", no_wrap=True, min_width=5 if narrow else 18, max_width=14 if narrow else None)
     if width >= _WIDE:
         table.add_column("places", no_wrap=True, min_width=8, max_width=24)
     if width >= _SPACIOUS:
@@ -239,7 +249,11 @@ def _cells(variable: Answer, old: Mapping[Any, Any], width: int, *, several: boo
         yield Text(variable["robot"], "dim")
 
 
-def _range(top: int, shown: int, found: int, view: View) -> Text:
+_ONLY_WIDE = {"places": _WIDE, "robot register": _SPACIOUS}
+"""Columns that a narrow screen leaves out, and the width that each needs."""
+
+
+def _range(top: int, shown: int, found: int, view: View, width: int) -> Text:
     text = Text(" ", no_wrap=True, overflow="ellipsis")
     text.append(
         f"{top + 1}-{top + shown} of {found}" if shown else "no variable fits", "dim" if shown else "yellow"
@@ -250,7 +264,8 @@ def _range(top: int, shown: int, found: int, view: View) -> Text:
         text.append(f"   filter: {view.filter}▏", "bold yellow")
     elif view.filter:
         text.append(f"   filter: {view.filter}", "yellow")
-    return text
+    left_out = [name for name, needed in _ONLY_WIDE.items() if width < needed]
+    return text.append(f"   wider: {', '.join(left_out)}" if left_out else "", "dim")
 
 
 def _events(glimpse: Glimpse) -> Iterator[Text]:

@@ -53,6 +53,23 @@ def test_it_fits_and_shows_the_keys(served: Served, width: int, height: int) -> 
     assert lines[-1].strip().startswith(KEYS[:30])
 
 
+@pytest.mark.parametrize(
+    "width, left_out", [(80, "wider: places, robot register"), (100, "wider: robot register"), (130, "")]
+)
+def test_columns_that_a_narrow_screen_leaves_out_are_named(served: Served, width: int, left_out: str) -> None:
+    text = "\n".join(picture(glimpse(served), View(), width, 24))
+    assert left_out in text
+    assert ("wider: " in text) is bool(left_out)
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_no_value_is_cut(served: Served, width: int) -> None:
+    assert served.cell.operator.force(CYCLES, 1234567890, 1.0, 31.0) is None
+    (cycles,) = [line for line in picture(glimpse(served), View(), width, 24) if " ← cycles " in line]
+    assert "1234567890" in cycles
+    assert "forced, 30" in cycles, "the owner is seen too"
+
+
 def test_wide_ones_show_both_places(served: Served) -> None:
     assert "400025" in "\n".join(picture(glimpse(served), View(), 100, 30))
     assert "input_double_register_1" in "\n".join(picture(glimpse(served), View(), 140, 30))
