@@ -187,7 +187,8 @@ def test_events_are_followed_as_they_come(cell: Cell) -> None:
         assert plc.write_integers(0, 11) == 0
         assert json.loads(following.stdout.readline())["event"] == "lock acquired"
         simulator.kill()
-        assert "robot lost" in json.loads(following.stdout.readline())["event"]
+        # On a machine that stands still for a moment, values may be stale before.
+        assert any("robot lost" in json.loads(line)["event"] for line in following.stdout)
     finally:
         following.kill()
         following.communicate()

@@ -64,7 +64,7 @@ def test_node_lives_and_dies_with_the_daemon_and_the_interface(vcan: str, plant:
     master.becomes(OPERATIONAL)
     assert master.ask("heard")["boots"] == 1
     assert (plc.status(CAN_BUS), plc.status(NMT_STATE)) == (ACTIVE, OPERATIONAL)
-    assert master.ask("read", 0x1008, 0) == "gatewayd"
+    assert master.ask("read", 0x1008, 0) == "gatewayd cell"
     assert master.ask("inputs", {COMMAND: 77}) == 1
     wait_for(lambda: master.output(ECHO) == 77, "RPDO -> robot -> TPDO")
     assert plc.integers(0, 2) == [77, 77]

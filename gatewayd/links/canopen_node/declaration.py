@@ -92,7 +92,9 @@ def _identities(
     old: CanopenPlan, new: CanopenPlan, before: CellDefinition, after: CellDefinition
 ) -> tuple[str, ...]:
     """What would be another number in 1018h."""
-    from gatewayd.links.canopen_node.eds import identity_of  # a whole node, which only a reload has to make
+    from gatewayd.links.canopen_node.identity import (
+        identity_of,  # a whole node, which only a reload has to make
+    )
 
     former, successor = asdict(identity_of(old, before)), asdict(identity_of(new, after))
     return tuple(

@@ -15,13 +15,10 @@ from typing import Final
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Dictionary, Entry, Object, ObjectCode, Pdo
-from gatewayd.canopen.identity import Identity
-from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition
 from gatewayd.links.canopen_node.bus_load import BIT_RATES
-from gatewayd.links.canopen_node.node import Node
+from gatewayd.links.canopen_node.identity import idle_node
 from gatewayd.links.canopen_node.plan import CanopenPlan
-from gatewayd.links.canopen_node.store import Store
 
 _DATE: Final = "01-01-2026"
 _TIME: Final = "12:00AM"
@@ -51,16 +48,7 @@ class Sheet:
 
 def objects_of(plan: CanopenPlan, definition: CellDefinition) -> Dictionary:
     """The object dictionary of the node of a cell, as it is after its first power-on."""
-    return _node(plan, definition).dictionary
-
-
-def identity_of(plan: CanopenPlan, definition: CellDefinition) -> Identity:
-    """What masters know the node of a cell by."""
-    return _node(plan, definition).identity
-
-
-def _node(plan: CanopenPlan, definition: CellDefinition) -> Node:
-    return Node(plan, Cell(definition), lambda _frame, _priority: False, Store(), lambda _now: True)
+    return idle_node(plan, definition).dictionary
 
 
 def sheet_of(plan: CanopenPlan, definition: CellDefinition) -> Sheet:
