@@ -328,6 +328,33 @@ async def confirm(page: Page, says: str) -> None:
     await page.run("document.getElementById('act-go').click()")
 
 
+async def test_what_belongs_together_has_a_label_that_folds_it(plant: Plant) -> None:
+    """A group that is owned as one, and the elements of a vector; a folded label says what is not good in it."""
+    async with showing(plant, WIDE, mapping=CROWDED) as shown:
+        page = shown.page
+        labels = "[...document.querySelectorAll('.group:not([hidden]) th')].map((label) => label.textContent).join()"
+        await page.wait(f"{labels} === 'motion2 variables, owned together,q6 variables'")
+        lines = "[...document.querySelectorAll('#rows tr:not(.group)')].filter((line) => !line.hidden).length"
+        assert await page.run(lines) == 12
+        await page.run("document.querySelectorAll('.fold')[1].click()")
+        assert await page.run(lines) == 6
+        assert await page.run("document.querySelectorAll('.fold')[1].ariaExpanded") == "false"
+        force(shown, "q[2]", 1.5)
+        await page.wait(f"{labels}.endsWith('q6 variables▲ 1 not good')")
+        assert await page.run(CONTRASTS) == []
+        await page.resize(*NARROW)
+        assert await page.run(OUTSIDE) == []
+
+
+async def test_the_keyboard_goes_through_the_page_in_reading_order(plant: Plant) -> None:
+    async with showing(plant, WIDE, mapping=CROWDED) as shown:
+        page = shown.page
+        assert await page.run("document.querySelectorAll('[tabindex]:not([tabindex=\"0\"])').length") == 0
+        assert await page.run(OUT_OF_ORDER) == []
+        assert await page.run(HEADINGS_OF_SECTIONS) == "H1 H2"
+        assert await page.run("document.documentElement.lang") == "en"
+
+
 async def test_the_plots_begin_before_the_page_was_opened(plant: Plant) -> None:
     """The gateway keeps a minute: a peak that nobody looked at is there."""
     async with showing(plant, WIDE) as shown:
@@ -389,7 +416,7 @@ async def test_filter_and_details_by_keyboard_alone(plant: Plant) -> None:
         assert await page.run("document.activeElement.id") == "filter"
         for key in "4001":
             await page.press(key)
-        visible = "[...document.querySelectorAll('#rows tr')].filter((row) => !row.hidden).length"
+        visible = "[...document.querySelectorAll('#rows tr:not(.group)')].filter((row) => !row.hidden).length"
         await page.wait(f"{visible} === 7")
         assert await page.run(text("#shown")) == "7 of 9"
         await page.press("Escape", 27)
@@ -462,6 +489,17 @@ CONTRASTS = """
   return [...bad];
 })()
 """
+OUT_OF_ORDER = """
+(() => {
+  const places = [...document.querySelectorAll("#variables :is(button, input)")].filter((one) => one.checkVisibility())
+    .map((one) => one.getBoundingClientRect());
+  return places.slice(1).filter((place, at) => place.bottom < places[at].top).map((place) => place.top);
+})()
+"""
+HEADINGS_OF_SECTIONS = (
+    "[...document.querySelectorAll('h1, h2, h3, h4')].filter((one) => one.checkVisibility())"
+    ".map((one) => one.tagName).join(' ')"
+)
 DIALOG_CONTRASTS = CONTRASTS.replace("main *, header *", "dialog *")
 NAMELESS = """
 [...document.querySelectorAll("button, input, select, a, [tabindex]")]

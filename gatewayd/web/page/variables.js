@@ -1,5 +1,6 @@
 // The table of variables: filter, live values, a small plot for each, a large one with all facts for the open one.
 
+import { Groups } from "./groups.js";
 import { History } from "./history.js";
 import { FORCED, OPERATOR, count, make, number, put, quality, span } from "./words.js";
 
@@ -70,7 +71,9 @@ export class Variables {
     }
     table.classList.toggle("units", layout.variables.some((one) => one.unit));
     this.rows = layout.variables.map((variable) => new Row(variable, (row) => this.toggle(row)));
-    byId("rows").replaceChildren(...this.rows.map((row) => row.element));
+    const columns = this.rows[0]?.element.children.length ?? 1;
+    this.groups = new Groups(layout, this.rows, columns, () => this.filter());
+    byId("rows").replaceChildren(...this.groups.elements);
     for (const row of this.rows) this.watch.observe(row.element);
     this.filter();
   }
@@ -89,6 +92,7 @@ export class Variables {
     put(this.odd, odd ? `Not good ${odd}` : "Not good");
     this.odd.classList.toggle("some", odd > 0);
     if (this.kind === "owned" || this.kind === "odd" || byId("filter").value) this.filter();
+    else this.groups.update((row) => row.wanted);
     this.draw(now);
   }
 
@@ -110,11 +114,13 @@ export class Variables {
     let shown = 0;
     for (const row of this.rows) {
       const text = `${row.text} ${row.owner}`;
-      const wanted = fits(row) && words.every((word) => text.includes(word));
-      if (row.element.hidden === wanted) row.element.hidden = !wanted;
-      if (row.detail) row.detail.element.hidden = !wanted;
-      shown += wanted;
+      row.wanted = fits(row) && words.every((word) => text.includes(word));
+      const visible = row.wanted && !this.groups.folds(row);
+      if (row.element.hidden === visible) row.element.hidden = !visible;
+      if (row.detail) row.detail.element.hidden = !visible;
+      shown += row.wanted;
     }
+    this.groups.update((row) => row.wanted);
     put(byId("shown"), shown === this.rows.length ? String(shown) : `${shown} of ${this.rows.length}`);
     byId("nothing").hidden = shown > 0 || this.rows.length === 0;
   }
@@ -132,6 +138,7 @@ class Row {
     this.variable = variable;
     this.owner = "";
     this.code = -1;
+    this.wanted = true;
     this.state = { owner: "", forced: false, value: 0 };
     this.detail = null;
     this.text = [variable.name, variable.robot, variable.comment,
