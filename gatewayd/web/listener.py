@@ -38,6 +38,7 @@ PAGE = {
     "/picture.js": ("picture.js", "text/javascript"),
     "/variables.js": ("variables.js", "text/javascript"),
     "/operate.js": ("operate.js", "text/javascript"),
+    "/facts.js": ("facts.js", "text/javascript"),
     "/groups.js": ("groups.js", "text/javascript"),
     "/history.js": ("history.js", "text/javascript"),
     "/words.js": ("words.js", "text/javascript"),
