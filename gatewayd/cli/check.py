@@ -1,4 +1,4 @@
-"""`gatewayd check`: every mistake of mapping files in one pass, without a robot."""
+"""`gatewayd check`: every mistake in mapping files in one pass, without a robot."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def command(
     strict: bool,
     separately: bool,
 ) -> None:
-    """Find every mistake of mapping FILES, all in one pass, each with file, line and column.
+    """Find every mistake in mapping FILES, all in one pass, each with file, line and column.
 
     Checked is all that can be known without the plant: the text, the Modbus addresses, the robot's fields, who may
     write, what happens when a side is lost, and what number conversions lose. `-` reads standard input, a directory

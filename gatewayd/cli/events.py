@@ -52,7 +52,7 @@ class PointInTime(click.ParamType):  # type: ignore[type-arg]
             return datetime.now(UTC) - timedelta(seconds=DURATION.convert(value, param, ctx))
         except (click.BadParameter, OverflowError):
             self.fail(
-                f"{value!r} is no time: write how long ago, say 10min or 2h, or when, say 2026-11-22T02:15Z",
+                f"{value!r} is not a time: write how long ago, say 10min or 2h, or when, say 2026-11-22T02:15Z",
                 param,
                 ctx,
             )
@@ -132,7 +132,7 @@ Exit codes:
     "-n",
     "--limit",
     type=click.IntRange(0, _ALL),
-    help="So many former ones.  [default: 20; with --since all that are kept, 1000 at most]",
+    help="How many past events to print.  [default: 20; with --since all that are kept, 1000 at most]",
 )
 @click.option(
     "--since",

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import shutil
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -110,11 +114,23 @@ def _print(locks: list[dict[str, Any]]) -> None:
         may = (" > " if lock["takeover"] else ", ").join(lock["owners"])
         members = "" if lock["members"] == [lock["name"]] else _members(lock)
         rows.append((name, lock["owner"] or "free", left, may, members))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for place, row in enumerate(rows):
-        line = "  ".join(map(str.ljust, row, widths))
-        colour = {"operator": "magenta", "free": None}.get(row[1], "green") if place else None
-        click.echo(click.style(line.rstrip(), bold=not place, fg=colour))
+    for place, lines in enumerate(_lined_up(rows)):
+        colour = {"operator": "magenta", "free": None}.get(rows[place][1], "green") if place else None
+        click.echo(click.style(lines, bold=not place, fg=colour))
+
+
+def _lined_up(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    """The rows in columns, each broken between words where the terminal is narrow; those of a pipe are not."""
+    from gatewayd.report.fitting import fitted, folded
+
+    known = sys.stdout.isatty() or "COLUMNS" in os.environ
+    width = shutil.get_terminal_size().columns if known else sys.maxsize
+    texts = {str(place): column for place, column in enumerate(zip(*rows, strict=True))}
+    widths = list(fitted(texts, width - len(texts) + 1, ()).widths.values())
+    for row in rows:
+        cells = [folded(text, wide).split("\n") for text, wide in zip(row, widths, strict=True)]
+        lines = ("  ".join(map(str.ljust, parts, widths)) for parts in zip_longest(*cells, fillvalue=""))
+        yield "\n".join(line.rstrip() for line in lines)
 
 
 def _members(lock: Mapping[str, Any]) -> str:

@@ -125,7 +125,7 @@ class Duration(click.ParamType):  # type: ignore[type-arg]
         seconds = float(found[1]) * self._UNITS[found[2]] if found else 0.0
         if seconds <= 0:
             self.fail(
-                f"{value!r} is no duration: write a number with its unit, say 30s, 5min or 2h", param, ctx
+                f"{value!r} is not a duration: write a number with its unit, say 30s, 5min or 2h", param, ctx
             )
         return seconds
 

@@ -41,7 +41,7 @@ Exit codes:
 @json_option
 @click.pass_context
 def command(context: click.Context, client: Client, cell: str | None, *, as_json: bool) -> None:
-    """Print how the running gateway is: links, rates, ages, owners, refusals, the last events."""
+    """Print the state of the running gateway: links, rates, ages, owners, refusals, the last events."""
     answer = client.get("/v1/status")
     limit = _EVENTS * (max(1, len(answer["cells"])) if cell is None else 1)
     events = client.get("/v1/events", limit=limit, cell=cell)["events"]
@@ -183,7 +183,7 @@ def _writer(writer: Answer, locks: int) -> str:
     from gatewayd.report.format import ago, counted, verb
 
     if writer["alive"]:
-        state, colour = f"there, last request {ago(writer['age'])}", "green"
+        state, colour = f"connected, last request {ago(writer['age'])}", "green"
     elif writer["age"] is None:
         return f"{writer['name']} {verb('have', writer['name'])} not come yet"
     else:

@@ -61,9 +61,14 @@ Exit codes:
 )
 @click.argument("text", default="", shell_complete=complete_variables)
 @click.option(
-    "--interval", type=DURATION, default="500ms", show_default=True, metavar="TIME", help="From look to look."
+    "--interval",
+    type=DURATION,
+    default="500ms",
+    show_default=True,
+    metavar="TIME",
+    help="Time between two updates.",
 )
-@click.option("--once", is_flag=True, help="One look, as lines.")
+@click.option("--once", is_flag=True, help="Print once, as lines, and end.")
 @on_gateway
 @cell_option
 @click.pass_context

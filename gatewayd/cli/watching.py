@@ -153,7 +153,7 @@ def plain(glimpse: Glimpse, view: View) -> str:
     lines += [f"  {cell['name']}: {_link_words(cell)}" for cell in glimpse.status.get("cells", ())]
     variables = chosen(glimpse.variables, view)
     if not variables and not glimpse.lost:
-        lines.append("  no variable fits")
+        lines.append("  no variable matches")
     for variable in variables:
         arrow = "->" if variable["direction"] == "input" else "<-"
         shown = f"{variable['name']:<20} {phrases.value(variable):>14}"
@@ -165,12 +165,12 @@ def plain(glimpse: Glimpse, view: View) -> str:
 def _head(glimpse: Glimpse, view: View) -> Text:
     text = Text(no_wrap=True, overflow="ellipsis")
     if glimpse.lost:
-        return text.append(f" what stands below is old: {glimpse.lost} ", "bold white on red")
+        return text.append(f" everything below is old: {glimpse.lost} ", "bold white on red")
     status = glimpse.status
     colour = "green" if status["healthy"] else "red"
     text.append(f" gatewayd {status['version']} ", "bold").append(_health(status), f"bold {colour}")
     if view.paused:
-        text.append("  PAUSED: what stands below is old ", "bold black on yellow")
+        text.append("  PAUSED: everything below is old ", "bold black on yellow")
     return text
 
 
@@ -194,7 +194,7 @@ def _link_words(cell: Answer) -> str:
     words = [f"robot {robot['state']}{rate}, age {age(robot['age'])}"]
     words += [f"{link['name']} {link['words']}" for link in cell["links"] if link["name"] != "robot"]
     there = [writer["name"] for writer in cell["writers"] if writer["alive"]]
-    words.append(f"{', '.join(there)} there" if there else "no writer there")
+    words.append(f"{', '.join(there)} connected" if there else "no writer connected")
     words.append(f"writes {writes['accepted']} accepted, {writes['refused']} refused")
     return "   ".join(words)
 
@@ -256,7 +256,8 @@ _ONLY_WIDE = {"places": _WIDE, "robot register": _SPACIOUS}
 def _range(top: int, shown: int, found: int, view: View, width: int) -> Text:
     text = Text(" ", no_wrap=True, overflow="ellipsis")
     text.append(
-        f"{top + 1}-{top + shown} of {found}" if shown else "no variable fits", "dim" if shown else "yellow"
+        f"{top + 1}-{top + shown} of {found}" if shown else "no variable matches",
+        "dim" if shown else "yellow",
     )
     text.append(f"   direction: {view.show.value}" if view.show is not Show.ALL else "", "cyan")
     text.append("   only bad" if view.only_bad else "", "cyan")

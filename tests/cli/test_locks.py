@@ -59,4 +59,16 @@ def test_a_time_needs_a_unit(invoke: Invoke) -> None:
     for wrong in ("10", "-5s", "0s", "soon", "1e9s"):
         done = invoke("locks", "take", "motion", "--for", wrong)
         assert done.exit_code == 2
-        assert "no duration" in done.output or "No such option" in done.output
+        assert "not a duration" in done.output or "No such option" in done.output
+
+
+@pytest.mark.usefixtures("gateway")
+@pytest.mark.parametrize("width", [30, 60, 80])
+def test_the_table_on_a_narrow_terminal(invoke: Invoke, monkeypatch: pytest.MonkeyPatch, width: int) -> None:
+    """Columns stay columns, and every word of the wide table is in it."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+    wide = invoke("locks").output
+    monkeypatch.setenv("COLUMNS", str(width))
+    narrow = invoke("locks").output
+    assert max(map(len, narrow.splitlines())) <= max(width, 40)
+    assert sorted(narrow.replace("_ ", "_").split()) == sorted(wide.split())

@@ -20,7 +20,7 @@ def test_durations(text: str, seconds: float) -> None:
     "text", ["", "30", "s", "-1s", "0s", "0.0s", "1 day", "1e3s", "٣s", "9" * 5000 + "s"]
 )
 def test_what_is_no_duration(text: str) -> None:
-    with pytest.raises(click.BadParameter, match="is no duration"):
+    with pytest.raises(click.BadParameter, match="is not a duration"):
         DURATION.convert(text, None, None)
 
 

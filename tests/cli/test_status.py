@@ -25,7 +25,7 @@ def test_a_healthy_gateway(gateway: Running, invoke: Invoke) -> None:
     for words in (
         "is healthy", "press  press.yaml, mapping", "192.168.1.10:30004 fresh",
         "127.0.0.1:1502 unit 1 listening, no connections",
-        "plc there", "owns 1 of 3 locks", "hmi has not come yet", "12, all good", "motion: plc",
+        "plc connected", "owns 1 of 3 locks", "hmi has not come yet", "12, all good", "motion: plc",
         "1 accepted, 0 refused", "plc took motion",
     ):  # fmt: skip
         assert words in done.output

@@ -34,8 +34,8 @@ def glimpse(served: Served, now: float = 1.0) -> Glimpse:
 
 
 def test_lines_without_a_match_say_so(served: Served) -> None:
-    assert "no variable fits" in plain(glimpse(served), View(filter="zzz"))
-    assert "no variable fits" not in plain(glimpse(served), View())
+    assert "no variable matches" in plain(glimpse(served), View(filter="zzz"))
+    assert "no variable matches" not in plain(glimpse(served), View())
 
 
 def picture(found: Glimpse, view: View, width: int, height: int, before: Glimpse | None = None) -> list[str]:
@@ -88,7 +88,7 @@ def test_owner_lease_and_force(served: Served) -> None:
 
 def test_a_gateway_that_is_gone_is_said_in_the_first_line(served: Served) -> None:
     found = replace(glimpse(served), lost="no gatewayd listens")
-    assert "what stands below is old: no gatewayd listens" in picture(found, View(), 100, 30)[0]
+    assert "everything below is old: no gatewayd listens" in picture(found, View(), 100, 30)[0]
     assert "no gatewayd listens" in plain(found, View())
 
 
@@ -136,7 +136,9 @@ class TestKeys:
         assert served.cell.operator.force(CYCLES, 99, 0.5, 31.0) is None
         view = press(View(), "b")
         assert [one["name"] for one in chosen(glimpse(served).variables, view)] == ["cycles"]
-        assert "no variable fits" in "\n".join(picture(glimpse(served), replace(view, filter="x"), 100, 30))
+        assert "no variable matches" in "\n".join(
+            picture(glimpse(served), replace(view, filter="x"), 100, 30)
+        )
 
     def test_scrolling_stops_at_both_ends(self, served: Served) -> None:
         found = glimpse(served)
