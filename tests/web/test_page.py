@@ -247,11 +247,15 @@ async def test_without_the_gateway_the_page_greys_and_says_since_when(plant: Pla
     """Also when connections are still accepted, by the kernel, and nothing answers."""
     async with showing(plant, NARROW, dark=True) as shown:
         page, daemon = shown.page, shown.daemon
-        assert await page.run("getComputedStyle(document.querySelector('main')).opacity") == "1"
+        struck = (
+            "getComputedStyle(document.querySelector('span.value')).textDecorationLine === 'line-through'"
+        )
+        await page.wait(f"!({struck})")
         daemon.popen.send_signal(19 if stopped else 9)
         await page.wait(LOST)
         await asyncio.sleep(0.5)
-        assert float(await page.run("getComputedStyle(document.querySelector('main')).opacity")) < 0.5
+        assert await page.run(struck)
+        assert await page.run(CONTRASTS) == [], "old, and still legible"
         assert "grayscale" in await page.run("getComputedStyle(document.querySelector('main')).filter")
         alarm = await page.run("document.getElementById('alarm').innerText")
         assert alarm.startswith("No answer from the gateway since ")
