@@ -224,6 +224,7 @@ def command(
     """
     import asyncio
 
+    from gatewayd.service.standard_streams import OutputError
     from gatewayd.simulator.process import serve
     from gatewayd.simulator.server import SimulatedController
 
@@ -233,6 +234,9 @@ def command(
     simulator = SimulatedController(controller, host=host, port=port, connections=connections)
     try:
         asyncio.run(serve(simulator, control=control is not None))
+    except (BrokenPipeError, OutputError):
+        # Of stdout: no fault of the address.
+        raise
     except OSError as error:
         # asyncio's own text says "error while attempting to bind" and repeats the address.
         reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)

@@ -18,7 +18,15 @@ ESCAPES = "gatewayd.escapes"
 """Name of the error handler for what a stream's encoding does not have."""
 _ASCII = "gatewayd_ascii"
 """ASCII by a name of its own: click takes a stream of plain `ascii` for a mistake and writes UTF-8 to it."""
-_NO_UNICODE = {"\u2026": "~", "\u2192": ">", "\u2190": "<", "\u25cf": "*", "\u2013": "-", "\u2014": "-"}
+_NO_UNICODE = {
+    "\u2026": "~",
+    "\u2192": ">",
+    "\u2190": "<",
+    "\u25cf": "*",
+    "\u2013": "-",
+    "\u2014": "-",
+    "\u258f": "|",
+}
 """Signs of our own that have one character of ASCII with the same meaning, so that columns stay in line."""
 
 

@@ -114,3 +114,12 @@ def prepare_once() -> None:
     streams = sys.stdin, sys.stdout, sys.stderr
     prepare()
     sys.stdin, sys.stdout, sys.stderr = streams
+
+
+@pytest.mark.parametrize("redirected", [">/dev/full", ">&-", ">/dev/full 2>&1"])
+@pytest.mark.parametrize("command", [("demo", "--seconds", "20"), ("simulate", "--quiet")], ids=" ".join)
+def test_what_would_run_on_unseen_ends(redirected: str, command: tuple[str, ...]) -> None:
+    done = shell(redirected, *command, "--port", "0")
+    assert done.returncode == 1
+    assert "internal error" not in done.stderr
+    assert len(done.stderr.splitlines()) == (0 if "2>" in redirected else 1)
