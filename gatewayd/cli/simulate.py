@@ -224,12 +224,13 @@ def command(
     """
     import asyncio
 
+    from gatewayd.logs.records import configure
     from gatewayd.service.standard_streams import OutputError
     from gatewayd.simulator.process import serve
     from gatewayd.simulator.server import SimulatedController
 
     level = logging.WARNING if quiet else logging.INFO
-    logging.basicConfig(level=level, format="%(asctime)s %(levelname)-7s %(message)s")
+    configure(level=level)
     controller = _controller(**options)
     simulator = SimulatedController(controller, host=host, port=port, connections=connections)
     try:

@@ -123,15 +123,15 @@ def _words() -> Callable[[Row], str]:
 
 
 def _text() -> _Form:
-    from datetime import datetime
+    from datetime import UTC, datetime
 
     words = _words()
 
     def line(row: Row) -> bytes:
-        moment = datetime.fromtimestamp(row["time"]).astimezone()
+        moment = datetime.fromtimestamp(row["time"], UTC)
         arrow = "->" if row["out"] else "<-"
         text = f"{row['cell'] or '-'} {row['link']} {arrow} {row['peer'] or row['own']}  {words(row)}"
-        return f"{moment:%H:%M:%S.%f} {printable(text)}\n".encode()
+        return f"{moment:%H:%M:%S.%f}Z {printable(text)}\n".encode()
 
     return line
 
