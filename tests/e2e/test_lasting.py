@@ -57,6 +57,7 @@ runpy.run_module("gatewayd", run_name="__main__")
 """The daemon on a machine that was suspended for as many seconds as a file says: CLOCK_MONOTONIC stood still."""
 
 WALL_CLOCK = {
+    "cli/events": "what `--since 10min` means",
     "control/server": "the time in answers",
     "demo/snapshot": "the time on the screen",
     "service/audit": "the time of a record",
