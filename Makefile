@@ -71,7 +71,7 @@ bench: $(VENV)/.dev ## Measure, and print the figures as ratios (ARGS="modbus la
 deb: $(VENV)/.runtime ## Build the Debian package of this tree into dist/ (ARCH="amd64 arm64 armhf"; this machine's by default)
 	@for arch in $(ARCH); do packaging/deb dist $(PY) "$$arch" || exit 1; done; ls -sh dist/*.deb
 
-deb-check: deb ## Judge it (lintian), try it in trees of Debian 12, 13, Ubuntu 24.04, upgrade one (as root; ARCH=..., mmdebstrap)
+deb-check: deb ## Judge it (lintian), try it in trees of Debian 12, 13 (UBUNTU=mirror: 24.04 too), upgrade one (as root; ARCH=...)
 	$(PY) packaging/check_deb.py dist/*.deb
 	lintian --allow-root --fail-on error,warning dist/*.deb
 	for package in dist/*.deb; do packaging/check-trees "$$package" || exit 1; done
