@@ -185,9 +185,12 @@ class PeerConnection(asyncio.BufferedProtocol):
         self, receive: Callable[[int, float], bytes], tap: Tap, count: int, now: float
     ) -> bytes:
         """In place of `receive`: requests and answers pass the tap as well."""
-        buffer = self.session.buffer
-        self._pass(bytes(buffer.data[: buffer.end + count]), tap, now, outgoing=False)
+        session, buffer = self.session, self.session.buffer
+        stream = bytes(buffer.data[: buffer.end + count])
         answers = receive(count, now)
+        # What stays in the buffer is no whole request, or one of a later turn; what is no Modbus is shown as it is.
+        taken = stream if session.broken else stream[: len(stream) - buffer.end]
+        self._pass(taken, tap, now, outgoing=False)
         self._pass(answers, tap, clock.now(), outgoing=True)
         return answers
 

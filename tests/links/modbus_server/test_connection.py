@@ -320,3 +320,19 @@ async def test_what_passes_is_handed_to_a_tap_while_there_is_one(listener: Modbu
     assert connection.receive == connection.session.received
     for stream in (writer, later):
         stream.close()
+
+
+async def test_a_request_that_waits_for_its_turn_passes_the_tap_once(listener: ModbusListener) -> None:
+    """More requests than one turn serves; what is no Modbus passes as it is."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", listener.port)
+    passed: list[Passage] = []
+    listener.trace(passed.append)
+    requests = [number.to_bytes(2, "big") + READ[2:] for number in range(30)]
+    writer.write(b"".join(requests))
+    await reader.readexactly(30 * len(ANSWER))
+    assert [passage.data for passage in passed if not passage.outgoing] == requests
+    assert len([passage for passage in passed if passage.outgoing]) == 30
+    writer.write(b"GET / HTTP/1.1\r\n\r\n")
+    assert await reader.read() == b""
+    assert [passage.data for passage in passed][60:] == [b"GET / HTTP/1.1\r\n\r\n"]
+    writer.close()
