@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from functools import cache
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -160,11 +161,18 @@ def _pcap() -> _Form:
     return lambda row: writer.blocks(_captured(row))
 
 
-def _captured(row: Row) -> Any:
-    from gatewayd.cli.capture import Captured
+@cache
+def _carrier(kind: str) -> TrafficDecoder:
+    """For its medium and port, which are those of all links of the kind."""
     from gatewayd.links.registry import decoder_of
 
-    kind = decoder_of(row["kind"])
+    return decoder_of(kind)
+
+
+def _captured(row: Row) -> Any:
+    from gatewayd.cli.capture import Captured
+
+    kind = _carrier(row["kind"])
     return Captured(
         row["time"], kind.medium, kind.port, row["peer"], row["own"], row["out"], bytes.fromhex(row["data"])
     )

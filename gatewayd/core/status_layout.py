@@ -127,3 +127,9 @@ TABLES = (
 )
 LENGTH = 4288
 """Words of the whole block."""
+_END = BASE + LENGTH
+
+
+def covers(address: int, count: int) -> bool:
+    """Whether `count` registers from `address` on all belong to the block."""
+    return address >= BASE and address + count <= _END

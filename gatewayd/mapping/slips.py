@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from gatewayd.report.format import counted
+
 _QUOTES: Final = "\u201c\u201d\u201e\u201f\u2018\u2019\u201a\u201b\u00ab\u00bb\u2039\u203a"
 _DASHES: Final = "\u2010\u2011\u2012\u2013\u2014\u2212\uff0d"
 _COLON: Final = "\uff1a"
@@ -66,8 +68,7 @@ def _too_deep(lines: Sequence[str], number: int) -> Slip | None:
     if here is None or above is None or above["value"] is None or len(here["indent"]) <= len(above["indent"]):
         return None
     message = f"`{here['key']}` is indented deeper than `{above['key']}` above, which has its value already"
-    spaces = len(above["indent"])
-    hint = f"begin both with {spaces} space{'s' if spaces != 1 else ''}, or put the value in quotes"
+    hint = f"begin both with {counted(len(above['indent']), 'space')}, or put the value in quotes"
     return Slip(number, len(here["indent"]) + 1, message, hint)
 
 
@@ -77,4 +78,4 @@ def _named(character: str) -> str:
 
 def _is_strange_space(character: str) -> bool:
     """Whether it is seen as a space or not at all, and is no space, tab or printed character."""
-    return character not in " \t" and (character.isspace() or unicodedata.category(character) in ("Zs", "Cf"))
+    return character != "\t" and not character.isprintable()

@@ -13,6 +13,7 @@ from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.links.registry import kind_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.diff import ChangeKind, Changes, objections
+from gatewayd.report.format import verb
 from gatewayd.report.wording import names_and_more
 from gatewayd.service.cell_runtime import CellRuntime, Losses
 
@@ -71,4 +72,4 @@ def _of_links(runtime: CellRuntime, plan: Plan) -> Iterator[Objection]:
 
 def _are(names: list[str]) -> str:
     """`a` is; `a`, `b` and 3 more are."""
-    return f"{names_and_more(names)} {'is' if len(names) == 1 else 'are'}"
+    return f"{names_and_more(names)} {verb('be', count=len(names))}"

@@ -41,22 +41,16 @@ def socket(plant: Plant) -> Path:
     return socket
 
 
+def traced(socket: Path) -> list[str | Path]:
+    """The command, with lines of JSON."""
+    return [sys.executable, "-m", "gatewayd", "trace", "--socket", socket, "--format", "json"]
+
+
 def test_all_links_are_traced_in_words(plant: Plant, socket: Path) -> None:
     plc = plant.ready_plc()
     wrong = plant.plc(unit=7)
     path = plant.directory / "trace.json"
-    command: list[str | Path] = [
-        sys.executable,
-        "-m",
-        "gatewayd",
-        "trace",
-        "--socket",
-        socket,
-        "--format",
-        "json",
-        "-o",
-        path,
-    ]
+    command = [*traced(socket), "-o", path]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as trace:
         wait_for(lambda: bool(rows(path)), "the trace to begin")
         assert plc.integers(100) == [0]
@@ -98,16 +92,7 @@ def test_all_links_are_traced_in_words(plant: Plant, socket: Path) -> None:
 
 
 def test_what_is_not_wanted_is_left_out(plant: Plant, socket: Path) -> None:
-    command: list[str | Path] = [
-        sys.executable,
-        "-m",
-        "gatewayd",
-        "trace",
-        "--socket",
-        socket,
-        "--format",
-        "json",
-    ]
+    command = traced(socket)
     done = subprocess.run(
         [*command, "--link", "canopen", "--count", "3"],
         capture_output=True,

@@ -93,7 +93,7 @@ def _identities(
 ) -> tuple[str, ...]:
     """What would be another number in 1018h."""
     from gatewayd.links.canopen_node.identity import (
-        identity_of,  # a whole node, which only a reload has to make
+        identity_of,  # imports a whole node, which only a reload may need
     )
 
     former, successor = asdict(identity_of(old, before)), asdict(identity_of(new, after))

@@ -74,7 +74,6 @@ Answer = bytes | ExceptionCode
 _Function = Callable[[Unit, Requester, bytes, float], Answer]
 
 _COIL_ON = 0xFF00
-_STATUS_END = status_layout.BASE + status_layout.LENGTH
 
 _WORD = struct.Struct(">H")
 _TWO_WORDS = struct.Struct(">HH")
@@ -129,7 +128,7 @@ def _read_registers(unit: Unit, table: RegisterTable, pdu: bytes, now: float) ->
 
 def _refuse_registers(unit: Unit, table: RegisterTable, address: int, count: int) -> ExceptionCode | None:
     """Why these registers cannot be read, if they cannot."""
-    if table.readable.reach[address] >= count or _of_status(address, count):
+    if table.readable.reach[address] >= count or status_layout.covers(address, count):
         return None
     return _unreadable(unit, table.readable.mapped[address], count)
 
@@ -143,10 +142,6 @@ def _registers(unit: Unit, table: RegisterTable, address: int, count: int, now: 
     if address >= status_layout.BASE:
         return unit.status.read(address - status_layout.BASE, count, now)
     return bytes(table.image[2 * address : 2 * (address + count)])
-
-
-def _of_status(address: int, count: int) -> bool:
-    return address >= status_layout.BASE and address + count <= _STATUS_END
 
 
 # -- writing ----------------------------------------------------------------------------------------------------------
@@ -182,7 +177,7 @@ def _write_multiple(unit: Unit, requester: Requester, pdu: bytes, now: float) ->
 
 def _mask_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
     address, and_mask, or_mask = _MASK.unpack_from(pdu, 1)
-    if _of_status(address, 1):
+    if status_layout.covers(address, 1):
         present = int.from_bytes(unit.status.read(address - status_layout.BASE, 1, now), "big")
         word = (present & and_mask) | (or_mask & ~and_mask & 0xFFFF)
         return _write_status(unit, requester, address, [word], now) or pdu
@@ -212,7 +207,7 @@ def _write_registers(
     unit: Unit, requester: Requester, pdu: bytes, written: tuple[int, bytes], now: float
 ) -> ExceptionCode | None:
     address, data = written
-    if _of_status(address, len(data) // 2):
+    if status_layout.covers(address, len(data) // 2):
         words = struct.unpack(f">{len(data) // 2}H", data)
         return _write_status(unit, requester, address, words, now)
     refused = _apply(unit, requester, pdu, unit.image.holding.changes(address, data), now)

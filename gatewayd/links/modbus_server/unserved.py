@@ -1,4 +1,4 @@
-"""Requests that a unit does not serve, in words that name what is there instead, for whoever looks for the mistake."""
+"""Requests that a unit does not serve, in words that name what is there instead."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.refusal import Reason, Refusal
-from gatewayd.core.status_layout import BASE, LENGTH
+from gatewayd.core.status_layout import BASE, LENGTH, covers
 from gatewayd.core.unserved import Unserved
 from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
 from gatewayd.links.modbus_server.readable import Readable
@@ -46,7 +46,7 @@ class Places:
             return "bits without a variable"
         if missing > 0xFFFF:
             return "addresses end at 65535"
-        if span.area in (Area.HOLDING, Area.INPUT) and BASE <= missing < BASE + LENGTH:
+        if not span.area.of_bits and covers(missing, 1):
             return f"the status block, {BASE}-{BASE + LENGTH - 1}, is asked for by itself"
         return f"{missing} is not mapped; {self._nearest(span.area, missing)}"
 
@@ -106,7 +106,7 @@ def unserved(
 
 
 def _in_status(span: Span) -> bool:
-    return not span.area.of_bits and span.first >= BASE and span.first + span.quantity <= BASE + LENGTH
+    return not span.area.of_bits and covers(span.first, span.quantity)
 
 
 def unknown_unit(unit: int, here: Iterable[int]) -> str:

@@ -53,7 +53,7 @@ class ControllerNotes:
             for (field, reason), names in fields.items()
         ]
         missing = session.unavailable if session is not None else ()
-        self._held = tuple(one.field for one in missing if one.word == IN_USE and not one.output)
+        self._held = tuple(wish.field for wish in missing if wish.word == IN_USE and not wish.output)
 
     def figures(self, plan: RobotPlan, now: float) -> dict[str, object]:
         """For the control interface."""
@@ -77,9 +77,9 @@ class ControllerNotes:
         )
         # What others hold is said above, together.
         reasons = (
-            f"{one['field']}: {one['reason']}"
-            for one in self._unavailable
-            if not str(one["reason"]).startswith(IN_USE)
+            f"{missing['field']}: {missing['reason']}"
+            for missing in self._unavailable
+            if not str(missing["reason"]).startswith(IN_USE)
         )
         found = contradiction(plan, self._version)
         return (*held, *reasons, *((found.text,) if found is not None and found.is_grave else ()))
