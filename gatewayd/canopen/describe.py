@@ -1,6 +1,6 @@
 """CANopen frames in words, by the predefined connection set (CiA 301, 7.3.3) and the frame's own content.
 
-Pure, and total: any frame has a description, whoever sent it. What needs to be known besides the frame, say which PDO a
+Pure, and total: any frame has a description. What needs to be known besides the frame, say which PDO a
 device has moved where, is left open.
 """
 

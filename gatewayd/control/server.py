@@ -275,7 +275,7 @@ def asker(request: web.Request) -> str:
 
 
 def _in_turn(share: LoopShare) -> Middleware:
-    """Whoever asks waits for his turn. Whoever acts does not: it costs little, and somebody may need it now."""
+    """Who asks waits for a turn. Who acts does not: it costs little, and somebody may need it now."""
 
     @web.middleware
     async def in_turn(request: web.Request, handler: _Handler) -> web.StreamResponse:

@@ -1,4 +1,4 @@
-"""What passes the links, for whoever traces: filtered, bounded, and raw. Words are made by whoever reads it.
+"""What passes the links, for traces: filtered, bounded, and raw. The reader makes words of it.
 
 Taps are in the links only while there is a trace. Each trace keeps what was not read yet; what finds no room
 is counted.

@@ -1,6 +1,6 @@
 """Why a reload must not happen unasked: what it would take from an owner or leave in a robot, and the like.
 
-Each objection has a kind by which whoever reloads may accept it (`gatewayd reload --accept KIND`). The words are a
+Each objection has a kind by which it may be accepted (`gatewayd reload --accept KIND`). The words are a
 contract: scripts name them.
 """
 

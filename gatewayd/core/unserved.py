@@ -1,4 +1,4 @@
-"""Requests that nothing here serves, whoever asks: no write is refused by them, and nobody owns what they are about.
+"""Requests that nothing here serves, from any peer: no write is refused by them, and nobody owns what they are about.
 
 They are what everybody meets on the first day: a wrong unit, an address beside the mapped ones. A cell counts and
 records them, worded by the link that they came to.

@@ -2,7 +2,7 @@
 
 A limit is a decimal number in the robot's unit. On a wire it is the nearest number that the register or object has,
 which may decode to a hair more: the float32 nearest to 0.05 is 0.05000000074, and 3 * 0.1 is 0.30000000000000004.
-Whoever writes that number means the limit, so it decodes to exactly the limit: a robot never gets more, and a set-point
+To write that number is to mean the limit, so it decodes to exactly the limit: a robot never gets more, and a set-point
 that stands on its maximum is not refused. The core compares values and knows of no encoding; so the limits are prepared
 here, once for each place.
 

@@ -37,7 +37,7 @@ LEVELS = {
 """Kinds that are not logged at INFO. Locks come and go with every lease, so they are for debugging and for the ring."""
 
 _ASKED = (EventKind.REFUSED, EventKind.UNSERVED)
-"""Kinds that somebody is told for who may be undeclared."""
+"""Kinds that may be about an undeclared peer."""
 _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 
 

@@ -1,7 +1,7 @@
 """The log under a flood: what is the same is written some times, then once in a while with the number of the others.
 
-Whoever can make the gateway log (a peer without a token, a controller that talks, a plant that flaps) could otherwise
-fill the disk or make the journal drop what matters.
+Anybody who can make the gateway log (a peer without a token, a controller that talks, a plant that flaps) could
+otherwise fill the disk or make the journal drop what matters.
 """
 
 from __future__ import annotations

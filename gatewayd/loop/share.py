@@ -1,6 +1,6 @@
 """Work that must not hold up the robot and the buses: in short pieces, and never more than a share of the loop's time.
 
-Whoever asks for something by HTTP gets his turn here. The pieces of several askers are done in turn, one at a time, and
+Every request by HTTP gets its turn here. The pieces of several askers are done in turn, one at a time, and
 after each the loop serves everything else for many times as long as the piece took. However many ask, and whatever
 for, a PLC's request waits for one short piece now and then, and nobody is kept waiting by another who asks more.
 """
@@ -74,7 +74,7 @@ class LoopShare:
     async def done_once(
         self, subject: Hashable, asker: str, begin: Callable[[], Generator[object, None, _Result]]
     ) -> _Result:
-        """The same for whoever else asks for this subject before the work has begun: it is done once for all of them.
+        """The same for all who ask for this subject before the work has begun: it is done once for all of them.
 
         Nobody gets what was true before he asked.
         """
@@ -94,7 +94,7 @@ class LoopShare:
         if self._announced.get(subject) is task:  # it has ended before its first turn
             del self._announced[subject]
         if not task.cancelled():
-            task.exception()  # whoever asked may be gone, and asyncio complains where nobody looks at it
+            task.exception()  # the asker may be gone, and asyncio complains where nobody looks at it
 
     # -- turns ---------------------------------------------------------------------------------------------------
 

@@ -118,7 +118,7 @@ class _Reader:
             if key not in FILE.model_fields:
                 meant = self._unknown_key(FILE, key, entry.key.position)
                 if meant not in root.entries:
-                    # Read on as what it is meant to be: a slip in one word makes no strangers of all writers.
+                    # Read on as what it is meant to be: a slip in one word makes no writer unknown.
                     name = Scalar(meant, quoted=False, position=entry.key.position)
                     root.entries[meant] = TableEntry(name, entry.value)
         for key, described in FILE.model_fields.items():

@@ -1,6 +1,6 @@
 """Modbus in words: what a request asks for, what is wrong with it, what an answer says (Application Protocol V1.1b3).
 
-Pure, and total: any bytes have a description, whoever sent them.
+Pure, and total: any bytes have a description.
 """
 
 from __future__ import annotations

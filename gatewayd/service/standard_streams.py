@@ -46,7 +46,7 @@ class _Output(io.FileIO):
 
 class _Errors(io.FileIO):
     def write(self, data: Any, /) -> int:
-        """Write, or lose it: where nobody can be told, nothing else should fail for that."""
+        """Write, or lose it: where nothing can be said, nothing else should fail for that."""
         try:
             return super().write(data)
         except OSError:

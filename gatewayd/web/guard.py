@@ -29,7 +29,7 @@ FAIR = 8
 PATIENCE = 20.0
 """Seconds after which a connection that has not finished a request is closed: idle, slow, or not reading its answer."""
 BUSY_DELAY = 1.0
-"""Seconds before who asks too much is told so."""
+"""Seconds before a client that asks too much is answered so."""
 MAX_BODY = 4096
 """Bytes of a request's body."""
 HEADERS = {

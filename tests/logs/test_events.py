@@ -36,7 +36,7 @@ def cell() -> Cell:
     return one
 
 
-def told(caplog: pytest.LogCaptureFixture) -> tuple[str, int, dict[str, object]]:
+def reported(caplog: pytest.LogCaptureFixture) -> tuple[str, int, dict[str, object]]:
     (record,) = caplog.records
     return record.getMessage(), record.levelno, record.__dict__["fields"]
 
@@ -55,7 +55,7 @@ def test_a_refusal_names_everybody(cell: Cell, caplog: pytest.LogCaptureFixture)
         repeats=3,
     )
     cell.events.append(event)
-    assert told(caplog) == (
+    assert reported(caplog) == (
         "write refused",
         logging.WARNING,
         {
@@ -76,7 +76,7 @@ def test_a_peer_without_a_name_is_undeclared(cell: Cell, caplog: pytest.LogCaptu
     cell.events.append(
         Event(1.0, EventKind.REFUSED, variable=1, reason=Reason.NOT_WRITABLE, peer="192.168.1.77")
     )
-    fields = told(caplog)[2]
+    fields = reported(caplog)[2]
     assert (fields["writer"], fields["peer"]) == ("undeclared", "192.168.1.77")
 
 
@@ -86,12 +86,12 @@ def test_a_value_out_of_limits_is_told_with_them(cell: Cell, caplog: pytest.LogC
     cell.events.append(
         Event(1.0, EventKind.REFUSED, variable=0, writer=0, reason=Reason.OUT_OF_LIMITS, new=999)
     )
-    assert told(caplog)[2]["limits"] == "0..150"
+    assert reported(caplog)[2]["limits"] == "0..150"
 
 
 def test_a_takeover_names_the_former_owner(cell: Cell, caplog: pytest.LogCaptureFixture) -> None:
     cell.events.append(Event(1.0, EventKind.TAKEN_OVER, lock=0, writer=0, other=1))
-    assert told(caplog) == (
+    assert reported(caplog) == (
         "lock taken over",
         logging.WARNING,
         {"cell": "press", "lock": "start", "writer": "plc", "former": "hmi"},
@@ -104,7 +104,7 @@ def test_every_kind_is_one_line_at_its_level(
 ) -> None:
     caplog.set_level(logging.DEBUG, "gatewayd.cell")
     cell.events.append(Event(1.0, kind, detail="why"))
-    text, level, fields = told(caplog)
+    text, level, fields = reported(caplog)
     assert (text, level) == (kind.value, LEVELS.get(kind, logging.INFO))
     assert fields["detail"] == "why"
 
@@ -182,7 +182,7 @@ def test_what_the_local_operator_does_is_told_at_the_default_level(
     cell: Cell, caplog: pytest.LogCaptureFixture
 ) -> None:
     cell.operator.take_lock(0, 1.0, detail="by anna")
-    assert told(caplog) == (
+    assert reported(caplog) == (
         "lock acquired",
         logging.WARNING,
         {"cell": "press", "lock": "start", "writer": "operator", "detail": "by anna"},

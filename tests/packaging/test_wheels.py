@@ -32,8 +32,8 @@ def test_each_has_its_hashes() -> None:
 
 def test_the_versions_are_those_of_the_classifiers() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    told = {line.rpartition(" ")[2] for line in project["classifiers"] if ":: 3." in line}
-    assert told == set(wheels.VERSIONS)
+    named = {line.rpartition(" ")[2] for line in project["classifiers"] if ":: 3." in line}
+    assert named == set(wheels.VERSIONS)
 
 
 def test_only_locked_wheels_for_the_machine_that_will_run_them(

@@ -103,8 +103,8 @@ def test_a_full_disk_is_told_once_and_costs_nothing(opened: Opened, caplog: pyte
         one.put("y")
     assert time.perf_counter() - begun < 1.0
     time.sleep(0.1)
-    told = [record for record in caplog.records if record.levelno == logging.ERROR]
-    assert [record.__dict__["fields"]["reason"] for record in told] == ["No space left on device"]
+    reported = [record for record in caplog.records if record.levelno == logging.ERROR]
+    assert [record.__dict__["fields"]["reason"] for record in reported] == ["No space left on device"]
 
 
 def test_it_goes_on_when_the_directory_comes_and_counts_what_was_lost(
@@ -159,8 +159,8 @@ def test_a_disk_that_hangs_is_a_trouble_and_told_once(
     for later in (HANGS, HANGS + 1, HANGS + 2):
         one.look(clock.now() + later)
     assert one.trouble(clock.now() + HANGS) == "it has taken nothing for more than 5 s"
-    told = [record.__dict__["fields"]["reason"] for record in caplog.records]
-    assert told == ["it has taken nothing for more than 5 s"]
+    reported = [record.__dict__["fields"]["reason"] for record in caplog.records]
+    assert reported == ["it has taken nothing for more than 5 s"]
     hung.set()
     until(lambda: text(one.path) == "x\n" and one.held_up(clock.now()) == 0)
     assert one.trouble(clock.now() + 2 * HANGS) == ""

@@ -18,16 +18,16 @@ def test_healthy_while_everything_turns() -> None:
 
 
 def test_ready_with_a_fresh_and_writable_robot(cell: Cell) -> None:
-    ready, told = readiness(verdicts(cell), (), ())
+    ready, answer = readiness(verdicts(cell), (), ())
     assert ready
-    assert told == {"ready": True, "reasons": [], "cells": {"press": {"ready": True, "reasons": []}}}
+    assert answer == {"ready": True, "reasons": [], "cells": {"press": {"ready": True, "reasons": []}}}
 
 
 def test_not_ready_without_the_robot_and_why(cell: Cell) -> None:
     cell.robot_lost("cable", 1.0)
-    ready, told = readiness(verdicts(cell), (), ())
+    ready, answer = readiness(verdicts(cell), (), ())
     assert not ready
-    assert told["cells"] == {"press": {"ready": False, "reasons": ["robot not connected for 0 s"]}}
+    assert answer["cells"] == {"press": {"ready": False, "reasons": ["robot not connected for 0 s"]}}
 
 
 def test_not_ready_before_the_inputs_are_adopted(cell: Cell) -> None:
@@ -42,14 +42,14 @@ def test_not_ready_before_the_inputs_are_adopted(cell: Cell) -> None:
 
 
 def test_not_ready_with_a_part_that_hangs_or_a_listener_that_is_away(cell: Cell) -> None:
-    ready, told = readiness(verdicts(cell), ("core of press",), ["not listening on :502", ""])
+    ready, answer = readiness(verdicts(cell), ("core of press",), ["not listening on :502", ""])
     assert not ready
-    assert told["reasons"] == ["hangs: core of press", "not listening on :502"]
+    assert answer["reasons"] == ["hangs: core of press", "not listening on :502"]
 
 
 def test_trouble_with_audit_or_log_is_told_and_the_cells_are_served(cell: Cell) -> None:
-    ready, told = readiness(
+    ready, answer = readiness(
         verdicts(cell), (), (), ["the audit file cannot be written: No space left on device"]
     )
     assert ready
-    assert told["reasons"] == ["the audit file cannot be written: No space left on device"]
+    assert answer["reasons"] == ["the audit file cannot be written: No space left on device"]

@@ -124,7 +124,7 @@ def test_troubles_of_audit_and_log_are_troubles(runtime: CellRuntime, daemon: Da
     assert runtime in daemon.runtimes
     probes = Probes(daemon, lambda: ["1 mapping file not served"], lambda: ["nobody has read the log"])
     assert {"1 mapping file not served", "nobody has read the log"} <= set(probes.troubles())
-    _, told = probes.readiness(time.monotonic())
-    reasons = told["reasons"]
+    _, answer = probes.readiness(time.monotonic())
+    reasons = answer["reasons"]
     assert isinstance(reasons, list)
     assert {"1 mapping file not served", "nobody has read the log"} <= set(reasons)

@@ -3,7 +3,7 @@
 | of the plan | may be otherwise |
 |---|---|
 | objects of variables | more of them |
-| TPDOs | more of them; more at the end of one (whoever receives it uses its first bytes); inhibit and event time |
+| TPDOs | more of them; more at the end of one (receivers use its first bytes); inhibit and event time |
 | RPDOs | more of them; the deadline |
 | heartbeats, guarding of writers | how long, ours and those that are watched; not whose |
 | autostart, inhibit time of EMCY | yes |

@@ -65,7 +65,7 @@ class ModbusUnit(Link):
             return f"modbus moves: listen {old} -> {new}"
         if plan.unit != self.plan.unit:
             return f"modbus moves: unit {self.plan.unit} -> {plan.unit}"
-        # Whoever asks for the units 255 and 0 would find another robot.
+        # A client that asks for the units 255 and 0 would find another robot.
         return "it is the default unit no more" if self.plan.default_unit and not plan.default_unit else ""
 
     def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:

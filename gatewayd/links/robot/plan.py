@@ -38,7 +38,7 @@ class RobotPlan(LinkPlan):
     types: tuple[tuple[str, str], ...] = ()
     """Fields whose type the file declares, with the type's word."""
     series: str | None = field(default=None, metadata=NO_MEANING)
-    """What the file says of the controller, for `check` and for whoever compares it with the controller's answer."""
+    """What the file says of the controller, for `check`, and to compare it with the controller's answer."""
     version: str | None = field(default=None, metadata=NO_MEANING)
     """The same of its software."""
 

@@ -1,4 +1,4 @@
-// Force and release from the page, for whoever has the token. Nothing is sent before it was said in full and confirmed.
+// Force and release from the page, with the token. Nothing is sent before it was said in full and confirmed.
 
 import { make, number, printable, put } from "./words.js";
 
