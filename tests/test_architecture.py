@@ -251,7 +251,6 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "links.modbus_server.tables": "tests/cli/test_show.py, tests/report/test_table.py",
     "links.robot.plan": "records; tests/mapping/test_compile.py pins their content",
     "links.robot.sections": "tests/mapping/test_model.py",
-    "links.robot.tables": "tests/cli/test_show.py, tests/report/test_table.py",
     "links.tables": "the contract; tests/report/test_table.py",
     "mapping.expanded": "records; tests/mapping/test_expand.py makes them",
     "mapping.plan": "records; tests/mapping/test_compile.py pins their content",

@@ -8,13 +8,12 @@ from typing import Any
 from gatewayd.links.registry import kinds
 from gatewayd.report.format import age
 from gatewayd.report.format import value as with_unit
+from gatewayd.report.words import meaning
 
 
 def value(variable: Mapping[str, Any]) -> str:
     """`12.5 N`, `7 running`: the value with its unit, and what it means where it stands for a state."""
-    shown = with_unit(variable["value"], variable["unit"])
-    meaning = (variable.get("meanings") or {}).get(str(variable["value"]))
-    return f"{shown} {meaning}" if meaning else shown
+    return f"{with_unit(variable['value'], variable['unit'])} {meaning(variable['value'], variable)}".rstrip()
 
 
 def owner(variable: Mapping[str, Any]) -> str:

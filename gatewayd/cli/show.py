@@ -129,7 +129,9 @@ def _notes(loaded: Loaded, plan: Plan, *, shortened: bool) -> list[str]:
         )
     if any(variable.valid_running for variable in plan.cell.variables):
         notes.append("running: not good while the robot program does not run")
-    notes.extend(note for link in tables() if link.key in plan.links for note in link.notes)
+    here = [link for link in tables() if link.key in plan.links]
+    notes.extend(note for link in here for note in link.notes)
+    notes.extend(text for link in here for text in link.legend(loaded.cell))
     if shortened:
         notes.append("ranges on one line of the file are one row here; --all shows each variable")
     return notes

@@ -6,7 +6,7 @@ Pure: the time is a parameter. `wall` is what the wall clock shows at monotonic 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -78,7 +78,8 @@ def declare(plan: Plan) -> Declared:
 
 def _declaration(plan: Plan, links: Mapping[str, Description], index: int) -> Json:
     variable = plan.cell.variables[index]
-    meanings = next((link.meanings[index] for link in links.values() if index in link.meanings), {})
+    meanings = [link.meanings[index] for link in links.values() if index in link.meanings]
+    bits = [link.bits[index] for link in links.values() if index in link.bits]
     is_input = variable.direction is Direction.INPUT
     found = VariableDeclaration(
         cell=plan.cell.name,
@@ -92,9 +93,15 @@ def _declaration(plan: Plan, links: Mapping[str, Description], index: int) -> Js
         limits=None if variable.limits is None else [variable.limits.low, variable.limits.high],
         fallback=_fallback(variable.on_release if is_input else variable.on_stale),
         comment=variable.comment,
-        meanings={str(number): words for number, words in meanings.items()} or None,
+        meanings=_words(meanings),
+        bits=_words(bits),
     )
     return cast("Json", found)
+
+
+def _words(found: Sequence[Mapping[int, str]]) -> dict[str, str] | None:
+    """The first of these tables as JSON has it."""
+    return {str(number): words for number, words in found[0].items()} if found else None
 
 
 def _places(plan: Plan, links: Mapping[str, Description], index: int) -> Json:

@@ -86,7 +86,9 @@ class Description:
     writers: Mapping[int, str] = field(default_factory=dict)
     """How the writer with this index is known."""
     meanings: Mapping[int, Mapping[int, str]] = field(default_factory=dict)
-    """By index of the variable: what its numbers mean, where they stand for states."""
+    """By index of the variable: what its numbers mean, where they stand for states (0 and 1 of a bit likewise)."""
+    bits: Mapping[int, Mapping[int, str]] = field(default_factory=dict)
+    """By index of the variable: what each bit of its number says when it is 1, where they stand for states."""
     address: str = ""
     """Where it is, in one piece: `127.0.0.1:502 unit 1`."""
     fields: Mapping[str, object] = field(default_factory=dict)

@@ -5,7 +5,7 @@ A kind that has only `columns` and `rows` is in every form of the table with the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar
 
 from gatewayd.mapping.expanded import ExpandedCell
@@ -60,6 +60,10 @@ class LinkTables:
     def page_table(self, cell: ExpandedCell) -> ReportTable | None:
         """The same in a document."""
         return self.screen_table(cell)
+
+    def legend(self, cell: ExpandedCell) -> Iterable[str]:
+        """What the numbers of its variables mean, where they stand for states: a line each, below the tables."""
+        return ()
 
     def document(self, plan: Plan, cell: ExpandedCell) -> object:
         """What JSON has of the link besides the columns, under its key."""

@@ -125,7 +125,11 @@ class VariableDeclaration(TypedDict):
     comment: Annotated[str, "comment of the mapping, may be empty"]
     meanings: Annotated[
         dict[str, str] | None,
-        'what its numbers mean where they stand for states (`{"7": "running"}`), or null',
+        'what its numbers mean where they stand for states (`{"7": "running"}`; `"0"` and `"1"` of a bit), or null',
+    ]
+    bits: Annotated[
+        dict[str, str] | None,
+        'what each bit of its number says when it is 1 (`{"2": "protective stopped"}`), or null',
     ]
 
 

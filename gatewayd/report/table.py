@@ -157,6 +157,8 @@ def as_markdown(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
             ]
             lines += ["", f"## {further_table.title}", "", *_markdown(further_table.head, texts)]
             lines += ["", *further_table.notes] if further_table.notes else []
+    legend = [f"- {text}" for link in here for text in link.legend(cell)]
+    lines += ["", "## Modes, states and status bits", "", *legend] if legend else []
     return "\n".join(lines) + "\n"
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.links.contract import Level
@@ -45,3 +48,18 @@ def source(name: str) -> Source:
 def quality(name: str) -> Quality:
     """The quality that the control interface calls so: `out_of_range`."""
     return Quality[name.upper()]
+
+
+def meaning(value: object, declared: Mapping[str, Any]) -> str:
+    """What a value of the control interface stands for: `running`, `power on, program running`; empty for a mere one.
+
+    `declared`: the variable's `meanings` and `bits`. A bit without words goes by its number, so that it is not missed.
+    """
+    if not isinstance(value, int):
+        return ""
+    bits: Mapping[str, str] | None = declared.get("bits")
+    if bits is None:
+        meanings: Mapping[str, str] = declared.get("meanings") or {}
+        return meanings.get(str(int(value)), "")
+    present = [bit for bit in range(value.bit_length()) if value >> bit & 1]
+    return ", ".join(bits.get(str(bit), f"bit {bit}") for bit in present) or "no bit is 1"

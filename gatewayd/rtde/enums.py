@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import IntEnum
 from types import MappingProxyType
+from typing import NamedTuple
 
 
 class RobotMode(IntEnum):
@@ -152,3 +153,47 @@ MEANINGS: Mapping[str, Mapping[int, str]] = MappingProxyType(
     }
 )
 """Field -> number -> what it means, in words."""
+
+
+class BitWords(NamedTuple):
+    """What one bit of a status word says."""
+
+    on: str
+    off: str
+
+
+_STATUS_BITS = {
+    "robot_status_bits": (
+        BitWords("power on", "power off"),
+        BitWords("program running", "program not running"),
+        BitWords("teach button pressed", "teach button not pressed"),
+        BitWords("power button pressed", "power button not pressed"),
+    ),
+    "safety_status_bits": (
+        BitWords("normal mode", "not normal mode"),
+        BitWords("reduced mode", "not reduced mode"),
+        BitWords("protective stopped", "not protective stopped"),
+        BitWords("recovery mode", "not recovery mode"),
+        BitWords("safeguard stopped", "not safeguard stopped"),
+        BitWords("system emergency stopped", "not system emergency stopped"),
+        BitWords("robot emergency stopped", "not robot emergency stopped"),
+        BitWords("emergency stopped", "not emergency stopped"),
+        BitWords("violation", "no violation"),
+        BitWords("fault", "no fault"),
+        BitWords("stopped due to safety", "not stopped due to safety"),
+        BitWords("3PE input active", "3PE input not active"),
+    ),
+}
+
+BITS: Mapping[str, Mapping[int, BitWords]] = MappingProxyType(
+    {field: MappingProxyType(dict(enumerate(words))) for field, words in _STATUS_BITS.items()}
+)
+"""Field -> bit -> what it says, where each bit is a state (both guides; bits that are not listed are reserved)."""
+
+
+def meanings(field: str, bit: int | None) -> Mapping[int, str]:
+    """What the numbers of a field mean, or 0 and 1 of one of its bits; empty where they mean themselves."""
+    if bit is None:
+        return MEANINGS.get(field, {})
+    words = BITS.get(field, {}).get(bit)
+    return {0: words.off, 1: words.on} if words is not None else {}

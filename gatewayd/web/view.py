@@ -41,7 +41,7 @@ _IN_RUNS = frozenset(
     }
 )
 """Kinds of events that happen to many variables in one moment."""
-_DECLARED = ("number", "name", "direction", "kind", "robot", "limits", "unit", "comment", "meanings")
+_DECLARED = ("number", "name", "direction", "kind", "robot", "limits", "unit", "comment", "meanings", "bits")
 """What the page has of a variable's declaration as it is."""
 
 

@@ -39,6 +39,8 @@ def test_a_state_has_its_number_and_its_word() -> None:
     assert value({"value": 5, "unit": "", "meanings": {"5": "safeguard stop"}}) == "5 safeguard stop"
     assert value({"value": 6, "unit": "", "meanings": {"5": "safeguard stop"}}) == "6"
     assert value({"value": 2.5, "unit": "N", "meanings": None}) == "2.5 N"
+    assert value({"value": True, "unit": "", "meanings": {"1": "fault"}}) == "1 fault"
+    assert value({"value": 3, "unit": "", "bits": {"0": "power on"}}) == "3 power on, bit 1"
 
 
 def test_places() -> None:

@@ -60,3 +60,40 @@ def test_the_field_reference_lists_every_value(field: str, enum: type[IntEnum]) 
     listed = row.split("|")[2].strip()
     assert listed == ", ".join(f"{number} {words}" for number, words in enums.MEANINGS[field].items())
     assert list(enums.MEANINGS[field]) == list(enum)
+
+
+@pytest.mark.parametrize("field, bits", [("robot_status_bits", 4), ("safety_status_bits", 12)])
+def test_the_field_reference_lists_every_status_bit(field: str, bits: int) -> None:
+    text = REFERENCE.read_text().partition("## Modes, states and status bits")[2]
+    (row,) = (line for line in text.splitlines() if line.startswith(f"| `{field}` |"))
+    words = enums.BITS[field]
+    assert row.split("|")[2].strip() == "bits: " + ", ".join(
+        f"{bit} {said.on}" for bit, said in words.items()
+    )
+    assert list(words) == list(range(bits))
+
+
+@pytest.mark.parametrize(
+    "field, bit, words",
+    [
+        ("robot_mode", None, {7: "running"}),
+        ("safety_status_bits", 2, {0: "not protective stopped", 1: "protective stopped"}),
+        ("robot_status_bits", 0, {0: "power off", 1: "power on"}),
+    ],
+)
+def test_numbers_and_single_bits_have_words(field: str, bit: int | None, words: dict[int, str]) -> None:
+    found = enums.meanings(field, bit)
+    assert {number: found[number] for number in words} == words
+
+
+@pytest.mark.parametrize(
+    "field, bit",
+    [
+        ("safety_status_bits", 31),
+        ("safety_status_bits", None),
+        ("output_bit_registers0_to_31", 0),
+        ("actual_q", None),
+    ],
+)
+def test_what_stands_for_itself_has_none(field: str, bit: int | None) -> None:
+    assert not enums.meanings(field, bit)

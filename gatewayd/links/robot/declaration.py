@@ -11,7 +11,7 @@ from gatewayd.links.robot.companions import all_inputs, all_outputs
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address, exact, seconds
-from gatewayd.rtde.enums import MEANINGS
+from gatewayd.rtde.enums import BITS, meanings
 
 
 class RobotKind(LinkKind):
@@ -97,9 +97,14 @@ class RobotKind(LinkKind):
                 "claimed": Names(" ".join(sorted(plan.inputs))),
             },
             meanings={
-                index: MEANINGS[variable.field]
+                index: found
                 for index, variable in enumerate(cell.variables)
-                if variable.field in MEANINGS and variable.bit is None
+                if (found := meanings(variable.field, variable.bit))
+            },
+            bits={
+                index: {bit: words.on for bit, words in BITS[variable.field].items()}
+                for index, variable in enumerate(cell.variables)
+                if variable.bit is None and variable.field in BITS
             },
             address=where,
             fields={"address": where},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from gatewayd.core.definition import Direction
@@ -11,6 +11,7 @@ from gatewayd.links.tables import LinkTables
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.report.layout import Column, Row
 from gatewayd.report.wording import family
+from gatewayd.rtde.enums import BITS, MEANINGS
 
 
 class RobotTables(LinkTables):
@@ -29,6 +30,21 @@ class RobotTables(LinkTables):
         """With the way that the value goes."""
         arrow = "->" if first.direction == Direction.INPUT.value else "<-"
         return {"robot": f"{arrow} {family(first['robot'], last['robot'])}"}
+
+    def legend(self, cell: ExpandedCell) -> Iterator[str]:
+        """`runtime_state: 0 stopping, 1 stopped, ...`; of bits the mapped ones, `bit 2 protective stopped`."""
+        used: dict[str, set[int | None]] = {}
+        for variable in cell.variables:
+            used.setdefault(variable.field, set()).add(variable.bit)
+        for field, bits in used.items():
+            words = [f"{number} {words}" for number, words in MEANINGS.get(field, {}).items()]
+            words += [
+                f"bit {bit} {words.on}"
+                for bit, words in BITS.get(field, {}).items()
+                if bit in bits or None in bits
+            ]
+            if words:
+                yield f"{field}: {', '.join(words)}"
 
 
 TABLES: Final = RobotTables()

@@ -23,6 +23,7 @@ export function factsOf(variable, layout) {
     ["Modbus", modbus.map((place) => `${place.area} ${place.address} = ${place.notation}, ${place.type}`).join("; ")],
     ["CANopen", objects.map((place) => `object ${place.address}, ${place.type}, ${place.notation}`).join("; ")],
     ...others.map((place) => [place.link, `${place.area} ${place.address}, ${place.type}, ${place.notation}`]),
+    ["bits", Object.entries(variable.bits ?? {}).map(([bit, words]) => `${bit} ${words}`).join(", ")],
     ["values", Object.entries(variable.meanings ?? {}).map(([value, words]) => `${value} ${words}`).join(", ")],
     ["limits", variable.limits ? `${variable.limits.join(" to ")} ${variable.unit}`.trim() : ""],
     [input ? "owner lost" : "robot lost", variable.fallback],

@@ -3,7 +3,7 @@
 import { areaOf, factsOf, placesOn } from "./facts.js";
 import { Groups } from "./groups.js";
 import { History } from "./history.js";
-import { FORCED, OPERATOR, make, number, put, quality, span } from "./words.js";
+import { FORCED, OPERATOR, make, meaning, number, put, quality, span } from "./words.js";
 
 const KINDS = [
   ["all", "All", () => true],
@@ -177,13 +177,13 @@ class Row {
   }
 
   update(value, code, age, owner, left, force) {
-    const { kind, unit, meanings } = this.variable;
+    const { kind, unit } = this.variable;
     put(this.value, number(value, kind));
-    put(this.meaning, meanings?.[value] ?? "");
+    put(this.meaning, meaning(value, this.variable));
     const [rest, reported, its] = force ?? [null, null, null];
     put(this.quality, force ? `${quality(code, age)}, ${span(rest)} left` : quality(code, age));
     // The truth beside the force: what the source reports, and how good that is.
-    const truth = its === null ? "" : `reports ${number(reported, kind)} ${meanings?.[reported] ?? unit}`.trimEnd();
+    const truth = its === null ? "" : `reports ${number(reported, kind)} ${meaning(reported, this.variable) || unit}`.trimEnd();
     put(this.truth, truth && its > 0 ? `${truth}, ${quality(its, null)}` : truth);
     const words = owner && left !== null ? `${owner}, ${span(left)}` : owner;
     const source = code === FORCED ? "operator" : "robot";

@@ -13,6 +13,16 @@ export function number(value, kind) {
   return value.toFixed(size >= 1000 ? 1 : size >= 10 ? 2 : 4);
 }
 
+// What a value stands for, as gatewayd/report/words.py has it: of a word of bits those that are 1.
+export function meaning(value, { meanings, bits }) {
+  if (!bits || typeof value !== "number") return meanings?.[Number(value)] ?? "";
+  const present = [];
+  for (let bit = 0, rest = value; rest > 0; bit += 1, rest = Math.floor(rest / 2)) {
+    if (rest % 2) present.push(bits[bit] ?? `bit ${bit}`);
+  }
+  return present.join(", ") || "no bit is 1";
+}
+
 export function span(milliseconds) {
   const seconds = milliseconds / 1000;
   if (seconds < 1) return "< 1 s";

@@ -26,3 +26,20 @@ def test_settings_and_address() -> None:
     assert found.settings["adopt_for"] == "10 s"
     assert found.fields == {"address": "127.0.0.1:30004"}
     assert not found.places
+
+
+def test_states_and_status_bits_have_words() -> None:
+    variables = """\
+  mode:    {robot: runtime_state, modbus: 100}
+  safety:  {robot: safety_status_bits, modbus: 102}
+  stopped: {robot: safety_status_bits.2, modbus: 104.0}
+  made:    {robot: output_int_register_0, modbus: 106}
+"""
+    plan = load((TEXT + variables).encode(), "cell.yaml").plan
+    assert plan is not None
+    found = kind_of("robot").describe(plan.the(RobotPlan), plan.cell)
+    assert {index: words[1] for index, words in found.meanings.items()} == {
+        1: "stopped",
+        3: "protective stopped",
+    }
+    assert {index: words[2] for index, words in found.bits.items()} == {2: "protective stopped"}
