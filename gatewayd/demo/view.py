@@ -33,11 +33,11 @@ def commands(port: int, python: str) -> tuple[list[Poke], Poke]:
     """What to type in another terminal, with mbpoll and with nothing but this Python."""
     mbpoll = f"mbpoll -0 -p {port}"
     script = (
-        f"import time, pymodbus.client as m; c = m.ModbusTcpClient('127.0.0.1', port={port}); c.connect(); "
-        "print(c.write_register(10, 50)); time.sleep(8)"
+        f"import pymodbus.client as m; c = m.ModbusTcpClient('127.0.0.1', port={port}); c.connect(); "
+        "print(c.write_register(10, 50))"
     )
     return [
-        ("watch part_done and cycles; let it run", f"{mbpoll} -t 4:int -B -r 101 -c 2 127.0.0.1"),
+        ("watch part_done and cycles", f"{mbpoll} -t 4:int -B -r 101 -c 2 127.0.0.1"),
         ("meanwhile: half speed, yours for 5 s", f"{mbpoll} -r 10 127.0.0.1 50"),
         ("meddle with the order: refused, 06", f"{mbpoll} -r 1 127.0.0.1 7"),
     ], ("Half speed for 5 s without mbpoll", f'{python} -c "{script}"')

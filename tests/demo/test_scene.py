@@ -9,7 +9,8 @@ from collections import deque
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
-from gatewayd.demo.scene import HOST, Scene, free_port
+from gatewayd.demo.master import RETRY
+from gatewayd.demo.scene import HOST, Scene, free_port, mapping
 
 SPEED_NOW = 11
 
@@ -42,6 +43,30 @@ async def test_somebody_else_is_refused_with_busy(scene: Scene, until) -> None: 
         await until(lambda: scene.cell.image.values[SPEED_NOW] == 50.0)  # speed_now: the robot has answered
     finally:
         client.close()
+
+
+async def test_who_connects_for_one_write_keeps_what_it_wrote(scene: Scene, until) -> None:  # type: ignore[no-untyped-def]
+    """As mbpoll does: half speed is promised to be yours for 5 s."""
+    await until(lambda: scene.plc.program.order.start)
+    client = AsyncModbusTcpClient(HOST, port=scene.port)
+    assert await client.connect()
+    assert not (await client.write_register(10, 50)).isError()
+    client.close()
+    await until(lambda: scene.cell.image.values[SPEED_NOW] == 50.0)
+    assert {writer.name: writer.grace for writer in scene.cell.definition.writers}["you"] >= _lease("speed")
+
+
+def test_the_line_renews_in_time_what_it_was_given_again() -> None:
+    """The first RPDO that is taken begins the lease; the next one comes before the lease ends."""
+    assert _lease("feed") > RETRY
+
+
+def _lease(variable: str) -> float:
+    plan = mapping().plan
+    assert plan is not None
+    [lock] = [lock for lock in plan.cell.locks if lock.name == variable]
+    assert lock.lease is not None
+    return lock.lease
 
 
 def test_port_in_use_is_not_free() -> None:
