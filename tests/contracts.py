@@ -398,46 +398,90 @@ def _last_name(node: ast.expr) -> str:
 
 # -- log --------------------------------------------------------------------------------------------------------------
 
-_METHODS = {"debug", "info", "warning", "error", "exception", "critical"}
+_METHODS = {"debug", "info", "warning", "error", "exception", "critical", "log"}
+Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
-def log_calls() -> dict[str, list[str]]:
-    """What the log may say apart from events: text -> its levels and the names of its fields, by its call."""
+def log_calls(sources: Mapping[str, Sequence[ast.AST]] | None = None) -> dict[str, list[str]]:
+    """What the log may say apart from events: text -> its levels and the names of its fields, by its call.
+
+    A text that a function is handed is found where that function is called. What no constant says (a finding, the text
+    of an error) has the name of its module in place of its text.
+    """
+    sources = sources or {module: nodes(module) for module in MODULES}
     found: dict[str, set[str]] = {}
-    for module in MODULES:
-        for call in filter(_is_logging, nodes(module)):
+    for module, inside in sources.items():
+        for call in filter(_is_logging, inside):
             assert isinstance(call, ast.Call)
-            text = ast.literal_eval(call.args[0])
-            found.setdefault(text, set()).add(f"{_method(call)} {_fields(call, nodes(module))}".strip())
+            said = f"{_level(call)} {_fields(call, inside)}".strip()
+            for text in _texts(call, inside, sources) or {f"(computed in {module})"}:
+                found.setdefault(text, set()).add(said)
     return {text: sorted(calls) for text, calls in found.items()}
-
-
-def texts() -> set[str]:
-    """Every text that stands in the code."""
-    constants = (node.value for node in every_node() if isinstance(node, ast.Constant))
-    return {value for value in constants if isinstance(value, str)}
 
 
 def _is_logging(node: ast.AST) -> bool:
     match node:
-        case ast.Call(ast.Attribute(logger, method), [ast.Constant(), *_]):
+        case ast.Call(ast.Attribute(ast.Call(ast.Attribute(_, "getLogger")), method), [_, *_]):
+            return method in _METHODS
+        case ast.Call(ast.Attribute(logger, method), [_, *_]):
             return method in _METHODS and _last_name(logger).lstrip("_") in ("log", "logger")
     return False
 
 
+def _texts(call: ast.Call, inside: Sequence[ast.AST], sources: Mapping[str, Sequence[ast.AST]]) -> set[str]:
+    """What a call may say: its constant, or what is handed to the function around it; empty where neither is there."""
+    text = call.args[1] if _method(call) == "log" else call.args[0]
+    if isinstance(text, ast.Constant) and text.value != "%s":
+        return {str(text.value)}
+    around = (node for node in inside if isinstance(node, Function) and call in ast.walk(node))
+    handed = (_handed(function, text.id, sources) for function in around if isinstance(text, ast.Name))
+    return set().union(*handed)
+
+
+def _handed(function: Function, name: str, sources: Mapping[str, Sequence[ast.AST]]) -> Iterator[str]:
+    """The constants that calls of a function give to one of its parameters, by name or place, or its default."""
+    parameters = [parameter.arg for parameter in function.args.args]
+    if name not in parameters:
+        return
+    default = dict(zip(reversed(parameters), reversed(function.args.defaults), strict=False)).get(name)
+    at = parameters.index(name) - (parameters[0] == "self")
+    for node in (node for inside in sources.values() for node in inside):
+        if isinstance(node, ast.Call) and _last_name(node.func) == function.name:
+            by_place = node.args[at] if at < len(node.args) else default
+            given = next((keyword.value for keyword in node.keywords if keyword.arg == name), by_place)
+            if isinstance(given, ast.Constant):
+                yield str(given.value)
+
+
 def _method(call: ast.Call) -> str:
     assert isinstance(call.func, ast.Attribute)
-    is_exception = any(keyword.arg == "exc_info" for keyword in call.keywords)
-    return "exception" if is_exception else call.func.attr
+    return call.func.attr
+
+
+def _level(call: ast.Call) -> str:
+    """The level by name, several where an expression chooses; `log` where it comes from elsewhere."""
+    if any(keyword.arg == "exc_info" for keyword in call.keywords):
+        return "exception"
+    chosen = [node.attr for node in ast.walk(call.args[0]) if isinstance(node, ast.Attribute)]
+    return "/".join(sorted(name.lower() for name in chosen if name.isupper())) or _method(call)
 
 
 def _fields(call: ast.Call, module: Sequence[ast.AST]) -> str:
     names: list[str] = []
     for keyword in call.keywords:
-        if keyword.arg == "extra" and isinstance(keyword.value, ast.Call):
-            for field in keyword.value.keywords:
+        if keyword.arg == "extra":
+            for field in _made(keyword.value, module).keywords:
                 names += [field.arg] if field.arg is not None else _returned(field.value, module)
     return " ".join(sorted(names))
+
+
+def _made(extra: ast.expr, module: Sequence[ast.AST]) -> ast.Call:
+    """The call that makes the fields, there or in the line that gives them their name."""
+    if isinstance(extra, ast.Name):
+        lines = (node for node in module if isinstance(node, ast.Assign))
+        extra = next(line.value for line in lines if ast.unparse(line.targets[0]) == extra.id)
+    assert isinstance(extra, ast.Call)
+    return extra
 
 
 def _returned(call: ast.expr, module: Sequence[ast.AST]) -> list[str]:
