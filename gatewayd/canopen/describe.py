@@ -139,21 +139,21 @@ def nmt_command(command: int) -> str | None:
 
 def _nmt(data: bytes) -> str:
     if len(data) != 2:
-        return f"NMT frame of {len(data)} bytes instead of 2"
+        return f"NMT frame of length {len(data)} instead of 2"
     target = "all nodes" if data[1] == 0 else f"node {data[1]}"
     return f"NMT {nmt_command(data[0]) or f'unknown command {data[0]}'}, {target}"
 
 
 def _emergency(data: bytes, node: int) -> str:
     if len(data) != 8:
-        return f"EMCY of node {node} with {len(data)} bytes instead of 8"
+        return f"EMCY of node {node}, length {len(data)} instead of 8"
     (code,) = _WORD.unpack_from(data)
     return f"EMCY of node {node}: {code:04X}h, error register {data[2]:02X}h" + _bytes(data[3:])
 
 
 def _error_control(data: bytes, node: int) -> str:
     if len(data) != 1:
-        return f"error control of node {node} with {len(data)} bytes instead of 1"
+        return f"error control of node {node}, length {len(data)} instead of 1"
     state = data[0] & ~_TOGGLE
     if data[0] == NmtState.INITIALISING:
         return f"boot-up of node {node}"
@@ -163,7 +163,7 @@ def _error_control(data: bytes, node: int) -> str:
 
 def _sdo_request(data: bytes, node: int) -> str:
     if len(data) != 8:
-        return f"SDO request to node {node} with {len(data)} bytes instead of 8"
+        return f"SDO request to node {node}, length {len(data)} instead of 8"
     request = REQUESTS[data[0]]
     if request is Request.ABORT:
         return f"SDO {_named(data)} of node {node} aborted by the client: {_code(data)}"
@@ -178,7 +178,7 @@ def _sdo_request(data: bytes, node: int) -> str:
 
 def _sdo_answer(data: bytes, node: int) -> str:
     if len(data) != 8:
-        return f"SDO answer of node {node} with {len(data)} bytes instead of 8"
+        return f"SDO answer of node {node}, length {len(data)} instead of 8"
     kind, command = data[0] >> 5, data[0]
     if kind == 4:
         return f"SDO {_named(data)} of node {node} refused: {_code(data)}"
@@ -187,7 +187,7 @@ def _sdo_answer(data: bytes, node: int) -> str:
     if kind == 2:
         if command & 0x02:
             return f"SDO {_named(data)} of node {node} ={_bytes(data[4 : 8 - (command >> 2 & 3)])}"
-        return f"SDO {_named(data)} of node {node}: {_LONG.unpack_from(data, 4)[0]} bytes follow"
+        return f"SDO {_named(data)} of node {node} comes in segments, length {_LONG.unpack_from(data, 4)[0]}"
     return f"SDO {_ANSWERS.get(kind, 'unknown answer')}, node {node}"
 
 

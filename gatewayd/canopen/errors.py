@@ -60,7 +60,7 @@ class ErrorFrame:
     def __str__(self) -> str:
         words = [_spell(self.classes & ~ErrorClass.COUNTERS), _spell(self.controller), _spell(self.violation)]
         if self.tx_errors is not None:
-            words.append(f"{self.tx_errors} transmit and {self.rx_errors} receive errors")
+            words.append(f"transmit errors: {self.tx_errors}, receive errors: {self.rx_errors}")
         return ", ".join(word for word in words if word) or "error frame"
 
 

@@ -87,7 +87,10 @@ def seen(name: str, interface: Interface | None) -> tuple[BusSignal, str]:
     signal = BusSignal.UP if interface.controller is None else _CONTROLLER[interface.controller]
     if interface.rx_errors is None:
         return signal, f"{name} is up"
-    return signal, f"{name} is up ({interface.tx_errors} transmit, {interface.rx_errors} receive errors)"
+    return (
+        signal,
+        f"{name} is up (transmit errors: {interface.tx_errors}, receive errors: {interface.rx_errors})",
+    )
 
 
 class SocketCanBus(SupervisedBus):

@@ -82,5 +82,5 @@ def named(image: ProcessImage, inputs: Sequence[int]) -> str:
 
 def adopted(image: ProcessImage, count: int, unread: Collection[int]) -> str:
     """What an adoption came to: `58 variables; not readable: a, b and 3 more`."""
-    counted = f"{count} variable" if count == 1 else f"{count} variables"
+    counted = f"{count or 'no'} {'variable' if count == 1 else 'variables'}"
     return counted + (f"; not readable: {named(image, sorted(unread))}" if unread else "")

@@ -194,7 +194,7 @@ class TrafficDecoder:
 
     def words(self, data: bytes, peer: str, *, outgoing: bool) -> str:
         """One passage in words, on one line. Never raises, whatever the bytes are."""
-        return f"{len(data)} bytes: {data[:16].hex(' ')}" + (" ..." if len(data) > 16 else "")
+        return f"length {len(data)}: {data[:16].hex(' ')}" + (" ..." if len(data) > 16 else "")
 
 
 # -- runtime -----------------------------------------------------------------------------------------------------

@@ -114,11 +114,11 @@ def fault(pdu: bytes) -> str:
         head = 10 if function == _READ_WRITE else 6
         size = (written.quantity + 7) >> 3 if written.area.of_bits else 2 * written.quantity
         if len(pdu) < head or pdu[head - 1] != size or len(pdu) != head + size:
-            return f"its data is not the {size} bytes that quantity {written.quantity} needs"
+            return f"its data does not fit quantity {written.quantity}, which needs length {size}"
     elif function in _MOST_WRITTEN:
-        return f"only {len(pdu)} bytes"
+        return f"too short, length {len(pdu)}"
     if function in _FIXED and len(pdu) != _FIXED[function]:
-        return f"{len(pdu)} bytes instead of {_FIXED[function]}"
+        return f"length {len(pdu)} instead of {_FIXED[function]}"
     if function == 5 and _word(pdu, 3) not in (0, _COIL_ON):
         return f"a coil is written with 0 or FF00h, not with {_word(pdu, 3):04X}h"
     return ""

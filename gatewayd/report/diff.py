@@ -99,8 +99,7 @@ class Changes:
         for kind in ChangeKind:
             count = len(self.of(kind))
             if count:
-                noun = "" if parts else " variable" if count == 1 else " variables"
-                parts.append(f"{count}{noun} {kind.name.lower()}")
+                parts.append(f"{count if parts else counted(count, 'variable')} {kind.name.lower()}")
         for noun, differences in (("writer", self.writers), ("group", self.groups)):
             if differences:
                 parts.append(f"{noun} {', '.join(difference.name for difference in differences)} changed")
@@ -175,7 +174,8 @@ def objections(
     if gone > MAX_GONE * before:
         found.append(
             Objection(
-                ObjectionKind.GONE, f"{gone} of {before} variables would be gone: is it the right file?"
+                ObjectionKind.GONE,
+                f"{gone} of {counted(before, 'variable')} would be gone: is it the right file?",
             )
         )
     return tuple(found)

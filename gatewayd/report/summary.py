@@ -29,8 +29,14 @@ def summary(cells: Sequence[tuple[Cell, CellVerdict]], troubles: Iterable[str] =
         if more > 0:
             parts.append(f"{counted(more, 'more cell')} with trouble")
         if well:
-            parts.append(f"{'all' if not ill else 'the other'} {counted(len(well), 'cell')} well")
+            parts.append(_others(len(well), all_of_them=not ill))
     return "; ".join(parts) or "no cell to serve"
+
+
+def _others(well: int, *, all_of_them: bool) -> str:
+    if all_of_them:
+        return f"all {counted(well, 'cell')} well"
+    return f"the other {counted(well, 'cell')} well" if well > 1 else "the other cell well"
 
 
 def _cell(cell: Cell, verdict: CellVerdict) -> str:

@@ -201,7 +201,9 @@ def _of_gateway(cell: Cell, now: float) -> Iterator[_Finding]:
     held = cell.ownership.held_by(OPERATOR)
     if held:
         names = [cell.definition.locks[lock].name for lock in held]
-        yield _Finding(Level.WARN, f"locks held by the local operator: {listed(names, _LISTED)}")
+        yield _Finding(
+            Level.WARN, f"{counted(len(names), 'lock')} held by the local operator: {listed(names, _LISTED)}"
+        )
     differed = cell.events.latest.get(EventKind.READ_BACK_DIFFERS)
     if differed is not None and now - differed.time <= RECENT and differed.detail:
         level, ago = _past(now - differed.time)

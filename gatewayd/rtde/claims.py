@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from types import MappingProxyType
 
+from gatewayd.report.format import counted
 from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.rtde.messages import ERROR_WORDS, IN_USE, InputsSetup, SetupInputs
 from gatewayd.rtde.recipe import Recipe
@@ -69,7 +70,7 @@ def sort_types(names: Sequence[str], words: Sequence[str]) -> tuple[list[DataTyp
     A type word that we do not know counts as not available. HandshakeError if the numbers differ.
     """
     if len(words) != len(names):
-        msg = f"the controller answered {len(words)} types for {len(names)} fields"
+        msg = f"the controller answered {counted(len(words), 'type')} for {counted(len(names), 'field')}"
         raise HandshakeError(msg)
     types: list[DataType] = []
     refused: dict[str, str] = {}

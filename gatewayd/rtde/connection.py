@@ -8,6 +8,7 @@ import struct
 from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar, Protocol, cast
 
+from gatewayd.report.format import counted
 from gatewayd.rtde.claims import HandshakeError, InputRecipe
 from gatewayd.rtde.codec import ClientProtocol, ProtocolError
 from gatewayd.rtde.lists import ListOutcome
@@ -311,7 +312,7 @@ class Connection(asyncio.Protocol):
             if package.recipe != recipe:
                 reason = f"data package of recipe {package.recipe} where {recipe} was agreed"
             elif length != size:
-                reason = f"data package with {length} bytes of values where the recipe has {size}"
+                reason = f"data package with {counted(length, 'byte')} of values, the recipe has {size}"
             else:
                 continue
             self._pass_over(StrangePackage(Oddity.RECIPE, PackageType.DATA_PACKAGE, reason))
@@ -381,7 +382,8 @@ class Connection(asyncio.Protocol):
         waiting = transport.get_write_buffer_size()
         if waiting > self._settings.write_buffer:
             self._fail(
-                LossReason.CONGESTED, f"the controller does not take what is sent: {waiting} bytes wait"
+                LossReason.CONGESTED,
+                f"the controller does not take what is sent: {counted(waiting, 'byte')} waiting",
             )
 
     def _request(self, message: ExecutableMessage) -> None:

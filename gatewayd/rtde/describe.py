@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 
+from gatewayd.report.format import counted
 from gatewayd.rtde import messages, payloads
 from gatewayd.rtde.messages import PackageType, TextLevel
 from gatewayd.rtde.recipe import Recipe
@@ -105,7 +106,7 @@ def _text(message: object) -> str:
     match message:
         case messages.DataPackage(recipe, payload):
             named = "" if recipe is None else f" of recipe {recipe}"
-            return f"data{named}, {len(payload)} bytes"
+            return f"data{named}, {counted(len(payload), 'byte')}"
         case messages.TextMessage(text, source, level):
             known = TextLevel(level).name.lower() if level in set(TextLevel) else f"level {level}"
             return f"text ({known})" + (f" of {source}" if source else "") + f": {text}"
@@ -161,4 +162,8 @@ def _list(names: tuple[str, ...]) -> str:
 
 
 def _bytes(data: bytes) -> str:
-    return f"{len(data)} bytes: {data[:_BYTES].hex(' ')}" + (" ..." if len(data) > _BYTES else "")
+    return (
+        counted(len(data), "byte")
+        + (f": {data[:_BYTES].hex(' ')}" if data else "")
+        + (" ..." if len(data) > _BYTES else "")
+    )

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from enum import Enum, auto
 from typing import ClassVar, NamedTuple
 
+from gatewayd.report.format import counted
 from gatewayd.rtde import messages
 from gatewayd.rtde.claims import REFUSED, Claims, HandshakeError, is_long, sort_types
 from gatewayd.rtde.fields import Series
@@ -340,7 +341,9 @@ class Negotiation:
 
     def _piece_answered(self, reply: messages.OutputsSetup) -> NextStep:
         if len(reply.types) != len(self._asked):
-            return self._give_up_piece(f"{len(reply.types)} types for {len(self._asked)} fields of a reading")
+            return self._give_up_piece(
+                f"{counted(len(reply.types), 'type')} for {counted(len(self._asked), 'field')} of a reading"
+            )
         types, refused = sort_types(self._asked, reply.types)
         if refused:
             self._reading.refused |= refused
@@ -420,7 +423,7 @@ class Negotiation:
         self.claims.answer(reply)
         self.took_long_list |= bool(reply.recipe) and is_long(asked)
         given = len(reply.types)
-        return f"{given} types for {len(asked)} inputs" if given != len(asked) else ""
+        return f"{counted(given, 'type')} for {counted(len(asked), 'input')}" if given != len(asked) else ""
 
     def _go(
         self, state: State, send: messages.ExecutableMessage | None, event: Notice | None = None

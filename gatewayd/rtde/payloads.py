@@ -11,6 +11,7 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING, TypeVar
 
+from gatewayd.report.format import counted
 from gatewayd.rtde import messages
 from gatewayd.rtde.messages import ControllerMessage, ExecutableMessage, PackageType, TextMessage
 
@@ -41,7 +42,7 @@ class MalformedPayloadError(Exception):
 
 def _at_least(payload: bytes, size: int) -> None:
     if len(payload) < size:
-        msg = f"payload of {len(payload)} bytes where at least {size} belong"
+        msg = f"payload of {counted(len(payload), 'byte')}, at least {size} expected"
         raise MalformedPayloadError(msg)
 
 
@@ -51,7 +52,7 @@ def _fixed(size: int, decode: Callable[[bytes], _Message]) -> Callable[[bytes], 
     def decode_fixed(payload: bytes) -> _Message:
         if len(payload) == size:
             return decode(payload)
-        msg = f"payload of {len(payload)} bytes where {size} belong"
+        msg = f"payload of {counted(len(payload), 'byte')}, {size} expected"
         raise MalformedPayloadError(msg, decode(payload[:size]) if len(payload) > size else None)
 
     return decode_fixed
@@ -85,7 +86,7 @@ def _decode_text(payload: bytes) -> TextMessage:
         raise MalformedPayloadError(msg, _as_v1(payload))
     text = TextMessage(_text(payload[1:end]), _text(payload[end + 1 : level]), payload[level])
     if level + 1 != len(payload):
-        msg = f"{len(payload) - level - 1} bytes behind the level"
+        msg = f"{counted(len(payload) - level - 1, 'byte')} after the level"
         raise MalformedPayloadError(msg, _as_v1(payload) or text)
     return text
 

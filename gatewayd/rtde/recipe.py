@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING
 
+from gatewayd.report.format import counted
 from gatewayd.rtde.codec import ProtocolError
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ class Recipe:
 
     def __init__(self, names: Sequence[str], types: Sequence[DataType]) -> None:
         if len(names) != len(types):
-            msg = f"{len(names)} names but {len(types)} types"
+            msg = f"{counted(len(names), 'name')} but {counted(len(types), 'type')}"
             raise ValueError(msg)
         self.names = tuple(names)
         self.types = tuple(types)
@@ -53,7 +54,9 @@ class Recipe:
         try:
             return self._struct.unpack(payload)
         except struct.error:
-            reason = f"data package with {len(payload)} bytes of values where the recipe has {self.size}"
+            reason = (
+                f"data package with {counted(len(payload), 'byte')} of values, the recipe has {self.size}"
+            )
             raise ProtocolError(reason, min(len(payload), self.size), payload, within="payload") from None
 
     def pack(self, values: Sequence[Scalar]) -> bytes:
@@ -65,7 +68,7 @@ class Recipe:
 
     def _complaint(self, values: Sequence[Scalar]) -> str:
         if len(values) != self.count:
-            return f"{len(values)} values for a recipe of {self.count}"
+            return f"{counted(len(values), 'value')} for a recipe of {self.count}"
         for name, kind in self.kinds.items():
             for value in values[self.slots[name]]:
                 try:

@@ -12,6 +12,7 @@ from gatewayd.logs.records import fields
 from gatewayd.mapping.compiled import PATTERNS, CompiledFile, files_of
 from gatewayd.mapping.diagnostics import Severity
 from gatewayd.mapping.plan import Plan
+from gatewayd.report.format import counted
 from gatewayd.report.schema import taken_names
 from gatewayd.service.compilation import Compilation
 
@@ -41,7 +42,7 @@ class Startup:
     def notes(self) -> list[str]:
         """What the service manager shows until a reload mends it."""
         count = self.broken + self.unreadable
-        return [f"{count} mapping file{'s' if count > 1 else ''} not served, see the log"] if count else []
+        return [f"{counted(count, 'mapping file')} not served, see the log"] if count else []
 
 
 def mapping_files(paths: Iterable[Path]) -> list[Path]:

@@ -27,6 +27,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from gatewayd.report.format import counted
 from gatewayd.rtde.catalogue import bit_word
 from gatewayd.rtde.fields import BITS_PER_WORD
 
@@ -173,7 +174,7 @@ class _Statement:
         column = self._column()
         inputs = self._references("a source")
         if len(inputs) != count:
-            raise self._error(f"{count} targets, but {len(inputs)} sources", column)
+            raise self._error(f"{counted(count, 'target')}, but {counted(len(inputs), 'source')}", column)
         return inputs
 
     def _references(self, wanted: str) -> list[FieldReference]:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from operator import itemgetter
 from weakref import WeakValueDictionary
 
+from gatewayd.report.format import counted
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import INTEGER_RANGES, DataType
 from gatewayd.simulator.arm import ControllerMoment, Vector
@@ -91,7 +92,7 @@ class FieldStore:
         """Set a field; ValueError unless there is one element for each of its type."""
         kind = self._types[name]
         if len(values) != kind.count:
-            message = f"{name} takes {kind.count} values, not {len(values)}"
+            message = f"{name} takes {counted(kind.count, 'value')}, not {len(values)}"
             raise ValueError(message)
         self.cells[self._places[name]] = [fitting(value, kind.code) for value in values]
         self.edition += 1

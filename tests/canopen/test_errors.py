@@ -16,7 +16,7 @@ def test_controller_report_with_counters() -> None:
     assert error.classes == ErrorClass.CONTROLLER | ErrorClass.COUNTERS
     assert error.controller == ControllerFlags.RX_WARNING | ControllerFlags.TX_WARNING
     assert (error.tx_errors, error.rx_errors) == (100, 120)
-    assert str(error) == "controller, rx warning, tx warning, 100 transmit and 120 receive errors"
+    assert str(error) == "controller, rx warning, tx warning, transmit errors: 100, receive errors: 120"
 
 
 def test_counters_of_old_kernels_are_not_announced() -> None:

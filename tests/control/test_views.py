@@ -154,7 +154,7 @@ class TestProblems:
         assert press.cell.operator.force(SPEED, 1.0, 0.0, 9.0) is None
         assert problems(press, 0.0) == [
             "forced by the local operator: speed",
-            "locks held by the local operator: motion",
+            "1 lock held by the local operator: motion",
         ]
 
     def test_a_writer_that_was_there_but_not_one_that_never_came(self, press: Served) -> None:

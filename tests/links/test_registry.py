@@ -62,5 +62,5 @@ def test_every_kind_has_a_decoder_of_its_own() -> None:
 def test_a_kind_need_not_offer_a_tap() -> None:
     Link().trace(lambda _passage: None)
     SharedPart().trace(None)
-    assert TrafficDecoder().words(b"\1\2", "", outgoing=True) == "2 bytes: 01 02"
+    assert TrafficDecoder().words(b"\1\2", "", outgoing=True) == "length 2: 01 02"
     assert TrafficDecoder().words(bytes(20), "", outgoing=True).endswith("00 ...")

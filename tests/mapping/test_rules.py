@@ -521,7 +521,7 @@ def test_the_number_of_missing_cob_ids_comes_with_free_ones() -> None:
     assert [(one.rule.id, one.message, one.hint) for one in found] == [
         (
             "GW409",
-            "1 of 5 PDOs towards the robot have no COB-ID: four are predefined, and none declared",
+            "1 of 5 PDOs towards the robot has no COB-ID: four are predefined, and none declared",
             "add `cob_ids: {rpdo: 0x685}` if nobody else uses them",
         ),
         (

@@ -224,13 +224,13 @@ GOOD = messages.StartReply(True)
 ODD = [
     ("0003 52", Oddity.UNKNOWN_TYPE, 82, "unknown package type 82", ()),
     ("0009 00 010203040506", Oddity.UNKNOWN_TYPE, 0, "unknown package type 0", ()),
-    ("0005 53 0101", Oddity.LAYOUT, 83, "START with payload of 2 bytes where 1 belong", (GOOD,)),
-    ("0003 53", Oddity.LAYOUT, 83, "START with payload of 0 bytes where 1 belong", ()),
+    ("0005 53 0101", Oddity.LAYOUT, 83, "START with payload of 2 bytes, 1 expected", (GOOD,)),
+    ("0003 53", Oddity.LAYOUT, 83, "START with payload of no bytes, 1 expected", ()),
     (
         "0014 76 00000005 0000000c 00000000 0000044d 00",
         Oddity.LAYOUT,
         118,
-        "GET_URCONTROL_VERSION with payload of 17 bytes where 16 belong",
+        "GET_URCONTROL_VERSION with payload of 17 bytes, 16 expected",
         (messages.ControllerVersion(5, 12, 0, 1101),),
     ),
     (
@@ -244,12 +244,12 @@ ODD = [
         "0009 4d 01 61 01 62 02 ff",
         Oddity.LAYOUT,
         77,
-        "TEXT_MESSAGE with 1 bytes behind the level",
+        "TEXT_MESSAGE with 1 byte after the level",
         (messages.TextMessage("a", "b", 2),),
     ),
     ("0007 4d ff 61 61 61", Oddity.LAYOUT, 77, "TEXT_MESSAGE with message length 255 reaches", ()),
     ("0003 49", Oddity.LAYOUT, 73, "SETUP_INPUTS with no recipe id", (messages.InputsSetup(0, ()),)),
-    ("0003 55", Oddity.LAYOUT, 85, "DATA_PACKAGE with payload of 0 bytes where at least 1 belong", ()),
+    ("0003 55", Oddity.LAYOUT, 85, "DATA_PACKAGE with payload of no bytes, at least 1 expected", ()),
 ]
 
 

@@ -164,15 +164,19 @@ async def test_bytes_that_cannot_be_cut_into_packages_end_the_connection(
 ODD = {
     "unknown type": (b"\x00\x05\xff\x00\x00", Oddity.UNKNOWN_TYPE, "unknown package type 255"),
     "properties": (b"\x00\x03\x52", Oddity.UNKNOWN_TYPE, "unknown package type 82"),
-    "data too short": (b"\x00\x05\x55\x01\x00", Oddity.RECIPE, "data package with 1 bytes of values where"),
+    "data too short": (
+        b"\x00\x05\x55\x01\x00",
+        Oddity.RECIPE,
+        "data package with 1 byte of values, the recipe",
+    ),
     "data too long": (
         b"\x00\x0d\x55\x01" + bytes(9),
         Oddity.RECIPE,
-        "data package with 9 bytes of values where",
+        "data package with 9 bytes of values, the recipe",
     ),
     "data of another recipe": (b"\x00\x0c\x55\x02" + bytes(8), Oddity.RECIPE, "recipe 2 where 1 was agreed"),
-    "data without a recipe": (b"\x00\x03\x55", Oddity.LAYOUT, "DATA_PACKAGE with payload of 0 bytes"),
-    "trailing byte": (b"\x00\x05\x53\x01\x00", Oddity.LAYOUT, "START with payload of 2 bytes where 1 belong"),
+    "data without a recipe": (b"\x00\x03\x55", Oddity.LAYOUT, "DATA_PACKAGE with payload of no bytes"),
+    "trailing byte": (b"\x00\x05\x53\x01\x00", Oddity.LAYOUT, "START with payload of 2 bytes, 1 expected"),
     "text of version 1": (b"\x00\x0a\x4d\x03legacy", Oddity.LAYOUT, "TEXT_MESSAGE with source length 97"),
     "pause": (b"\x00\x04\x50\x01", Oddity.UNEXPECTED, "PauseReply while data was awaited"),
     "inputs": (b"\x00\x08\x49\x01BOOL", Oddity.UNEXPECTED, "InputsSetup while data was awaited"),

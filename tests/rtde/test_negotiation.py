@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gatewayd.report.format import counted
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.claims import HandshakeError
 from gatewayd.rtde.fields import Series
@@ -170,7 +171,7 @@ def test_a_refused_start_ends_the_talk() -> None:
         ((m.ProtocolVersionReply(False),) * 2, "neither protocol version 2 nor 1"),
         ((*TO_OUTPUTS, m.OutputsSetup(0, ("NOT_FOUND",) * 3)), "none of the wanted outputs"),
         ((*TO_OUTPUTS, m.OutputsSetup(0, ("DOUBLE", "INT32", "INT32"))), "without naming a field"),
-        ((*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",))), "1 types for 3 fields"),
+        ((*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",))), "1 type for 3 fields"),
     ],
 )
 def test_what_ends_the_talk(replies: Sequence[m.ControllerMessage], words: str) -> None:
@@ -204,7 +205,7 @@ def test_a_claim_answered_with_too_many_or_no_types_is_refused_and_asked_again(
     words: tuple[str, ...],
 ) -> None:
     negotiation, steps = talk(WISHES, (*TO_INPUTS, m.InputsSetup(1, words)))
-    assert steps[-1] == NextStep(m.Start(), strange=f"{len(words)} types for 1 inputs")
+    assert steps[-1] == NextStep(m.Start(), strange=f"{counted(len(words), 'type')} for 1 input")
     negotiation.handle(m.StartReply(True))
     assert [(one.field, one.word) for one in negotiation.session().unavailable] == [
         ("input_int_register_0", "REFUSED")
@@ -220,7 +221,7 @@ PIECE = m.OutputsSetup(1, ("INT32",))
 @pytest.mark.parametrize(
     "answers, words",
     [
-        ((m.OutputsSetup(1, ()),), "0 types for 1 fields of a reading"),
+        ((m.OutputsSetup(1, ()),), "no types for 1 field of a reading"),
         ((m.OutputsSetup(0, ("INT32",)),), "a refused reading without a word for any field"),
         ((PIECE, m.StartReply(False)), "a refused start of a reading"),
     ],

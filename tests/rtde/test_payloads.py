@@ -19,19 +19,19 @@ def test_every_package_type_is_decoded_in_both_directions_and_versions() -> None
 @pytest.mark.parametrize(
     "kind, payload, words",
     [
-        (PackageType.REQUEST_PROTOCOL_VERSION, "", "0 bytes where 1 belong"),
-        (PackageType.REQUEST_PROTOCOL_VERSION, "0102", "2 bytes where 1 belong"),
-        (PackageType.GET_URCONTROL_VERSION, "000000050000", "6 bytes where 16 belong"),
+        (PackageType.REQUEST_PROTOCOL_VERSION, "", "no bytes, 1 expected"),
+        (PackageType.REQUEST_PROTOCOL_VERSION, "0102", "2 bytes, 1 expected"),
+        (PackageType.GET_URCONTROL_VERSION, "000000050000", "6 bytes, 16 expected"),
         (PackageType.TEXT_MESSAGE, "0000", "source length 0 does not fit"),
         (PackageType.TEXT_MESSAGE, "", "no payload"),
         (PackageType.TEXT_MESSAGE, "036162", "reaches beyond"),
         (PackageType.TEXT_MESSAGE, "01610262", "source length 2 does not fit"),
-        (PackageType.TEXT_MESSAGE, "0161016202ff", "1 bytes behind the level"),
+        (PackageType.TEXT_MESSAGE, "0161016202ff", "1 byte after the level"),
         (PackageType.DATA_PACKAGE, "", "at least 1"),
         (PackageType.SETUP_OUTPUTS, "", "no recipe id"),
         (PackageType.SETUP_INPUTS, "", "no recipe id"),
-        (PackageType.START, "", "0 bytes where 1 belong"),
-        (PackageType.PAUSE, "0101", "2 bytes where 1 belong"),
+        (PackageType.START, "", "no bytes, 1 expected"),
+        (PackageType.PAUSE, "0101", "2 bytes, 1 expected"),
     ],
 )
 def test_what_a_controller_cannot_send_is_refused(kind: PackageType, payload: str, words: str) -> None:

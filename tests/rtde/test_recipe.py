@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gatewayd.report.format import counted
 from gatewayd.rtde.codec import ProtocolError
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import DataType
@@ -83,7 +84,7 @@ def test_not_a_number_and_infinity_pass() -> None:
 
 @pytest.mark.parametrize("length", [0, 7, 9, 100])
 def test_a_payload_of_another_length_is_a_protocol_error(length: int) -> None:
-    with pytest.raises(ProtocolError, match=f"{length} bytes of values where the recipe has 8"):
+    with pytest.raises(ProtocolError, match=f"{counted(length, 'byte')} of values, the recipe has 8"):
         Recipe(["timestamp"], [DataType.DOUBLE]).unpack(bytes(length))
 
 
@@ -92,7 +93,7 @@ def test_a_payload_of_another_length_is_a_protocol_error(length: int) -> None:
     [
         ([1, 2**31], r"b is INT32 and cannot hold 2147483648"),
         ([256, 0], r"a is UINT8 and cannot hold 256"),
-        ([1], r"1 values for a recipe of 2"),
+        ([1], r"1 value for a recipe of 2"),
         (["x", 0], r"a is UINT8 and cannot hold 'x'"),
     ],
 )
@@ -102,7 +103,7 @@ def test_what_cannot_be_packed_is_named(values: list[Any], words: str) -> None:
 
 
 def test_names_and_types_must_pair_up() -> None:
-    with pytest.raises(ValueError, match="2 names but 1 types"):
+    with pytest.raises(ValueError, match="2 names but 1 type"):
         Recipe(["a", "b"], [DataType.BOOL])
 
 

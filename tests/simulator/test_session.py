@@ -261,9 +261,9 @@ def test_what_is_not_laid_out_as_its_type_says_is_complained_of_and_costs_no_con
     peer = Peer(Controller())
     peer.ask(SetupOutputs(("timestamp",), 0.0))
     short, long = bytes.fromhex("0004 4f 00"), bytes.fromhex("0004 53 00")
-    assert text(peer.answers(peer.session.receive(short))).startswith("SETUP_OUTPUTS with payload of 1 bytes")
+    assert text(peer.answers(peer.session.receive(short))).startswith("SETUP_OUTPUTS with payload of 1 byte")
     complaint, started = peer.answers(peer.session.receive(long))
-    assert text([complaint]) == "START with payload of 1 bytes where 0 belong"
+    assert text([complaint]) == "START with payload of 1 byte, 0 expected"
     assert started == StartReply(accepted=True)
 
 

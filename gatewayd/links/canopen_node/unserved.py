@@ -12,6 +12,7 @@ from gatewayd.canopen.sdo.server import SdoAbort
 from gatewayd.core.cell import Cell
 from gatewayd.core.requester import Requester
 from gatewayd.core.unserved import Unserved
+from gatewayd.report.format import counted
 
 SDO_LENGTH = 8
 """Bytes of every SDO frame."""
@@ -66,7 +67,7 @@ class UnservedFrames:
         """Whether a frame to the SDO server is as long as those of SDO; another one is reported."""
         length = len(frame.data)
         if length != SDO_LENGTH and not frame.remote:
-            text = f"sent an SDO frame of {length} bytes instead of {SDO_LENGTH}"
+            text = f"sent an SDO frame of {counted(length, 'byte')} instead of {SDO_LENGTH}"
             self._report(self._client, Unserved.MALFORMED, text)
         return length == SDO_LENGTH
 
@@ -76,7 +77,7 @@ class UnservedFrames:
             text = f"sent NMT command {data[0]}, which is not known"
             self._report(_NMT_MASTER, Unserved.NO_SUCH_FUNCTION, text)
         else:
-            text = f"sent an NMT frame of {len(data)} bytes instead of 2"
+            text = f"sent an NMT frame of {counted(len(data), 'byte')} instead of 2"
             self._report(_NMT_MASTER, Unserved.MALFORMED, text)
 
     def _report(self, requester: Requester, reason: Unserved, text: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from gatewayd.links.contract import Medium, TrafficDecoder
+from gatewayd.report.format import counted
 from gatewayd.rtde.describe import MessageStream, Recipes, package_text
 
 
@@ -23,7 +24,7 @@ class RtdeTraffic(TrafficDecoder):
         packages = self._streams[peer, outgoing].feed(data)
         recipes = self._recipes[peer]
         texts = [package_text(package, recipes, from_controller=not outgoing) for package in packages]
-        return "; ".join(texts) or f"the beginning of a message, {len(data)} bytes"
+        return "; ".join(texts) or f"the beginning of a message, {counted(len(data), 'byte')}"
 
 
 DECODER = RtdeTraffic

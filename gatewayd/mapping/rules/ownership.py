@@ -12,6 +12,7 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock
 from gatewayd.mapping.model import ANY, Group, VariableSpec
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.writers import is_supervised
+from gatewayd.report.format import counted
 from gatewayd.report.wording import alternatives, did_you_mean, seconds
 
 _MIN_LEASE = 0.1
@@ -26,7 +27,7 @@ def no_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         return
     inputs = [variable for variable in cell.variables if variable.direction is Direction.INPUT]
     if inputs:
-        more = f" and {len(inputs) - 1} more input{'s' if len(inputs) > 2 else ''}" if len(inputs) > 1 else ""
+        more = f" and {counted(len(inputs) - 1, 'more input')}" if len(inputs) > 1 else ""
         message = f"nobody can write `{inputs[0].name}`{more}: the file declares no writers"
         having = [language for language in languages() if language.writer_keys is not None]
         here = [language for language in having if language.key in cell.document.sections]

@@ -61,7 +61,7 @@ def texts(cell: Cell) -> list[str]:
             Unserved.NO_SUCH_FUNCTION,
             "undeclared peer NMT master sent NMT command 7, which is not known",
         ),
-        (0, "01", Unserved.MALFORMED, "undeclared peer NMT master sent an NMT frame of 1 bytes instead of 2"),
+        (0, "01", Unserved.MALFORMED, "undeclared peer NMT master sent an NMT frame of 1 byte instead of 2"),
         (0x205, "01 02", Unserved.MALFORMED, "line sent RPDO 1 with 2 bytes instead of 4: dropped"),
         (
             0x205,

@@ -77,7 +77,7 @@ def texts(cell: Cell) -> list[str]:
         (
             "10 000a 0002 02 0001",
             Unserved.MALFORMED,
-            "plc asked for function 16 (write registers): its data is not the 4 bytes that quantity 2 needs",
+            "plc asked for function 16 (write registers): its data does not fit quantity 2, which needs length 4",
         ),
         (
             "17 0063 0001 000a 0001 02 0009",

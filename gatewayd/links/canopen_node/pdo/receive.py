@@ -32,6 +32,7 @@ from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.core.unserved import Unserved
 from gatewayd.links.canopen_node.pdo.parameters import Configuration
+from gatewayd.report.format import counted
 
 
 class Fault(Enum):
@@ -268,7 +269,7 @@ class ReceiveEngine:
     def _report_length(
         self, pdo: ReceivePdo, length: int, what: str, now: float, requester: Requester
     ) -> None:
-        text = f"sent RPDO {pdo.configuration.number} with {length} bytes instead of {pdo.size}: {what}"
+        text = f"sent RPDO {pdo.configuration.number} with {counted(length, 'byte')} instead of {pdo.size}: {what}"
         self._cell.unserved(requester, Unserved.MALFORMED, text, now)
 
     def _write(self, pdo: ReceivePdo, data: bytes, now: float, requester: Requester) -> None:

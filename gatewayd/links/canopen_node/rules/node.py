@@ -25,6 +25,7 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.model import WriterSpec
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.mapping.rules.writers import known_by, ways_of, ways_of_variable
+from gatewayd.report.format import counted
 from gatewayd.report.wording import number, one_and_more, seconds
 
 _REAL32_DIGITS = 2**24
@@ -136,7 +137,7 @@ def narrow_canopen_type(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> It
             text = f"{placed.plan.type_text} shows {number(low)} to {number(high)}"
             hint = "use a wider type, or state the range with `limits: [least, greatest]`"
         elif variable.kind is ValueKind.FLOAT and 0 < steps < _MIN_STEPS:
-            text = f"{placed.plan.type_text} leaves {number(int(steps) + 1)} values of it"
+            text = f"{placed.plan.type_text} leaves {counted(int(steps) + 1, 'value')} of it"
             hint = "use a finer scale"
         else:
             continue

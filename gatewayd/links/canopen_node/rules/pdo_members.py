@@ -10,6 +10,7 @@ from gatewayd.links.canopen_node.rules.registry import first_at_each_place, node
 from gatewayd.links.canopen_node.sections import AUTO, NO_PDO, CanopenPlaces, CanopenWriter, PdoSpec
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedLock, ExpandedVariable
+from gatewayd.report.format import counted
 from gatewayd.report.wording import did_you_mean
 
 
@@ -73,7 +74,7 @@ def unknown_pdo_variable(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> I
             count = len(family)
             message = f"the PDO `{wrong.pdo}` names `{wrong.text}`, and `{name}` "
             single = count == 1 and family[0].member is None
-            message += "is a single variable" if single else f"has {count} members"
+            message += "is a single variable" if single else f"has {counted(count, 'member')}"
             hint = f"write `{name}`" if single else f"write `{name}[0..{count - 1}]` or less"
         else:
             message = f"the PDO `{wrong.pdo}` names `{wrong.text}`, which is no variable of this file"

@@ -15,6 +15,7 @@ from gatewayd.links.canopen_node.pdo_layout import PDO_BITS, PDO_NUMBERS
 from gatewayd.links.canopen_node.rules.registry import first_at_each_place, node_rule
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
+from gatewayd.report.format import verb
 from gatewayd.report.wording import cob, seconds
 
 _UNUSED = range(0x680, 0x6E0)
@@ -138,7 +139,7 @@ def too_few_cob_ids(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterat
         declared = getattr(node.part.spec.cob_ids, key)
         total = sum(map(len, declared)) or "none"
         message = (
-            f"{missing} of {len(pdos)} PDOs {_WORDS[direction]} have no COB-ID: "
+            f"{missing} of {len(pdos)} PDOs {_WORDS[direction]} {verb('have', count=missing)} no COB-ID: "
             f"four are predefined, and {total} declared"
         )
         hint = "use REAL32, or keep variables out of PDOs with `canopen: object`"

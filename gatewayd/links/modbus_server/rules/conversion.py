@@ -13,6 +13,7 @@ from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.modbus.codec import TYPES, Codec, turns
+from gatewayd.report.format import counted
 from gatewayd.report.wording import number
 
 _FLOAT_DIGITS = {"float32": 1 << 24, "float64": 1 << 53}
@@ -96,7 +97,7 @@ def _loss(placement: ExpandedPlacement, bounds: tuple[float, float]) -> tuple[st
         )
     steps = span / abs(placement.scale)
     if placement.spec.scale is not None and steps < _MIN_STEPS:
-        text = f"scale {number(placement.scale)} leaves {number(int(steps) + 1)} values of it to {form}"
+        text = f"scale {number(placement.scale)} leaves {counted(int(steps) + 1, 'value')} of it to {form}"
         return text, f"robot value = raw * scale: use a finer scale such as {number(_fine(span))}"
     return None
 
@@ -143,7 +144,7 @@ def coarse_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         steps = span / abs(placement.scale)
         if 0 < steps < _MIN_STEPS:
             message = (
-                f"the scale {number(placement.scale)} leaves {number(int(steps) + 1)} values of "
+                f"the scale {number(placement.scale)} leaves {counted(int(steps) + 1, 'value')} of "
                 f"`{placement.variable.name}` between {number(limits[0])} and {number(limits[1])}"
             )
             hint = f"robot value = raw * scale: use a finer scale such as {number(_fine(span))}"

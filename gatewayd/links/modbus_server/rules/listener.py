@@ -11,6 +11,7 @@ from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.document import Part
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
+from gatewayd.report.format import counted
 
 _LOOPBACK = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
 _EXAMPLES = {4: "192.168.1.2:502", 6: "[fd00::2]:502"}
@@ -152,10 +153,8 @@ def too_few_connections(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[D
     for listen, modbus in widest.items():
         connections, needed = modbus.spec.connections, len(peers[listen])
         if connections <= needed:
-            message = (
-                f"{listen} has {connections} {'connection' if connections == 1 else 'connections'}, "
-                f"and {needed} addresses of writers that one is kept for"
-            )
+            has = counted(connections, "connection")
+            message = f"{listen} has {has}, and keeps one for each writer's address: {needed}"
             hint = f"write `connections: {needed + 4}` or more, for a second connection and for those that only read"
             yield rule.at(modbus.at("connections"), message, hint=hint)
 
