@@ -335,6 +335,13 @@ class SharedPart:
         """Have ready what these plans need besides what there is. Raises PrepareError."""
         raise NotImplementedError
 
+    def disturbs(self, plans: Sequence[Plan]) -> Iterable[tuple[Cell, Objection]]:
+        """What other plans would take from who uses it, each with the cell that it concerns. Changes nothing.
+
+        A cell may lose something here though its own plan stays as it is: another one comes beside it.
+        """
+        return ()
+
     def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
         """Serve these links from now on, and no others. `successors` are cells that took the place of another one."""
         raise NotImplementedError

@@ -255,6 +255,8 @@ class Reloader:
                 found += (CellObjection(name, each) for each in objections_of_change(runtimes[name], changes))
         for name in sorted(runtimes.keys() - {plan.cell.name for plan in plans}):
             found += (CellObjection(name, each) for each in objections_of_removal(runtimes[name]))
+        disturbed = self._daemon.shared.disturbs(plans)
+        found += (CellObjection(cell.definition.name, each) for cell, each in disturbed)
         return tuple(found)
 
     async def _settle(self) -> None:

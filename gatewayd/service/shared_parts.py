@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Iterator, Mapping, Sequence
 
 from gatewayd.core.cell import Cell
+from gatewayd.core.objection import Objection
 from gatewayd.links.contract import Prepared, PrepareError, SharedPart
 from gatewayd.links.registry import runtime_of
 from gatewayd.mapping.plan import Plan
@@ -54,6 +55,10 @@ class SharedParts:
     def troubles(self) -> list[str]:
         """What concerns the gateway as a whole."""
         return [trouble for part in self for trouble in part.troubles()]
+
+    def disturbs(self, plans: Sequence[Plan]) -> Iterator[tuple[Cell, Objection]]:
+        """What these plans would take from who uses the parts, each with the cell that it concerns."""
+        return (found for part in self for found in part.disturbs(plans))
 
     async def prepare(self, plans: Sequence[Plan]) -> AllPrepared:
         """Have ready what these plans need. Raises PrepareError, and nothing has changed."""

@@ -137,7 +137,7 @@ ROWS: dict[str, list[Row]] = {
         row("modbus.allow", ["127.0.0.0/8"]),
         row("modbus.allow", ["127.0.0.0/8"], "weakening", given={"modbus.allow": ["127.0.0.1", "127.0.0.3"]}),
         row("modbus.default_unit", True),
-        row("modbus.default_unit", False, "release", LINE, given={"modbus.default_unit": True}),
+        row("modbus.default_unit", False, given={"modbus.default_unit": True}),  # a sole cell is it anyway
         row("modbus.connections", 2),
         row("modbus.connections_per_peer", 1),
         row("modbus.idle_timeout", "1s"),

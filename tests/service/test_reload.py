@@ -184,10 +184,10 @@ async def read(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, addre
 
 
 async def write(
-    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, address: int, value: int
+    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, address: int, value: int, unit: int = 1
 ) -> bytes:
     """Function 16 with an int32: the function code, or that and the exception."""
-    writer.write(struct.pack(">HHHBBHHBi", 7, 0, 11, 1, 16, address, 2, 4, value))
+    writer.write(struct.pack(">HHHBBHHBi", 7, 0, 11, unit, 16, address, 2, 4, value))
     head = await asyncio.wait_for(reader.readexactly(7), 5)
     body = await asyncio.wait_for(reader.readexactly(struct.unpack(">HHHB", head)[2] - 1), 5)
     return body[:1] if body[0] == 16 else body
@@ -324,7 +324,7 @@ async def test_cells_come_and_go_with_their_files(rigged: Rigged) -> None:
     async with rigged() as rig:
         first = rig.cell
         rig.write("  count: {robot: output_int_register_5, modbus: 0}\n", name="stamp", unit=2)
-        outcome = await rig.reloader.reload()
+        outcome = await rig.reloader.reload(accept=[ObjectionKind.WEAKENING])
         assert outcome.text == "reloaded: stamp: new cell, 1 variable"
         assert rig.cell is first, "who did not change is not touched"
         stamp = rig.daemon.runtimes[1]
@@ -340,6 +340,35 @@ async def test_cells_come_and_go_with_their_files(rigged: Rigged) -> None:
         assert [runtime.plan.cell.name for runtime in rig.daemon.runtimes] == ["stamp"]
         await until(lambda: rig.robot.get("input_double_register_0") == -1.5)
         assert stamp.cell.health.sessions == 1
+
+
+async def test_a_second_cell_takes_the_unit_ids_0_and_255_from_nobody_unasked(rigged: Rigged) -> None:
+    """Who writes by them would be answered 0B and own what it drives for ever, or drive another robot."""
+    async with rigged() as rig:
+        wires = await asyncio.open_connection("127.0.0.1", rig.port)
+        for unit, value in ((255, 40), (0, 41)):
+            assert await write(*wires, 1, value, unit=unit) == b"\x10"
+        rig.write("  count: {robot: output_int_register_5, modbus: 0}\n", name="stamp", unit=2)
+        outcome = await rig.reloader.reload()
+        assert outcome.kinds == (ObjectionKind.RELEASE,)
+        (reason,) = outcome.reasons
+        assert reason == (
+            "press: clients that ask for the unit ids 0 and 255 would find nobody; `default_unit: true` keeps them; "
+            "`number` is owned by such a client and would be released [release]"
+        )
+        assert rig.owners() == {"number": "plc"}
+        path = rig.directory / "press.yaml"
+        path.write_text(path.read_text().replace("unit: 1}", "unit: 1, default_unit: true}"))
+        assert (await rig.reloader.reload()).result is Result.APPLIED
+        assert await write(*wires, 1, 42, unit=255) == b"\x10"
+        rig.write()
+        assert (await rig.reloader.reload()).kinds == (ObjectionKind.RELEASE,)
+        assert (await rig.reloader.reload(accept=[ObjectionKind.RELEASE])).result is Result.APPLIED
+        await until(lambda: rig.robot.get("input_int_register_0") == 0)
+        assert rig.owners() == {}
+        assert await write(*wires, 1, 43, unit=255) == b"\x90\x0b"
+        assert await write(*wires, 1, 44) == b"\x10", "it may write by the cell's own"
+        wires[1].close()
 
 
 async def test_cells_are_checked_together(rigged: Rigged) -> None:

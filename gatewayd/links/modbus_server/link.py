@@ -63,10 +63,7 @@ class ModbusUnit(Link):
         old, new = address(self.plan.host, self.plan.port), address(plan.host, plan.port)
         if old != new:
             return f"modbus moves: listen {old} -> {new}"
-        if plan.unit != self.plan.unit:
-            return f"modbus moves: unit {self.plan.unit} -> {plan.unit}"
-        # A client that asks for the units 255 and 0 would find another robot.
-        return "it is the default unit no more" if self.plan.default_unit and not plan.default_unit else ""
+        return "" if plan.unit == self.plan.unit else f"modbus moves: unit {self.plan.unit} -> {plan.unit}"
 
     def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
         """Be the unit of another plan and cell; the listeners that it has and had see to the connections."""

@@ -9,14 +9,16 @@ import asyncio
 import errno
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 
 from gatewayd.core.cell import Cell
+from gatewayd.core.objection import Objection
 from gatewayd.core.requester import Requester
 from gatewayd.links.contract import Tap
 from gatewayd.links.modbus_server.connection import PeerConnection
+from gatewayd.links.modbus_server.default_unit import NamedPlan, default_cell, default_for, losing, lost
 from gatewayd.links.modbus_server.functions import Unit
 from gatewayd.links.modbus_server.limits import idle_timeout, overdue
 from gatewayd.links.modbus_server.peers import (
@@ -32,7 +34,7 @@ from gatewayd.links.modbus_server.polling import ReadPoller
 from gatewayd.links.modbus_server.session import UnitAccess
 from gatewayd.links.modbus_server.shares import Shares
 from gatewayd.links.modbus_server.waiting import SETTLING
-from gatewayd.links.modbus_server.writers import names_of, succeeded, writers_of
+from gatewayd.links.modbus_server.writers import Accesses, names_of, succeeded, writers_of
 from gatewayd.loop import clock
 from gatewayd.report.format import address as address_text
 
@@ -205,6 +207,17 @@ class ModbusListener:
             if its is cell
         ]
 
+    def disturbs(self, after: Sequence[NamedPlan]) -> Iterator[tuple[Cell, Objection]]:
+        """Cells whose clients would reach them by the unit ids 0 and 255 no more, if these were the units."""
+        cells = {unit.cell.definition.name: unit.cell for unit in self._units.values()}
+        before = [(unit.cell.definition.name, unit.plan) for unit in self._units.values()]
+        addresses = [its.address for its in self._connections if its.address is not None]
+        moved = {each for each in addresses if default_for(each, before) != default_for(each, after)}
+        for name, other in lost(before, after, addresses).items():
+            writers = self.writers(cells[name])
+            departing = [requester for connection, requester in writers if connection.address in moved]
+            yield cells[name], losing(cells[name], other, departing)
+
     def trace(self, tap: Tap | None) -> None:
         """Hand `tap` the frames of all connections, those to come as well; None: no more."""
         if tap is not self._tap:
@@ -277,6 +290,7 @@ class ModbusListener:
         accesses = {} if address is None else self._accesses(address, connection.number)
         connection.fill(frozenset() if address is None else self._shares.places_of(address))
         before, after = succeeded(writers_of(connection.accesses), successors), writers_of(accesses)
+        left = self._left(connection.accesses, accesses, successors)
         connection.accesses = accesses
         connection.session.serve(accesses)
         for cell, requester in after:
@@ -285,7 +299,19 @@ class ModbusListener:
         for cell, requester in before:
             if (cell, requester) not in after:
                 cell.writer_disconnected(requester, now, reason)
+            elif cell is left:
+                # Whether it asked by these ids or by the cell's own is not known: it may write anew by its own.
+                why = "the unit ids 0 and 255 are another cell's or nobody's"
+                cell.writer_disconnected(requester, now, why, at_once=True)
+                cell.writer_connected(requester, now, connection.peer)
         return bool(accesses)
+
+    @staticmethod
+    def _left(before: Accesses, after: Accesses, successors: Mapping[Cell, Cell]) -> Cell | None:
+        """The cell that a connection had at 0 and 255 and has there no more."""
+        former = default_cell(before)
+        cell = None if former is None else successors.get(former, former)
+        return None if cell is default_cell(after) else cell
 
     def _accesses(self, address: Address, connection: int) -> dict[int, UnitAccess]:
         """What a peer may do, by unit."""

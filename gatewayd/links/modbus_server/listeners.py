@@ -8,10 +8,12 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from gatewayd.core.cell import Cell
+from gatewayd.core.objection import Objection
 from gatewayd.links.contract import Link, PrepareError, SharedPart, Tap
+from gatewayd.links.modbus_server.default_unit import NamedPlan
 from gatewayd.links.modbus_server.link import ModbusUnit
 from gatewayd.links.modbus_server.listener import ListenError, ModbusListener
 from gatewayd.links.modbus_server.peers import PeerEvent
@@ -88,6 +90,15 @@ class Listeners(SharedPart):
                 raise PrepareError(error.errno, reason_of(error)) from error
             opened.new.append(listener)
         return opened
+
+    def disturbs(self, plans: Sequence[Plan]) -> Iterator[tuple[Cell, Objection]]:
+        """Cells that would answer to the unit ids 0 and 255 no more."""
+        units: dict[Address, list[NamedPlan]] = {listener.address: [] for listener in self.listeners}
+        for plan in plans:
+            for unit in plan.of(ModbusPlan).values():
+                units.setdefault((unit.host, unit.port), []).append((plan.cell.name, unit))
+        for listener in self.listeners:
+            yield from listener.disturbs(units[listener.address])
 
     def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
         """Have a listener for every address of these units, and no other."""
