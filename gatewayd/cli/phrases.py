@@ -27,13 +27,14 @@ def owner(variable: Mapping[str, Any]) -> str:
 
 
 def _reported(variable: Mapping[str, Any]) -> str:
-    """What the source of a forced output reports meanwhile: `; reports 0.2 m`, `; reports 3 N, stale`."""
+    """The truth beside a force: `; reports 0.2 m` of an output, `; robot holds 3 N, stale` of an input."""
     forced = variable["forced"]
     if forced.get("reported_quality") is None:
         return ""
     shown = value({**variable, "value": forced["reported"]})
     good = forced["reported_quality"] == "good"
-    return f"; reports {shown}" + ("" if good else f", {quality(forced['reported_quality'])}")
+    verb = "robot holds" if variable["direction"] == "input" else "reports"
+    return f"; {verb} {shown}" + ("" if good else f", {quality(forced['reported_quality'])}")
 
 
 def quality(name: str) -> str:

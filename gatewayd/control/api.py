@@ -141,7 +141,7 @@ class Api:
         wanted = []
         for runtime in self._runtimes(query.get("cell")):
             indices = yield from _named(runtime, query.get("name"))
-            states = [variable_state(runtime.cell, index, moment.now) for index in indices]
+            states = [variable_state(runtime, index, moment.now) for index in indices]
             wanted.append((self._declarations.of(runtime.plan).variables, indices, states))
         found: list[Json] = []
         for declared, indices, states in wanted:
@@ -274,7 +274,7 @@ class Api:
 
     def _view(self, runtime: ServedCell, index: int, moment: Moment) -> Json:
         declared = self._declarations.of(runtime.plan).variables[index]
-        return variable_view(declared, variable_state(runtime.cell, index, moment.now))
+        return variable_view(declared, variable_state(runtime, index, moment.now))
 
     def _variable(self, name: str, body: Mapping[str, Any]) -> tuple[ServedCell, int]:
         found = [

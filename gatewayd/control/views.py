@@ -13,6 +13,7 @@ from typing import cast
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import OPERATOR, Direction, Fallback, FallbackKind, Value
 from gatewayd.core.events import Event, EventKind
+from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.links.contract import Description
 from gatewayd.links.registry import kind_of, kinds
@@ -36,7 +37,7 @@ from gatewayd.report.verdict import CellVerdict, PicturePart, ServedCell, verdic
 from gatewayd.service.audit_record import Record, plain_value, utc
 
 ForceState = tuple[Value, float, tuple[Value, Quality] | None]
-"""The forced value, its time left, and what the source reports meanwhile."""
+"""The forced value, its time left, and the `truth` beside it."""
 VariableState = tuple[Value, Quality, float, str | None, float | None, ForceState | None]
 """Value, quality and age, the owner and its lease, the force; None: there is none."""
 _QUALITIES = tuple(quality.name.lower() for quality in Quality)
@@ -189,8 +190,22 @@ def _source(cell: Cell, now: float) -> Json:
     }
 
 
-def variable_state(cell: Cell, index: int, now: float) -> VariableState:
+def truth(served: ServedCell, index: int) -> tuple[Value, Quality] | None:
+    """What stands beside a force: what the source of an output reports meanwhile, or what the robot reads back of an
+    input, and how good that is. None: nobody knows.
+    """
+    cell = served.cell
+    if cell.definition.variables[index].direction is Direction.OUTPUT:
+        return cell.forcing.reported(index)
+    held = served.source.read_back(index)
+    if held is None:
+        return None
+    return held, Quality.GOOD if cell.freshness.state is Source.FRESH else Quality.STALE
+
+
+def variable_state(served: ServedCell, index: int, now: float) -> VariableState:
     """How one variable is at this moment: all that changes. Cheap, so that a list of all is of one moment."""
+    cell = served.cell
     lock = cell.definition.variables[index].lock
     owner = cell.ownership.owners[lock] if lock is not None else None
     force = cell.forcing.forces.get(index)
@@ -200,7 +215,7 @@ def variable_state(cell: Cell, index: int, now: float) -> VariableState:
         cell.image.age(index, now),
         None if owner is None else cell.definition.writer_name(owner),
         None if lock is None or owner is None else cell.ownership.remaining(lock, now),
-        None if force is None else (force.value, force.until - now, cell.forcing.reported(index)),
+        None if force is None else (force.value, force.until - now, truth(served, index)),
     )
 
 

@@ -52,7 +52,7 @@ class Forcing:
     def reported(self, variable: int) -> tuple[Value, Quality] | None:
         """What the source of a forced output reports meanwhile. None: it is not forced, or an input.
 
-        What would be written to a forced input is refused: nobody reports it.
+        What would be written to a forced input is refused: nobody reports it. Its link knows what the robot holds.
         """
         if self._image.variables[variable].direction is Direction.INPUT:
             return None

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 if TYPE_CHECKING:
     # A check, which has no use for a running cell, imports this module.
     from gatewayd.core.cell import Cell
-    from gatewayd.core.definition import CellDefinition
+    from gatewayd.core.definition import CellDefinition, Value
     from gatewayd.core.objection import Objection
     from gatewayd.core.requester import Requester
     from gatewayd.core.status_layout import StatusField
@@ -294,6 +294,10 @@ class SourceLink(Link):
 
     sent_listeners: list[Callable[[], None]]
     """Called after something that was written has been sent. They must not raise."""
+
+    def read_back(self, variable: int) -> Value | None:
+        """What the other side holds of an input, as it said last in this session; None: it does not say so."""
+        return None
 
 
 class PrepareError(OSError):

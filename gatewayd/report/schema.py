@@ -147,8 +147,8 @@ class VariableStatus(TypedDict):
     lease: Annotated[float | None, "seconds of the owner's lease left, or null without an owner or end"]
     forced: Annotated[
         Json | None,
-        "null, or `value` and `remaining` seconds of a force, and of a forced output `reported` and "
-        "`reported_quality`: what its source reports meanwhile (null for an input)",
+        "null, or `value` and `remaining` seconds of a force, and `reported` and `reported_quality`: what the robot "
+        "reports of an output meanwhile, or reads back of an input (null where it does not)",
     ]
 
 

@@ -16,7 +16,7 @@ from gatewayd.core.definition import OPERATOR
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
-from gatewayd.links.contract import Level, Link, LinkHealth
+from gatewayd.links.contract import Level, Link, LinkHealth, SourceLink
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.format import counted, listed, span, verb
 from gatewayd.report.words import SOURCE_LEVELS, SOURCES
@@ -93,7 +93,7 @@ class ServedCell(Protocol):
         """Its state."""
 
     @property
-    def source(self) -> Link:
+    def source(self) -> SourceLink:
         """The link that its values come from."""
 
     @property

@@ -12,7 +12,7 @@ from collections.abc import Generator
 from itertools import groupby, islice
 from typing import Any
 
-from gatewayd.control.views import Declared, declare
+from gatewayd.control.views import Declared, declare, truth
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Lock
 from gatewayd.core.events import CAPACITY, Event, EventKind
@@ -151,7 +151,7 @@ def state(runtime: CellRuntime, probes: Probes, since: int, now: float) -> dict[
         "quality": list(map(int, image.quality)),
         "ages": _ages(cell, now),
         "owned": owned,
-        "forced": [_forced(cell, index, now) for index in cell.forcing.forces],
+        "forced": [_forced(runtime, index, now) for index in cell.forcing.forces],
         "accepted": health.writes_accepted,
         "refused": health.writes_refused,
         "events": {"count": cell.events.count, "latest": _events(cell, since, now)},
@@ -169,11 +169,10 @@ def past(runtime: CellRuntime, probes: Probes, now: float) -> Generator[None, No
     return b'{"period":%d,"samples":[%b]}' % (round(1000 * history.period), b",".join(samples))
 
 
-def _forced(cell: Cell, index: int, now: float) -> list[object]:
-    """Variable, milliseconds left, and what its source reports meanwhile with its quality (outputs)."""
-    reported = cell.forcing.reported(index)
-    value, quality = reported if reported is not None else (None, None)
-    left = _milliseconds(cell.forcing.forces[index].until - now)
+def _forced(runtime: CellRuntime, index: int, now: float) -> list[object]:
+    """Variable, milliseconds left, and the truth beside it with its quality."""
+    value, quality = truth(runtime, index) or (None, None)
+    left = _milliseconds(runtime.cell.forcing.forces[index].until - now)
     return [index, left, None if value is None else _number(value), None if quality is None else int(quality)]
 
 

@@ -31,6 +31,7 @@ def test_a_forced_value_has_its_truth_beside_it() -> None:
     assert owner(variable) == "forced, 30.0 s left; reports 7 running"
     reported["reported_quality"] = "stale"
     assert owner(variable) == "forced, 30.0 s left; reports 7 running, stale"
+    assert owner({**variable, "direction": "input"}) == "forced, 30.0 s left; robot holds 7 running, stale"
     input_forced = {"remaining": 30.0, "reported": None, "reported_quality": None}
     assert owner({**FREE, "forced": input_forced}) == "forced, 30.0 s left"
 

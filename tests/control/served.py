@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 from gatewayd.control.api import Moment
 from gatewayd.core.cell import Cell
-from gatewayd.core.definition import Direction
-from gatewayd.links.contract import Link, LinkHealth, TapOf
+from gatewayd.core.definition import Direction, Value
+from gatewayd.links.contract import Link, LinkHealth, SourceLink, TapOf
 from gatewayd.mapping.loader import load_together
 from gatewayd.mapping.plan import Plan
 
@@ -51,6 +51,16 @@ class ServedLink(Link):
 
 
 @dataclass
+class ServedSource(ServedLink, SourceLink):
+    """The robot, which reads back what a test has it hold."""
+
+    held: dict[int, Value] = field(default_factory=dict)
+
+    def read_back(self, variable: int) -> Value | None:
+        return self.held.get(variable)
+
+
+@dataclass
 class Served:
     """A cell with its links."""
 
@@ -58,7 +68,7 @@ class Served:
     cell: Cell
 
     def __post_init__(self) -> None:
-        self.source = ServedLink(LinkHealth(figures={"address": "192.168.1.10:30004", "watchdog": False}))
+        self.source = ServedSource(LinkHealth(figures={"address": "192.168.1.10:30004", "watchdog": False}))
         unit = LinkHealth(
             "Modbus 127.0.0.1:1502", words="listening, no connections", figures={"connections": 0}
         )

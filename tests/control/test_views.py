@@ -122,6 +122,20 @@ def test_a_force_is_told_with_what_is_left_of_it(api: Api, press: Served) -> Non
     assert found["forced"] == {"value": 7, "remaining": 7.0} | truth
 
 
+def test_a_forced_input_has_what_the_robot_reads_back_beside_it(api: Api, press: Served) -> None:
+    def beside() -> tuple[object, object]:
+        (found,) = finished(api.variables({"name": "limit"}, at(4.0)))["variables"]
+        return found["forced"]["reported"], found["forced"]["reported_quality"]
+
+    assert press.cell.operator.force(LIMIT, 7.0, 1.0, 11.0) is None
+    assert beside() == (None, None)
+    press.source.held = {LIMIT: 6.5}
+    press.cell.package_arrived(4.0, 4.0)
+    assert beside() == (6.5, "good")
+    press.cell.robot_lost("gone", 4.0)
+    assert beside() == (6.5, "stale")
+
+
 def problems(served: Served, now: float) -> list[str]:
     return list(verdict_of(served, now).problems)
 

@@ -227,6 +227,20 @@ async def test_a_forced_value_shows_its_truth_and_the_time_left(plant: Plant) ->
         await page.wait(f"{row('mode', '.truth')}.endsWith(', stale')")
 
 
+async def test_a_forced_input_shows_what_the_robot_holds(plant: Plant) -> None:
+    async with showing(plant, WIDE) as shown:
+        page = shown.page
+        force(shown, "part", 7)
+        await page.wait(f"{row('part', '.truth')} === 'robot holds 7'")
+        quiet = "document.querySelector('tr[data-quality=\"4\"] .truth').classList.contains('muted')"
+        assert await page.run(quiet)
+        await page.wait(f"{row('part', 'span.quality')}.endsWith(' s left')")
+        shown.simulator.do("overwrite input_int_register_0 99")
+        await page.wait(f"{row('part', '.truth')} === 'robot holds 99'")
+        await page.wait(f"{row('part', 'span.quality')}.startsWith('differs in robot; forced, ')")
+        assert await page.run(CONTRASTS) == []
+
+
 async def test_a_thumb_finds_what_it_wants(plant: Plant) -> None:
     """The whole row opens on a phone; what can be tapped is high enough, and the filter does not enlarge the page."""
     async with showing(plant, NARROW) as shown:

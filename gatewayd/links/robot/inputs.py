@@ -85,6 +85,8 @@ class ClaimedInputs:
         self._recipes: list[_Recipe] = []
         self._carriers: dict[int, _Recipe] = {}
         self._known: set[str] = set()
+        self._seen: Sequence[Value] | None = None
+        """The newest package."""
         self._cleared: dict[int, float] = {}
         """Since when nothing is left to be sent of a fallback."""
         round_trip = 0.0
@@ -285,11 +287,20 @@ class ClaimedInputs:
     # -- reading back --------------------------------------------------------------------------------------------
 
     def look(self, flat: Sequence[Value]) -> None:
-        """Take from a package what decides how inputs act."""
+        """Take from a package what decides how inputs act, and keep what it reads back."""
+        self._seen = flat
         slot = self._slots.get(DOMAINS)
         if slot is not None:
             for recipe in self._recipes:
                 recipe.actuation.domains = int(flat[slot.start])
+
+    def held(self, index: int) -> Value | None:
+        """What the newest package reads back of a variable; None where packages do not show it."""
+        recipe, name = self._carriers.get(index), self._variables[index].field
+        if recipe is None or self._seen is None or name not in self._slots:
+            return None
+        part = next(part for part in recipe.transfer.parts[name] if part.variable == index)
+        return part.of(self._seen[self._slots[name]])
 
     def compare(self, package: Package) -> Finding:
         """What a package reads back otherwise than it was sent."""

@@ -206,6 +206,10 @@ class RobotLink(SourceLink):
 
         self._client.trace(passed)
 
+    def read_back(self, variable: int) -> Value | None:
+        """What the controller's newest package says of an input, where the session reads it back."""
+        return self._inputs.held(variable)
+
     def flush(self, now: float) -> None:
         """Send what is still due at once."""
         self._inputs.release(self._cell.delivery.take_releases())

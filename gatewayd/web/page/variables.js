@@ -181,9 +181,12 @@ class Row {
     put(this.value, number(value, kind));
     put(this.meaning, meaning(value, this.variable));
     const [rest, reported, its] = force ?? [null, null, null];
-    put(this.quality, force ? `${quality(code, age)}, ${span(rest)} left` : quality(code, age));
-    // The truth beside the force: what the source reports, and how good that is.
-    const truth = its === null ? "" : `reports ${number(reported, kind)} ${meaning(reported, this.variable) || unit}`.trimEnd();
+    put(this.quality, !force ? quality(code, age)
+      : code === FORCED ? `forced, ${span(rest)} left` : `${quality(code, age)}; forced, ${span(rest)} left`);
+    // The truth beside the force: what the robot reports, or reads back of an input, and how good that is.
+    const says = this.variable.direction === "input" ? "robot holds" : "reports";
+    const truth = its === null ? "" : `${says} ${number(reported, kind)} ${meaning(reported, this.variable) || unit}`.trimEnd();
+    this.truth.classList.toggle("muted", its === 0 && reported === value);
     put(this.truth, truth && its > 0 ? `${truth}, ${quality(its, null)}` : truth);
     const words = owner && left !== null ? `${owner}, ${span(left)}` : owner;
     const source = code === FORCED ? "operator" : "robot";

@@ -160,6 +160,14 @@ def test_a_difference_has_to_last_and_is_reported_once() -> None:
     assert bench.send(20.0) == {}
 
 
+def test_what_is_read_back_is_known_of_each_variable() -> None:
+    bench = Bench()
+    assert [bench.inputs.held(index) for index in (NUMBER, REAL, SLIDER)] == [5, 2.5, None]
+    bench.inputs.look((0.0, 99, 3.25))
+    assert [bench.inputs.held(index) for index in (NUMBER, REAL)] == [99, 3.25]
+    assert ClaimedInputs(VARIABLES).held(NUMBER) is None
+
+
 def test_what_nobody_gave_follows_the_controller_and_is_not_overwritten() -> None:
     bench = Bench()
     assert bench.compare(5, 3.5, 11.0).follow == {REAL: 3.5}
