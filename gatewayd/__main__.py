@@ -11,7 +11,7 @@ import sys
 from contextlib import suppress
 from typing import NoReturn
 
-from gatewayd.service import standard_streams
+from gatewayd.service import garbage, standard_streams
 from gatewayd.service.signals import SIGNALS
 from gatewayd.service.standard_streams import OutputError
 
@@ -28,6 +28,7 @@ UNWRITTEN = 1
 def main() -> NoReturn:
     """Run `sys.argv` and exit. GATEWAYD_TRACEBACK=1 shows where an internal error came from."""
     is_daemon = sys.argv[1:2] == ["run"]
+    garbage.begin()
     standard_streams.prepare()
     if is_daemon:
         SIGNALS.install()
@@ -39,6 +40,7 @@ def main() -> NoReturn:
         _leave(code)
     # From here on nothing is left to be interrupted: Ctrl-C ends the process, and prints nothing.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    garbage.end()
     sys.exit(code)
 
 

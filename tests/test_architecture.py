@@ -95,6 +95,7 @@ LAYERS: dict[str, set[str]] = {
         "loop",
         "mapping.compiled",
         "mapping.diagnostics",
+        "mapping.files",
         "mapping.plan",
         "report",
         "service",
@@ -113,6 +114,7 @@ LAYERS: dict[str, set[str]] = {
         "web.launch",
     },
     "service.options": {"web.settings"},
+    "service.garbage": set(),
     "service.signals": set(),
     "web.settings": set(),
     "web": {
@@ -160,7 +162,7 @@ LAYERS: dict[str, set[str]] = {
         "simulator",
         "web.settings",
     },
-    "__main__": {"cli", "report.printable", "service.signals", "service.standard_streams"},
+    "__main__": {"cli", "report.printable", "service.garbage", "service.signals", "service.standard_streams"},
 }
 """Module or package -> what it and everything in it may import; the longest name that fits decides."""
 

@@ -129,7 +129,7 @@ def _named(files: tuple[str, ...]) -> Iterator[str]:
     """The files meant: a directory stands for its mapping files, as in `gatewayd run`; an empty one for itself."""
     from pathlib import Path
 
-    from gatewayd.mapping.compiled import files_of
+    from gatewayd.mapping.files import files_of
 
     for file in files:
         try:
@@ -140,7 +140,8 @@ def _named(files: tuple[str, ...]) -> Iterator[str]:
 
 
 def _read(file: str) -> bytes | Unreadable:
-    from gatewayd.mapping.compiled import PATTERNS, Unreadable
+    from gatewayd.mapping.compiled import Unreadable
+    from gatewayd.mapping.files import PATTERNS
 
     try:
         return read_file(file)

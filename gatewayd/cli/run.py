@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -94,20 +95,24 @@ def command(
     `modbus: listen:` share one listener and differ by their unit id. Robots, PLCs and
     interfaces may come and go in any order.
     """
-    from gatewayd.logs.records import Format, configure
-    from gatewayd.logs.stream import LogStream
     from gatewayd.service.main import main
     from gatewayd.service.options import Options
 
     page = _settings(status, token_file) if status else None
     options = Options(files, state, control, audit, page, strict=strict)
+    with ExitStack() as log:
+        return main(options, lambda: _configure(log, log_format, log_level))
+
+
+def _configure(log: ExitStack, form: str, level: str) -> None:
+    """Make the log, and have `log` end it."""
+    from gatewayd.logs.records import Format, configure
+    from gatewayd.logs.stream import LogStream
+
     stream = LogStream(_descriptor())
-    configure(Format(log_format), logging.getLevelNamesMapping()[log_level.upper()], stream)
-    try:
-        return main(options)
-    finally:
-        logging.shutdown()  # lines that were merged are written before the stream ends
-        stream.close()
+    log.callback(stream.close)
+    configure(Format(form), logging.getLevelNamesMapping()[level.upper()], stream)
+    log.callback(logging.shutdown)  # lines that were merged are written before the stream ends
 
 
 def _settings(status: str, token_file: Path | None) -> Settings:

@@ -10,17 +10,18 @@ from the robots. Whatever a file does to that process, the gateway goes on with 
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import gatewayd
-from gatewayd.mapping.compiled import Compiled
+
+if TYPE_CHECKING:
+    from gatewayd.mapping.compiled import Compiled
 
 LIMIT = 20.0
 """Seconds that all files together may take; hundreds take two."""
@@ -32,9 +33,12 @@ gc.disable()
 sys.path.insert(0, sys.argv.pop(1))
 from gatewayd.mapping.worker import main
 main()
+sys.stdout.flush()
+os._exit(0)
 """
 """Isolated (-I), so that no environment variable and no directory decides what is imported; this very gatewayd is.
-What lives for a moment needs no collection of garbage. Standard input ends when who started it ends."""
+What lives for a moment needs no collection of garbage, and is not taken apart at its end. Standard input ends when who
+started it ends."""
 _LOOK = 0.05
 """Seconds between two looks whether the result is still wanted."""
 _ENVIRONMENT = {"PYDANTIC_DISABLE_PLUGINS": "1"}
@@ -50,18 +54,21 @@ class Compilation:
     """Files on their way to plans: the process runs from the beginning, and not beyond the end of the `with`."""
 
     def __init__(self, names: Iterable[Path]) -> None:
-        """Raises CompilationError if there can be no such process."""
+        """Where there can be no such process, `result` says so: whoever starts early may have no log yet."""
+        self._process: subprocess.Popen[bytes] | None = None
+        self._failure: Exception | None = None
+        self._asked = False
         try:
             self._process, self._lifeline = _start(map(str, names))
         except (OSError, ValueError) as error:
-            text = f"the process that reads the mapping files cannot be started: {error}"
-            raise CompilationError(text) from error
-        self._asked = False
+            self._failure = error
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_exception: object) -> None:
+        if self._process is None:
+            return
         # Whoever waits in `result`, maybe in another thread, comes back by this and closes the pipes.
         self._process.kill()
         os.close(self._lifeline)
@@ -70,9 +77,16 @@ class Compilation:
 
     def result(self, given_up: Callable[[], bool] = lambda: False) -> Compiled:
         """What the files come to. Waits until it is `given_up`; to be called once. Raises CompilationError."""
+        import pickle  # noqa: PLC0415 - while the other process works
+
+        from gatewayd.mapping.compiled import Compiled  # noqa: PLC0415
+
         self._asked = True
         process = self._process
-        answer, said = self._communicate(given_up)
+        if process is None:
+            text = f"the process that reads the mapping files cannot be started: {self._failure}"
+            raise CompilationError(text) from self._failure
+        answer, said = _communicate(process, given_up)
         if process.returncode:
             last = said.decode("utf-8", "replace").strip().rpartition("\n")[2]
             raise CompilationError(
@@ -83,23 +97,24 @@ class Compilation:
         assert isinstance(compiled, Compiled)
         return compiled
 
-    def _communicate(self, given_up: Callable[[], bool]) -> tuple[bytes, bytes]:
-        """Output and errors, once it has ended."""
-        process, until = self._process, time.monotonic() + LIMIT
-        while True:
-            try:
-                return process.communicate(timeout=_LOOK)
-            except subprocess.TimeoutExpired:
-                late = time.monotonic() >= until
-                if not late and not given_up():
-                    continue
-            process.kill()
-            process.communicate()
-            raise CompilationError(
-                f"reading the mapping files takes longer than {LIMIT:g} s: does `gatewayd check` end?"
-                if late
-                else "reading the mapping files was given up"
-            )
+
+def _communicate(process: subprocess.Popen[bytes], given_up: Callable[[], bool]) -> tuple[bytes, bytes]:
+    """Output and errors of the process, once it has ended."""
+    until = time.monotonic() + LIMIT
+    while True:
+        try:
+            return process.communicate(timeout=_LOOK)
+        except subprocess.TimeoutExpired:
+            late = time.monotonic() >= until
+            if not late and not given_up():
+                continue
+        process.kill()
+        process.communicate()
+        raise CompilationError(
+            f"reading the mapping files takes longer than {LIMIT:g} s: does `gatewayd check` end?"
+            if late
+            else "reading the mapping files was given up"
+        )
 
 
 def _start(names: Iterable[str]) -> tuple[subprocess.Popen[bytes], int]:

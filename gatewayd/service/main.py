@@ -1,13 +1,15 @@
 """`gatewayd run` from its options to its exit code.
 
-The mapping files are read by a process of their own, and meanwhile this one imports what will serve.
+The mapping files are read by a process of their own, and meanwhile this one imports what will serve: hardly anything is
+imported before that process has been started.
 """
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 
-from gatewayd.logs.records import fields
+from gatewayd.service import garbage
 from gatewayd.service.compilation import CompilationError
 from gatewayd.service.options import Options
 from gatewayd.service.signals import SIGNALS, name_of
@@ -20,10 +22,15 @@ DEFECT = 70
 """Worth another attempt, unlike the others: the service manager starts it again."""
 
 
-def main(options: Options) -> int:
-    """Read the files and serve what they say until the end is asked for; the exit code."""
-    found = _load(options)
+def main(options: Options, configure: Callable[[], None] = lambda: None) -> int:
+    """Read the files and serve what they say until the end is asked for; the exit code.
+
+    `configure` makes the log; it is called once, while the files are being read.
+    """
+    found = _load(options, configure)
     if SIGNALS.stopping:
+        from gatewayd.logs.records import fields  # noqa: PLC0415 - see `_load`
+
         logging.getLogger("gatewayd.run").info(
             "stopped before anything was served", extra=fields(signal=name_of(SIGNALS.stopped_by))
         )
@@ -32,14 +39,20 @@ def main(options: Options) -> int:
         return found
     from gatewayd.service import assemble  # noqa: PLC0415 - see `_load`
 
+    garbage.serve()
     assemble.run(found, options)
     return STOPPED
 
 
-def _load(options: Options) -> Startup | int:
+def _load(options: Options, configure: Callable[[], None]) -> Startup | int:
     """What there is to serve, or the exit code."""
+
+    def meanwhile() -> None:
+        configure()
+        _import_what_serves()
+
     try:
-        found = load_plans(options.files, _import_what_serves, lambda: SIGNALS.stopping)
+        found = load_plans(options.files, meanwhile, lambda: SIGNALS.stopping)
     except CompilationError as error:
         if not SIGNALS.stopping:
             logging.getLogger("gatewayd.startup").error("%s", error)  # noqa: TRY400 - the text says it all

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from gatewayd.web.settings import Settings
+if TYPE_CHECKING:
+    from gatewayd.web.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)

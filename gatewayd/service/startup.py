@@ -1,4 +1,7 @@
-"""From the files named on the command line to the plans that can be served; what cannot be is said, one line each."""
+"""From the files named on the command line to the plans that can be served; what cannot be is said, one line each.
+
+The process that reads takes longest, so it is started before anything is imported that has to do with its answer.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,15 @@ import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from gatewayd.links.registry import kind_of
-from gatewayd.logs.records import fields
-from gatewayd.mapping.compiled import PATTERNS, CompiledFile, files_of
-from gatewayd.mapping.diagnostics import Severity
-from gatewayd.mapping.plan import Plan
+from gatewayd.mapping.files import PATTERNS, files_of
 from gatewayd.report.format import counted
-from gatewayd.report.schema import taken_names
 from gatewayd.service.compilation import Compilation
+
+if TYPE_CHECKING:
+    from gatewayd.mapping.compiled import CompiledFile
+    from gatewayd.mapping.plan import Plan
 
 log = logging.getLogger("gatewayd.startup")
 
@@ -46,18 +49,29 @@ class Startup:
 
 
 def mapping_files(paths: Iterable[Path]) -> list[Path]:
-    """The files meant: a directory stands for its mapping files, by name."""
-    found: list[Path] = []
+    """The files meant: a directory stands for its mapping files, by name. One without any is logged."""
+    meant = _files_by_path(paths)
+    _log_empty(meant)
+    return [file for files in meant.values() for file in files]
+
+
+def _files_by_path(paths: Iterable[Path]) -> dict[Path, list[Path]]:
+    meant: dict[Path, list[Path]] = {}
     for path in paths:
         try:
-            inside = files_of(path)
+            meant[path] = files_of(path)
         except OSError:
             # It is reported, with its reason, when it is opened.
-            inside = [path]
-        if not inside:
+            meant[path] = [path]
+    return meant
+
+
+def _log_empty(meant: Mapping[Path, Sequence[Path]]) -> None:
+    from gatewayd.logs.records import fields  # noqa: PLC0415 - after the process was started
+
+    for path, files in meant.items():
+        if not files:
             log.error("no mapping file in the directory", extra=fields(directory=str(path), pattern=PATTERNS))
-        found += inside
-    return found
 
 
 def load_plans(
@@ -67,11 +81,15 @@ def load_plans(
 ) -> Startup:
     """Read and check everything; log what cannot be served and why. Raises CompilationError.
 
-    `meanwhile` is called while another process reads; that ends early once it is `given_up`.
+    `meanwhile` is called while another process reads, before anything is logged; that ends early once it is `given_up`.
     """
-    with Compilation(mapping_files(paths)) as compilation:
+    meant = _files_by_path(paths)
+    with Compilation(file for files in meant.values() for file in files) as compilation:
         meanwhile()
+        _log_empty(meant)
         compiled = compilation.result(given_up)
+    from gatewayd.logs.records import fields  # noqa: PLC0415 - after the process was started
+
     for unread in compiled.unreadable:
         log.error("cannot read the mapping file", extra=fields(file=unread.name, reason=unread.reason))
     log_findings(compiled.files)
@@ -88,6 +106,9 @@ def load_plans(
 
 def misnamed(plans: Iterable[Plan]) -> Iterator[tuple[str, str]]:
     """Mapping files with a link whose name stands for something else in what the gateway says of a cell, and why."""
+    from gatewayd.links.registry import kind_of  # noqa: PLC0415 - after the process was started
+    from gatewayd.report.schema import taken_names  # noqa: PLC0415
+
     for plan in plans:
         names = [
             name
@@ -103,6 +124,9 @@ def misnamed(plans: Iterable[Plan]) -> Iterator[tuple[str, str]]:
 
 def log_findings(files: Iterable[CompiledFile]) -> None:
     """Log every finding with its place, rule and remedy."""
+    from gatewayd.logs.records import fields  # noqa: PLC0415 - after the process was started
+    from gatewayd.mapping.diagnostics import Severity  # noqa: PLC0415
+
     for finding in (finding for file in files for finding in file.diagnostics):
         level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
         rule = f"{finding.rule.id} {finding.rule.slug}"

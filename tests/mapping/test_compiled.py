@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.mapping.compiled import Compiled, CompiledFile, Unreadable, files_of
+from gatewayd.mapping.compiled import Compiled, CompiledFile, Unreadable
 from gatewayd.mapping.loader import load
 from gatewayd.modbus.codec import ORDERS, TYPES
 
@@ -74,20 +74,3 @@ def test_findings_arrive_whole() -> None:
     assert found.plans == ()
     assert found.files[0].errors
     assert all(str(one.position).startswith("x.yaml:") for one in found.files[0].errors)
-
-
-def test_a_directory_stands_for_its_mapping_files_as_a_shell_would_read_it(tmp_path: Path) -> None:
-    for name in (
-        "b.yaml",
-        "a.yml",
-        "C.YAML",
-        ".a.yaml",
-        "._b.yaml",
-        ".#b.yaml",
-        "b.yaml~",
-        "b.yaml.bak",
-        "x.txt",
-    ):
-        (tmp_path / name).touch()
-    assert [file.name for file in files_of(tmp_path)] == ["C.YAML", "a.yml", "b.yaml"]
-    assert files_of(tmp_path / "gone.yaml") == [tmp_path / "gone.yaml"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -50,3 +52,23 @@ def test_a_process_that_cannot_read_the_files_is_a_defect(
     monkeypatch.setattr(main_module, "load_plans", fail)
     assert main(Options((Path("a.yaml"),))) == DEFECT
     assert "it was killed" in caplog.text
+
+
+def test_the_process_that_reads_is_started_before_anything_that_serves_is_imported(tmp_path: Path) -> None:
+    """It takes longest; whatever is imported before it begins makes every start longer."""
+    program = """
+import os, subprocess, sys
+import gatewayd.__main__ as entry
+def started(*_arguments, **_options):
+    ours = {"gatewayd.core.definition", "gatewayd.links.registry", "gatewayd.logs.records"}
+    heavy = {"asyncio", "json", "pickle"} | ours
+    print(*sorted(heavy & sys.modules.keys()), flush=True)
+    os._exit(7)
+subprocess.Popen = started
+sys.argv = ["gatewayd", "run", "cell.yaml"]
+entry.main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert (done.returncode, done.stdout.split()) == (7, [])
