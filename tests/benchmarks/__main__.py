@@ -7,18 +7,22 @@ import os
 import platform
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 
 from tests.benchmarks.report import Table
+from tests.benchmarks.trees import HERE, Job, before
 
 SUBJECTS = {
     "throughput": "Modbus requests per second and round trips, beside libmodbus and the stock pymodbus server",
-    "latency": "robot to PLC and PLC to robot, as histograms",
-    "cost": "CPU time, memory and start of the daemon with the full image at 500 Hz",
+    "latency": "robot to PLC and PLC to robot, as histograms, beside a gateway in C",
+    "cost": "CPU time and memory of the daemon with the full image at 500 Hz, beside a gateway in C",
+    "packages": "packages of the robot that were not shown, one by one and in bursts",
+    "growth": "cells, connections and variables: what each of them adds, and where that ends",
     "canopen": "CPU per PDO, a saturated bus and SYNC, beside python-canopen's own node",
-    "check": "time of `gatewayd check`",
+    "check": "start and `gatewayd check`, as multiples of an empty Python",
     "script": "the script that a user would write instead: ur_rtde feeding a pymodbus server",
 }
-"""Module -> what it measures. Each has `run(seconds) -> list[Table]`."""
+"""Module -> what it measures. Each has `run(job) -> list[Table]`."""
 
 
 def _main() -> None:
@@ -30,18 +34,31 @@ def _main() -> None:
     )
     parser.add_argument("subjects", nargs="*", metavar="SUBJECT", default=list(SUBJECTS))
     parser.add_argument("--seconds", type=float, default=3.0, help="length of each measurement (default 3)")
+    parser.add_argument(
+        "--against",
+        type=Path,
+        metavar="DIR",
+        help="also measure gatewayd of the checkout in DIR (installed there by `make dev`), in turn with this one",
+    )
     options = parser.parse_args()
     unknown = set(options.subjects) - set(SUBJECTS)
     if unknown:
         parser.error(f"no subject is called {', '.join(sorted(unknown))}")
+    trees = (HERE,) if options.against is None else (HERE, before(options.against))
+    try:
+        for tree in trees:
+            tree.check()
+    except (OSError, RuntimeError) as error:
+        parser.error(str(error))
+    job = Job(options.seconds, trees)
     # Installed packages are compiled; where this variable is set, gatewayd would be compiled anew at each start.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     print(
         f"{platform.python_implementation()} {platform.python_version()}, {os.cpu_count()} cores, {platform.machine()}"
     )
     for subject in options.subjects:
-        run: Callable[[float], list[Table]] = import_module(f"tests.benchmarks.{subject}").run
-        for table in run(options.seconds):
+        run: Callable[[Job], list[Table]] = import_module(f"tests.benchmarks.{subject}").run
+        for table in run(job):
             print(f"\n{table}\n", flush=True)
 
 

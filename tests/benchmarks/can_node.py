@@ -2,7 +2,9 @@
 
 Arguments: the number of the socket, and `gatewayd` or `canopen`. The sockets carry SocketCAN's frames, so that both
 run the code that they run on SocketCAN. Lines on standard input are orders: `report` prints frames received and CPU
-seconds used; `transmit KIND COUNT` changes values and sends them COUNT times, and prints the CPU seconds that took.
+seconds used; `transmit KIND COUNT` changes values and sends them COUNT times, `receive KIND COUNT` hands so many RPDOs
+with new values to the node without a bus, and both print the CPU seconds that took. It is run as a file, so that it
+measures the gatewayd of whatever interpreter runs it.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import io
 import socket
+import struct
 import sys
 import time
 from collections.abc import Callable
@@ -19,6 +22,7 @@ import can
 import canopen
 from can.interfaces.socketcan import socketcan as stock_socketcan
 
+from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.socketcan import SocketCanBus
 from gatewayd.canopen.supervision import BusSignal
 from gatewayd.core.cell import Cell
@@ -44,6 +48,8 @@ variables:
 """
 BITS, INTEGERS, SYNCHRONOUS = 1, 2, 3
 """PDOs: 64 bits, two integers, two integers with SYNC."""
+COB_IDS = {BITS: 0x200 + NODE, INTEGERS: 0x300 + NODE}
+"""Of the RPDOs."""
 TICK = 0.02
 
 
@@ -107,10 +113,16 @@ class Gateway:
         line = sys.stdin.readline()
         if not line:
             raise SystemExit
-        _obey(line, self.received, self.transmit)
+        _obey(line, self.received, {"transmit": self.transmit, "receive": self.receive})
 
     def received(self) -> int:
         return self.link.node.counters.received
+
+    def receive(self, kind: int, count: int) -> None:
+        """As the driver does it, with frames of which each has other values than the one before."""
+        can_id, now = COB_IDS[kind], time.monotonic()
+        for number in range(1, count + 1):
+            self.link.node.receive(Frame(can_id, struct.pack("<ii", number, -number)), now)
 
     def transmit(self, kind: int, count: int) -> None:
         """As the robot's link does it: values into the image, one notice."""
@@ -169,14 +181,14 @@ class Stock:
     def run(self) -> None:
         print("ready", flush=True)
         for line in sys.stdin:
-            _obey(line, lambda: self.count, self.transmit)
+            _obey(line, lambda: self.count, {"transmit": self.transmit})
 
 
-def _obey(line: str, received: Callable[[], int], transmit: Callable[[int, int], None]) -> None:
+def _obey(line: str, received: Callable[[], int], orders: dict[str, Callable[[int, int], None]]) -> None:
     order, *arguments = line.split()
-    if order == "transmit":
+    if order in orders:
         begin = time.process_time()
-        transmit(int(arguments[0]), int(arguments[1]))
+        orders[order](int(arguments[0]), int(arguments[1]))
         print(time.process_time() - begin, flush=True)
     else:
         print(received(), time.process_time(), flush=True)

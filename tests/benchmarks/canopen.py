@@ -2,211 +2,138 @@
 
 from __future__ import annotations
 
-import errno
-import select
-import socket
-import struct
-import sys
-import tempfile
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
 from statistics import median
+from typing import TypeVar
 
-from gatewayd.canopen.socketcan import RECEIVE_BUFFER
-from tests.benchmarks.can_node import BITS, INTEGERS, NODE
-from tests.benchmarks.report import Table, at_least, at_most, histogram, percentile
-from tests.e2e.processes import Process
+from tests.benchmarks.can_node import BITS, INTEGERS
+from tests.benchmarks.can_peer import (
+    Peer,
+    Reception,
+    in_process,
+    leave_operational,
+    make_synchronous,
+    node,
+    receive,
+    syncs,
+    transmit,
+)
+from tests.benchmarks.report import Table, against, at_least, at_most, histogram, percentile
+from tests.benchmarks.samples import NOISE, RULE, Samples
+from tests.benchmarks.trees import Job
 
 SATURATED = 8752
 """Frames of 8 bytes that a bus of 1 Mbit/s carries in a second, with stuffing as it falls."""
-SLOT = 0.01
-BATCH = 40
-"""Frames sent between two readings: fewer than a socket holds."""
-ROUNDS = 25
-SYNCS_PER_SECOND = 200
-PATIENCE = 5.0
+ROUNDS = 2
+STOCK = "canopen"
+RECEIVED, WITHOUT_BUS, SENT = "received", "without a bus", "sent"
 TO_NODE = "received, up to the node"
+CPU_AIMS = {f"{RECEIVED}, 2 integers": 8.0, f"{RECEIVED}, 64 bits": 40.0, TO_NODE: 5.0}
+"""us of CPU per frame."""
 BOUNDS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0)
-CPU_AIM = 5.0
-"""us of CPU per received frame."""
-_FRAME = struct.Struct("=IB3x8s")
-_NMT, _SYNC, _TPDO = 0x000, 0x080, 0x380 + NODE
-_RPDOS = {BITS: 0x200 + NODE, INTEGERS: 0x300 + NODE}
-_START, _ENTER_PRE_OPERATIONAL = 1, 128
 
-COST = """\
+COST = f"""\
 Both nodes are processes at the end of a pair of sockets that carries SocketCAN's frames, so both run the code that they
-run on SocketCAN. Received: RPDOs with new values, up to the values in the cell (gatewayd: checked for owner and limits,
-and told to the listeners) or in Python variables (canopen: its notifier, a callback, `.raw`); integers at the rate of
-a saturated bus of 1 Mbit/s, bits at a tenth of it. Up to the node: the same in PRE-OPERATIONAL, where gatewayd drops
-RPDOs as CiA 301 demands, so that only driver and dispatch are left; a LocalNode knows no such state. Sent: values of
-the robot up to the frame in the socket (canopen: `.raw`, `transmit`). User and system time of the process per
-frame; ratio: canopen / gatewayd."""
+run on SocketCAN. Received: RPDOs with new values, the whole way into the cell (gatewayd: checked for owner and limits,
+and told to the listeners) or into Python variables (canopen: its notifier, a callback, `.raw`); integers at the rate of
+a saturated bus of 1 Mbit/s, bits at a tenth of it. Without a bus: the same from the node on, in one process. Up to the
+node: the same in PRE-OPERATIONAL, where gatewayd drops RPDOs as CiA 301 demands, so that only driver and dispatch are
+left; a LocalNode knows no such state. Sent: values of the robot up to the frame in the socket (canopen: `.raw`,
+`transmit`). User and system time of the process per frame, median of {ROUNDS} rounds in which the nodes take turns.
+{RULE}"""
 SATURATION = """\
 The same frames: as many in each slot of 10 ms as the bus carries. Lost: no room in the socket, or never counted."""
 LATENCY = """\
 SYNC handed to the kernel by another process -> a TPDO of type 1 in its hands, socket pair both ways included."""
 
-
-class Peer:
-    """The other end of a node's bus."""
-
-    def __init__(self, kind: str, folder: str) -> None:
-        self.socket, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, RECEIVE_BUFFER)
-        with other:
-            command = [sys.executable, "-m", "tests.benchmarks.can_node", str(other.fileno()), kind]
-            self.process = Process(command, Path(folder) / kind, pass_fds=(other.fileno(),))
-        said = self.process.answer()
-        if said != "ready":
-            raise RuntimeError(said + self.process.text())
-
-    def ask(self, order: str) -> list[float]:
-        """An order's answer."""
-        assert self.process.popen.stdin is not None
-        self.process.popen.stdin.write(order + "\n")
-        return [float(word) for word in self.process.answer().split()]
-
-    def send(self, can_id: int, data: bytes) -> bool:
-        """Whether there was room."""
-        try:
-            self.socket.send(_FRAME.pack(can_id, len(data), data), socket.MSG_DONTWAIT)
-        except OSError as error:
-            if error.errno not in (errno.EAGAIN, errno.ENOBUFS):
-                raise
-            return False
-        return True
-
-    def received(self, seconds: float = 0.0) -> list[int]:
-        """Identifiers of what has come."""
-        found = []
-        while select.select([self.socket], [], [], seconds)[0]:
-            found.append(_FRAME.unpack(self.socket.recv(16))[0])
-            seconds = 0.0
-        return found
-
-    def answered(self, can_id: int) -> bool:
-        """Wait for a frame of this identifier."""
-        end = time.perf_counter() + PATIENCE
-        while time.perf_counter() < end:
-            if can_id in self.received(PATIENCE):
-                return True
-        return False
+T = TypeVar("T")
 
 
-@contextmanager
-def _node(kind: str) -> Iterator[Peer]:
-    with tempfile.TemporaryDirectory() as folder:
-        peer = Peer(kind, folder)
-        try:
-            yield peer
-        finally:
-            peer.process.kill()
-            peer.socket.close()
-
-
-def run(seconds: float) -> list[Table]:
+def run(job: Job) -> list[Table]:
     """Three tables."""
-    cost = Table("CPU per PDO frame", COST, ("frame", "gatewayd", "canopen", "ratio"))
-    saturation = Table(
-        "A saturated bus of 1 Mbit/s", SATURATION, ("node", "frames/s", "lost", "share of a core")
-    )
-    latency = Table("SYNC -> TPDO", LATENCY, ("time", "gatewayd", "canopen", ""))
-    costs: dict[str, dict[str, float]] = {}
-    times: dict[str, list[float]] = {}
-    for kind in ("gatewayd", "canopen"):
-        with _node(kind) as peer:
-            found = _receive(peer, INTEGERS, SATURATED, seconds)
-            lost = at_most(found.lost, 0) if kind == "gatewayd" else str(found.lost)
-            saturation.add(kind, f"{found.rate:.0f}", lost, f"{100 * found.cpu * found.rate:.1f} %")
-            costs[kind] = {
-                "received, 2 integers": found.cpu,
-                "received, 64 bits": _receive(peer, BITS, SATURATED / 10, seconds).cpu,
-                "sent, 2 integers": _transmit(peer, INTEGERS),
-                "sent, 64 bits": _transmit(peer, BITS),
-            }
-            times[kind] = _syncs(peer, kind, seconds)
-            peer.send(_NMT, bytes([_ENTER_PRE_OPERATIONAL, NODE]))
-            costs[kind][TO_NODE] = _receive(peer, INTEGERS, SATURATED, seconds).cpu
-    for name, ours in costs["gatewayd"].items():
-        theirs = costs["canopen"][name]
-        if name == TO_NODE:
-            cost.add(name, at_most(ours * 1e6, CPU_AIM, " us"), "-", "-")
-        else:
-            cost.add(name, f"{ours * 1e6:.1f} us", f"{theirs * 1e6:.1f} us", at_least(theirs / ours, 1.0))
-    for name, share in (("p50", 0.5), ("p99", 0.99)):
-        latency.add(name, *(f"{percentile(times[kind], share) * 1000:.3f} ms" for kind in times))
-    latency.rows += [(bound, part, "", bar) for bound, part, bar in histogram(times["gatewayd"], BOUNDS)]
-    return [cost, saturation, latency]
-
-
-@dataclass(frozen=True)
-class _Reception:
-    rate: float
-    """Frames per second."""
-    lost: int
-    cpu: float
-    """Seconds per frame."""
-
-
-def _receive(peer: Peer, kind: int, rate: float, seconds: float) -> _Reception:
-    """Send RPDOs with new values at this rate."""
-    peer.received(0.2)
-    count_before, cpu_before = peer.ask("report")
-    can_id, sent, refused, offered = _RPDOS[kind], 0, 0, 0.0
-    begin = slot = time.perf_counter()
-    while slot - begin < seconds:
-        offered += rate * SLOT
-        while sent + refused < int(offered):
-            if peer.send(can_id, struct.pack("<ii", sent, -sent)):
-                sent += 1
-            else:
-                refused += 1
-        # Slots that were missed are not made up for: no bus is faster than it is.
-        slot = max(slot + SLOT, time.perf_counter())
-        time.sleep(max(0.0, slot - time.perf_counter()))
-    elapsed = time.perf_counter() - begin
-    end = time.perf_counter() + PATIENCE
-    while True:
-        count, cpu = peer.ask("report")
-        if count - count_before >= sent or time.perf_counter() > end:
-            break
-        time.sleep(0.05)
-    received = int(count - count_before)
-    return _Reception(
-        (sent + refused) / elapsed, refused + sent - received, (cpu - cpu_before) / max(1, received)
-    )
-
-
-def _transmit(peer: Peer, kind: int) -> float:
-    """CPU seconds per frame."""
-    costs = []
+    samples = Samples()
+    nodes = {tree.name: (tree, "gatewayd") for tree in job.trees} | {STOCK: (job.trees[0], STOCK)}
+    found = {name: _Figures() for name in nodes}
     for _ in range(ROUNDS):
-        peer.received()
-        (cpu,) = peer.ask(f"transmit {kind} {BATCH}")
-        frames = peer.received(0.01)
-        if len(frames) < BATCH:
-            raise RuntimeError(f"{len(frames)} of {BATCH} frames came")
-        costs.append(cpu / BATCH)
-    return median(costs)
+        for name, (tree, kind) in nodes.items():
+            with node(tree, kind) as peer:
+                _measure(found[name], peer, kind, job.seconds / ROUNDS, samples)
+    return [_costs(found, samples), _saturated(found), _latency(found)]
 
 
-def _syncs(peer: Peer, kind: str, seconds: float) -> list[float]:
-    """Seconds from each SYNC to its TPDO."""
-    if kind == "gatewayd":
-        peer.send(0x600 + NODE, bytes.fromhex("2f02180201000000"))
-        if not peer.answered(0x580 + NODE):
-            raise RuntimeError("no answer to the write of 1802h")
-    times = []
-    for _ in range(round(seconds * SYNCS_PER_SECOND)):
-        time.sleep(1 / SYNCS_PER_SECOND)
-        peer.received()
-        begin = time.perf_counter()
-        peer.send(_SYNC, b"")
-        if not peer.answered(_TPDO):
-            raise TimeoutError(f"no TPDO on a SYNC within {PATIENCE:g} s")
-        times.append(time.perf_counter() - begin)
-    return times
+@dataclass
+class _Figures:
+    """What was measured of one node, in all rounds."""
+
+    costs: dict[str, list[float]] = field(default_factory=dict)
+    """CPU seconds per frame, by row."""
+    saturated: list[Reception] = field(default_factory=list)
+    syncs: list[float] = field(default_factory=list)
+
+    def cost(self, row: str) -> float | None:
+        return median(self.costs[row]) if row in self.costs else None
+
+
+def _measure(figures: _Figures, peer: Peer, kind: str, seconds: float, samples: Samples) -> None:
+    def take(row: str, measure: Callable[[], T]) -> T:
+        return samples.take(row, peer.process.pid, measure)
+
+    def note(row: str, cost: float) -> None:
+        figures.costs.setdefault(row, []).append(cost)
+
+    reception = take(f"{RECEIVED}, 2 integers", partial(receive, peer, INTEGERS, SATURATED, seconds))
+    figures.saturated.append(reception)
+    note(f"{RECEIVED}, 2 integers", reception.cpu)
+    bits = take(f"{RECEIVED}, 64 bits", partial(receive, peer, BITS, SATURATED / 10, seconds))
+    note(f"{RECEIVED}, 64 bits", bits.cpu)
+    for what, pdo in (("2 integers", INTEGERS), ("64 bits", BITS)):
+        if kind != STOCK:
+            note(f"{WITHOUT_BUS}, {what}", take(f"{WITHOUT_BUS}, {what}", partial(in_process, peer, pdo)))
+        note(f"{SENT}, {what}", take(f"{SENT}, {what}", partial(transmit, peer, pdo)))
+    if kind != STOCK:
+        make_synchronous(peer)
+    figures.syncs += take("SYNC", partial(syncs, peer, seconds))
+    if kind != STOCK:
+        leave_operational(peer)
+        note(TO_NODE, take(TO_NODE, partial(receive, peer, INTEGERS, SATURATED, seconds)).cpu)
+
+
+def _costs(found: dict[str, _Figures], samples: Samples) -> Table:
+    own, *others = found
+    table = Table(
+        "CPU per PDO frame", COST, ("frame", *found, *(f"{name} / {own}" for name in others), *NOISE)
+    )
+    for row in found[own].costs:
+        costs = {name: figures.cost(row) for name, figures in found.items()}
+        cells = [f"{cost * 1e6:.3g} us" if cost is not None else "-" for cost in costs.values()]
+        mine = costs[own]
+        if mine is not None and row in CPU_AIMS:
+            cells[0] = at_most(mine * 1e6, CPU_AIMS[row], " us")
+        cells += [against(costs[name], mine, at_least, 1.0 if name == STOCK else None) for name in others]
+        table.add(row, *cells, *samples.noise(row))
+    table.note = samples.note
+    return table
+
+
+def _saturated(found: dict[str, _Figures]) -> Table:
+    table = Table("A saturated bus of 1 Mbit/s", SATURATION, ("node", "frames/s", "lost", "share of a core"))
+    for name, figures in found.items():
+        lost = sum(one.lost for one in figures.saturated)
+        rate = median(one.rate for one in figures.saturated)
+        cpu = median(one.cpu for one in figures.saturated)
+        told = str(lost) if name == STOCK else at_most(lost, 0)
+        table.add(name, f"{rate:.0f}", told, f"{100 * cpu * rate:.1f} %")
+    return table
+
+
+def _latency(found: dict[str, _Figures]) -> Table:
+    table = Table("SYNC -> TPDO", LATENCY, ("time", *found, ""))
+    times = {name: figures.syncs for name, figures in found.items()}
+    for name, share in (("p50", 0.5), ("p99", 0.99)):
+        table.add(name, *(f"{percentile(values, share) * 1000:.3f} ms" for values in times.values()))
+    first, *rest = (histogram(values, BOUNDS) for values in times.values())
+    for number, (bound, part, bar) in enumerate(first):
+        table.add(bound, part, *(rows[number][1] for rows in rest), bar)
+    return table

@@ -41,7 +41,7 @@ def _type_of(name: str) -> DataType:
     return (OUTPUTS.get(name) or INPUTS[name]).type
 
 
-class _Session:
+class Session:
     """One client's connection."""
 
     def __init__(self, connection: socket.socket) -> None:
@@ -94,9 +94,11 @@ class Controller:
         self._listener = socket.create_server((host, port))
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._listener, selectors.EVENT_READ)
-        self._sessions: dict[socket.socket, _Session] = {}
+        self._sessions: dict[socket.socket, Session] = {}
         self.values: Values = {}
         """What the next package carries; fields that are not named are zero."""
+        self.sent = 0
+        """Packages."""
 
     def pump(self, timeout: float) -> list[Values]:
         """Wait for anything to happen, at most `timeout` seconds; the input packages that it brought."""
@@ -128,14 +130,17 @@ class Controller:
                 raise TimeoutError("no client has started its output")
             self.pump(0.01)
 
-    def send(self) -> None:
-        """One package to every client that has started, stamped with the present moment."""
-        self.values["timestamp"] = (time.monotonic(),)
+    def send(self, count: int = 1, period: float = 0.0) -> None:
+        """Packages to every client that has started, in one segment; stamped `period` apart, the last one now."""
+        self.sent += count
+        now = time.monotonic()
         for session in self._sessions.values():
             if session.started and session.output is not None:
-                session.connection.sendall(
-                    session.protocol.send(DataPackage(1, self._packed(session.output)))
-                )
+                data = b""
+                for place in range(count):
+                    self.values["timestamp"] = (now - (count - 1 - place) * period,)
+                    data += session.protocol.send(DataPackage(1, self._packed(session.output)))
+                session.connection.sendall(data)
 
     def close(self) -> None:
         """Drop all clients."""
@@ -147,7 +152,7 @@ class Controller:
         connection, _ = self._listener.accept()
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._selector.register(connection, selectors.EVENT_READ)
-        self._sessions[connection] = _Session(connection)
+        self._sessions[connection] = Session(connection)
 
     def _packed(self, recipe: Recipe) -> bytes:
         flat: list[Scalar] = []

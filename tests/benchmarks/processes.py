@@ -38,16 +38,11 @@ def python(*args: str | Path) -> list[str]:
     return [sys.executable, *map(str, args)]
 
 
-def gatewayd(*args: str | Path) -> list[str]:
-    """Command line of gatewayd."""
-    return python("-m", "gatewayd", *args)
-
-
 @contextmanager
 def running(command: Sequence[str], port: int | None = None) -> Iterator[Process]:
     """`command` as a process that listens on `port`; stopped at the end.
 
-    RuntimeError with its last words if it ends by itself.
+    RuntimeError if it ends by itself. What goes wrong meanwhile has its last words as a note.
     """
     with tempfile.TemporaryDirectory() as folder:
         process = Process(command, Path(folder) / "log")
@@ -56,9 +51,16 @@ def running(command: Sequence[str], port: int | None = None) -> Iterator[Process
                 wait_for(lambda: not process.running or listens(port), f"port {port}")
             if process.running:
                 yield process
-            if not process.running:
-                raise RuntimeError(f"{' '.join(command)} ended:\n{process.text()[-LAST_WORDS:]}")
-            process.signal(signal.SIGTERM)
-            process.wait()
+            _stop(process, command)
+        except Exception as error:
+            error.add_note(f"last words of {command[-1]}:\n{process.text()[-LAST_WORDS:]}")
+            raise
         finally:
             process.kill()
+
+
+def _stop(process: Process, command: Sequence[str]) -> None:
+    if not process.running:
+        raise RuntimeError(f"{' '.join(command)} ended by itself")
+    process.signal(signal.SIGTERM)
+    process.wait()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 BAR = 40
@@ -17,6 +17,8 @@ class Table:
     definition: str
     header: tuple[str, ...]
     rows: list[tuple[str, ...]] = field(default_factory=list)
+    note: str = ""
+    """Stands below the rows."""
 
     def add(self, *cells: str) -> None:
         """Append a row; missing cells stay empty."""
@@ -29,9 +31,9 @@ class Table:
             "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
             for line in lines
         ]
-        return "\n".join(
-            [self.title, "=" * len(self.title), self.definition, "", text[0], "-" * len(text[0]), *text[1:]]
-        )
+        title = [self.title, "=" * len(self.title), self.definition, ""]
+        note = [self.note] if self.note else []
+        return "\n".join([*title, text[0], "-" * len(text[0]), *text[1:], *note])
 
 
 def at_most(value: float, aim: float, unit: str = "") -> str:
@@ -42,6 +44,15 @@ def at_most(value: float, aim: float, unit: str = "") -> str:
 def at_least(value: float, aim: float, unit: str = "") -> str:
     """`value` with the aim that it should reach, and whether it does."""
     return _judged(value, aim, ">=", unit, met=value >= aim)
+
+
+def against(
+    own: float | None, other: float | None, judge: Callable[[float, float], str], aim: float | None = None
+) -> str:
+    """`own` as a multiple of `other`, judged where there is an aim; a dash where one of them was not measured."""
+    if not own or not other:
+        return "-"
+    return f"{own / other:.3g}" if aim is None else judge(own / other, aim)
 
 
 def _judged(value: float, aim: float, sign: str, unit: str, *, met: bool) -> str:

@@ -15,6 +15,8 @@ from tests.benchmarks.plc import Plc
 from tests.benchmarks.processes import free_port, listens, python, running
 from tests.benchmarks.report import Table, percentile
 from tests.benchmarks.servers import Served, mapped_gateway
+from tests.benchmarks.trees import Job
+from tests.benchmarks.usage import usage
 
 ROBOT_PORT = 30004
 """ur_rtde knows no other, so the controller gets a loopback address of its own."""
@@ -35,11 +37,11 @@ full image, inward and read-back too. Mixed: a block with doubles of two package
 stops sending but keeps its connection, as behind a dead switch; how long until the registers tell."""
 
 
-def run(seconds: float) -> list[Table]:
+def run(job: Job) -> list[Table]:
     """One table; only gatewayd's column where ur_rtde has no wheel."""
-    columns = {"gatewayd": _column_of_gatewayd(seconds)}
+    columns = {"gatewayd": _column_of_gatewayd(job.seconds)}
     if find_spec("rtde_receive") is not None:
-        columns["script"] = _column_of_script(seconds)
+        columns["script"] = _column_of_script(job.seconds)
     table = Table("Beside the script that a user would write", DEFINITION, ("what", *columns))
     for what in columns["gatewayd"]:
         table.add(what, *(column[what] for column in columns.values()))
@@ -74,9 +76,10 @@ def _script(controller: Controller) -> Iterator[Served]:
 def _column(controller: Controller, served: Served, seconds: float) -> dict[str, str]:
     plc = Plc(served.port)
     pace(controller, 1.0)
-    before = served.process.cpu_seconds()
+    before = usage(served.process.pid)
     pace(controller, seconds)
-    cpu = 100 * (served.process.cpu_seconds() - before) / seconds
+    used = usage(served.process.pid) - before
+    cpu = 100 * used.cpu / used.wall
     seen = stream(controller, plc, seconds, first=FIRST, count=DOUBLES)
     hammered = stream(controller, plc, seconds, first=FIRST, count=DOUBLES, hammer=True)
     silence = _silence(controller, plc)
