@@ -23,7 +23,7 @@ COMMANDS = {
     "watch": "Watch the variables of the running gateway live.",
     "locks": "Print who owns what; take and release locks.",
     "events": "Print past events, and follow new ones.",
-    "trace": "Print what passes the links of the running gateway, in words.",
+    "trace": "Print the traffic on the links of the running gateway, decoded.",
     "force": "Put a value in a variable's place for commissioning.",
     "unforce": "End a force before its time.",
     "completion": "Print the completion script of a shell.",
@@ -50,7 +50,7 @@ Exit codes:
   0    all is well
   1    the command found something, or what it had to do failed
   2    wrong usage, or a file that cannot be read
-  70   a defect of gatewayd itself; GATEWAYD_TRACEBACK=1 shows where
+  70   a defect in gatewayd itself; GATEWAYD_TRACEBACK=1 shows where
   130  interrupted by Ctrl-C
 """
 

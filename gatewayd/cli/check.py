@@ -39,7 +39,7 @@ def _complete_rules(
 Examples:
   gatewayd check my-cell.yaml
   gatewayd check cells/*.yaml               cells of one gateway: what they share is checked too
-  gatewayd check /etc/gatewayd              the same for all of a directory
+  gatewayd check /etc/gatewayd              the same for all files of a directory
   gatewayd check --separately a.yaml b.yaml  two mappings that never run together
   gatewayd check --strict my-cell.yaml      warnings count as errors
   gatewayd check --format github *.yaml     annotations in a pull request
@@ -66,7 +66,7 @@ Exit codes:
     "github",
     help="How findings are written: for people, for programs, for GitHub's annotations.",
 )
-@click.option("--strict", is_flag=True, help="Let warnings fail the check too.")
+@click.option("--strict", is_flag=True, help="Fail on warnings too.")
 @click.option(
     "--separately", is_flag=True, help="Check each file by itself: the cells will not run in one gateway."
 )
@@ -88,9 +88,9 @@ def command(
 ) -> None:
     """Find every mistake in mapping FILES, all in one pass, each with file, line and column.
 
-    Checked is all that can be known without the plant: the text, the Modbus addresses, the robot's fields, who may
-    write, what happens when a side is lost, and what number conversions lose. `-` reads standard input, a directory
-    stands for its mapping files: *.yaml and *.yml, none that begins with a dot.
+    It checks all that can be known without the plant: the text, the Modbus addresses, the robot's fields, who may
+    write, what happens when a side is lost, and what number conversions lose. `-` reads standard input; a directory
+    stands for its mapping files, *.yaml and *.yml, except those whose names begin with a dot.
     """
     if explain is not None:
         click.echo(_explain(explain), nl=False)

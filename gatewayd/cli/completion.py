@@ -19,7 +19,7 @@ INSTRUCTIONS = {
 def command(ctx: click.Context, shell: str) -> None:
     """Print the completion script of SHELL.
 
-    To try it in the present shell: eval "$(gatewayd completion bash)". The script's last line says how to keep it.
+    To try it in this shell: eval "$(gatewayd completion bash)". The script's last line says how to keep it.
     """
     script = get_completion_class(shell)
     assert script is not None

@@ -43,7 +43,7 @@ Examples:
 \b
 Exit codes:
   0    parts were made, and every value came back right on both buses (or Ctrl-C before the first time)
-  1    that was not so, or the port cannot be had
+  1    that was not the case, or the port is taken
   130  forced by a second Ctrl-C
 """,
 )
@@ -51,7 +51,7 @@ Exit codes:
     "--seconds",
     type=click.FloatRange(0),
     metavar="N",
-    help="End after N seconds. Default: at Ctrl-C, or after 20 where the output is no terminal; 0: at Ctrl-C.",
+    help="End after N seconds; 0: at Ctrl-C. Default: 0, or 20 where the output is not a terminal.",
 )
 @click.option(
     "--port",
@@ -59,9 +59,9 @@ Exit codes:
     help="Modbus TCP port; 0 takes a free one. Default: 1502 if it is free, else a free one.",
 )
 def command(seconds: float | None, port: int | None) -> int:
-    """See it work: a simulated robot, the gateway, a small PLC program and a CANopen master, no robot needed.
+    """See it work: a simulated robot, the gateway, a small PLC program and a CANopen master; no robot is needed.
 
-    They talk to each other over real sockets and a CAN bus of this process. The table shows what the gateway knows:
+    They talk to each other over real sockets and a CAN bus inside this process. The table shows what the gateway knows:
     every variable with its registers, objects, value, quality, age and owner. From another terminal you can take part.
     """
     from rich.console import Console

@@ -31,9 +31,10 @@ Exit codes:
 @format_option("text", "json", help="For people or for programs.")
 @click.pass_context
 def command(context: click.Context, old: str, new: str, form: str) -> None:
-    """Print what the mapping NEW changes of the mapping OLD: variables, owners, addresses, settings of the links.
+    """Print what the mapping NEW changes in the mapping OLD: variables, owners, addresses, settings of the links.
 
-    Compared is what the files mean: order of keys, spelling and formatting do not count. `-` reads standard input.
+    It compares what the files mean: the order of keys, spelling and formatting make no difference. `-` reads standard
+    input.
     """
     from gatewayd.report.diff import as_json, as_text, compare
 

@@ -122,12 +122,12 @@ Examples:
 Exit codes:
   0  printed
   1  refused
-  2  wrong usage, or no gateway could be reached; with --follow, it has ended
+  2  wrong usage, or no gateway could be reached; with --follow also: the gateway has ended
 """,
 )
 @on_gateway
 @cell_option
-@click.option("-f", "--follow", is_flag=True, help="Go on with what happens, until Ctrl-C.")
+@click.option("-f", "--follow", is_flag=True, help="Then print what happens from now on, until Ctrl-C.")
 @click.option(
     "-n",
     "--limit",
@@ -138,7 +138,7 @@ Exit codes:
     "--since",
     type=PointInTime(),
     metavar="TIME",
-    help="Only those since then: 10min, 2h; or 2026-11-22T02:15, UTC unless a zone stands there.",
+    help="Only events since then: 10min or 2h ago, or 2026-11-22T02:15, in UTC unless it names a zone.",
 )
 @click.option(
     "--kind",
@@ -147,7 +147,7 @@ Exit codes:
     metavar="TEXT",
     callback=_kinds,
     shell_complete=_complete_kinds,
-    help="Only those with this in the name of what happened, say lost or refused; may be repeated.",
+    help="Only events whose kind has this in its name, say lost or refused; may be repeated.",
 )
 @click.option(
     "--variable",
@@ -155,9 +155,9 @@ Exit codes:
     multiple=True,
     metavar="NAME",
     shell_complete=complete_variables,
-    help="Only what happened to this variable; may be repeated.",
+    help="Only events of this variable; may be repeated.",
 )
-@click.option("--audit", is_flag=True, help="The audit instead: accepted and refused writes.")
+@click.option("--audit", is_flag=True, help="Print the audit instead: accepted and refused writes.")
 @json_option
 @click.pass_context
 def command(
@@ -175,7 +175,7 @@ def command(
 ) -> None:
     """Print the last events of the running gateway: links, locks, refusals, fallbacks, forces.
 
-    Each has the time that the log has for it: date, milliseconds, UTC.
+    Each has the time that it has in the log: date and time in UTC, with milliseconds.
     """
     if follow and audit:
         raise click.UsageError("--audit cannot be followed; gatewayd run --audit FILE writes a file that can")

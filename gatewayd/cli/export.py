@@ -21,7 +21,7 @@ _EXIT_CODES = """\
 \b
 Exit codes:
   0  written
-  1  the file has errors (they are listed), or nothing of what is asked for
+  1  the file has errors (they are listed), or it has nothing of what is asked for
   2  wrong usage, or a file that cannot be read or written
 """
 

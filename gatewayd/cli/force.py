@@ -40,15 +40,22 @@ Exit codes:
 @click.argument("name", shell_complete=complete_variables)
 @click.argument("value")
 @click.option(
-    "--for", "seconds", type=DURATION, default="1min", show_default=True, metavar="TIME", help="At most 24h."
+    "--for",
+    "seconds",
+    type=DURATION,
+    default="1min",
+    show_default=True,
+    metavar="TIME",
+    help="How long, at most 24h.",
 )
 @on_gateway
 @cell_option
 def command(client: Client, name: str, value: str, seconds: float, cell: str | None) -> None:
-    """Force variable NAME to VALUE (a number in the robot's unit, or on and off).
+    """Force variable NAME to VALUE (a number in the robot's unit, or on or off).
 
-    An input: the robot gets the value, and its lock is yours so long. An output: the fieldbus sees the value. Declared
-    limits hold. Afterwards an output shows the truth again, and an input its release fallback until its owner writes.
+    Input: the robot gets the value, and its lock is yours for this time; afterwards it takes its release fallback until
+    its owner writes. Output: the fieldbus sees the value, and afterwards again what the robot reports. Declared limits
+    apply.
     """
     from gatewayd.control.client import segment
     from gatewayd.report.format import span
@@ -74,5 +81,5 @@ def _parse(text: str) -> bool | int | float:
         except ValueError:
             continue
     raise click.BadParameter(
-        f"{text!r} is no number, and neither on nor off: write 7, 0.5, on or off", param_hint="VALUE"
+        f"{text!r} is neither a number nor on or off: write 7, 0.5, on or off", param_hint="VALUE"
     )

@@ -46,7 +46,7 @@ Exit codes:
 @json_option
 @click.pass_context
 def command(context: click.Context, client: Client, cell: str | None, *, as_json: bool) -> None:
-    """Print who owns what and for how long. What you take or release stands in events and audit with your name."""
+    """Print who owns what and for how long. Events and audit record with your name what you take or release."""
     if context.invoked_subcommand is not None:
         return
     locks = client.get("/v1/locks", cell=cell)["locks"]
@@ -67,7 +67,7 @@ Examples:
 )
 @click.argument("name", shell_complete=complete_locks)
 @click.option(
-    "--for", "seconds", type=DURATION, metavar="TIME", help="Give it back after that time: 30s, 10min, 2h."
+    "--for", "seconds", type=DURATION, metavar="TIME", help="Give it back after this time: 30s, 10min, 2h."
 )
 @on_gateway
 @cell_option
@@ -96,7 +96,7 @@ Examples:
 @on_gateway
 @cell_option
 def release(client: Client, name: str, cell: str | None) -> None:
-    """Release lock NAME, whoever holds it; the release fallbacks apply. A writer that goes on writing gets it again."""
+    """Release lock NAME, whoever holds it; the release fallbacks apply. A writer that keeps writing gets it back."""
     from gatewayd.control.client import segment
 
     lock = readable(client.post(f"/v1/locks/{segment(name)}/release", {"cell": cell}))

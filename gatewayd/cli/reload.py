@@ -24,8 +24,8 @@ PATIENCE = 60.0
     epilog="""\b
 Examples:
   gatewayd reload
-  gatewayd reload --accept weakening   a longer time-out, wider limits: on purpose
-  gatewayd diff /etc/gatewayd/press.yaml new.yaml   before: what it would change
+  gatewayd reload --accept weakening   a longer time-out or wider limits, on purpose
+  gatewayd diff /etc/gatewayd/press.yaml new.yaml   what it would change, before you do it
 
 \b
 Kinds of objections, each refused unless it is accepted:
@@ -43,9 +43,9 @@ Exit codes:
     multiple=True,
     type=click.Choice([kind.value for kind in ObjectionKind]),
     metavar="KIND",
-    help="Apply it in spite of objections of this kind; can be given more than once.",
+    help="Apply the new mapping in spite of objections of this kind; may be repeated.",
 )
-@click.option("--force", is_flag=True, help="Apply it whatever stands against it: accept all kinds.")
+@click.option("--force", is_flag=True, help="Apply the new mapping in spite of all objections.")
 @on_gateway
 @json_option
 @click.pass_context

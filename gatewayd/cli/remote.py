@@ -51,7 +51,7 @@ def on_gateway(command: Callable[..., None]) -> Callable[..., None]:
         type=click.Path(path_type=Path),
         envvar="GATEWAYD_CONTROL",
         is_eager=True,
-        help="Control socket of the gateway; found by itself where there is one.",
+        help="Control socket of the gateway. Default: the only one that there is.",
     )
     @wraps(command)
     def run(**options: Any) -> None:
@@ -163,8 +163,8 @@ cell_option = click.option(
     "--cell",
     metavar="NAME",
     shell_complete=_complete_cells,
-    help="Only this cell, of several in one gateway.",
+    help="Only this cell, where the gateway serves several.",
 )
 json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print what the gateway answers, for programs."
+    "--json", "as_json", is_flag=True, help="Print the answer of the gateway as JSON, for programs."
 )

@@ -25,7 +25,7 @@ Examples:
 \b
 Exit codes:
   0    stopped by SIGTERM, SIGINT or SIGQUIT, or by the end of its terminal; SIGHUP otherwise means: reload
-  1    no mapping could be served (each reason stands in the log), or --strict and one of them could not
+  1    no mapping could be served (the log says why), or --strict and one of them could not
   2    wrong usage, or none of the files could be read
   70   the process that reads the files could not do so; the log says why
   130  forced by a second signal
@@ -44,12 +44,12 @@ Exit codes:
     type=click.Choice(["debug", "info", "warning", "error"]),
     default="info",
     show_default=True,
-    help="Least severity logged; debug also logs every lock taken and released.",
+    help="Lowest severity that is logged; debug also logs every lock taken and released.",
 )
 @click.option(
     "--state",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Directory of what CANopen masters have stored; default: $STATE_DIRECTORY, else ~/.local/state/gatewayd.",
+    help="Directory for what CANopen masters store; default: $STATE_DIRECTORY, else ~/.local/state/gatewayd.",
 )
 @click.option("--strict", is_flag=True, help="Start only if every file can be served.")
 @click.option(
@@ -69,13 +69,13 @@ Exit codes:
     "--status",
     metavar="HOST:PORT",
     envvar="GATEWAYD_STATUS",
-    help="Listen there for the status page, /metrics, /healthz and /readyz, say 127.0.0.1:9502. Off by default.",
+    help="Address of the status page, /metrics, /healthz and /readyz, say 127.0.0.1:9502. Off by default.",
 )
 @click.option(
     "--token-file",
     type=click.Path(path_type=Path),
     envvar="GATEWAYD_TOKEN_FILE",
-    help="File with the token that the status listener asks for by everything but reading.",
+    help="File with the token that the status listener demands for everything but reading.",
 )
 def command(
     files: tuple[Path, ...],
@@ -91,8 +91,8 @@ def command(
 ) -> int:
     """Serve the robot cells of mapping FILES until stopped.
 
-    A FILE may also be a directory: all its *.yaml and *.yml files are meant. Cells with the same
-    `modbus: listen:` share one listener and differ by their unit id. Robots, PLCs and
+    A FILE may also be a directory, which stands for all its *.yaml and *.yml files. Cells with the same
+    `modbus: listen:` share one listener and are told apart by their unit id. Robots, PLCs and
     interfaces may come and go in any order.
     """
     from gatewayd.service.main import main

@@ -30,7 +30,7 @@ _EXPENDABLE = ("no.", "lost", "owner", "robot", "value", "type", "address")
     name="show",
     epilog="""\b
 Examples:
-  gatewayd show my-cell.yaml                         a look at the screen
+  gatewayd show my-cell.yaml                         a table for the screen
   gatewayd show --all my-cell.yaml                   every element of ranges and vectors
   gatewayd show --format csv my-cell.yaml > map.csv  for a spreadsheet or the PLC's tag import
   gatewayd show --format markdown my-cell.yaml       for the documents of the cell

@@ -54,18 +54,23 @@ The robot program, one rule a line or separated by `;`, run in order in every co
   TARGET = count SOURCE | count every DURATION
   TARGET = toggle SOURCE | toggle every DURATION
   TARGET = NUMBER
-TARGET and SOURCE are RTDE fields (output_int_register_0), elements (actual_TCP_pose[2]), bits of
-integers (actual_digital_input_bits.0) or reserved bits (output_bit_register_0 to _63); NAME_0..23 on both
-sides makes a rule for each number. `after` delays every change, `for` makes a pulse of every change from 0,
-`count` and `toggle` act on every change of SOURCE from 0. DURATION has its unit: 200ms, 1.5s. # starts a
-comment.
+
+TARGET and SOURCE are RTDE fields (output_int_register_0), elements (actual_TCP_pose[2]), bits of integers
+(actual_digital_input_bits.0) or reserved bits (output_bit_register_0 to _63); NAME_0..23 on both sides makes a rule
+for each number. `after` delays every change, `for` turns every change from 0 into a pulse, `count` and `toggle` act
+on every change of SOURCE from 0. A DURATION has its unit: 200ms, 1.5s. A # starts a comment.
 
 \b
 Commands on standard input (--control stdin), each answered with `ok`, `ok RESULT` or `error REASON`:
-  get FIELD            set FIELD VALUE[,VALUE...]    hold FIELD[,FIELD...]    free FIELD[,FIELD...]
-  freeze on|off        silence on|off                creep on|off             overwrite FIELD VALUE[,...]|off
-  pause SECONDS        delay SECONDS                 drop-clients             drop-at STEP[:NUMBER]|off
-  text MESSAGE         clients                       restart                  quit (as does the end of input)
+  get FIELD                          set FIELD VALUE[,VALUE...]
+  hold FIELD[,FIELD...]              free FIELD[,FIELD...]
+  freeze on|off                      creep on|off
+  silence on|off                     overwrite FIELD VALUE[,...]|off
+  pause SECONDS                      delay SECONDS
+  drop-clients                       drop-at STEP[:NUMBER]|off
+  text MESSAGE                       raw HEX
+  clients                            restart
+  quit (as does the end of input)
 
 \b
 Examples:
@@ -77,8 +82,8 @@ Examples:
 \b
 Exit codes:
   0    stopped by SIGTERM, SIGINT or `quit`
-  1    the address cannot be listened on
-  2    wrong usage, a mistake in the robot program
+  1    it cannot listen on the address
+  2    wrong usage, or a mistake in the robot program
 """,
 )
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
@@ -90,16 +95,18 @@ Exit codes:
     help="TCP port; 0 takes a free one and prints it.",
 )
 @click.option(
-    "--series", type=click.Choice(["cb3", "e", "x"]), help="Generation; default: that of --version, else e."
+    "--series",
+    type=click.Choice(["cb3", "e", "x"]),
+    help="Controller series. Default: that of --version, else e.",
 )
 @click.option(
-    "--version", help="Controller software, as 5.12.0: later fields are NOT_FOUND. Default: by series."
+    "--version", help="Controller software, say 5.12.0; later fields are NOT_FOUND. Default: by series."
 )
 @click.option(
     "--frequency",
     type=click.FloatRange(1, 1000),
     metavar="HZ",
-    help="Control cycles per second, in place of the series' 125 or 500.",
+    help="Control cycles per second, instead of the 125 or 500 of the series.",
 )
 @click.option(
     "--uptime",
@@ -126,7 +133,7 @@ Exit codes:
     type=click.IntRange(1, 1000),
     default=16,
     show_default=True,
-    help="Most clients at a time.",
+    help="Greatest number of clients at a time.",
 )
 @click.option("--protocol-v1", "v1_only", is_flag=True, help="Fault: refuse protocol version 2.")
 @click.option(
@@ -134,7 +141,7 @@ Exit codes:
     is_flag=False,
     flag_value=SAFETY_TEXT,
     metavar="[TEXT]",
-    help="Fault: a text message before anything was asked, as an unpowered PolyScope X sends it.",
+    help="Fault: a text message before anything was asked for, as an unpowered PolyScope X sends it.",
 )
 @click.option(
     "--boot-restart",
@@ -158,42 +165,42 @@ Exit codes:
 @click.option(
     "--unreadable",
     metavar="FIELD,...",
-    help="Fault: inputs that can be claimed and are NOT_FOUND where they are read back.",
+    help="Fault: inputs that can be claimed, but are NOT_FOUND when read back.",
 )
 @click.option(
     "--strict-lists",
     is_flag=False,
     flag_value="complain",
     type=click.Choice(["refuse", "complain", "ignore", "close"]),
-    help="Fault: lists of names of more than 2048 bytes are refused with id 0, answered by a text message only "
-    "(the default), not answered, or end the connection.",
+    help="Fault: how a list of names of more than 2048 bytes is answered: refused with id 0, by a text message alone "
+    "(complain, the default), not at all, or by closing the connection.",
 )
 @click.option(
     "--drop-at",
     metavar="STEP[:NUMBER]",
-    help="Fault: close a connection at this step of it, before it is answered: version, controller, outputs, "
-    "inputs, start, pause, write, data; NUMBER: the first, second, ... of that kind on a connection.",
+    help="Fault: close a connection instead of answering this step: version, controller, outputs, inputs, start, "
+    "pause, write or data. NUMBER: the first, second, ... of that kind on the connection.",
 )
 @click.option(
     "--drop-times",
     type=click.IntRange(0),
     default=1,
     show_default=True,
-    help="Connections that --drop-at closes; 0: each.",
+    help="How many connections --drop-at closes; 0: all.",
 )
 @click.option(
     "--delay",
     callback=_seconds,
     default="0",
     metavar="SECONDS",
-    help="Fault: packages and answers leave this late.",
+    help="Fault: delay packages and answers by this time.",
 )
 @click.option(
     "--linger",
     type=click.IntRange(0, 3_600_000),
     default=0,
     metavar="MS",
-    help="Fault: release claims this long after a connection has closed.",
+    help="Fault: release claims only this long after a connection has closed.",
 )
 @click.option(
     "--overflow-close",
@@ -201,26 +208,35 @@ Exit codes:
     default="1",
     show_default=True,
     metavar="SECONDS",
-    help="Close a client that has not read for this long, or never.",
+    help="Close the connection of a client that has not read for this long; `never`: do not.",
 )
 @click.option("--drop", type=_PROBABILITY, default=0.0, help="Fault: probability of losing a data package.")
-@click.option("--duplicate", type=_PROBABILITY, default=0.0, help="Fault: probability of sending one twice.")
 @click.option(
-    "--split", type=_PROBABILITY, default=0.0, help="Fault: probability of sending one in two segments."
+    "--duplicate", type=_PROBABILITY, default=0.0, help="Fault: probability of sending a data package twice."
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the three probabilities.")
+@click.option(
+    "--split",
+    type=_PROBABILITY,
+    default=0.0,
+    help="Fault: probability of sending a data package in two segments.",
+)
+@click.option(
+    "--seed", type=int, default=0, show_default=True, help="Seed of the random numbers behind these three."
+)
 @click.option("--freeze", is_flag=True, help="Fault: the timestamp stands still, packages go on.")
-@click.option("--creep", is_flag=True, help="Fault: as --freeze, but the timestamp goes on by 1 ns a cycle.")
+@click.option(
+    "--creep", is_flag=True, help="Fault: as --freeze, but the timestamp advances by 1 ns per cycle."
+)
 @click.option("--silence", is_flag=True, help="Fault: no data packages.")
 @click.option("--control", type=click.Choice(["stdin"]), help="Take commands (below) from standard input.")
 @click.option("-q", "--quiet", is_flag=True, help="Log warnings only.")
 def command(
     host: str, port: int, control: str | None, connections: int, *, quiet: bool, **options: Any
 ) -> int:
-    """Be a Universal Robots controller: its RTDE interface with moving values, claims and a small robot program.
+    """Simulate a Universal Robots controller: its RTDE interface with moving values, claims and a robot program.
 
-    Serves any number of RTDE clients as a real controller does and prints one line when it listens. Its faults
-    are declared here and, in part, switched while it runs.
+    It serves several RTDE clients at a time, as a real controller does, and prints one line when it listens. Faults
+    are chosen by options; some can also be switched while it runs (--control).
     """
     import asyncio
 

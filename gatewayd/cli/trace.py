@@ -13,6 +13,7 @@ from typing import IO, TYPE_CHECKING, Any
 import click
 
 from gatewayd.cli.remote import DURATION, UNREACHABLE, cell_option, on_gateway
+from gatewayd.report.format import counted
 from gatewayd.report.printable import json_text, printable
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ Examples:
 Exit codes:
   0  printed, ended by --seconds or --count
   1  refused
-  2  wrong usage, or no gateway could be reached, or it has ended
+  2  wrong usage, no gateway could be reached, or the gateway has ended
 """,
 )
 @on_gateway
@@ -50,11 +51,21 @@ Exit codes:
     type=click.Choice(["text", "json", "candump", "pcap"]),
     default="text",
     show_default=True,
-    help="Words; a line of JSON for each; the log of candump (CAN alone); pcapng for Wireshark.",
+    help="Decoded text; JSON, an object a line; the log format of candump (CAN only); pcapng for Wireshark.",
 )
-@click.option("-o", "--output", metavar="FILE", type=click.Path(dir_okay=False), help="Write to FILE.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    type=click.Path(dir_okay=False),
+    help="Write to FILE, not to standard output.",
+)
 @click.option("--seconds", "duration", metavar="TIME", type=DURATION, help="End after this time: 30s, 5min.")
-@click.option("--count", type=click.IntRange(1, 10**9 - 1), help="End after so many.")
+@click.option(
+    "--count",
+    type=click.IntRange(1, 10**9 - 1),
+    help="End after this many requests, frames or messages.",
+)
 @click.pass_context
 def command(
     context: click.Context,
@@ -68,7 +79,7 @@ def command(
     duration: float | None,
     count: int | None,
 ) -> None:
-    """Print what passes the links of the running gateway: Modbus requests and answers, CAN frames, RTDE messages."""
+    """Print the traffic on the links of the running gateway: Modbus requests and answers, CAN frames, RTDE messages."""
     if form == "pcap" and output is None and sys.stdout.isatty():
         raise click.UsageError("pcap is for a file or a pipe: name a file with -o")
     seconds = None if duration is None else max(1, round(duration))
@@ -89,7 +100,7 @@ def _written(found: Iterable[Row], form: _Form) -> Iterator[bytes | None]:
     for row in found:
         if "passed" in row:
             lost = f", {row['dropped']} dropped" if row["dropped"] else ""
-            click.echo(f"{row['passed']} passed{lost}", err=True)
+            click.echo(f"{counted(row['passed'], 'entry')}{lost}", err=True)
             yield None
         elif "dropped" in row:
             click.echo(f"{row['dropped']} dropped so far: narrow the trace by --link or --peer", err=True)

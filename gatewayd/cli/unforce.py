@@ -31,7 +31,7 @@ Exit codes:
 @on_gateway
 @cell_option
 def command(client: Client, name: str | None, cell: str | None, *, every: bool) -> None:
-    """End the force of variable NAME: an output shows the truth again, an input its release fallback."""
+    """End the force of variable NAME: an output shows what the robot reports again, an input its release fallback."""
     from gatewayd.control.client import segment
     from gatewayd.report.format import value
 

@@ -49,7 +49,7 @@ Keys:
 Examples:
   gatewayd watch
   gatewayd watch tcp              only names, registers and owners with tcp in them
-  gatewayd watch --once           one look, as lines
+  gatewayd watch --once           one snapshot, as lines
   gatewayd watch | tee log.txt    lines, every interval
 
 \b

@@ -28,8 +28,8 @@ class ObjectionKind(StrEnum):
 
 MEANINGS: Mapping[ObjectionKind, str] = MappingProxyType(
     {
-        ObjectionKind.RELEASE: "an owner would lose what it owns now, and the robot gets the release fallback",
-        ObjectionKind.OWNED: "a variable that is owned now would mean something else; its owner keeps it",
+        ObjectionKind.RELEASE: "an owner would lose what it owns now, and the robot would get the release fallback",
+        ObjectionKind.OWNED: "a variable that is owned now would mean something else, and its owner would keep it",
         ObjectionKind.LEFT: "the robot would keep a value that nobody could clear any more",
         ObjectionKind.WATCHDOG: "the robot's watchdog would not be fed for a moment: its program may stop",
         ObjectionKind.DIRECTION: "a variable would turn from input to output or back",

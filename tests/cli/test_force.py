@@ -43,7 +43,7 @@ def test_values_as_typed(gateway: Running, invoke: Invoke, name: str, text: str,
     [
         (("limit", "151"), 1, "value out of limits, 0..150"),
         (("cycles", "1.5"), 1, "must be a whole number"),
-        (("cycles", "much"), 2, "is no number"),
+        (("cycles", "much"), 2, "is neither a number"),
         (("nothing", "1"), 1, "there is no variable nothing"),
         (("cycels", "1"), 1, "there is no variable cycels; did you mean cycles?"),
         (("cycles", "1", "--for", "25h"), 1, "at most 86400"),

@@ -27,7 +27,7 @@ def _exported(text: Callable[[Iterable[Object], Sheet], str], plan: Plan) -> str
     made = text(dictionary, sheet_of(node, plan.cell))
     found = differences(made, dictionary, node.node)
     if found:
-        raise ExportError(f"not written, because python-canopen reads it otherwise: {'; '.join(found[:3])}")
+        raise ExportError(f"not written, because python-canopen reads it differently: {'; '.join(found[:3])}")
     return made
 
 
@@ -37,16 +37,16 @@ EXPORTS: Final = (
         "The electronic data sheet, for the master's configurator.",
         """Write the electronic data sheet (CiA 306) of the node of a mapping FILE, for the configurator of the master.
 
-        Before it is written, python-canopen's importer has read it back, every entry as it was meant. The same mapping
-        gives the same bytes. The sheet is valid for any node-ID; COB-IDs beyond the four predefined of each direction
-        are those of the mapping.
+        The sheet is written only after python-canopen's importer has read back every entry as it was meant. The same
+        mapping gives the same bytes. The sheet is valid for any node-ID; COB-IDs beyond the four predefined ones of
+        each direction are those of the mapping.
         """,
         "gatewayd export eds my-cell.yaml -o my-cell.eds",
         partial(_exported, eds_text),
     ),
     Export(
         "dcf",
-        "The same with node-ID, bit-rate and values.",
+        "The device configuration file: the EDS with node-ID, bit-rate and values.",
         """Write the device configuration file (CiA 306) of a mapping FILE: its data sheet with the node-ID, the
         bit-rate and the value of every parameter as the mapping has them.
         """,
