@@ -40,7 +40,7 @@ NEVER_ONE = {
     "links.canopen_node.rules.pdos: len(pdos)": "more than the four predefined ones",
     "links.canopen_node.rules.pdos: pdo.bits": "more than 64",
     "links.modbus_server.rules.places: limit": "the greatest block of a request",
-    "links.robot.rules.fields: _length(names)": "more than 2048",
+    "links.robot.rules.fields: size": "more than 2048",
     "links.robot.rules.fields: len(names)": "as many as take more than 2048 bytes",
     "mapping.rules.bounds: len(cell.variables)": "more than the limit",
     "mapping.rules.bounds: len(writers)": "more than the limit",

@@ -80,7 +80,7 @@ def seen(name: str, interface: Interface | None) -> tuple[BusSignal, str]:
     if not interface.up:
         return BusSignal.DOWN, f"{name} is down; `ip link set {name} up` brings it up"
     if not interface.carrier:
-        restart = f"it stays off until {name} is taken down and up (restart-ms is not set)"
+        restart = f"it stays off until {name} is set down and up again (restart-ms is not set)"
         if interface.restart_ms:
             restart = f"the kernel restarts it after {interface.restart_ms} ms"
         return BusSignal.OFF, f"{name} is off the bus; {restart}"
@@ -124,7 +124,7 @@ class SocketCanBus(SupervisedBus):
             raise BusError(f"{self._channel}: {error.strerror}") from error
         if found is not None and not found.is_can:
             self.close()
-            raise BusError(f"{self._channel} is no CAN interface; `ip link show type can` lists them")
+            raise BusError(f"{self._channel} is not a CAN interface; `ip link show type can` lists them")
         self._look()
 
     def close(self) -> None:

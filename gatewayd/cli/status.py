@@ -185,7 +185,7 @@ def _writer(writer: Answer, locks: int) -> str:
     if writer["alive"]:
         state, colour = f"connected, last request {ago(writer['age'])}", "green"
     elif writer["age"] is None:
-        return f"{writer['name']} {verb('have', writer['name'])} not come yet"
+        return f"{writer['name']} {verb('have', writer['name'])} not connected yet"
     else:
         state, colour = f"lost, last request {ago(writer['age'])}", "red"
     owned = f"{verb('own', writer['name'])} {writer['locks']} of {counted(locks, 'lock')}"

@@ -269,7 +269,7 @@ class Api:
         found = [runtime for runtime in self._gateway.runtimes if runtime.cell.definition.name == cell]
         if not found:
             names = ", ".join(runtime.cell.definition.name for runtime in self._gateway.runtimes)
-            raise ApiError(404, "no_such_cell", f"there is no cell {cell}; there is {names}")
+            raise ApiError(404, "no_such_cell", f"there is no cell {cell}, only {names}")
         return found
 
     def _view(self, runtime: ServedCell, index: int, moment: Moment) -> Json:

@@ -119,7 +119,7 @@ class Client:
         try:
             found = json.loads(response.read())
         except (OSError, http.client.HTTPException, ValueError) as error:
-            raise NoDaemon(f"what answers at {self.path} is no gatewayd") from error
+            raise NoDaemon(f"what answers at {self.path} is not gatewayd") from error
         if response.status >= http.client.BAD_REQUEST:
             failure = found.get("error") or {}
             code, message = failure.get("code", "http"), failure.get("message", f"HTTP {response.status}")

@@ -133,7 +133,7 @@ def _make_room(path: Path) -> None:
     except FileNotFoundError:
         return
     if not stat.S_ISSOCK(mode):
-        raise SocketTaken(errno.EEXIST, "what lies there is no socket; name another place with --control")
+        raise SocketTaken(errno.EEXIST, "what is there is not a socket; name another place with --control")
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         probe.settimeout(_PROBE)
         try:

@@ -104,7 +104,7 @@ class _Routes:
     async def guard(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
         """Bound what is under way, and give every error the same form."""
         if self._under_way >= REQUESTS:
-            return _error(ApiError(503, "busy", f"{REQUESTS} requests are under way already"))
+            return _error(ApiError(503, "busy", f"{REQUESTS} requests are being answered already"))
         self._under_way += 1
         try:
             return await handler(request)
@@ -166,7 +166,7 @@ class _Routes:
         if follow is None or follow in ("0", "false"):
             return await self._answer(request, self._api.events)
         if self._followers >= FOLLOWERS:
-            raise ApiError(503, "busy", f"{FOLLOWERS} follow the events already")
+            raise ApiError(503, "busy", f"{FOLLOWERS} clients follow the events already")
         self._followers += 1
         try:
             cursor, limited = Cursor(), {"limit": "0"} | dict(request.query)
@@ -217,7 +217,7 @@ async def _trace(traces: Traces, share: LoopShare, request: web.Request) -> web.
         raise ApiError(404, "no_such_link", unknown)
     trace = traces.open(query)
     if trace is None:
-        raise ApiError(503, "busy", f"{MAX_TRACES} trace already")
+        raise ApiError(503, "busy", f"{MAX_TRACES} traces are running already")
     response = web.StreamResponse(
         headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"}
     )
@@ -261,12 +261,12 @@ def _accepted(kinds: object) -> frozenset[ObjectionKind]:
 
 _HTTP_ERRORS = {
     404: ApiError(404, "no_such_path", "there is nothing at this path"),
-    405: ApiError(405, "wrong_method", "this path has another method"),
-    413: ApiError(413, "too_large", f"a request has {MAX_BODY} bytes at most"),
+    405: ApiError(405, "wrong_method", "this path does not allow this method"),
+    413: ApiError(413, "too_large", f"a request may have at most {MAX_BODY} bytes"),
 }
 
 
-_BUSY = ApiError(503, "busy", "too many ask at once: ask again, and more seldom")
+_BUSY = ApiError(503, "busy", "too many requests at once: try again later, and less often")
 
 
 def asker(request: web.Request) -> str:
@@ -335,13 +335,13 @@ async def _body(request: web.Request) -> dict[str, Any]:
         async with asyncio.timeout(_BODY_TIME):
             text = await request.text()
     except TimeoutError:
-        raise ApiError(408, "too_slow", f"the body did not come within {_BODY_TIME:g} s") from None
+        raise ApiError(408, "too_slow", f"the body did not arrive within {_BODY_TIME:g} s") from None
     except UnicodeDecodeError:
-        raise ApiError(400, "bad_json", "the body is no UTF-8") from None
+        raise ApiError(400, "bad_json", "the body is not UTF-8") from None
     try:
         found = json.loads(text) if text.strip() else {}
     except (ValueError, RecursionError):
-        raise ApiError(400, "bad_json", "the body is no JSON") from None
+        raise ApiError(400, "bad_json", "the body is not JSON") from None
     if not isinstance(found, dict):
         raise ApiError(400, "bad_json", "the body must be a JSON object")
     return found

@@ -116,7 +116,7 @@ class Traces:
         served = self._gateway.runtimes
         cells = [runtime.cell.definition.name for runtime in served]
         if "cell" in query and query["cell"] not in cells:
-            return f"there is no cell {query['cell']}; there is {', '.join(cells)}"
+            return f"there is no cell {query['cell']}, only {', '.join(cells)}"
         links = sorted(
             {
                 text
@@ -126,7 +126,7 @@ class Traces:
             }
         )
         if "link" in query and query["link"] not in links:
-            return f"there is no link {query['link']}; there is {', '.join(links)}"
+            return f"there is no link {query['link']}, only {', '.join(links)}"
         return ""
 
     def _tap_of(self, cell: str, link: str, kind: str) -> Tap:

@@ -39,7 +39,7 @@ def commands(port: int, python: str) -> tuple[list[Poke], Poke]:
     return [
         ("watch part_done and cycles", f"{mbpoll} -t 4:int -B -r 101 -c 2 127.0.0.1"),
         ("meanwhile: half speed, yours for 5 s", f"{mbpoll} -r 10 127.0.0.1 50"),
-        ("meddle with the order: refused, 06", f"{mbpoll} -r 1 127.0.0.1 7"),
+        ("try to change the order: refused, 06", f"{mbpoll} -r 1 127.0.0.1 7"),
     ], ("Half speed for 5 s without mbpoll", f'{python} -c "{script}"')
 
 

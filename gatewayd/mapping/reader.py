@@ -61,7 +61,7 @@ _ARTICLE: Final[dict[type[Section], str]] = {
 }
 _ELSEWHERE: Final[dict[tuple[type[Section], str], str]] = {
     **{
-        (FILE, key): f"`{key}` belongs into the section `{language.key}`"
+        (FILE, key): f"`{key}` belongs in the section `{language.key}`"
         for language in languages()
         for key in language.telling_keys
     },
@@ -102,7 +102,7 @@ _EXPECTED = {
     "tuple_type": "a list",
     "list_type": "a list",
 }
-_TEXT_HINT = "put it into quotes to make it a text"
+_TEXT_HINT = "put it in quotes to make it a text"
 _NAME_READER: TypeAdapter[str] = TypeAdapter(Name)
 _CELL_READER: TypeAdapter[str] = TypeAdapter(CellName)
 
@@ -145,7 +145,7 @@ class _Reader:
         value = entry.value
         if not isinstance(value, Scalar) or value.quoted or value.text != str(FORMAT_VERSION):
             given = f"`{value.text}`" if isinstance(value, Scalar) else "this"
-            message = f"{given} is no version of the mapping language that this gatewayd knows"
+            message = f"{given} is not a version of the mapping language that this gatewayd knows"
             self._find(syntax.FORMAT_VERSION, message, value.position, hint)
 
     def _cell(self, entry: TableEntry | None) -> str:
@@ -256,9 +256,9 @@ class _Reader:
             hint = _TEXT_HINT if kind == "string_type" else f"write {_EXPECTED[kind]}"
             if name == "limits":
                 hint = "write [least, greatest], for example [0, 150]"
-            self._find(syntax.WRONG_TYPE, f"`{name}` is {text}, expected is {_EXPECTED[kind]}", value, hint)
+            self._find(syntax.WRONG_TYPE, f"`{name}` is {text}, but must be {_EXPECTED[kind]}", value, hint)
         elif kind in _BOUNDS:
-            message = f"`{name}` is {text}, it must be {_BOUNDS[kind][0]} {context[_BOUNDS[kind][1]]}"
+            message = f"`{name}` is {text}, but must be {_BOUNDS[kind][0]} {context[_BOUNDS[kind][1]]}"
             self._find(syntax.OUT_OF_RANGE, message, value, _field_hint(inner, name))
         elif kind == "string_pattern_mismatch":
             message = f"{text} is not a host name or IP address"
@@ -294,7 +294,7 @@ class _Reader:
         meant = next((word for word in synonyms if word in choices), None)
         if meant is not None:
             hint = f"write {meant}: that is {written.upper()} here"
-        message = f"`{name}` is {text}, it must be one of {', '.join(choices)}"
+        message = f"`{name}` is {text}, but must be one of {', '.join(choices)}"
         self._find(syntax.BAD_CHOICE, message, position, hint)
 
     def _find(self, rule: Rule, message: str, position: Position, hint: str) -> None:

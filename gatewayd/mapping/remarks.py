@@ -27,6 +27,7 @@ def remarks(cell: ExpandedCell) -> Iterator[str]:
             elif variable.direction is Direction.INPUT and variable.spec.limits is None:
                 unlimited[variable.part.name] = None
     if whole:
-        yield f"whole numbers for reals, halves to even, saturated, NaN as 0: {names_and_more(list(whole))}"
+        does = "reals are rounded to integers (halves to even), limited to the range of the type, and NaN becomes 0"
+        yield f"{does}: {names_and_more(list(whole))}"
     if unlimited:
-        yield f"NaN and infinities reach the robot, there are no limits: {names_and_more(list(unlimited))}"
+        yield f"without limits, NaN and infinities reach the robot: {names_and_more(list(unlimited))}"

@@ -246,7 +246,7 @@ def one_or_many(value: object) -> object:
             syntax.WRONG_TYPE, "the list is empty", "name at least one, or remove the key"
         )
     if isinstance(value, str) and "," in value:
-        refuse(syntax.WRONG_TYPE, f"`{value}` is no list", f"a list needs brackets: [{value}]")
+        refuse(syntax.WRONG_TYPE, f"`{value}` is not a list", f"a list needs brackets: [{value}]")
     return (value,)
 
 

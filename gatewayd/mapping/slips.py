@@ -33,9 +33,9 @@ def lookalike(text: str) -> str:
     """The remedy for the first character that looks like one of YAML and is another; empty if there is none."""
     for character in text:
         if _is_strange_space(character):
-            return f"there is a {_named(character)} in it: type the line anew, with ordinary spaces"
+            return f"there is a {_named(character)} in it: retype the line with ordinary spaces"
         if character in _QUOTES:
-            return f'`{character}` is no quotation mark of YAML: write " or leave it out'
+            return f'`{character}` is not a quotation mark in YAML: write " or leave it out'
         if character in _DASHES:
             return f"`{character}` is a {_named(character)}: write an ordinary minus, -"
         if character == _COLON:
@@ -50,7 +50,7 @@ def slip_in(lines: Sequence[str], first: int, last: int) -> Slip | None:
         column = next((at for at, character in enumerate(line) if _is_strange_space(character)), None)
         if column is not None:
             message = f"a {_named(line[column])} stands in place of a space"
-            return Slip(number, column + 1, message, "type the line anew, with ordinary spaces")
+            return Slip(number, column + 1, message, "retype the line with ordinary spaces")
     for number in range(max(first, 1), min(last, len(lines)) + 1):
         line = _COMMENT.sub("", lines[number - 1])
         if (found := _NO_SPACE.fullmatch(line)) is not None:

@@ -183,7 +183,7 @@ class _Reader:
         try:
             root = self._document(YAML(typ="safe", pure=True).parse(text))
         except _TooDeepError as error:
-            message = f"more than {MAX_DEPTH} tables or lists lie in one another"
+            message = f"tables or lists are nested more than {MAX_DEPTH} deep"
             self._find(syntax.TOO_LARGE, message, error.position, "a mapping needs no more than five levels")
             return None
         except MarkedYAMLError as error:
@@ -309,7 +309,7 @@ class _Reader:
     def _unprintable(self, text: str, offset: int) -> None:
         lines = text[: offset + 1].splitlines()
         position = Position(self.name, len(lines), len(lines[-1]) or 1)
-        message = f"the character U+{ord(text[offset]):04X} does not belong into a text file"
+        message = f"the character U+{ord(text[offset]):04X} does not belong in a text file"
         self._find(
             syntax.NOT_UTF8, message, position, "delete it; the file may have been saved in a wrong encoding"
         )

@@ -52,7 +52,7 @@ _TEXTS = {
     EventKind.AVAILABLE.value: "{variable} {are} available",
     EventKind.READ_BACK_DIFFERS.value: "read-back of {variable} differs",
     EventKind.FOLLOWED.value: "{variable} {follow} the robot: {old} -> {new}",
-    EventKind.ADOPTION_ENDS.value: "{variable} {fall} back soon: adopted, and owned by nobody",
+    EventKind.ADOPTION_ENDS.value: "{variable} {fall} back soon (adopted, but owned by nobody)",
 }
 """Of those kinds that name and detail alone do not say."""
 _WITHOUT_VALUES = {

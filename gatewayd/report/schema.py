@@ -30,7 +30,7 @@ class LinkStatus(TypedDict):
     title: Annotated[str, "what its kind is called"]
     address: Annotated[str, "where it is"]
     level: Annotated[str, "`good`, `warn`, `bad`, or `idle`: not there, and not missed yet"]
-    words: Annotated[str, "why it has this level; may be worded anew at any time"]
+    words: Annotated[str, "why it has this level; its wording may change at any time"]
     detail: Annotated[str, "more of it, may be empty"]
 
 
@@ -189,7 +189,8 @@ class EventMessage(TypedDict):
     request: NotRequired[Annotated[str, "what was asked for, in words, where no variable tells it"]]
     detail: NotRequired[Annotated[str, "more, in words"]]
     text: Annotated[
-        str, "all that in one sentence for people, values with their unit; it may be worded anew at any time"
+        str,
+        "all that in one sentence for people, values with their unit; it its wording may change at any time",
     ]
     bad: Annotated[bool, "somebody should look at it"]
 

@@ -244,7 +244,9 @@ def _writer(cell: Cell, index: int, lost: _Finding | None, now: float) -> Pictur
     if lost is not None:
         return PicturePart(name, lost.level, lost.text, detail)
     alive = cell.writers.alive[index]
-    words, level = ("connected", Level.GOOD) if alive else (f"{verb('have', name)} not come yet", Level.IDLE)
+    words, level = (
+        ("connected", Level.GOOD) if alive else (f"{verb('have', name)} not connected yet", Level.IDLE)
+    )
     if refused is not None:
         words, level = f"{words}; {refused.text}", max(level, refused.level)
     return PicturePart(name, level, words, detail)

@@ -44,9 +44,9 @@ def _supervision(old: Writer, new: Writer) -> Iterator[str]:
         ("heartbeat", old.heartbeat, new.heartbeat),
     ):
         if _endless(after) > _endless(before):
-            yield f"`{old.name}` would be missed later: {what} {_seconds(before)} -> {_seconds(after)}"
+            yield f"the loss of `{old.name}` would be noticed later: {what} {_seconds(before)} -> {_seconds(after)}"
     if old.counts_writes and not new.counts_writes and old.timeout is not None:
-        yield f"`{old.name}` would be missed later: reads would feed its timeout too"
+        yield f"the loss of `{old.name}` would be noticed later: reads would feed its timeout too"
     if new.grace > old.grace:
         yield f"`{old.name}` would keep its locks without a connection: grace {old.grace:g} s -> {new.grace:g} s"
 

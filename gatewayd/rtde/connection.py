@@ -417,7 +417,7 @@ class Connection(asyncio.Protocol):
             self._fall_silent(self._patience, first=self.session is None)
             return
         what, limit = self._negotiation.awaited, self._settings.handshake_timeout
-        self._fail(LossReason.UNANSWERED, f"{what} did not come within {limit:g} s{self._instead()}")
+        self._fail(LossReason.UNANSWERED, f"{what} did not arrive within {limit:g} s{self._instead()}")
 
     def _fall_silent(self, seconds: float, *, first: bool) -> None:
         instead = self._instead()
@@ -473,7 +473,8 @@ class Connection(asyncio.Protocol):
 
     def _give_up_recipes(self) -> None:
         self._fail(
-            LossReason.RECIPES, "all 255 input recipes of the connection are used up: a new one is opened"
+            LossReason.RECIPES,
+            "all 255 input recipes of the connection are used up: a new connection is opened",
         )
 
     def _fail(self, reason: LossReason, text: str) -> None:

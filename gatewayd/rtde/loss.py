@@ -67,7 +67,7 @@ _BY_ERRNO = {
     errno.ENETDOWN: (LossReason.UNREACHABLE, "the network interface of this machine is down"),
     errno.ETIMEDOUT: (
         LossReason.UNREACHABLE,
-        "the robot does not answer: is it powered, is the address right",
+        "the robot does not answer: is it powered, and is the address right?",
     ),
     errno.ECONNRESET: (LossReason.CLOSED, "connection reset by the controller"),
     errno.EPIPE: (LossReason.CLOSED, "connection closed by the controller"),

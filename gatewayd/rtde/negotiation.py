@@ -285,7 +285,7 @@ class Negotiation:
             return self._list_refused()
         types, refused = sort_types(names, reply.types)
         if self._agreed is not None and (refused or tuple(types) != self._agreed.types):
-            raise HandshakeError("the controller answered the same output recipe otherwise than before")
+            raise HandshakeError("the controller answered the same output recipe differently than before")
         if refused:
             self._reading.refused |= refused
             return self._ask_outputs()

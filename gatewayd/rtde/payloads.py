@@ -185,7 +185,7 @@ def _encode_text(message: TextMessage) -> bytes:
 
 def _recipe(recipe: int | None) -> bytes:
     if recipe is None:
-        msg = "a recipe id belongs into this package"
+        msg = "a recipe id belongs in this package"
         raise ValueError(msg)
     return bytes((recipe,))
 

@@ -100,7 +100,7 @@ class ReloadOutcome:
                 return f"reloaded: {changes}" + (f" (but {reasons})" if reasons else "")
             case Result.REFUSED:
                 accept = "".join(f" --accept {kind}" for kind in self.kinds)
-                return f"reload refused, the old mapping runs on: {reasons} (gatewayd reload{accept} does it)"
+                return f"reload refused, the old mapping runs on: {reasons} (gatewayd reload{accept} applies it anyway)"
         return f"reload failed, the old mapping runs on: {reasons}"
 
     @property

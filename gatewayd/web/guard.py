@@ -164,7 +164,7 @@ def middleware(
             response = _plain(*refusal) if refusal is not None else await _answer(request, handler)
         except Busy:
             await asyncio.sleep(BUSY_DELAY)  # who asks again at once would cost more than what was refused
-            response = _plain(503, "too many ask at once: ask again, and more seldom")
+            response = _plain(503, "too many requests at once: try again later, and less often")
         for name, value in HEADERS.items():
             response.headers.setdefault(name, value)
         entrance = doors()

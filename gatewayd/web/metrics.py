@@ -161,10 +161,10 @@ METRICS = (
     _info("gatewayd_parts_hanging", "parts of the gateway that make no progress; /healthz names them"),
     _info(
         "gatewayd_troubles",
-        "what is wrong with no cell in particular, say a mapping not served or a reload refused; /readyz names it",
+        "problems that belong to no single cell, such as a mapping not served or a reload refused; /readyz names them",
     ),
     _info(
-        "gatewayd_loop_lag_seconds", "by how much the event loop came late, ten times a second", kind=_TIMES
+        "gatewayd_loop_lag_seconds", "by how much the event loop was late, ten times a second", kind=_TIMES
     ),
     *(_info(metric.name, metric.meaning, "cell", *filter(None, [metric.label])) for metric in _OF_CELLS),
     *(_info(metric.name, metric.meaning, *metric.labels) for kind in kinds() for metric in kind.metrics),

@@ -29,7 +29,7 @@ def parse_address(text: str) -> tuple[str, int]:
     if not (colon and port.isascii() and port.isdigit() and int(port) <= 0xFFFF) or (
         ":" in bare and not bracketed
     ):
-        raise SettingsError(f"{text!r} is no address: use HOST:PORT, say 127.0.0.1:9502 or [::1]:9502")
+        raise SettingsError(f"{text!r} is not an address: use HOST:PORT, say 127.0.0.1:9502 or [::1]:9502")
     return bare or "127.0.0.1", int(port)
 
 
@@ -38,7 +38,7 @@ def read_token(path: Path) -> str:
     try:
         mode = path.stat().st_mode
         if not stat.S_ISREG(mode):
-            raise SettingsError(f"{path}: no ordinary file")
+            raise SettingsError(f"{path}: not a regular file")
         if mode & (stat.S_IROTH | stat.S_IWOTH):
             raise SettingsError(f"{path}: others may read or change it; run: chmod o-rw {path}")
         with path.open("rb") as stream:
@@ -46,7 +46,7 @@ def read_token(path: Path) -> str:
     except OSError as error:
         raise SettingsError(f"{path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise SettingsError(f"{path}: no text") from error
+        raise SettingsError(f"{path}: not a text file") from error
     if len(text) < MIN_TOKEN or not text.isascii() or not text.isprintable() or " " in text:
         raise SettingsError(
             f"{path}: a token is one word of at least {MIN_TOKEN} characters; make one: "

@@ -97,7 +97,7 @@ async def test_json_is_the_answer(reloading: Reloading) -> None:
     assert done.exit_code == 1
     assert json.loads(done.output) == {
         "result": "refused",
-        "text": "reload refused, the old mapping runs on: why (gatewayd reload --accept left does it)",
+        "text": "reload refused, the old mapping runs on: why (gatewayd reload --accept left applies it anyway)",
         "reasons": ["why"],
         "changes": [CHANGE],
         "objections": [{"cell": "press", "kind": "left", "text": "why"}],

@@ -25,7 +25,7 @@ def test_a_healthy_gateway(gateway: Running, invoke: Invoke) -> None:
     for words in (
         "is healthy", "press  press.yaml, mapping", "192.168.1.10:30004 fresh",
         "127.0.0.1:1502 unit 1 listening, no connections",
-        "plc connected", "owns 1 of 3 locks", "hmi has not come yet", "12, all good", "motion: plc",
+        "plc connected", "owns 1 of 3 locks", "hmi has not connected yet", "12, all good", "motion: plc",
         "1 accepted, 0 refused", "plc took motion",
     ):  # fmt: skip
         assert words in done.output
@@ -129,7 +129,7 @@ def test_json_is_what_the_gateway_says(invoke: Invoke) -> None:
 def test_one_cell(invoke: Invoke) -> None:
     assert invoke("status", "--cell", "press").exit_code == 0
     done = invoke("status", "--cell", "weld")
-    assert (done.exit_code, done.output) == (1, "Error: there is no cell weld; there is press\n")
+    assert (done.exit_code, done.output) == (1, "Error: there is no cell weld, only press\n")
 
 
 @pytest.mark.parametrize("name", ["status", "watch", "locks", "events", "unforce --all", "force x 1"])

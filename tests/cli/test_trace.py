@@ -85,7 +85,7 @@ def test_it_ends_after_its_time_and_leaves_nothing_in_the_links(gateway: Running
 @pytest.mark.parametrize(
     "options, text",
     [
-        (("--link", "modbsu"), "there is no link modbsu; there is modbus, robot"),
+        (("--link", "modbsu"), "there is no link modbsu, only modbus, robot"),
         (("--cell", "nowhere"), "there is no cell nowhere"),
     ],
 )

@@ -73,7 +73,7 @@ class TestQuestions:
 
     def test_an_unknown_cell_names_the_known(self, api: Api) -> None:
         message = refused(404, "no_such_cell", lambda: finished(api.variables({"cell": "pres"}, at(1.0))))
-        assert message == "there is no cell pres; there is press"
+        assert message == "there is no cell pres, only press"
 
     def test_a_reloaded_mapping_is_seen(self, api: Api, press: Served) -> None:
         assert finished(api.variables({"name": "cycles"}, at(1.0)))["variables"]

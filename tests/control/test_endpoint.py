@@ -78,7 +78,7 @@ def test_a_live_one_is_refused_with_the_remedy(path: Path) -> None:
 
 def test_a_file_that_is_no_socket_is_never_replaced(path: Path) -> None:
     path.write_text("precious")
-    with pytest.raises(SocketTaken, match="no socket"):
+    with pytest.raises(SocketTaken, match="not a socket"):
         bind(path)
     assert path.read_text() == "precious"
 

@@ -99,5 +99,5 @@ def test_there_are_few_at_a_time(gateway: FixedGateway) -> None:
 def test_a_misspelt_filter_is_said(gateway: FixedGateway) -> None:
     traces = Traces(gateway)
     assert traces.unknown({"link": "modbus"}) == ""
-    assert traces.unknown({"link": "modbsu"}) == "there is no link modbsu; there is modbus, robot"
+    assert traces.unknown({"link": "modbsu"}) == "there is no link modbsu, only modbus, robot"
     assert "there is no cell nowhere" in traces.unknown({"cell": "nowhere"})

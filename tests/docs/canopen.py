@@ -242,7 +242,7 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.PDO_TOO_LONG: "an RPDO was longer than its mapping; its first bytes were used",
     ErrorCode.SYNC_LENGTH: "SYNC has another length than 1019h says (byte 4: the length)",
     ErrorCode.COB_ID_COLLISION: "another node on the bus has the node-ID of this one",
-    ErrorCode.RPDO_TIMEOUT: "an RPDO did not come within its deadline; the RPDO writer is lost",
+    ErrorCode.RPDO_TIMEOUT: "an RPDO did not arrive within its deadline; the RPDO writer is lost",
     ErrorCode.WRITE_HELD: "an RPDO was dropped: another writer owns a variable of it",
     ErrorCode.WRITE_OUT_OF_LIMITS: "an RPDO was dropped: a value is out of limits",
     ErrorCode.WRITE_ROBOT_LOST: "an RPDO was dropped: the robot is not connected",

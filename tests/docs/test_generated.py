@@ -33,7 +33,7 @@ def test_numbers_of_variables_in_the_guide_are_those_of_the_block() -> None:
     reference = (DOCS / "reference" / "status-block.md").read_text()
     guide = (DOCS / "howto" / "status-block.md").read_text()
     for address in re.findall(r"\b6[0-4]\d{3}\b", guide):
-        assert address in reference, f"{address} is no word of the status block"
+        assert address in reference, f"{address} is not a word of the status block"
 
 
 def test_every_page_is_found_from_the_index() -> None:

@@ -26,8 +26,11 @@ def test_what_happens_to_reals_is_said_by_line() -> None:
         "  f: {robot: output_int_register_0, modbus: 60}\n"
     )
     assert list(remarks(load(text.encode(), "cell.yaml").cell)) == [
-        "whole numbers for reals, halves to even, saturated, NaN as 0: `d` and `e`",
-        "NaN and infinities reach the robot, there are no limits: `a` and `b`",
+        (
+            "reals are rounded to integers (halves to even), limited to the range of the type, and NaN becomes 0: "
+            "`d` and `e`"
+        ),
+        "without limits, NaN and infinities reach the robot: `a` and `b`",
     ]
 
 

@@ -85,7 +85,7 @@ def cell() -> Cell:
         (Event(0, EventKind.FOLLOWED, LIMIT), "limit follows the robot"),
         (
             Event(0, EventKind.ADOPTION_ENDS, LIMIT, detail="in 2 s"),
-            "limit falls back soon: adopted, and owned by nobody: in 2 s",
+            "limit falls back soon (adopted, but owned by nobody): in 2 s",
         ),
         (Event(0, EventKind.ADOPTION_ENDS, detail="3 inputs"), "adopted values fall back soon: 3 inputs"),
         (Event(0, EventKind.STOOD_STILL, detail="4.8 s"), "gateway stood still: 4.8 s"),
@@ -188,4 +188,4 @@ def test_several_at_one_moment_are_told_without_values(cell: Cell) -> None:
 
     assert told(EventKind.READ_BACK_DIFFERS) == "read-back of limit and 3 more differs"
     assert told(EventKind.FOLLOWED) == "limit and 3 more follow the robot"
-    assert told(EventKind.ADOPTION_ENDS) == "limit and 3 more fall back soon: adopted, and owned by nobody"
+    assert told(EventKind.ADOPTION_ENDS) == "limit and 3 more fall back soon (adopted, but owned by nobody)"

@@ -151,7 +151,7 @@ def test_writers_by_their_last_deeds(cell: Cell) -> None:
     past = verdict(cell, NOW + PRESENT + 1).writers[HMI]
     assert past.level is Level.GOOD, "what is over does not outshine how it is"
     assert past.words == "connected; start refused 4 s ago: never writable by this writer"
-    assert (line.level, line.words) == (Level.IDLE, "has not come yet")
+    assert (line.level, line.words) == (Level.IDLE, "has not connected yet")
     assert verdict(cell, NOW + RECENT + 1).writers[HMI].words == "connected"
     cell.writer_disconnected(Requester(PLC), NOW, "closed")
     lost = verdict(cell, NOW + 5).writers[PLC]

@@ -40,15 +40,27 @@ def definition(text: str) -> CellDefinition:
 @pytest.mark.parametrize(
     "before, after, found",
     [
-        ("timeout: 1s,", "timeout: 2s,", "`plc` would be missed later: timeout 1 s -> 2 s"),
-        ("timeout: 1s, timeout_counts: writes,", "", "`plc` would be missed later: timeout 1 s -> none"),
-        (" timeout_counts: writes,", "", "`plc` would be missed later: reads would feed its timeout too"),
+        ("timeout: 1s,", "timeout: 2s,", "the loss of `plc` would be noticed later: timeout 1 s -> 2 s"),
+        (
+            "timeout: 1s, timeout_counts: writes,",
+            "",
+            "the loss of `plc` would be noticed later: timeout 1 s -> none",
+        ),
+        (
+            " timeout_counts: writes,",
+            "",
+            "the loss of `plc` would be noticed later: reads would feed its timeout too",
+        ),
         (
             "grace: 1s",
             "grace: 3s",
             "`plc` would keep its locks without a connection: grace 1 s -> 3 s",
         ),
-        ("heartbeat: 500ms", "heartbeat: 2s", "`line` would be missed later: heartbeat 0.5 s -> 2 s"),
+        (
+            "heartbeat: 500ms",
+            "heartbeat: 2s",
+            "the loss of `line` would be noticed later: heartbeat 0.5 s -> 2 s",
+        ),
         (", limits: [0, 150]", "", "`force` could be written beyond its limits: 0..150 -> none"),
         ("[0, 150]", "[-5, 150]", "`force` could be written beyond its limits: 0..150 -> -5..150"),
         ("lease: 2s", "lease: 3s", "`move` would be kept longer for a silent owner: lease 2 s -> 3 s"),

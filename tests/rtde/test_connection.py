@@ -89,7 +89,7 @@ async def test_a_request_that_is_not_answered_ends_the_connection(
     async with connected(inputs=("input_int_register_0",), handshake_timeout=0.05) as (_, seen):
         await until(lambda: seen.losses)
         assert seen.losses[0].reason is LossReason.UNANSWERED
-        assert f"{words} did not come within 0.05 s" in seen.losses[0].text
+        assert f"{words} did not arrive within 0.05 s" in seen.losses[0].text
         controller.script.mute.clear()
         await until(lambda: seen.packages)
 

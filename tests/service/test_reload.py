@@ -265,7 +265,7 @@ async def test_a_removed_input_gets_its_fallback_and_leaves_the_rest(rigged: Rig
         assert refused.result is Result.REFUSED
         assert refused.text == (
             "reload refused, the old mapping runs on: press: `real` is owned by plc now and would be removed "
-            "[release] (gatewayd reload --accept release does it)"
+            "[release] (gatewayd reload --accept release applies it anyway)"
         )
         assert refused.exit_code == 1
         assert rig.value("real") == 9.5
@@ -438,7 +438,8 @@ async def test_a_writer_whose_peers_change_is_another_one(rigged: Rigged) -> Non
         path.write_text(path.read_text().replace("plc: {modbus: 127.0.0.1}", "plc: {modbus: 127.0.0.7}"))
         said = (await rig.reloader.reload()).text
         assert (
-            "`number` is owned by plc now and would be released: 127.0.0.1 is no writer from then on" in said
+            "`number` is owned by plc now and would be released: 127.0.0.1 is no writer in the new mapping"
+            in said
         )
         assert (await rig.reloader.reload(force=True)).result is Result.APPLIED
         assert rig.owners() == {}

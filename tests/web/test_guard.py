@@ -75,7 +75,7 @@ async def test_whoever_reads_waits_for_his_turn(
 ) -> None:
     monkeypatch.setattr(LoopShare, "request", full)
     status, text, _ = await ask(session, "GET", path)
-    assert (status, text) == (503, "too many ask at once: ask again, and more seldom\n")
+    assert (status, text) == (503, "too many requests at once: try again later, and less often\n")
 
 
 @pytest.mark.parametrize("path", LONG)

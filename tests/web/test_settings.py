@@ -42,5 +42,5 @@ def test_a_token_is_one_word_that_nobody_else_may_read(token_file: Path, tmp_pat
             read_token(token_file)
     with pytest.raises(SettingsError, match="No such file"):
         read_token(tmp_path / "nothing")
-    with pytest.raises(SettingsError, match="no ordinary file"):
+    with pytest.raises(SettingsError, match="not a regular file"):
         read_token(Path("/dev/zero"))

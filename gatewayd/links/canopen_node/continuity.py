@@ -38,7 +38,8 @@ def goes_on(old: CanopenPlan, new: CanopenPlan, before: CellDefinition, after: C
 def weakened(old: CanopenPlan, new: CanopenPlan) -> Iterator[str]:
     """What its peers could rely on less, in words."""
     if _longer(old.heartbeat, new.heartbeat):
-        yield f"node {old.node} would be missed later: heartbeat {_time(old.heartbeat)} -> {_time(new.heartbeat)}"
+        times = f"{_time(old.heartbeat)} -> {_time(new.heartbeat)}"
+        yield f"the loss of node {old.node} would be noticed later: heartbeat {times}"
     successors = _pdos(new)
     for (direction, number), pdo in _pdos(old).items():
         successor = successors.get((direction, number))
@@ -49,7 +50,7 @@ def weakened(old: CanopenPlan, new: CanopenPlan) -> Iterator[str]:
             and _longer(pdo.event, successor.event)
         ):
             times = f"{_time(pdo.event)} -> {_time(successor.event)}"
-            yield f"RPDO {number} would be missed later: deadline {times}"
+            yield f"the loss of RPDO {number} would be noticed later: deadline {times}"
 
 
 def _rest(plan: CanopenPlan, cell: CellDefinition) -> dict[str, str]:

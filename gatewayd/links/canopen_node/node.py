@@ -402,7 +402,7 @@ class Node:
         if broken:
             indices = ", ".join(f"{index:04X}h" for index in broken)
             self._observer.report(
-                f"stored parameters of these PDOs make no PDO, defaults are used: {indices}"
+                f"stored parameters of these PDOs are not valid, defaults are used: {indices}"
             )
         self.consumer.restart(now)
         self.promises.restart()
@@ -428,7 +428,7 @@ class Node:
 
     def _lose_node(self, reason: str, node: int, now: float) -> None:
         """Its writers are lost; by the mapping's promise that is no communication error, whoever else is."""
-        reason = "the guarding stays away" if node == GUARDING else reason.format(node)
+        reason = "guarding requests have stopped" if node == GUARDING else reason.format(node)
         for writer in self.promises.of(node):
             self._lose(writer, reason, now)
 

@@ -116,7 +116,7 @@ class CanLink(Link, Observer):
             words = f"{BUS_STATES[bus + 1]}: {reason}"
         if self.node.errors.is_doubled:
             problems.append(
-                f"another node on the bus has node-ID {self.node.node_id} too: give one a new one"
+                f"another node on the bus has node-ID {self.node.node_id} too: give one of them another"
             )
         if problems and level is Level.GOOD:
             level = Level.WARN
@@ -150,8 +150,8 @@ class CanLink(Link, Observer):
         if self._other_bit_rate in (None, self.plan.bitrate):
             return ""
         return (
-            f"{self.plan.channel} runs at {self._other_bit_rate} bit/s, the mapping says {self.plan.bitrate}: "
-            "set up the interface anew, or correct the mapping"
+            f"{self.plan.channel} runs at {self._other_bit_rate} bit/s, but the mapping says {self.plan.bitrate}: "
+            "set up the interface again, or correct the mapping"
         )
 
     async def run(self) -> None:

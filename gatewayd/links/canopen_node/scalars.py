@@ -59,7 +59,7 @@ def _timer(value: object, unit: float, ticks: str) -> float | None:
     if abs(count - round(count)) > 1e-6 * max(count, 1):
         refuse(
             syntax.BAD_DURATION,
-            f"the duration `{written(value)}` is no whole number of {ticks}",
+            f"the duration `{written(value)}` is not a whole number of {ticks}",
             f"CANopen counts this time in {ticks}",
         )
     if count > 0xFFFF:
@@ -249,7 +249,7 @@ def _status_member(value: object) -> StatusMember:
     if text not in FIELD_NAMES:
         close = difflib.get_close_matches(text, FIELD_NAMES, n=1, cutoff=0.6)
         hint = f"did you mean `{close[0]}`?" if close else hint
-        refuse(syntax.BAD_CHOICE, f"`{text}` is no word of the status block that a PDO can carry", hint)
+        refuse(syntax.BAD_CHOICE, f"`{text}` is not a word of the status block that a PDO can carry", hint)
     return StatusMember(text, text)
 
 

@@ -100,14 +100,17 @@ class Guarding(Section):
         description="time between two requests of the master (100Ch); none: it is not supervised",
     )
     factor: Whole = Field(
-        default=3, ge=1, le=255, description="so many of these times without one, and it is missed (100Dh)"
+        default=3,
+        ge=1,
+        le=255,
+        description="how many of these times may pass without one until it is missing (100Dh)",
     )
 
 
 class Emcy(Section):
     """How EMCY is sent."""
 
-    inhibit: InhibitTime = Field(default=None, description="least time between two messages (1015h)")
+    inhibit: InhibitTime = Field(default=None, description="shortest time between two messages (1015h)")
 
 
 ERROR_BEHAVIOURS = ("pre_operational", "stay", "stop")

@@ -138,7 +138,7 @@ class PeerConnection(asyncio.BufferedProtocol):
             self.last_request = now
             self._send(answers)
         if session.broken:
-            self.drop(f"no Modbus TCP: {session.broken}")
+            self.drop(f"not Modbus TCP: {session.broken}")
         return session.pending
 
     def _send(self, answers: bytes) -> None:

@@ -93,7 +93,7 @@ class ModbusUnit(Link):
 def _stranger(peer: Address | None, name: str, plan: ModbusPlan | None, after: CellDefinition) -> str:
     """Why the peer would be the writer of this name no more; empty: it would."""
     if plan is None or peer is None or not may_connect(peer, plan):
-        return f"{peer} may not connect any more"
+        return f"the new mapping does not let {peer} connect"
     writer = writer_of(peer, plan.writers)
     found = after.writers[writer].name if writer is not None else "no writer"
-    return "" if found == name else f"{peer} is {found} from then on"
+    return "" if found == name else f"{peer} is {found} in the new mapping"

@@ -55,7 +55,7 @@ class Modbus(Section):
         description="greatest number of connections of one address; default: half of `connections`, at least 4",
     )
     idle_timeout: OptionalDuration = Field(
-        default=60.0, description="a connection without a request for so long is closed; none: never"
+        default=60.0, description="a connection without a request for this long is closed; none: never"
     )
     gaps: Literal["refuse", "zero"] = Field(
         default="refuse",
@@ -107,7 +107,7 @@ class PlacementSpec(Section):
             message = f"a placement names exactly one of holding, input, coil and discrete; found {found}"
             refuse(BAD_ADDRESS, message, "write for example {holding: 100}; several placements make a list")
         if self.area.of_bits and self.bit is not None:
-            message = f"a {given[0]} address has no bits and bytes"
+            message = f"a {given[0]} address has no bits or bytes"
             refuse(BAD_ADDRESS, message, f"write {{{given[0]}: N}} with a whole number")
         return self
 

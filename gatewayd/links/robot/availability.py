@@ -47,7 +47,9 @@ def _misfit(variable: Variable, types: Mapping[str, DataType], declared: Mapping
         return None
     if word is not None:
         is_other = answered.word != word
-        return f"the controller answers {answered.word}, the mapping declares {word}" if is_other else None
+        return (
+            f"the controller answers {answered.word}, but the mapping declares {word}" if is_other else None
+        )
     if _carries(answered, variable):
         return None
     return f"the controller answers {answered.word}, which is not what the mapping was made for"

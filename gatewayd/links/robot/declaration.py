@@ -125,7 +125,7 @@ class RobotKind(LinkKind):
         if old.verify and not new.verify:
             yield Objection(
                 ObjectionKind.WEAKENING,
-                "inputs that the robot holds otherwise would no longer be noticed: verify",
+                "inputs that the robot holds differently would no longer be noticed: verify",
             )
         if old.watchdog is None:
             return

@@ -29,7 +29,7 @@ def too_many(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         yield rule.at(variable.position, message, hint=hint)
     writers = list(cell.document.writers.values())
     if len(writers) > MAX_WRITERS:
-        message = f"the cell has {len(writers)} writers, the limit is {MAX_WRITERS}"
+        message = f"the cell has {len(writers)} writers, but the limit is {MAX_WRITERS}"
         hint = "let writers with equal rights share one entry with a network or a list of addresses"
         yield rule.at(writers[MAX_WRITERS].key, message, hint=hint)
 

@@ -115,7 +115,9 @@ def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
             yield rule.at(variable.part.key_at(key), message, hint=f"write `{other}`, or remove `{key}`")
         for key, what in policies.items():
             if is_input and key in variable.spec.model_fields_set:
-                message = f"`{variable.part.name}` is an input ({variable.target}); `{key}` never acts on it"
+                message = (
+                    f"`{variable.part.name}` is an input ({variable.target}); `{key}` has no effect on it"
+                )
                 yield rule.at(variable.part.key_at(key), message, hint=f"remove `{key}`: {what}")
 
 

@@ -57,7 +57,7 @@ def unknown_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 @cell_rule("GW503")
 def writer_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """A writer that stands twice in one list."""
+    """A writer that is named twice in one list."""
     for part in _owned(cell.document):
         owners = part.spec.owner or ()
         for index, name in enumerate(owners):

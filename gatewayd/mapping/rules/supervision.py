@@ -40,13 +40,13 @@ def unsupervised_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 @cell_rule("GW522")
 def key_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """A key that nothing in the file lets act."""
+    """A key that has no effect in this file."""
     yield from _writers(rule, cell)
     takeovers = {lock.name for lock in cell.locks if lock.takeover and len(lock.owners) > 1}
     used = {lock.name for lock in cell.locks if lock.group is not None}
     for group in cell.document.groups.values():
         if group.spec.whole and group.name in used - takeovers:
-            message = f"the group `{group.name}` is `whole`, and nobody takes it over from anybody"
+            message = f"the group `{group.name}` is `whole`, but no owner can take it over from another"
             hint = (
                 "name the owners by priority (owner: [plc, hmi]) without `takeover: false`, or remove `whole`"
             )
@@ -65,5 +65,5 @@ def _writers(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             yield rule.at(writer.key_at("timeout_counts"), message, hint=hint)
         ends = [language.lost_by for language in known_by(writer.spec)]
         if writer.spec.grace is not None and all(ends):
-            message = f"the writer `{writer.name}` has `grace`, and no connection that could end"
+            message = f"the writer `{writer.name}` has `grace`, but no connection that could end"
             yield rule.at(writer.key_at("grace"), message, hint=f"remove it; {ends[0]}")

@@ -85,7 +85,7 @@ function showWorst({ robot, gateway, buses, writers }) {
   if (level === undefined) return;
   const names = nodes.filter((node) => node.level === level).map((node) => node.name);
   worst.dataset.level = level;
-  const shown = names.length > 1 ? `${names.length} in ${level === "bad" ? "trouble" : "question"}` : names[0];
+  const shown = names.length > 1 ? `${names.length} ${level === "bad" ? "in trouble" : "need attention"}` : names[0];
   worst.setAttribute("aria-label", `${MARKS[level]} ${shown}, ${LEVELS[level]}: ${names.join(", ")}`);
   put(worst, `${MARKS[level]} ${shown}`);
 }

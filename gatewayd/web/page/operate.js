@@ -15,7 +15,7 @@ const ACTS = {
     says: ({ variable, state }, { value, for: seconds }) =>
       `Force ${variable.name} from ${number(state.value, variable.kind)} to ${value} ${variable.unit}`.trimEnd() + ` for ${seconds} s. ` +
       (variable.direction === "input"
-        ? `The robot gets it at once. Who writes it meanwhile is refused; afterwards it takes its fallback: ${variable.fallback}.`
+        ? `The robot gets it at once. Writes to it are refused meanwhile; afterwards it takes its fallback: ${variable.fallback}.`
         : "The fieldbus sees it instead of what the robot reports."),
   },
   unforce: {

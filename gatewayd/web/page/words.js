@@ -1,6 +1,6 @@
 // Numbers, ages and times in words.
 
-export const QUALITIES = ["good", "stale", "unavailable", "never told", "forced", "differs in robot", "out of range", "program not running"];
+export const QUALITIES = ["good", "stale", "unavailable", "never reported", "forced", "differs in robot", "out of range", "program not running"];
 export const FORCED = 4;
 export const OPERATOR = 254;
 

@@ -81,8 +81,8 @@ def test_an_object_that_moves_is_another_one() -> None:
 def test_longer_times_are_weaker_and_shorter_ones_are_not() -> None:
     longer = plan(("heartbeat: 500ms\n", "heartbeat: 1s\n"), ("300ms", "400ms"))
     assert ask(weakened, plan(), longer) == [
-        "node 5 would be missed later: heartbeat 500 ms -> 1000 ms",
-        "RPDO 1 would be missed later: deadline 300 ms -> 400 ms",
+        "the loss of node 5 would be noticed later: heartbeat 500 ms -> 1000 ms",
+        "the loss of RPDO 1 would be noticed later: deadline 300 ms -> 400 ms",
     ]
     assert ask(weakened, longer, plan()) == []
     none = plan(("heartbeat: 500ms\n", "heartbeat: none\n"), (" deadline: 300ms,", ""))

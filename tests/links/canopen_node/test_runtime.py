@@ -402,7 +402,7 @@ def test_a_bit_rate_that_is_not_the_mapping_s_is_a_problem(
     node.bus, node.nmt.state = BusState.ACTIVE, NmtState.OPERATIONAL
     health = station.link.health()
     assert health.level is Level.WARN
-    assert "250000 bit/s, the mapping says 500000" in health.problems[0]
+    assert "250000 bit/s, but the mapping says 500000" in health.problems[0]
 
 
 async def test_another_node_with_our_id_is_a_problem_until_it_is_gone(

@@ -71,4 +71,6 @@ def test_a_declared_type_is_to_be_the_controllers(answered: DataType, fits: bool
     """Also where the answer could carry the value: what else the file says of the field may be wrong as well."""
     variable = Variable(1, "v", Direction.OUTPUT, ValueKind.FLOAT, "f", element=0)
     reasons = unavailable(session({"f": answered}, {}), [variable], {"f": "DOUBLE"})
-    assert reasons == ({} if fits else {0: "the controller answers VECTOR3D, the mapping declares DOUBLE"})
+    assert reasons == (
+        {} if fits else {0: "the controller answers VECTOR3D, but the mapping declares DOUBLE"}
+    )

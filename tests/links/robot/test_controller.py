@@ -206,7 +206,7 @@ async def test_a_field_newer_than_the_catalogue_works_by_its_declared_type(until
     [
         (
             [Field("dexterity", DataType.VECTOR3D, "")],
-            "the controller answers VECTOR3D, the mapping declares DOUBLE",
+            "the controller answers VECTOR3D, but the mapping declares DOUBLE",
         ),
         ([], "NOT_FOUND: this controller's software does not have the field"),
     ],

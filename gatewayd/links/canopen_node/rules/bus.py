@@ -92,7 +92,7 @@ def same_device(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnosti
             continue
         message = (
             f"the data sheets of this cell and of another one describe the same device (product "
-            f"0x{identity.product:X}) with different objects: an engineering tool replaces one by the other"
+            f"0x{identity.product:X}) with different objects: an engineering tool replaces one with the other"
         )
         hint = "write `identity: {product: 2}` with a number of its own for each, or `identity: {revision: auto}`"
         related = (Related(first.part.at("identity", "product"), "the other cell is here"),)

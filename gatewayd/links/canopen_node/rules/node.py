@@ -65,7 +65,7 @@ def canopen_type(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[
 
 @node_rule("GW438")
 def canopen_scale(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
-    """A scale that cannot be: 0, or at a bit."""
+    """A scale that is not possible: 0, or on a bit."""
     for variable, _ in _lines(cell, node):
         problem = scale_problem(variable, linear_of(place_of(variable)))
         if problem is not None:
@@ -167,7 +167,7 @@ def unknown_bit_rate(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Itera
     if rate in BIT_RATES:
         return
     near = rate * 1000 if rate * 1000 in BIT_RATES else min(BIT_RATES, key=lambda known: abs(known - rate))
-    message = f"{rate} bit/s is no bit-rate of CANopen"
+    message = f"{rate} bit/s is not a CANopen bit-rate"
     hint = f"write {near}, if that is the bit-rate of the bus"
     yield rule.at(node.part.at("bitrate"), message, hint=hint)
 
@@ -328,7 +328,7 @@ def timeout_of_silence(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Ite
         timeout, only_here = writer.spec.timeout, len(known_by(writer.spec)) == 1
         promised = spec.heartbeat if spec.heartbeat is not None else spec.guarding
         if spec.by_rpdo and only_here and timeout is not None and promised is None:
-            message = f"`{writer.name}` is lost after {seconds(timeout)} without a PDO, and none has to come"
+            message = f"`{writer.name}` is lost after {seconds(timeout)} without a PDO, but no PDO is sent regularly"
             hint = "write `node: 1, heartbeat: 1s` in place of `timeout`, or give the PDOs a `deadline`"
             yield rule.at(writer.at("timeout"), message, hint=hint)
 

@@ -77,7 +77,7 @@ def unknown_pdo_variable(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> I
             message += "is a single variable" if single else f"has {counted(count, 'member')}"
             hint = f"write `{name}`" if single else f"write `{name}[0..{count - 1}]` or less"
         else:
-            message = f"the PDO `{wrong.pdo}` names `{wrong.text}`, which is no variable of this file"
+            message = f"the PDO `{wrong.pdo}` names `{wrong.text}`, which is not a variable of this file"
             hint = did_you_mean(name, declared, "add the variable, or remove the name")
         assert wrong.position is not None
         yield rule.at(wrong.position, message, hint=hint)

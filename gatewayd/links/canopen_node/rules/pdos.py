@@ -32,9 +32,7 @@ def pdo_too_long(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[
     for pdo in _declared(node):
         if pdo.bits > PDO_BITS:
             name = next(name for name, end in _contents(cell, pdo) if end > PDO_BITS)
-            message = (
-                f"the PDO `{pdo.name}` has {pdo.bits} bits, a PDO carries {PDO_BITS}; `{name}` does not fit"
-            )
+            message = f"the PDO `{pdo.name}` has {pdo.bits} bits, but a PDO carries {PDO_BITS}; `{name}` does not fit"
             hint = f"move `{name}` and what follows it to another PDO"
             yield rule.at(pdo.position, message, hint=hint)
 
@@ -188,7 +186,7 @@ def pdo_key_of_other_side(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> 
 
 @node_rule("GW416", Severity.WARNING)
 def sync_without_period(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
-    """Synchronous PDOs, and nobody says how often SYNC comes."""
+    """Synchronous PDOs without a period of SYNC."""
     if node.part.spec.sync.period is not None:
         return
     pdo = next((pdo for pdo in node.pdos if pdo.transmission < FIRST_EVENT_TYPE), None)
@@ -202,7 +200,7 @@ def sync_without_period(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> It
 def producer_without_period(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[Diagnostic]:
     """A SYNC producer without a period."""
     if node.part.spec.sync.producer and node.part.spec.sync.period is None:
-        message = f"node {node.part.spec.node} is to produce SYNC without a period"
+        message = f"node {node.part.spec.node} is a SYNC producer without a period"
         yield rule.at(node.part.at("sync", "producer"), message, hint="add `period: 10ms` to `sync`")
 
 
@@ -219,7 +217,7 @@ def event_below_inhibit(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> It
             f"the event time of {pdo.label}, {seconds(pdo.event)}, is shorter than its inhibit time, "
             f"{seconds(pdo.inhibit)}"
         )
-        hint = "make the event time some times as long as the inhibit time"
+        hint = "make the event time several times as long as the inhibit time"
         yield rule.at(_key_place(node, pdo, "event"), message, hint=hint)
 
 

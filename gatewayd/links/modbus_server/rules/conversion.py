@@ -26,9 +26,8 @@ def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """The controller's time in a float32."""
     for placement in _numbers(cell):
         if placement.type == "float32" and placement.variable.grows:
-            message = (
-                f"`{placement.variable.name}` grows for ever, and float32 at {where(placement)} loses its end"
-            )
+            name, place = placement.variable.name, where(placement)
+            message = f"`{name}` grows without end, and float32 at {place} loses its last digits"
             yield rule.at(_key(placement, "type"), message, hint="use `type: float64`")
 
 
@@ -38,7 +37,7 @@ def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for placement in _numbers(cell, ValueKind.FLOAT):
         if _is_integer(placement) and placement.spec.scale is None:
             message = (
-                f"`{placement.variable.name}` is a real, {placement.type} at {where(placement)} "
+                f"`{placement.variable.name}` is a real, but {placement.type} at {where(placement)} "
                 "shows whole numbers only"
             )
             hint = "add a scale such as `scale: 0.001`, or `scale: 1` if whole numbers are meant"
@@ -55,7 +54,7 @@ def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if bounds[0] < low or bounds[1] > high:
             message = (
                 f"`{variable.name}` can be {number(bounds[0])} to {number(bounds[1])}, "
-                f"{placement.type} at {where(placement)} shows {number(low)} to {number(high)}"
+                f"but {placement.type} at {where(placement)} shows {number(low)} to {number(high)}"
             )
             hint = "use a wider type, or state the range with `limits: [least, greatest]`"
             yield rule.at(_key(placement, "type"), message, hint=hint)
@@ -77,7 +76,7 @@ def field_not_shown(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if loss is not None:
             reported.add(id(placement.spec))
             low, high = map(number, bounds)
-            message = f"`{variable.name}` ({variable.target}) goes from {low} to {high}, {loss[0]}"
+            message = f"`{variable.name}` ({variable.target}) goes from {low} to {high}, but {loss[0]}"
             yield rule.at(_key(placement, "scale"), message, hint=loss[1])
 
 
@@ -174,7 +173,7 @@ def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if least < low - slack or most > high + slack:
             message = (
                 f"`{variable.name}` may be {number(limits[0])} to {number(limits[1])}, "
-                f"{placement.type} with scale {number(placement.scale)} reaches {number(low)} to {number(high)}"
+                f"but {placement.type} with scale {number(placement.scale)} reaches {number(low)} to {number(high)}"
             )
             hint = "use a wider type or a coarser scale, or narrow the limits"
             yield rule.at(_key(placement, "type"), message, hint=hint)
@@ -209,7 +208,7 @@ def order_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         if order in (None, "ABCD") or turns(order, placement.type):
             continue
         name = placement.variable.name
-        message = f"`{name}` is {placement.type} at {where(placement)}, and `order: {order}` turns nothing"
+        message = f"`{name}` is {placement.type} at {where(placement)}, and `order: {order}` changes nothing"
         hint = "remove `order`: a `bool` is 0 or 1"
         if placement.type != "bool":
             hint = "remove `order`, or write BADC to swap the two bytes"
@@ -231,8 +230,8 @@ def uneven_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             )
         if not even:
             message = (
-                f"`{variable.name}` is a whole number, scale {number(placement.scale)} "
-                f"and offset {number(placement.offset)} round it"
+                f"`{variable.name}` is a whole number, which scale {number(placement.scale)} "
+                f"and offset {number(placement.offset)} round"
             )
             key = "scale" if placement.spec.scale is not None else "offset"
             hint = "leave scale and offset out, or choose them so that every value comes out even"
@@ -254,7 +253,7 @@ def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if max(-bounds[0], bounds[1]) > digits:
             message = (
                 f"`{variable.name}` can be {number(bounds[0])} to {number(bounds[1])}, "
-                f"{placement.type} is exact up to {digits}"
+                f"but {placement.type} is exact only up to {digits}"
             )
             hint = "use an integer type, or state the range with `limits: [least, greatest]`"
             yield rule.at(_key(placement, "type"), message, hint=hint)
@@ -266,9 +265,7 @@ def number_as_bool(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for placement in _numbers(cell):
         variable = placement.variable
         if placement.type == "bool" and variable.kind is not ValueKind.BOOL:
-            message = (
-                f"`{variable.name}` is a number ({variable.type}), bool at {where(placement)} shows 0 or 1"
-            )
+            message = f"`{variable.name}` is a number ({variable.type}), but bool at {where(placement)} shows 0 or 1"
             hint = f"use a number type, or map one bit, `{variable.target}.N`"
             yield rule.at(_key(placement, "type"), message, hint=hint)
 
@@ -285,7 +282,7 @@ def fallback_not_shown(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if shown is None or abs(shown - value) > abs(placement.scale) / 2 + 1e-6 * abs(value):
             message = (
                 f"`{variable.name}` is to be {number(value)} when stale, "
-                f"{placement.type} at {where(placement)} shows {'nothing' if shown is None else number(shown)}"
+                f"but {placement.type} at {where(placement)} shows {'nothing' if shown is None else number(shown)}"
             )
             hint = "use a value that the register can show, or another type"
             yield rule.at(variable.at("on_stale"), message, hint=hint)

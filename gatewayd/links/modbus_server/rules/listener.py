@@ -60,8 +60,8 @@ def listener_settings(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Dia
         for key in _SHARED:
             if getattr(modbus.spec, key) != getattr(earlier.spec, key):
                 message = (
-                    f"`{key}` of {modbus.spec.listen} differs from the cell `{other.document.cell}`; "
-                    "the most generous counts"
+                    f"`{key}` of {modbus.spec.listen} differs from that of the cell `{other.document.cell}`; "
+                    "the most generous one applies"
                 )
                 related = (Related(earlier.at(key), f"`{key}` of `{other.document.cell}`"),)
                 hint = f"write the same `{key}` in both files"
@@ -78,7 +78,7 @@ def writer_shut_out(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         networks = writer.spec.by(ModbusWriter).modbus
         if networks and not _meet(networks, modbus.spec.allow):
             shown = ", ".join(map(network_text, networks[:3]))
-            message = f"the access list of the listener shuts the writer `{writer.name}` ({shown}) out"
+            message = f"the access list of the listener shuts out the writer `{writer.name}` ({shown})"
             related = (Related(modbus.at("allow"), "the access list is here"),)
             hint = f"add {network_text(networks[0])} to `allow`"
             yield rule.at(writer.at("modbus"), message, hint=hint, related=related)

@@ -137,7 +137,7 @@ def type_of_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 @cell_rule("GW212", Severity.WARNING)
 def split_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """A value that a client reading or writing in full blocks cuts in two."""
+    """A value that a client cuts in two when it reads or writes in full blocks."""
     reported: set[tuple[str, int]] = set()
     for area in (Area.HOLDING, Area.INPUT):
         placed = [item for item in placements_of(cell) if item.area is area and item.problem is None]
@@ -153,8 +153,8 @@ def split_value(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                     continue
                 reported.add(key)
                 message = (
-                    f"`{placement.variable.name}` at {where(placement)} is cut at {boundary} "
-                    f"by a client that {verb} the block from {start} on with {limit} registers at a time"
+                    f"`{placement.variable.name}` at {where(placement)} is cut in two at {boundary} "
+                    f"by a client that {verb} the block from {start} on in requests of {limit} registers"
                 )
                 hint = f"let it begin at {boundary}, or leave a gap in the block before it"
                 yield rule.at(placement.position, message, hint=hint)
@@ -212,7 +212,7 @@ def bit_in_number(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for later, earlier, _ in _overlaps(cell, mixed=True):
         packed = later if later.bit is not None else earlier
         message = (
-            f"`{later.variable.name}` lies at {where(later)}, inside the same register as "
+            f"`{later.variable.name}` lies at {where(later)}, in the same register as "
             f"`{earlier.variable.name}`: one is a {'bit' if packed.codec is None else 'byte'}, the other a number"
         )
         yield _overlap(rule, cell, later, earlier, message)
@@ -322,7 +322,7 @@ _OF_INPUTS = frozenset({"owner", "group", "lease", "takeover", "on_release", "li
 
 @cell_rule("GW226", Severity.WARNING)
 def input_among_outputs(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """An input that nothing is said of, between outputs."""
+    """An input without an owner, a fallback or limits, placed among outputs."""
     for area in (Area.HOLDING, Area.COIL):
         inside = [item for item in placements_of(cell) if item.area is area and item.problem is None]
         placed = sorted(inside, key=lambda item: (item.addresses.start, item.bit or 0))

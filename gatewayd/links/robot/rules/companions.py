@@ -32,7 +32,7 @@ def missing_mask_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 @cell_rule("GW315", Severity.WARNING)
 def missing_domain(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """An analog output without what says whether it is a current or a voltage."""
+    """An analog output without the bit that says whether it is a current or a voltage."""
     for variable, domain, bit in _without(cell, lambda needs: needs.type):
         message = f"`{variable.name}` ({variable.target}) acts as a current or a voltage without saying which"
         yield rule.at(variable.at("robot"), message, hint=f"map `{domain}.{bit}` as a variable too")

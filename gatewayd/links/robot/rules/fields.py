@@ -78,7 +78,7 @@ def field_not_in_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
 
 @cell_rule("GW317", Severity.WARNING)
 def field_beyond_catalogue(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
-    """A declared type of a field that the catalogue does not have, or has otherwise."""
+    """A declared type of a field that the catalogue lacks, or has with another type."""
     series, version = controller(cell.document)
     seen: set[str] = set()
     for variable in cell.variables:
@@ -154,13 +154,13 @@ _PARTS = {
         "ranges are for numbered registers, such as output_int_register_0..23",
     ),
     ReferenceProblem.NO_SUCH_REGISTER: ("there is no register `{name}`", "the last one is number {last}"),
-    ReferenceProblem.NOT_A_VECTOR: ("`{text}`: `{name}` is no vector", "leave the brackets out"),
+    ReferenceProblem.NOT_A_VECTOR: ("`{text}`: `{name}` is not a vector", "leave the brackets out"),
     ReferenceProblem.NO_SUCH_ELEMENT: (
         "`{text}`: the vector `{name}` does not have this element",
         "its elements are 0 to {last}",
     ),
     ReferenceProblem.NOT_AN_INTEGER: (
-        "`{text}`: `{name}` is no integer and has no bits",
+        "`{text}`: `{name}` is not an integer and has no bits",
         "leave the dot and the number out",
     ),
     ReferenceProblem.NO_SUCH_BIT: ("`{text}`: `{name}` does not have this bit", "its bits are 0 to {last}"),
@@ -191,7 +191,7 @@ def input_mapped_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         message = f"`{variable.name}` writes {variable.target}, as `{earlier.name}` does ({earlier.target})"
         related = (Related(earlier.at("robot"), f"`{earlier.name}`, first used here"),)
         more = more_places(earlier)
-        hint = "map it once" + (f"; more places for it make a list: {more}" if more else "")
+        hint = "map it once" + (f"; for more places give it a list: {more}" if more else "")
         yield rule.at(variable.at("robot"), message, hint=hint, related=related)
 
 
@@ -210,7 +210,10 @@ def long_recipe(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     names = list(dict.fromkeys((*outputs, *read_back))) if robot.spec.verify else outputs
     if _length(names) <= OLD_LIST_LIMIT:
         return
-    message = f"the names of {len(names)} fields take {_length(names)} bytes, this controller takes {OLD_LIST_LIMIT}: "
+    size = _length(names)
+    message = (
+        f"the names of {len(names)} fields take {size} bytes, but this controller takes {OLD_LIST_LIMIT}: "
+    )
     if _length(outputs) > OLD_LIST_LIMIT:
         message += "outputs that have no room have no value"
         hint = "leave fields out"

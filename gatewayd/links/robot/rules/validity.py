@@ -22,7 +22,7 @@ def valid_without_program(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
             and not variable.member
             and not is_program_output(variable)
         ):
-            message = f"`{variable.part.name}` ({variable.target}) is as true while no program runs"
+            message = f"`{variable.part.name}` ({variable.target}) is just as valid while no program runs"
             hint = "remove `valid`; it is for output registers"
             yield rule.at(variable.part.key_at("valid"), message, hint=hint)
     robot = cell.document.part(Robot)
