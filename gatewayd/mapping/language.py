@@ -6,83 +6,87 @@ JSON Schema is generated from these models.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Annotated, Any, Final, Literal, cast
-
-from pydantic import BeforeValidator, ConfigDict, Field, create_model, model_validator
+from collections.abc import Iterable
+from typing import Any, Final, Literal, TypeVar, cast
 
 from gatewayd.links.registry import languages
 from gatewayd.mapping import syntax
 from gatewayd.mapping.model import Group, VariablePolicy, VariableSpec, WriterSpec
 from gatewayd.mapping.scalars import CellName, Name, refuse
 from gatewayd.mapping.section import Section
+from gatewayd.mapping.typed import Field
 from gatewayd.report.wording import alternatives
 
-
-def _known(writer: WriterSpec) -> WriterSpec:
-    if not any(language.knows(writer) for language in languages()):
-        having = [language for language in languages() if language.writer_keys is not None]
-        keys = alternatives([language.key for language in having])
-        examples = alternatives([language.writer_example for language in having])
-        refuse(
-            syntax.MISSING_KEY,
-            f"a writer needs the key {keys}, by which it is known",
-            f"add for example {examples}",
-        )
-    return writer
+S = TypeVar("S", bound=Section)
 
 
-def _keys(models: Iterable[type[Section] | None]) -> tuple[Any, ...]:
-    """Bases whose keys come in this order: pydantic takes those of the last base first."""
-    return tuple(reversed([model for model in models if model is not None]))
+def _with(base: type[S], models: Iterable[type[Section] | None], **namespace: Any) -> type[S]:
+    """`base` with the keys of the models, which come in this order: keys of the last base are the first ones."""
+    bases = (base, *reversed([model for model in models if model is not None]))
+    made = type(base.__name__, bases, {"__doc__": base.__doc__, "__module__": __name__, **namespace})
+    return cast("type[S]", made)
 
 
-VARIABLE: Final[type[VariableSpec]] = create_model(
-    "VariableSpec",
-    __base__=(
-        VariableSpec,
-        *_keys(language.variable_policies for language in languages()),
-        cast("Any", VariablePolicy),
-        *_keys(language.variable_keys for language in languages()),
+def _known(writer: WriterSpec) -> None:
+    if any(language.knows(writer) for language in languages()):
+        return
+    having = [language for language in languages() if language.writer_keys is not None]
+    keys = alternatives([language.key for language in having])
+    examples = alternatives([language.writer_example for language in having])
+    refuse(
+        syntax.MISSING_KEY,
+        f"a writer needs the key {keys}, by which it is known",
+        f"add for example {examples}",
+    )
+
+
+VARIABLE: Final = _with(
+    VariableSpec,
+    (
+        *(language.variable_keys for language in languages()),
+        VariablePolicy,
+        *(language.variable_policies for language in languages()),
     ),
-    __doc__=VariableSpec.__doc__,
 )
 """A variable with the keys of all kinds."""
 
-WRITER: Final[type[WriterSpec]] = create_model(
-    "WriterSpec",
-    __base__=(WriterSpec, *_keys(language.writer_keys for language in languages())),
-    __config__=ConfigDict(
-        json_schema_extra={
-            "anyOf": [
-                {"required": [language.key]} for language in languages() if language.writer_keys is not None
-            ]
-        }
-    ),
-    __validators__={"known": cast("Callable[..., Any]", model_validator(mode="after")(_known))},
-    __doc__=WriterSpec.__doc__,
+WRITER: Final = _with(
+    WriterSpec,
+    (language.writer_keys for language in languages()),
+    judge=_known,
+    schema_extra={
+        "anyOf": [
+            {"required": [language.key]} for language in languages() if language.writer_keys is not None
+        ]
+    },
 )
 """A writer with the keys of all kinds."""
 
-_SECTIONS: Final[dict[str, Any]] = {
-    language.key: (language.section, Field(description=language.meaning))
-    if language.required
-    else (language.section | None, Field(default=None, description=language.meaning))
-    for language in languages()
-}
-
-FILE: Final[type[Section]] = create_model(
-    "MappingFile",
-    __base__=Section,
+FILE: Final = _with(
+    Section,
+    (),
     __doc__="A mapping of gatewayd: one robot cell.",
-    gatewayd=(
-        Annotated[Literal[1], BeforeValidator(lambda value: value, json_schema_input_type=Literal[1])],
-        Field(description="version of the mapping language"),
-    ),
-    cell=(CellName, Field(description="name of the cell")),
-    **_SECTIONS,
-    writers=(dict[Name, WRITER], Field(default_factory=dict, description="who may write inputs")),  # type: ignore[valid-type]
-    groups=(dict[Name, Group], Field(default_factory=dict, description="variables that are owned together")),
-    variables=(dict[Name, VARIABLE], Field(description="the variables by name")),  # type: ignore[valid-type]
+    __annotations__={
+        "gatewayd": Literal[1],
+        "cell": CellName,
+        **{
+            language.key: language.section if language.required else language.section | None
+            for language in languages()
+        },
+        "writers": dict[Name, WRITER],  # type: ignore[valid-type]
+        "groups": dict[Name, Group],
+        "variables": dict[Name, VARIABLE],  # type: ignore[valid-type]
+    },
+    gatewayd=Field(description="version of the mapping language"),
+    cell=Field(description="name of the cell"),
+    **{
+        language.key: Field(description=language.meaning)
+        if language.required
+        else Field(default=None, description=language.meaning)
+        for language in languages()
+    },
+    writers=Field(default_factory=dict, description="who may write inputs"),
+    groups=Field(default_factory=dict, description="variables that are owned together"),
+    variables=Field(description="the variables by name"),
 )
 """The whole file."""

@@ -9,13 +9,12 @@ Defaults that hang on other parts of a file (the lease of a list, the type of a 
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
-
-from pydantic import Field
+from typing import Literal
 
 from gatewayd.core.definition import Fallback
 from gatewayd.mapping.scalars import Name, Names, OptionalDuration, OutputPolicy, Real, ReleasePolicy
 from gatewayd.mapping.section import Section
+from gatewayd.mapping.typed import Field
 
 FORMAT_VERSION = 1
 """Version of the mapping language that this module describes."""
@@ -69,7 +68,7 @@ class VariablePolicy(Section):
         description="how long an owner keeps it without writing; default: none for one owner, 5s for a list and any",
     )
     group: Name | None = Field(default=None, description="group that it is owned with")
-    limits: Annotated[tuple[Real, Real], Field(strict=False)] | None = Field(
+    limits: tuple[Real, Real] | None = Field(
         default=None, description="least and greatest value in the robot's unit"
     )
     clamp: bool = Field(

@@ -10,9 +10,6 @@ import difflib
 from collections.abc import Mapping
 from typing import Any, Final, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
-from pydantic_core import ErrorDetails
-
 from gatewayd.links.language import LinkLanguage
 from gatewayd.links.registry import languages
 from gatewayd.mapping import syntax
@@ -24,6 +21,8 @@ from gatewayd.mapping.scalars import CellName, Name
 from gatewayd.mapping.section import Section
 from gatewayd.mapping.slips import lookalike
 from gatewayd.mapping.source import Items, MappingText, Node, Scalar, Table, TableEntry, shown
+from gatewayd.mapping.tables import read
+from gatewayd.mapping.typed import Invalid, Mistake
 
 S = TypeVar("S", bound=Section)
 Found = TypeVar("Found")
@@ -103,8 +102,6 @@ _EXPECTED = {
     "list_type": "a list",
 }
 _TEXT_HINT = "put it in quotes to make it a text"
-_NAME_READER: TypeAdapter[str] = TypeAdapter(Name)
-_CELL_READER: TypeAdapter[str] = TypeAdapter(CellName)
 
 
 class _Reader:
@@ -152,10 +149,10 @@ class _Reader:
         if entry is None or not self._has_value("cell", entry):
             return ""
         try:
-            return _CELL_READER.validate_python(_raw(entry.value))
-        except ValidationError as error:
-            for details in error.errors(include_url=False):
-                self._translate(details, FILE, entry, ("cell",))
+            return str(read(CellName, _raw(entry.value)))
+        except Invalid as invalid:
+            for mistake in invalid.mistakes:
+                self._translate(mistake, FILE, entry, ("cell",))
         return ""
 
     def _sections(self, model: type[S], entry: TableEntry | None) -> dict[str, Part[S]]:
@@ -186,10 +183,9 @@ class _Reader:
             self._find(syntax.BAD_NAME, message, entry.key.position, "choose another name")
             return False
         try:
-            _NAME_READER.validate_python(entry.key.text)
-        except ValidationError as error:
-            details = error.errors(include_url=False)[0]
-            context = details.get("ctx", {})
+            read(Name, entry.key.text)
+        except Invalid as invalid:
+            context = invalid.mistakes[0].context
             self._find(syntax.BAD_NAME, context["message"], entry.key.position, context["hint"])
             return False
         return True
@@ -201,9 +197,9 @@ class _Reader:
         data = self._data(entry.value)
         try:
             spec = model.model_validate(data)
-        except ValidationError as error:
-            for details in error.errors(include_url=False):
-                self._translate(details, model, entry, ())
+        except Invalid as invalid:
+            for mistake in invalid.mistakes:
+                self._translate(mistake, model, entry, ())
             return None
         if len(self.findings) > found:
             return None
@@ -217,7 +213,7 @@ class _Reader:
         return True
 
     def _data(self, node: Node) -> Any:
-        """Turn a node into what pydantic reads; keys without a value are findings and left out."""
+        """Turn a node into what typed tables read; keys without a value are findings and left out."""
         match node:
             case Scalar():
                 return node.value
@@ -232,12 +228,11 @@ class _Reader:
                 }
 
     def _translate(
-        self, details: ErrorDetails, model: type[Section], entry: TableEntry, prefix: tuple[Step, ...]
+        self, mistake: Mistake, model: type[Section], entry: TableEntry, prefix: tuple[Step, ...]
     ) -> None:
-        """Make one finding of a pydantic error."""
-        path = details["loc"]
+        """Make one finding of a mistake."""
+        kind, path, context = mistake
         key, value = walk(entry.value, path, entry.key.position)
-        kind, context = details["type"], details.get("ctx", {})
         rule = rule_of(kind)
         if rule is not None:
             place = key if rule is syntax.MISSING_KEY else value

@@ -2,7 +2,7 @@
 lie with it.
 
 Each reader takes what YAML made of a value and gives a typed one. What cannot be read raises
-`PydanticCustomError` whose type is the slug of the rule that it breaks and whose context holds the remedy.
+`ValueRefused`, with the slug of the rule that it breaks, a message and the remedy.
 """
 
 from __future__ import annotations
@@ -14,13 +14,11 @@ from functools import partial
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 from typing import Annotated, Any, Final, Literal, NoReturn, TypeAlias
 
-from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf
-from pydantic_core import PydanticCustomError
-
 from gatewayd.core.definition import Fallback, FallbackKind
 from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Rule
 from gatewayd.mapping.source import RealNumber, WholeNumber
+from gatewayd.mapping.typed import AfterValidator, BeforeValidator, Field, InstanceOf, ValueRefused
 from gatewayd.report.format import address as address_text
 
 _DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?")
@@ -44,7 +42,7 @@ _MAPPED_PREFIX: Final = 96
 
 def refuse(rule: Rule, message: str, hint: str) -> NoReturn:
     """Stop the validation of a value: it breaks `rule`."""
-    raise PydanticCustomError(rule.slug, "{message}", {"message": message, "hint": hint})
+    raise ValueRefused(rule.slug, message, hint)
 
 
 def written(value: object) -> str:
@@ -90,7 +88,7 @@ def _decimal(value: object) -> object:
 
 Whole = Annotated[int, BeforeValidator(_decimal)]
 """An integer in plain decimal digits."""
-Real = Annotated[float, BeforeValidator(_decimal), Field(allow_inf_nan=False)]
+Real = Annotated[float, BeforeValidator(_decimal)]
 """A number in plain decimal digits."""
 
 
@@ -257,7 +255,6 @@ _OneNetwork = Annotated[
 Networks = Annotated[
     tuple[_OneNetwork, ...],
     BeforeValidator(one_or_many, json_schema_input_type=_NETWORK_SCHEMA | list[_NETWORK_SCHEMA]),
-    Field(strict=False),
 ]
 """An address, a network, or a list of them."""
 
@@ -296,7 +293,6 @@ CellName = Annotated[
 Names = Annotated[
     tuple[Name, ...],
     BeforeValidator(one_or_many, json_schema_input_type=_NAME_SCHEMA | list[_NAME_SCHEMA]),
-    Field(strict=False),
 ]
 """A name or a list of names."""
 

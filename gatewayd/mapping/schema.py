@@ -1,4 +1,4 @@
-"""The JSON Schema of the mapping language, for editors: generated from the models, so that it never lags behind.
+"""The JSON Schema of the mapping language, for editors: generated from the typed tables, so that it never lags behind.
 
 `python -m gatewayd.mapping.schema > mappings/schema.json` renews the file. A schema cannot say everything:
 `gatewayd check` is the authority.
@@ -6,19 +6,38 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import sys
-from typing import Any, Final
+from collections.abc import Callable, Mapping
+from types import NoneType, UnionType
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from gatewayd.mapping.language import FILE
+from gatewayd.mapping.tables import TypedTable
+from gatewayd.mapping.typed import BeforeValidator, Key
 
 _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
+_BOUNDS: Final = {
+    "ge": "minimum",
+    "gt": "exclusiveMinimum",
+    "le": "maximum",
+    "lt": "exclusiveMaximum",
+    "min_length": "minLength",
+    "max_length": "maxLength",
+    "pattern": "pattern",
+}
+_PLAIN: Final = {str: "string", bool: "boolean", int: "integer", float: "number"}
+
+Schema = dict[str, Any]
 
 
-def mapping_schema() -> dict[str, Any]:
+def mapping_schema() -> Schema:
     """Return the schema of a mapping file. Deterministic."""
-    schema: dict[str, Any] = _tidy(FILE.model_json_schema())
-    return {"$schema": _DIALECT, "title": "gatewayd mapping, version 1", **schema}
+    definitions = _Definitions()
+    file = definitions.table(FILE)
+    tables = dict(sorted(definitions.found.items()))
+    return {"$schema": _DIALECT, "title": "gatewayd mapping, version 1", "$defs": tables, **file}
 
 
 def schema_text() -> str:
@@ -26,24 +45,106 @@ def schema_text() -> str:
     return json.dumps(mapping_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
-def _tidy(thing: Any) -> Any:
-    """Take out what means nothing in a mapping: null in place of a missing key, and titles that repeat the key."""
-    if isinstance(thing, list):
-        return [_tidy(item) for item in thing]
-    if not isinstance(thing, dict):
-        return thing
-    tidy = {
-        key: _tidy(value)
-        for key, value in thing.items()
-        if not (key == "title" and isinstance(value, str)) and not (key == "default" and value is None)
+class _Definitions:
+    """Makes schemas of types, and keeps those of the tables that they name."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, Schema] = {}
+
+    def table(self, table: type[TypedTable]) -> Schema:
+        """What a table may hold."""
+        keys = table.model_fields
+        required = [name for name, key in keys.items() if key.is_required()]
+        return _ordered(
+            {
+                "type": "object",
+                "description": inspect.cleandoc(table.__doc__ or ""),
+                "properties": {name: self._key(key) for name, key in keys.items()},
+                "additionalProperties": False,
+                **({"required": required} if required else {}),
+                **table.schema_extra,
+            }
+        )
+
+    def _key(self, key: Key) -> Schema:
+        default = key.value_without() if not key.is_required() and key.default_factory is None else None
+        said = (
+            {} if default is None else {"default": list(default) if isinstance(default, tuple) else default}
+        )
+        said |= {"description": key.description} | dict(key.extra or {})
+        return _ordered(self._type(key.annotation, key.bounds) | said)
+
+    def _type(self, kind: Any, bounds: Mapping[str, Any]) -> Schema:
+        arguments = get_args(kind)
+        if kind in _PLAIN:
+            said = {_BOUNDS[name]: bound for name, bound in bounds.items() if name in _BOUNDS}
+            return _ordered({"type": _PLAIN[kind], **said})
+        make = self._makers.get(get_origin(kind))
+        return make(self, arguments, bounds) if make is not None else self._reference(kind)
+
+    def _reference(self, table: type[TypedTable]) -> Schema:
+        name = table.__name__
+        if name not in self.found:
+            self.found[name] = {}  # tables may hold each other
+            self.found[name] = self.table(table)
+        return {"$ref": f"#/$defs/{name}"}
+
+    def _annotated(self, arguments: tuple[Any, ...], bounds: Mapping[str, Any]) -> Schema:
+        kind, *notes = arguments
+        keys = [note for note in notes if isinstance(note, Key)]
+        for key in keys:
+            bounds = {**key.bounds, **bounds}
+        if get_origin(kind) is tuple and "max_length" in bounds:
+            bounds = {
+                "max_items": bounds["max_length"]
+            }  # of the list, not of the one text that may stand for it
+        written = [note.input_type for note in notes if isinstance(note, BeforeValidator)]
+        found = self._type(next((each for each in written if each is not None), kind), bounds)
+        for key in keys:
+            found |= {} if key.examples is None else {"examples": key.examples}
+            found |= key.extra or {}
+        return _ordered(found)
+
+    def _union(self, arguments: tuple[Any, ...], bounds: Mapping[str, Any]) -> Schema:
+        choices: list[Schema] = []
+        for argument in arguments:
+            schema = self._type(argument, bounds) if argument is not NoneType else {}
+            choices += schema.get("anyOf", [schema] if schema else [])
+        return choices[0] if len(choices) == 1 else {"anyOf": choices}
+
+    def _words(self, arguments: tuple[Any, ...], _bounds: Mapping[str, Any]) -> Schema:
+        words = {"const": arguments[0]} if len(arguments) == 1 else {"enum": list(arguments)}
+        return {**words, "type": _PLAIN[type(arguments[0])]}
+
+    def _items(self, arguments: tuple[Any, ...], bounds: Mapping[str, Any]) -> Schema:
+        if len(arguments) == 1 or arguments[1] is ...:
+            most = {"maxItems": bounds["max_items"]} if "max_items" in bounds else {}
+            return {"items": self._type(arguments[0], {}), **most, "type": "array"}
+        items = [self._type(argument, {}) for argument in arguments]
+        return {"maxItems": len(items), "minItems": len(items), "prefixItems": items, "type": "array"}
+
+    def _by_name(self, arguments: tuple[Any, ...], _bounds: Mapping[str, Any]) -> Schema:
+        name, table = (self._type(argument, {}) for argument in arguments)
+        return {
+            "additionalProperties": False,
+            "patternProperties": {name["pattern"]: table},
+            "type": "object",
+        }
+
+    _makers: Final[dict[Any, Callable[[_Definitions, tuple[Any, ...], Mapping[str, Any]], Schema]]] = {
+        Annotated: _annotated,
+        Union: _union,
+        UnionType: _union,
+        Literal: _words,
+        tuple: _items,
+        list: _items,
+        dict: _by_name,
     }
-    if "patternProperties" in tidy:
-        tidy["additionalProperties"] = False
-    choices = [choice for choice in tidy.get("anyOf", ()) if choice != {"type": "null"}]
-    if len(choices) == 1:
-        del tidy["anyOf"]
-        return {**choices[0], **tidy}
-    return {**tidy, "anyOf": choices} if choices else tidy
+
+
+def _ordered(schema: Schema) -> Schema:
+    """The same with its words by the alphabet; keys of a table stay in the order of the language."""
+    return dict(sorted(schema.items()))
 
 
 if __name__ == "__main__":

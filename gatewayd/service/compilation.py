@@ -41,8 +41,6 @@ What lives for a moment needs no collection of garbage, and is not taken apart a
 started it ends."""
 _LOOK = 0.05
 """Seconds between two looks whether the result is still wanted."""
-_ENVIRONMENT = {"PYDANTIC_DISABLE_PLUGINS": "1"}
-"""Looking for plugins of pydantic, of which there are none, would take a tenth of the time."""
 _ROOT = str(Path(gatewayd.__file__).parents[1])
 
 
@@ -128,7 +126,6 @@ def _start(names: Iterable[str]) -> tuple[subprocess.Popen[bytes], int]:
             stdin=theirs,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            env=os.environ | _ENVIRONMENT,
         )
     except BaseException:
         os.close(ours)

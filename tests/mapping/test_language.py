@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from pydantic import ValidationError
 
 from gatewayd.links.canopen_node.sections import CanopenWriter
 from gatewayd.links.modbus_server.sections import ModbusWriter
 from gatewayd.mapping.language import FILE, VARIABLE, WRITER
+from gatewayd.mapping.typed import Invalid
 
 
 def test_keys_come_in_the_order_of_the_kinds() -> None:
@@ -31,11 +31,11 @@ def test_a_kind_finds_its_own_keys() -> None:
 
 
 def test_a_writer_needs_some_link() -> None:
-    with pytest.raises(ValidationError) as caught:
+    with pytest.raises(Invalid) as caught:
         WRITER.model_validate({"timeout": "1s"})
-    (error,) = caught.value.errors()
-    assert error["type"] == "missing-key"
-    assert error["ctx"] == {
+    (mistake,) = caught.value.mistakes
+    assert mistake.kind == "missing-key"
+    assert mistake.context == {
         "message": "a writer needs the key `modbus` or `canopen`, by which it is known",
         "hint": "add for example `modbus: 192.168.1.20` or `canopen: rpdo`",
     }

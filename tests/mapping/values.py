@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from pydantic import TypeAdapter, ValidationError
 
+from gatewayd.mapping import tables
 from gatewayd.mapping.source import Items, Node, Scalar, Table, parse
+from gatewayd.mapping.typed import Invalid
 
 
 def plain(node: Node) -> object:
@@ -31,12 +32,12 @@ def written(text: str) -> object:
 
 
 def read(kind: Any, text: str) -> Any:
-    return TypeAdapter(kind).validate_python(written(text), strict=True)
+    return tables.read(kind, written(text))
 
 
 def refused(kind: Any, text: str) -> tuple[str, str, str]:
     """Rule, message and hint of the refusal."""
-    with pytest.raises(ValidationError) as caught:
+    with pytest.raises(Invalid) as caught:
         read(kind, text)
-    details = caught.value.errors()[0]
-    return details["type"], details["ctx"]["message"], details["ctx"]["hint"]
+    kind, _path, context = caught.value.mistakes[0]
+    return kind, context["message"], context["hint"]

@@ -31,7 +31,7 @@ def test_it_comes_to_the_same_as_here() -> None:
 def test_the_environment_and_the_directory_decide_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("gatewayd.py", "pydantic.py", "json.py", "sitecustomize.py"):
+    for name in ("gatewayd.py", "ruamel.py", "json.py", "sitecustomize.py"):
         (tmp_path / name).write_text("raise SystemExit(3)")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setenv("PYTHONSTARTUP", str(tmp_path / "json.py"))
@@ -104,7 +104,7 @@ import subprocess
 import sys
 for name in {modules.split(", ")}:
     __import__("gatewayd." + name)
-print(*sorted({{"pydantic", "ruamel", "rich", "can", "gatewayd.mapping.loader"}} & sys.modules.keys()))
+print(*sorted({{"ruamel", "rich", "can", "gatewayd.mapping.tables", "gatewayd.mapping.loader"}} & sys.modules.keys()))
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []

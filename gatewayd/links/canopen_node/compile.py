@@ -49,7 +49,12 @@ def compile_canopen(cell: ExpandedCell, node: CanopenCell) -> CanopenPlan:
         life_time_factor=spec.guarding.factor if spec.guarding.time is not None else 0,
         emcy_inhibit=_ticks(spec.emcy.inhibit, 10_000),
         error_behaviour=ERROR_BEHAVIOURS.index(spec.on_communication_error),
-        identity=IdentityPlan(**spec.identity.model_dump()),
+        identity=IdentityPlan(
+            vendor=spec.identity.vendor,
+            product=spec.identity.product,
+            revision=spec.identity.revision,
+            serial=spec.identity.serial,
+        ),
     )
 
 

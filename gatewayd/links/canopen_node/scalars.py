@@ -1,6 +1,6 @@
 """The small languages of the CANopen part of a mapping: COB-IDs, timers, transmission types, members of PDOs.
 
-As `gatewayd.mapping.scalars`: what cannot be read raises `PydanticCustomError` with the rule that it breaks.
+As `gatewayd.mapping.scalars`: what cannot be read raises `ValueRefused` with the rule that it breaks.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ import re
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Final, Literal
-
-from pydantic import BeforeValidator, Field, InstanceOf
 
 from gatewayd.links.canopen_node.status_words import FIELD_NAMES
 from gatewayd.mapping import syntax
@@ -25,6 +23,7 @@ from gatewayd.mapping.scalars import (
     span,
     written,
 )
+from gatewayd.mapping.typed import BeforeValidator, Field, InstanceOf
 
 EVENT: Final = 254
 """Transmission type of `event`: manufacturer-specific, since the node has no device profile."""
@@ -165,7 +164,7 @@ CobIdRanges = Annotated[
         ...,
     ],
     BeforeValidator(one_or_many, json_schema_input_type=_COB_IDS_SCHEMA | list[_COB_IDS_SCHEMA]),
-    Field(strict=False, max_length=_MAX_RANGES),
+    Field(max_length=_MAX_RANGES),
 ]
 """Identifiers and ranges of them, or a single one."""
 
@@ -220,7 +219,7 @@ Members = Annotated[
         Annotated[InstanceOf[Member], BeforeValidator(_member, json_schema_input_type=_MEMBER_SCHEMA)], ...
     ],
     BeforeValidator(one_or_many, json_schema_input_type=_MEMBER_SCHEMA | list[_MEMBER_SCHEMA]),
-    Field(strict=False, max_length=_MAX_MEMBERS),
+    Field(max_length=_MAX_MEMBERS),
 ]
 """Variables by name, or a single one."""
 
@@ -271,6 +270,6 @@ StatusMembers = Annotated[
         ...,
     ],
     BeforeValidator(one_or_many, json_schema_input_type=_STATUS_SCHEMA | list[_STATUS_SCHEMA]),
-    Field(strict=False, max_length=_MAX_MEMBERS),
+    Field(max_length=_MAX_MEMBERS),
 ]
 """Words of the status block by name, or a single one."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
-
 from gatewayd.canopen.identity import PRODUCT_CODE, VENDOR_ID
 from gatewayd.links.canopen_node.scalars import (
     EVENT,
@@ -23,6 +21,7 @@ from gatewayd.links.canopen_node.scalars import (
 from gatewayd.mapping import syntax
 from gatewayd.mapping.scalars import Duration, Name, Names, Real, Whole, refuse
 from gatewayd.mapping.section import Section
+from gatewayd.mapping.typed import AfterValidator, BeforeValidator, Field
 
 AUTO = "auto"
 """Stands for the automatic layout; no PDO can have this name."""
@@ -193,24 +192,24 @@ class Canopen(Section):
         default=0.5, description="time between two heartbeats; none: no heartbeat"
     )
     guarding: Guarding = Field(
-        default=Guarding(),
+        default_factory=Guarding,
         description="life guarding; only with `heartbeat: none`",
         json_schema_extra={"default": {}},
     )
-    emcy: Emcy = Field(default=Emcy(), description="EMCY", json_schema_extra={"default": {}})
+    emcy: Emcy = Field(default_factory=Emcy, description="EMCY", json_schema_extra={"default": {}})
     on_communication_error: Literal["pre_operational", "stay", "stop"] = Field(
         default="pre_operational",
         description="NMT state after the loss of the bus, of a watched heartbeat or of the guarding (1029h)",
     )
     identity: IdentitySpec = Field(
-        default=IdentitySpec(), description="identity of the node", json_schema_extra={"default": {}}
+        default_factory=IdentitySpec, description="identity of the node", json_schema_extra={"default": {}}
     )
-    sync: Sync = Field(default=Sync(), description="SYNC", json_schema_extra={"default": {}})
+    sync: Sync = Field(default_factory=Sync, description="SYNC", json_schema_extra={"default": {}})
     pdo: PdoDefaults = Field(
-        default=PdoDefaults(), description="defaults of all PDOs", json_schema_extra={"default": {}}
+        default_factory=PdoDefaults, description="defaults of all PDOs", json_schema_extra={"default": {}}
     )
     cob_ids: CobIdPool = Field(
-        default=CobIdPool(),
+        default_factory=CobIdPool,
         description="COB-IDs for PDOs beyond the predefined ones",
         json_schema_extra={"default": {}},
     )

@@ -1,6 +1,6 @@
 """The small language of the Modbus part of a mapping: addresses.
 
-As `gatewayd.mapping.scalars`: what cannot be read raises `PydanticCustomError` with the rule that it breaks.
+As `gatewayd.mapping.scalars`: what cannot be read raises `ValueRefused` with the rule that it breaks.
 """
 
 from __future__ import annotations
@@ -8,11 +8,10 @@ from __future__ import annotations
 import re
 from typing import Annotated, Final, Literal
 
-from pydantic import BeforeValidator, Field
-
 from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import declare
 from gatewayd.mapping.scalars import refuse, scalar
+from gatewayd.mapping.typed import BeforeValidator, Field
 
 BAD_ADDRESS = declare(
     "GW115", "bad-address", "a Modbus address that cannot be read", home="gatewayd.links.modbus_server.rules"
@@ -65,6 +64,5 @@ Address = Annotated[
         json_schema_input_type=float
         | Annotated[str, Field(pattern=r"^([0-9]{1,5}|0[xX][0-9A-Fa-f]{1,4})(\.([0-9]{1,2}|high|low))?$")],
     ),
-    Field(strict=False),
 ]
 """Protocol address from 0, decimal or hexadecimal, and after a dot the bit or the byte of the register."""

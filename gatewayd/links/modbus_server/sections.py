@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
-
-from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from gatewayd.links.modbus_server.scalars import BAD_ADDRESS, Address, Part
 from gatewayd.mapping import syntax
 from gatewayd.mapping.scalars import Listen, ListenAddress, Networks, OptionalDuration, Real, Whole, refuse
 from gatewayd.mapping.section import Section
+from gatewayd.mapping.typed import BeforeValidator, Field
 from gatewayd.modbus.areas import AREA_NAMES, Area
 
 NumberType = Literal[
@@ -80,11 +80,9 @@ class Modbus(Section):
 class PlacementSpec(Section):
     """Where a variable lies in Modbus and how its number is written there."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "oneOf": [{"required": [area]} for area in ("holding", "input", "coil", "discrete")]
-        }
-    )
+    schema_extra: ClassVar[Mapping[str, Any]] = {
+        "oneOf": [{"required": [area]} for area in ("holding", "input", "coil", "discrete")]
+    }
 
     holding: Address | None = Field(default=None, description="holding register (4xxxxx)")
     input: Address | None = Field(default=None, description="input register (3xxxxx), read only")
@@ -99,8 +97,8 @@ class PlacementSpec(Section):
     scale: Real | None = Field(default=None, description="robot value = raw value * scale + offset")
     offset: Real | None = Field(default=None, description="robot value = raw value * scale + offset")
 
-    @model_validator(mode="after")
-    def _one_area(self) -> Self:
+    def judge(self) -> None:
+        """Exactly one area, and no bit of what is one."""
         given = [area for area in _AREAS if getattr(self, area) is not None]
         if len(given) != 1:
             found = "none" if not given else " and ".join(given)
@@ -109,7 +107,6 @@ class PlacementSpec(Section):
         if self.area.of_bits and self.bit is not None:
             message = f"a {given[0]} address has no bits or bytes"
             refuse(BAD_ADDRESS, message, f"write {{{given[0]}: N}} with a whole number")
-        return self
 
     @property
     def area(self) -> Area:
@@ -167,7 +164,6 @@ class ModbusPlaces(Section):
         BeforeValidator(
             _places, json_schema_input_type=float | str | PlacementSpec | list[float | str | PlacementSpec]
         ),
-        Field(strict=False),
     ] = Field(
         default=(),
         description="address from 0 (100, 0x64), bit (100.3) or byte (100.high) of a register, "

@@ -1,6 +1,6 @@
 """The small languages of the robot's part of a mapping: references to its fields, software versions.
 
-As `gatewayd.mapping.scalars`: what cannot be read raises `PydanticCustomError` with the rule that it breaks.
+As `gatewayd.mapping.scalars`: what cannot be read raises `ValueRefused` with the rule that it breaks.
 """
 
 from __future__ import annotations
@@ -9,11 +9,10 @@ import re
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field, InstanceOf
-
 from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import declare
 from gatewayd.mapping.scalars import refuse, scalar, span
+from gatewayd.mapping.typed import BeforeValidator, Field, InstanceOf
 
 BAD_REFERENCE = declare(
     "GW117",

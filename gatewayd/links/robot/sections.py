@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
-
 from gatewayd.links.robot.scalars import RobotReference, Version
 from gatewayd.mapping.scalars import Duration, Host, Name, Names, OptionalDuration, Real, Whole
 from gatewayd.mapping.section import Section
+from gatewayd.mapping.typed import BeforeValidator, Field
 from gatewayd.rtde.types import DEFAULT_PORT
 
 FieldType = Literal[

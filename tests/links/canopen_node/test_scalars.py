@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from pydantic import TypeAdapter, ValidationError
 
 from gatewayd.links.canopen_node.scalars import (
     CobId,
@@ -16,7 +15,9 @@ from gatewayd.links.canopen_node.scalars import (
     MillisecondTime,
     Transmission,
 )
+from gatewayd.mapping import tables
 from gatewayd.mapping.source import parse
+from gatewayd.mapping.typed import Invalid
 from tests.mapping.values import plain
 
 
@@ -28,14 +29,14 @@ def yaml(text: str) -> Any:
 
 
 def read(kind: Any, text: str) -> Any:
-    return TypeAdapter(kind).validate_python(yaml(text))
+    return tables.read(kind, yaml(text))
 
 
 def refused(kind: Any, text: str) -> tuple[str, str]:
-    with pytest.raises(ValidationError) as caught:
+    with pytest.raises(Invalid) as caught:
         read(kind, text)
-    details = caught.value.errors()[0]
-    return details["type"], details["ctx"]["hint"]
+    mistake = caught.value.mistakes[0]
+    return mistake.kind, mistake.context["hint"]
 
 
 @pytest.mark.parametrize("text, number", [("0x1A0", 0x1A0), ("0x1a0", 0x1A0), ("'0x7FF'", 0x7FF), ("0x0", 0)])
@@ -116,6 +117,6 @@ def test_members() -> None:
 def test_lists_have_an_end() -> None:
     """A PDO has 64 entries at most."""
     for kind, item, most in ((Members, "a", 64), (CobIdRanges, "0x680", 256)):
-        TypeAdapter(kind).validate_python(yaml(f"[{', '.join([item] * most)}]"))
-        with pytest.raises(ValidationError):
-            TypeAdapter(kind).validate_python(yaml(f"[{', '.join([item] * (most + 1))}]"))
+        tables.read(kind, yaml(f"[{', '.join([item] * most)}]"))
+        with pytest.raises(Invalid):
+            tables.read(kind, yaml(f"[{', '.join([item] * (most + 1))}]"))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
 
 from gatewayd.links.modbus_server.sections import ModbusPlaces
 from gatewayd.mapping.language import VARIABLE
+from gatewayd.mapping.typed import Invalid
 from gatewayd.modbus.areas import Area
 
 
@@ -44,6 +44,6 @@ def test_placements_have_short_forms() -> None:
 )
 def test_placement_names_exactly_one_area(value: Any) -> None:
     """Coils and discrete inputs are bits already."""
-    with pytest.raises(ValidationError) as caught:
+    with pytest.raises(Invalid) as caught:
         placements(value)
-    assert {error["type"] for error in caught.value.errors()} <= {"bad-address", "wrong-type"}
+    assert {mistake.kind for mistake in caught.value.mistakes} <= {"bad-address", "wrong-type"}

@@ -5,17 +5,17 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import TypeAdapter
 
 from gatewayd.links.robot.reference import ReferenceProblem, UnresolvedReference, resolve
 from gatewayd.links.robot.scalars import Reference, RobotReference
+from gatewayd.mapping import tables
 from gatewayd.rtde.fields import INPUTS, OUTPUTS
-
-READER: TypeAdapter[Reference] = TypeAdapter(RobotReference)
 
 
 def read(text: str) -> Reference:
-    return READER.validate_python(text)
+    reference = tables.read(RobotReference, text)
+    assert isinstance(reference, Reference)
+    return reference
 
 
 @pytest.mark.parametrize(

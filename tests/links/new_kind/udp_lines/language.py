@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pydantic import Field
-
 from gatewayd.links.language import LinkLanguage
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Document, Part
@@ -15,6 +13,7 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedLink, ExpandedVariab
 from gatewayd.mapping.model import VariableSpec, WriterSpec
 from gatewayd.mapping.scalars import Duration, Host, Listen, Name
 from gatewayd.mapping.section import Section
+from gatewayd.mapping.typed import Field
 
 from .declaration import KIND
 from .plan import LinesPlan
