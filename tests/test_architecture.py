@@ -224,6 +224,7 @@ MAX_LENGTH = 500
 """Lines of a module."""
 
 WITHOUT_TEST_FILE: dict[str, str] = {
+    "rtde.handler": "a protocol; tests/rtde/test_connection.py",
     "service.options": "a record; tests/service/test_main.py",
     "gatewayd": "the version",
     "__main__": "tests/cli/test_main.py tests it as a process",

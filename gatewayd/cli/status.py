@@ -146,6 +146,8 @@ def _counts(robot: Answer) -> Iterator[str]:
     yield from (counted(robot["packages"], "package"), f"{robot['skipped']} skipped", f"{robot['late']} late")
     if robot.get("pauses"):
         yield counted(robot["pauses"], "pause")
+    if robot.get("overtaken"):
+        yield f"{robot['overtaken']} overtaken"
     yield counted(robot["sessions"], "session")
     strange = {kind: count for kind, count in (robot.get("strange") or {}).items() if count}
     if strange:

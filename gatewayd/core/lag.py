@@ -56,6 +56,10 @@ class Lag:
         self.seconds = lag = offset - baseline
         return lag
 
+    def of(self, timestamp: float, raw: float) -> float:
+        """The lag that `package` would find, or a little more; changes nothing."""
+        return max(0.0, raw - timestamp - self._baseline)
+
     def stays_late(self, now: float) -> None:
         """A late package, after `package`: follow whether the lag is steady."""
         if abs(self.seconds - self._level) > self.limit / 2:

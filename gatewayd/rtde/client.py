@@ -1,8 +1,8 @@
 """An RTDE client that keeps itself connected: one asyncio task, synchronous callbacks, no logging of its own.
 
 It negotiates, subscribes, claims, and starts over with the full set-up whenever the connection ends, be it the boot
-restart of a controller or a pulled cable. Packages are handed on from within the read of the socket; of several that
-are waiting only the newest. The decisions are in `gatewayd.rtde.negotiation`, one connection in
+restart of a controller or a pulled cable. Packages are handed on from within the read of the socket, in their
+order, also those that waited together. The decisions are in `gatewayd.rtde.negotiation`, one connection in
 `gatewayd.rtde.connection`; here connections follow one another.
 """
 
@@ -16,7 +16,8 @@ from dataclasses import replace
 
 from gatewayd.loop.progress import wait_with_progress
 from gatewayd.rtde.claims import InputRecipe
-from gatewayd.rtde.connection import ClientHandler, Connection, StreamTap
+from gatewayd.rtde.connection import Connection, StreamTap
+from gatewayd.rtde.handler import ClientHandler
 from gatewayd.rtde.lists import ListMemory
 from gatewayd.rtde.loss import Loss, connect_failure
 from gatewayd.rtde.pace import Statistics

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import math
-import struct
 from collections.abc import Callable, Iterable, Sequence
-from typing import ClassVar, Protocol, cast
+from typing import ClassVar, cast
 
 from gatewayd.report.format import counted
 from gatewayd.rtde.claims import HandshakeError, InputRecipe
 from gatewayd.rtde.codec import ClientProtocol, ProtocolError
+from gatewayd.rtde.handler import ClientHandler
 from gatewayd.rtde.lists import ListOutcome
 from gatewayd.rtde.loss import Loss, LossReason, connection_failure
 from gatewayd.rtde.messages import (
@@ -18,7 +18,6 @@ from gatewayd.rtde.messages import (
     ControllerMessage,
     DataPackage,
     ExecutableMessage,
-    PackageType,
     Pause,
     TextLevel,
     TextMessage,
@@ -27,49 +26,19 @@ from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice
 from gatewayd.rtde.pace import Pace, Statistics
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import TIMESTAMP, ClientSettings, Session
-from gatewayd.rtde.strange import Oddity, StrangePackage
+from gatewayd.rtde.strange import Oddity, StrangePackage, odd_data
 from gatewayd.rtde.types import DataType
 
-_TIMESTAMP = struct.Struct(">d")
 _FIRST_CLAIM_RETRY = 0.1
 _MEASURE_EVERY = 1.0
 _PERIODS_OF_PATIENCE = 5
+_MOST_EARLIER = 64
+"""Packages that are handed on before the newest of those that came together: a burst takes a bounded time."""
 _GOODBYE = 0.2
 
 
 StreamTap = Callable[[bytes, bool, tuple[str, int] | None], None]
 """Takes bytes, whether we sent them, and our end of the connection as its socket has it."""
-
-
-class ClientHandler(Protocol):
-    """What the user of a client gets to know, by synchronous calls from the event loop. They must not block.
-
-    An exception from one of them ends the client: `RtdeClient.run` raises it.
-    """
-
-    def session_started(self, session: Session) -> None:
-        """The set-up is complete; values follow."""
-
-    def values(self, values: tuple[Scalar, ...], now: float) -> None:
-        """A package, flat in the order of `Session.outputs`, received at `now` (the loop's time)."""
-
-    def inputs_changed(self, session: Session) -> None:
-        """The input recipes have changed: inputs that were in use have been claimed, or registers have joined.
-
-        Those of former session objects can still be sent.
-        """
-
-    def session_lost(self, loss: Loss) -> None:
-        """A session has ended, or an attempt at one has failed. The client goes on by itself."""
-
-    def text(self, message: TextMessage) -> None:
-        """The controller has sent a text."""
-
-    def strange(self, package: StrangePackage) -> None:
-        """A package could not be taken as it came; the first of its oddity and type that the client has met."""
-
-    def probed(self, delay: float) -> None:
-        """A probe was answered `delay` seconds after it was sent; infinity: it was not, within the handshake's time."""
 
 
 class Connection(asyncio.Protocol):
@@ -277,45 +246,43 @@ class Connection(asyncio.Protocol):
             self._asked_at = None
 
     def _deliver(self, packages: list[DataPackage], now: float) -> None:
-        """Hand on the newest package that is of the agreed recipe, if there is any, and count them all."""
-        pace = self._pace
-        if pace is None or not packages or self.done.done():
+        """Hand on the packages that are of the agreed recipe, in their order, and count them all."""
+        if self._pace is None or not packages or self.done.done():
             return
         recipe, size = self._negotiation.outputs_id, self._outputs.size
         agreed = [one for one in packages if one.recipe == recipe and len(one.payload) == size]
         if len(agreed) < len(packages):
-            self._pass_over_data(packages, recipe, size)
+            for odd in odd_data(packages, recipe, size):
+                self._pass_over(odd)
         packages.clear()
         if not agreed:
             return
         self._heard = now
         self._passed_over = None
         self._patience = max(self._settings.data_timeout, _PERIODS_OF_PATIENCE * self._period)
-        (*older, newest) = agreed
-        values = self._outputs.unpack(newest.payload)
-        for package in older:
-            self._statistics.overtaken += 1
-            if self._clocked and len(package.payload) >= _TIMESTAMP.size:
-                pace.package(_TIMESTAMP.unpack_from(package.payload)[0], now)
-        last = pace.timestamp
-        if self._clocked and not pace.package(values[0], now):
-            text = (
-                f"the controller's clock went from {last} s to {values[0]} s: its RTDE service has restarted"
-            )
-            self._fail(LossReason.RESTARTED, text)
-            return
-        self._handler.values(values, now)
+        *earlier, newest = agreed
+        for left, package in zip(range(len(earlier), 0, -1), earlier, strict=True):
+            values = self._counted(package, now)
+            if values is None:
+                return
+            taken = self._clocked and left <= _MOST_EARLIER and self._handler.earlier(values, now)
+            self._statistics.overtaken += not taken
+            if self.done.done():
+                return
+        values = self._counted(newest, now)
+        if values is not None:
+            self._handler.values(values, now)
 
-    def _pass_over_data(self, packages: Iterable[DataPackage], recipe: int | None, size: int) -> None:
-        for package in packages:
-            length = len(package.payload)
-            if package.recipe != recipe:
-                reason = f"data package of recipe {package.recipe} where {recipe} was agreed"
-            elif length != size:
-                reason = f"data package with {counted(length, 'byte')} of values, the recipe has {size}"
-            else:
-                continue
-            self._pass_over(StrangePackage(Oddity.RECIPE, PackageType.DATA_PACKAGE, reason))
+    def _counted(self, package: DataPackage, now: float) -> tuple[Scalar, ...] | None:
+        """The values of a package; None if it shows that the controller has restarted, which ends the connection."""
+        values, pace = self._outputs.unpack(package.payload), self._pace
+        assert pace is not None
+        last = pace.timestamp
+        if not self._clocked or pace.package(float(values[0]), now):
+            return values
+        text = f"the controller's clock went from {last} s to {values[0]} s: its RTDE service has restarted"
+        self._fail(LossReason.RESTARTED, text)
+        return None
 
     def _started(self) -> None:
         now = self._loop.time()

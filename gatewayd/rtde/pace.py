@@ -31,7 +31,7 @@ class Statistics:
     late: int = 0
     """Packages that came more than a period later after their predecessor than their timestamps say."""
     overtaken: int = 0
-    """Packages not handed on because a newer one had already arrived."""
+    """Packages that were not taken, because newer ones came together with them and they had waited too long."""
     writes: int = 0
     """Input packages sent."""
     frequency: float = 0.0

@@ -6,8 +6,12 @@ does not understand ends where its header says, and what follows is RTDE again.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
+
+from gatewayd.report.format import counted
+from gatewayd.rtde.messages import DataPackage, PackageType
 
 _MOST_REPORTED = 64
 
@@ -61,3 +65,16 @@ class StrangeCounts:
             return False
         self._reported.add(key)
         return True
+
+
+def odd_data(packages: Iterable[DataPackage], recipe: int | None, size: int) -> Iterator[StrangePackage]:
+    """Those of `packages` that are not of the agreed recipe, whose values have `size` bytes."""
+    for package in packages:
+        length = len(package.payload)
+        if package.recipe != recipe:
+            reason = f"data package of recipe {package.recipe} where {recipe} was agreed"
+        elif length != size:
+            reason = f"data package with {counted(length, 'byte')} of values, the recipe has {size}"
+        else:
+            continue
+        yield StrangePackage(Oddity.RECIPE, PackageType.DATA_PACKAGE, reason)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import selectors
 import socket
 import time
+from collections.abc import Sequence
 
 from gatewayd.rtde.codec import ControllerProtocol
 from gatewayd.rtde.fields import INPUTS, OUTPUTS
@@ -91,6 +92,7 @@ class Controller:
     """Listens on one port; everything happens in `pump` and `send`, in the caller's thread."""
 
     def __init__(self, port: int, host: str = "127.0.0.1") -> None:
+        self.port = port
         self._listener = socket.create_server((host, port))
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._listener, selectors.EVENT_READ)
@@ -130,17 +132,26 @@ class Controller:
                 raise TimeoutError("no client has started its output")
             self.pump(0.01)
 
-    def send(self, count: int = 1, period: float = 0.0) -> None:
-        """Packages to every client that has started, in one segment; stamped `period` apart, the last one now."""
-        self.sent += count
-        now = time.monotonic()
-        for session in self._sessions.values():
-            if session.started and session.output is not None:
-                data = b""
-                for place in range(count):
-                    self.values["timestamp"] = (now - (count - 1 - place) * period,)
-                    data += session.protocol.send(DataPackage(1, self._packed(session.output)))
-                session.connection.sendall(data)
+    def send(self) -> None:
+        """One package to every client that has started, stamped with the present moment."""
+        self.burst([{}], 0.0)
+
+    def burst(self, packages: Sequence[Values], period: float) -> None:
+        """Packages to every client that has started, in one segment; stamped `period` apart, the last one now.
+
+        Each changes `values` before it is made.
+        """
+        first = time.monotonic() - (len(packages) - 1) * period
+        segments = dict.fromkeys(self._sessions.values(), b"")
+        for place, values in enumerate(packages):
+            self.values.update(values, timestamp=(first + place * period,))
+            for session in segments:
+                if session.started and session.output is not None:
+                    package = DataPackage(1, self._packed(session.output))
+                    segments[session] += session.protocol.send(package)
+        for session, segment in segments.items():
+            session.connection.sendall(segment)
+        self.sent += len(packages)
 
     def close(self) -> None:
         """Drop all clients."""

@@ -14,7 +14,7 @@ from tests.benchmarks.samples import NOISE, RULE, Samples
 from tests.benchmarks.servers import counters, mapped_gateway
 from tests.benchmarks.trees import Job, Tree
 
-BURST = 32
+BURST = 16
 """Packages of one segment."""
 BETWEEN = 50
 """Packages sent one by one before each burst."""
@@ -43,7 +43,7 @@ def _bursts(controller: Controller) -> None:
     for _ in range(BURSTS):
         pace(controller, BETWEEN * PERIOD)
         time.sleep(BURST * PERIOD)
-        controller.send(BURST, PERIOD)
+        controller.burst([{}] * BURST, PERIOD)
 
 
 def _not_shown(tree: Tree, title: str, send: Callable[[Controller], None], samples: Samples) -> str:

@@ -93,6 +93,7 @@ def test_what_is_known_of_the_controller(gateway: Running, invoke: Invoke) -> No
         "series": "e",
         "protocol": 2,
         "pauses": 2,
+        "overtaken": 3,
         "strange": {"unknown type": 3, "layout": 0},
         "contradiction": "the mapping says software 5.9.0, the controller runs 5.12.0, which is newer",
         "last_text": {"text": "Protective stop", "source": "URControl", "level": "warning", "age": 3.0},
@@ -103,6 +104,7 @@ def test_what_is_known_of_the_controller(gateway: Running, invoke: Invoke) -> No
     for words in (
         "software 5.12.0.1101 (series e), RTDE protocol 2",
         "2 pauses",
+        "3 overtaken",
         "3 strange packages (unknown type)",
         "the controller runs 5.12.0, which is newer",
         "last text 3.0 s ago, warning: Protective stop",

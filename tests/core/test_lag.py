@@ -29,6 +29,14 @@ def test_the_lag_is_what_a_package_needs_more_than_the_quickest(lag: Lag) -> Non
     assert lag.package(5000.006, 100.036) == pytest.approx(0.04, abs=1e-4)
 
 
+def test_the_lag_that_a_package_would_have_changes_nothing(lag: Lag) -> None:
+    assert lag.of(5000.002, 100.032) == pytest.approx(0.03)
+    assert lag.of(5000.002, 99.0) == 0.0
+    assert lag.seconds == 0.0
+    assert lag.package(5000.002, 100.032) <= 0.03 + 1e-9
+    assert Lag(LIMIT).of(5000.0, 100.0) == 0.0
+
+
 @pytest.mark.parametrize("drift", [-400e-6, -20e-6, 20e-6, 400e-6])
 def test_clocks_that_drift_for_a_day_are_no_lag(drift: float) -> None:
     lag = Lag(LIMIT)

@@ -229,6 +229,8 @@ class Notebook:
         self.delays: list[float] = []
         self.strange_packages: list[StrangePackage] = []
         self.packages: list[tuple[Scalar, ...]] = []
+        self.earlier_packages: list[tuple[Scalar, ...]] = []
+        self.takes_earlier = True
         self.calls: list[str] = []
         """Names of the calls about sessions, packages and inputs, in their order."""
         self.client: client.RtdeClient | None = None
@@ -241,6 +243,11 @@ class Notebook:
         assert now > 0
         self.packages.append(values)
         self.calls.append("values")
+
+    def earlier(self, values: tuple[Scalar, ...], now: float) -> bool:
+        assert now > 0
+        self.earlier_packages.append(values)
+        return self.takes_earlier
 
     def inputs_changed(self, session: Session) -> None:
         self.changes.append(session)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import asyncio
 import math
 import socket
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -16,7 +16,7 @@ from gatewayd.rtde.strange import Oddity
 from tests.rtde.conftest import E_SERIES, send
 
 if TYPE_CHECKING:
-    from tests.rtde.conftest import Connected, Controller
+    from tests.rtde.conftest import Connected, Controller, Notebook
 
 Until = Callable[..., Awaitable[None]]
 DOUBLES = tuple(f"input_double_register_{number}" for number in range(24))
@@ -34,21 +34,62 @@ async def test_small_writes_are_not_delayed_and_dead_peers_are_noticed(
         assert own.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
 
 
-async def test_only_the_newest_of_waiting_packages_is_handed_on(
+def burst(controller: Controller, seen: Notebook, timestamps: Iterable[float]) -> None:
+    """Packages in one segment."""
+    peer, layout = controller.peer, seen.sessions[0].outputs
+    packages = (messages.DataPackage(1, layout.pack((one,))) for one in timestamps)
+    peer.writer.write(b"".join(map(peer.protocol.send, packages)))
+
+
+async def test_packages_that_wait_together_are_handed_on_in_their_order(
     controller: Controller, connected: Connected, until: Until
 ) -> None:
     controller.script.sends_data = False
     async with connected() as (client, seen):
         await until(lambda: seen.sessions)
-        protocol, peer = controller.peer.protocol, controller.peer
-        layout = seen.sessions[0].outputs
-        stream = b"".join(
-            protocol.send(messages.DataPackage(1, layout.pack((float(step),)))) for step in range(1, 6)
-        )
-        peer.writer.write(stream)
+        burst(controller, seen, [1.0, 2.0, 3.0, 4.0, 5.0])
         await until(lambda: seen.packages)
+        assert seen.earlier_packages == [(1.0,), (2.0,), (3.0,), (4.0,)]
         assert seen.packages == [(5.0,)]
-        assert (client.statistics.packages, client.statistics.overtaken) == (5, 4)
+        assert (client.statistics.packages, client.statistics.overtaken) == (5, 0)
+
+
+async def test_earlier_packages_that_are_not_taken_are_counted(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.sends_data = False
+    async with connected() as (client, seen):
+        seen.takes_earlier = False
+        await until(lambda: seen.sessions)
+        burst(controller, seen, [1.0, 2.0, 3.0])
+        await until(lambda: seen.packages)
+        assert (client.statistics.packages, client.statistics.overtaken) == (3, 2)
+
+
+async def test_of_a_great_burst_only_the_end_is_handed_on(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.sends_data = False
+    async with connected() as (client, seen):
+        await until(lambda: seen.sessions)
+        burst(controller, seen, [0.002 * step for step in range(1000)])
+        await until(lambda: client.statistics.packages == 1000)
+        assert seen.packages == [(0.002 * 999,)]
+        assert seen.earlier_packages == [(0.002 * step,) for step in range(935, 999)]
+        assert client.statistics.overtaken == 935
+        assert client.statistics.skipped == 0
+
+
+async def test_a_clock_that_goes_back_within_a_burst_is_a_restart(
+    controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.sends_data = False
+    async with connected() as (_, seen):
+        await until(lambda: seen.sessions)
+        burst(controller, seen, [50.0, 50.008, 1.0, 1.008])
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.RESTARTED
+        assert (seen.earlier_packages, seen.packages) == ([(50.0,), (50.008,)], [])
 
 
 async def test_skipped_packages_are_counted(

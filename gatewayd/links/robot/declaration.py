@@ -30,6 +30,7 @@ class RobotKind(LinkKind):
         "packages": "packages received",
         "skipped": "packages that the controller left out, being busy",
         "pauses": "times that the controller sent nothing for so long that it is no skipping; its clock went on",
+        "overtaken": "packages that waited too long and were not shown: newer ones had come",
         "strange": "packages that could not be taken as they came, by what is odd about them: `unknown type`, "
         "`layout`, `recipe` (data of another one), `unexpected` (an answer to nothing)",
         "late": "packages that came late",
@@ -55,6 +56,11 @@ class RobotKind(LinkKind):
             "gatewayd_robot_pauses_total",
             "pauses",
             "times the controller sent nothing while its clock went on",
+        ),
+        LinkMetric(
+            "gatewayd_robot_packages_overtaken_total",
+            "overtaken",
+            "packages that waited too long and were not shown, newer ones had come",
         ),
         LinkMetric(
             "gatewayd_robot_strange_packages_total",

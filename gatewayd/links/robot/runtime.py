@@ -24,9 +24,9 @@ from gatewayd.links.robot.companions import Driven, all_inputs, all_outputs
 from gatewayd.links.robot.controller import ControllerNotes
 from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.inputs import ClaimedInputs
+from gatewayd.links.robot.outputs import SessionOutputs
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.links.robot.readback import Package
-from gatewayd.links.robot.transfer import OutputTransfer
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.mapping.plan import LinkPlan
@@ -43,7 +43,6 @@ LOSS_INTERVAL = 60.0
 LAST_WORDS = 0.4
 """Seconds for which the end of the link waits until what is due has been sent."""
 _LOOK = 0.005
-_PROGRAM = "runtime_state"
 _CYCLE_UNKNOWN = 0.002
 _FEED_LIMIT = 1 << 31
 
@@ -79,11 +78,7 @@ class RobotLink(SourceLink):
             self._client.statistics = former._client.statistics  # noqa: SLF001 - another one of the same class
             if not KIND.moved(former.plan, plan):
                 self._driven, self._notes = former._driven, former._notes  # noqa: SLF001
-        self._outputs = OutputTransfer((), {})
-        self._slots: dict[str, slice] = {}
-        self._has_timestamp = False
-        self._program: int | None = None
-        """Where packages have the state of the robot program."""
+        self._outputs = SessionOutputs()
         self._inputs = ClaimedInputs()
         self._session: Session | None = None
         """What was agreed and is not adopted yet."""
@@ -111,6 +106,7 @@ class RobotLink(SourceLink):
             "trouble": trouble,
             "watchdog": self._watchdog_fed(),
             "pauses": statistics.pauses,
+            "overtaken": statistics.overtaken,
             "strange": {oddity.value: count for oddity, count in statistics.strange.by_oddity.items()},
             **self._notes.figures(self.plan, clock.now()),
         }
@@ -238,7 +234,7 @@ class RobotLink(SourceLink):
             return
         variables = cell.definition.variables
         reasons = unavailable(session, variables, dict(self.plan.types))
-        self._outputs = OutputTransfer(variables, self._slots, reasons)
+        self._outputs = SessionOutputs(variables, self._outputs.slots, reasons)
         self._adopting = True
         held = self._inputs.rebind(variables, reasons)
         self._report_availability(reasons, now)
@@ -255,11 +251,8 @@ class RobotLink(SourceLink):
         """The set-up is complete; the first package follows."""
         now = clock.now()
         variables = self._cell.definition.variables
-        self._slots = session.outputs.slots
-        self._has_timestamp = "timestamp" in self._slots
-        self._program = self._slots[_PROGRAM].start if _PROGRAM in self._slots else None
         reasons = unavailable(session, variables, dict(self.plan.types))
-        self._outputs = OutputTransfer(variables, self._slots, reasons)
+        self._outputs = SessionOutputs(variables, session.outputs.slots, reasons)
         self._cycle = 1 / session.series.base_rate if session.series is not None else _CYCLE_UNKNOWN
         self._inputs = ClaimedInputs(variables, session, self._driven, self._cycle)
         self._session = self._agreed = session
@@ -283,14 +276,8 @@ class RobotLink(SourceLink):
         clock.judged_now()
         cell = self._cell
         self._measure()
-        if cell.freshness.state is not Source.FRESH:
-            self._outputs.forget()
-        timestamp = float(flat[self._slots["timestamp"]][0]) if self._has_timestamp else None
-        news = cell.package_arrived(timestamp, now, clock.raw())
+        news = self._outputs.show(cell, flat, now, clock.raw())
         if news:
-            self._outputs.copy(flat, cell.image.values)
-            cell.program(int(flat[self._program]) if self._program is not None else None)
-            cell.outputs_written(now)
             self._inputs.look(flat)
             if self._session is not None:
                 self._adopt(self._session, flat, now)
@@ -303,6 +290,11 @@ class RobotLink(SourceLink):
                 cell.delivery.delivered(index)
         if not news and cell.lag_doubtful(now):
             self._client.probe()
+
+    def earlier(self, flat: Sequence[Value], now: float) -> bool:
+        """A package that waited together with newer ones. What inputs hold is told by the newest of them alone."""
+        clock.judged_now()
+        return self._outputs.show_earlier(self._cell, flat, now, clock.raw())
 
     def session_lost(self, loss: Loss) -> None:
         """The session has ended, or an attempt at one has failed."""
