@@ -65,7 +65,7 @@ def variables(contexts: list[click.Context]) -> Iterator[str]:
             if isinstance(parameter.envvar, str):
                 found.setdefault(parameter.envvar, []).append(f"{ctx.info_name} {parameter.opts[0]}")
     for name, places in sorted(found.items()):
-        yield f".TP\n.B {name}\nThe option of: {plain(', '.join(places))}."
+        yield f".TP\n.B {name}\nStands for the option: {plain(', '.join(places))}."
     yield ".TP\n.B GATEWAYD_TRACEBACK\n1: show where an internal error came from."
 
 

@@ -340,7 +340,7 @@ def _field(text: str) -> Field:
         return Field(name, DataType.from_word(word), "of this simulator")
     except KeyError:
         types = ", ".join(kind.word for kind in DataType)
-        msg = f"{text!r} is not NAME:TYPE with a type out of {types}"
+        msg = f"{text!r} is not NAME:TYPE, where TYPE is one of {types}"
         raise ValueError(msg) from None
 
 

@@ -26,7 +26,7 @@ class WriterName:
     name: str
     position: Position
     role: str
-    """What the writer is there: `the writer that the watchdog requires,`."""
+    """What the writer is there: `a writer that the watchdog requires`."""
     no_any: str = ""
     """What is wrong with `any` there; empty: nothing."""
     whole: Position | None = None

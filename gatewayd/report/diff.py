@@ -17,7 +17,7 @@ from gatewayd.links.contract import Names
 from gatewayd.mapping.plan import Plan
 from gatewayd.report import facts
 from gatewayd.report.facts import Facts
-from gatewayd.report.format import counted
+from gatewayd.report.format import counted, plural
 from gatewayd.report.printable import json_document, printable
 from gatewayd.report.weakening import weakened
 from gatewayd.report.wording import family
@@ -102,7 +102,8 @@ class Changes:
                 parts.append(f"{count if parts else counted(count, 'variable')} {kind.name.lower()}")
         for noun, differences in (("writer", self.writers), ("group", self.groups)):
             if differences:
-                parts.append(f"{noun} {', '.join(difference.name for difference in differences)} changed")
+                names = ", ".join(difference.name for difference in differences)
+                parts.append(f"{noun if len(differences) == 1 else plural(noun)} {names} changed")
         if self.links:
             parts.append(f"settings of {', '.join(difference.name for difference in self.links)} changed")
         if self.renumbered and not parts:
@@ -236,8 +237,8 @@ def as_text(changes: Changes) -> str:
     if changes.renumbered:
         first, count = changes.renumbered[0], len(changes.renumbered)
         lines.append(
-            f"note: the status block counts {counted(count, 'variable')} anew, from `{first.name}` "
-            f"({first.old} -> {first.new}) on; what is added at the end of the file moves none"
+            f"note: the status block renumbers {counted(count, 'variable')}, from `{first.name}` "
+            f"({first.old} -> {first.new}) on; variables added at the end of the file renumber none"
         )
     return "".join(f"{printable(line, None)}\n" for line in lines)
 

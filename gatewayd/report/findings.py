@@ -98,6 +98,8 @@ def _summary(outcome: CheckOutcome) -> str:
     found = [counted(outcome.errors, "error")] if outcome.errors else []
     if outcome.warnings:
         found.append(counted(outcome.warnings, "warning"))
+    if not outcome.files:
+        return ", ".join(parts)
     return f"{', '.join(parts)}: {', '.join(found) or 'no findings'}"
 
 

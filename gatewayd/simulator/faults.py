@@ -65,7 +65,7 @@ class DropAt(NamedTuple):
         word, _, number = text.partition(":")
         steps = {step.value: step for step in FaultStep}
         if word not in steps or not (number or "1").isdecimal() or int(number or "1") < 1:
-            message = f"{text!r} is not STEP or STEP:NUMBER with a step out of {', '.join(steps)}"
+            message = f"{text!r} is not STEP or STEP:NUMBER, where STEP is one of {', '.join(steps)}"
             raise ValueError(message)
         return cls(steps[word], int(number or "1"))
 

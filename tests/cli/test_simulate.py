@@ -40,7 +40,10 @@ def test_a_mistake_in_a_program_file_names_its_place(tmp_path: Path) -> None:
     [
         (("--hold", "foo"), "no such input: foo"),
         (("--unreadable", "input_int_register_0,foo"), "no such input: foo"),
-        (("--field", "dexterity:REAL"), "'dexterity:REAL' is not NAME:TYPE with a type out of BOOL, UINT8"),
+        (
+            ("--field", "dexterity:REAL"),
+            "'dexterity:REAL' is not NAME:TYPE, where TYPE is one of BOOL, UINT8",
+        ),
         (("--field", "timestamp:INT32"), "timestamp cannot be another field"),
         (("--drop-at", "nowhere"), "'nowhere' is not STEP or STEP:NUMBER"),
         (("--strict-lists", "maybe"), "'maybe' is not one of"),

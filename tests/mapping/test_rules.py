@@ -576,7 +576,7 @@ def test_all_cells_of_a_bus_load_it() -> None:
     assert on_can("", text) == []
     together = load_together([("a.yaml", text.encode()), ("b.yaml", other.encode())])
     assert [[one.rule.id for one in cell.diagnostics] for cell in together] == [["GW426"], []]
-    assert "by 2 cells" in together[0].diagnostics[0].message
+    assert "from 2 cells" in together[0].diagnostics[0].message
     apart = load_together([("a.yaml", text.encode()), ("b.yaml", other.replace("can0", "can1").encode())])
     assert [cell.diagnostics for cell in apart] == [(), ()]
 

@@ -28,7 +28,7 @@ def test_every_command_and_option_is_there() -> None:
 
 
 def test_options_have_their_variables() -> None:
-    assert re.search(r"\.B GATEWAYD_AUDIT\nThe option of: run \\-\\-audit\.", PAGE)
+    assert re.search(r"\.B GATEWAYD_AUDIT\nStands for the option: run \\-\\-audit\.", PAGE)
 
 
 def test_text_is_no_markup() -> None:

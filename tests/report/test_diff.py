@@ -151,7 +151,7 @@ def test_nothing_that_means_anything_is_missed() -> None:
 
 def test_renumbering_is_told_once() -> None:
     changes = changed(("variables:\n", "variables:\n  first: {robot: output_bit_register_0, modbus: 90.0}\n"))
-    assert "counts 13 variables anew, from `start` (1 -> 2)" in as_text(changes)
+    assert "renumbers 13 variables, from `start` (1 -> 2)" in as_text(changes)
 
 
 def test_json_has_what_the_text_has() -> None:

@@ -45,7 +45,7 @@ def test_text_lists_unreadable_files() -> None:
     assert as_text(outcome).splitlines() == [
         "c.yaml: cannot be read: No such file or directory",
         "",
-        "no files checked, 1 file not readable: no findings",
+        "no files checked, 1 file not readable",
     ]
 
 

@@ -85,7 +85,7 @@ async def test_faults_of_lines_and_connections(control: Control, simulator: Simu
     assert (faults.delay, faults.drop_at, faults.creep) == (0.25, DropAt(FaultStep.INPUTS, 3), True)
     answer = await control.execute("drop-at nowhere")
     assert answer.startswith(
-        "error 'nowhere' is not STEP or STEP:NUMBER with a step out of version, controller"
+        "error 'nowhere' is not STEP or STEP:NUMBER, where STEP is one of version, controller"
     )
 
 

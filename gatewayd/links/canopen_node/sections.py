@@ -268,13 +268,13 @@ class CanopenWriter(Section):
     )
     heartbeat: MillisecondTime = Field(
         default=None,
-        description="time without a heartbeat of `node`, from the writer's first sign on, after which it is lost "
-        "and writes nothing by CANopen until it is heard",
+        description="time without a heartbeat of `node`, from the writer's first sign of life on, after which it is "
+        "lost and writes nothing by CANopen until it is heard",
     )
 
     guarding: MillisecondTime = Field(
         default=None,
-        description="time without a guarding request (remote frame to this node), from the writer's first sign on, "
+        description="time without a guarding request (remote frame to this node), from the writer's first sign of life on, "
         "after which it is lost; for masters without a heartbeat, with `canopen: heartbeat: none`",
     )
 

@@ -72,8 +72,8 @@ class Modbus(Section):
     )
     order: WordOrder = Field(
         default="ABCD",
-        description="order of all values of two and more registers that do not name their own; what lies in one "
-        "register, numbers of 16 bits, `bool` and bits, it leaves as it is",
+        description="order of values of two or more registers that do not name their own; values of one register "
+        "(16 bits, `bool`, bits) stay as they are",
     )
 
 

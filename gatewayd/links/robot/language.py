@@ -93,7 +93,7 @@ class RobotLanguage(DefiningLanguage):
                 yield WriterName(
                     name,
                     position,
-                    "the writer that the watchdog requires,",
+                    "a writer that the watchdog requires",
                     "a watchdog cannot require `any`",
                     robot.at("watchdog", "requires"),
                 )

@@ -74,14 +74,14 @@ class Robot(Section):
 class RobotField(Section):
     """A field with what is known of it beyond the catalogue."""
 
-    field: RobotReference = Field(description="RTDE field, or what else `robot:` alone can name")
+    field: RobotReference = Field(description="RTDE field, or anything else that `robot:` can name")
     type: FieldType | None = Field(
         default=None,
-        description="type that the controller gives it; for a field that the catalogue does not have, or has otherwise",
+        description="type that the controller gives it, if the catalogue does not have the field, or has another type",
     )
     direction: Literal["input", "output"] | None = Field(
         default=None,
-        description="of a field that the catalogue does not have; default: input for input_*, else output",
+        description="direction, if the catalogue does not have the field; default: input for input_*, else output",
     )
 
 

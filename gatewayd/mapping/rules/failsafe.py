@@ -110,7 +110,7 @@ def policy_of_other_side(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         if key in variable.spec.model_fields_set:
             message = (
                 f"`{variable.part.name}` is an {variable.direction.value} ({variable.target}); "
-                f"`{key}` never acts on it"
+                f"`{key}` has no effect on it"
             )
             yield rule.at(variable.part.key_at(key), message, hint=f"write `{other}`, or remove `{key}`")
         for key, what in policies.items():
@@ -174,9 +174,8 @@ def clear_outside_limits(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
             continue
         if limits[0] < limits[1]:
             low, high = map(number, limits)
-            message = (
-                f"`{variable.part.name}` is cleared to 0 when its owner is lost, outside {low} to {high}"
-            )
+            name = variable.part.name
+            message = f"`{name}` is cleared to 0, outside its limits {low} to {high}, when its owner is lost"
             hint = f"write `on_release: {low if limits[0] > 0 else high}`, or `on_release: hold`"
             written = "on_release" in variable.spec.model_fields_set
             yield rule.at(variable.at("on_release" if written else "limits"), message, hint=hint)

@@ -46,7 +46,7 @@ def unknown_writer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for name, position, role in _named_writers(cell.document):
         if name != ANY and name not in known:
             hint = did_you_mean(name, known, f"add `{name}` to the section `writers`")
-            yield rule.at(position, f"{role} `{name}` is not among the writers", hint=hint)
+            yield rule.at(position, f"`{name}`, {role}, is not among the writers", hint=hint)
     for language in languages():
         for named in language.names_writers(cell.document):
             if named.name == ANY and named.no_any and named.whole is not None:
@@ -231,7 +231,7 @@ def reserved_writer_name(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         if writer.name in _RESERVED:
             message = f"`{writer.name}` is a name that the gateway uses itself"
             yield rule.at(
-                writer.key, message, hint="give the writer another name, say what it is: plc, hmi, line"
+                writer.key, message, hint="give the writer another name, such as what it is: plc, hmi, line"
             )
 
 
@@ -256,7 +256,7 @@ def _owned(document: Document) -> Iterator[Part[Group] | Part[VariableSpec]]:
 def _named_writers(document: Document) -> Iterator[tuple[str, Position, str]]:
     for part in _owned(document):
         for index, name in enumerate(part.spec.owner or ()):
-            yield name, part.at("owner", index), f"the owner of `{part.name}`,"
+            yield name, part.at("owner", index), f"the owner of `{part.name}`"
     for language in languages():
         for named in language.names_writers(document):
             yield named.name, named.position, named.role

@@ -112,13 +112,13 @@ def two_sync_producers(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Di
 
 @plant_rule("GW426", Severity.WARNING)
 def bus_load_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """A bus that can be loaded with more than 40 %."""
+    """A bus whose load can exceed 40 %."""
     yield from _loaded(rule, cells, lambda share: WARNING_ABOVE < share <= ERROR_ABOVE)
 
 
 @plant_rule("GW427")
 def bus_load_too_high(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnostic]:
-    """A bus that can be loaded with more than 70 %."""
+    """A bus whose load can exceed 70 %."""
     yield from _loaded(rule, cells, lambda share: share > ERROR_ABOVE)
 
 
@@ -133,10 +133,10 @@ def _loaded(
         if not is_meant(share):
             continue
         most = max(shares, key=lambda share: share.bits_per_second)
-        others = "" if len(bus) == 1 else f" by {len(bus)} cells"
+        others = "" if len(bus) == 1 else f" from {len(bus)} cells"
         message = (
-            f"{channel} can be loaded with {share:.0%} of {bit_rate} bit/s{others}, "
-            f"most of it by {most.what} ({most.rate:.4g} frames/s, {load([most], bit_rate):.1%})"
+            f"the load of {channel} can reach {share:.0%} of {bit_rate} bit/s{others}, "
+            f"most of it from {most.what} ({most.rate:.4g} frames/s, {load([most], bit_rate):.1%})"
         )
         yield rule.at(part.at("bitrate"), message, hint=_remedy(bus, shares, bit_rate))
 

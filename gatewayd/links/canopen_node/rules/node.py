@@ -144,7 +144,7 @@ def narrow_canopen_type(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> It
         reported.add(variable.part.name)
         # An integer is alike in all elements of a line, a real is not: a pose has metres and radians.
         name = variable.name if variable.kind is ValueKind.FLOAT else variable.part.name
-        message = f"`{name}` can be {number(bounds[0])} to {number(bounds[1])}, {text}"
+        message = f"`{name}` can be {number(bounds[0])} to {number(bounds[1])}, but {text}"
         yield rule.at(_type_place(variable), message, hint=hint)
 
 
@@ -182,7 +182,8 @@ def idle_canopen_writer(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> It
     for writer, spec in _writers(cell):
         if (spec.canopen == "rpdo" and not by_rpdo) or (spec.by_sdo and not by_sdo):
             what = "in a PDO" if by_sdo else "on CANopen"
-            message = f"`{writer.name}` writes by {spec.canopen}, and no variable towards the robot is {what}"
+            ways = " and ".join(sorted(ways_of(writer.spec)))
+            message = f"`{writer.name}` writes by {ways}, but no variable towards the robot is {what}"
             hint = "write `canopen: auto` at its variables, or remove `canopen` here"
             yield rule.at(writer.at("canopen"), message, hint=hint)
 
@@ -206,7 +207,7 @@ def out_of_reach(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterator[
         elif not ways & reach:
             message = (
                 f"`{variable.part.name}` can be written by {' and '.join(sorted(ways))} only, "
-                f"its owner {names} writes by {' and '.join(sorted(reach))}"
+                f"but its owner {names} writes by {' and '.join(sorted(reach))}"
             )
             hint = "name another owner, or put the variable where its owner writes"
             yield rule.at(variable.position, message, hint=hint)
@@ -227,7 +228,7 @@ def owner_elsewhere(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> Iterat
             if not ways & ways_of(writer):
                 message = (
                     f"the owner `{name}` writes by {' and '.join(sorted(ways_of(writer)))}, "
-                    f"`{variable.part.name}` can be written by {' and '.join(sorted(ways))} only"
+                    f"but `{variable.part.name}` can be written by {' and '.join(sorted(ways))} only"
                 )
                 hint = f"put `{variable.part.name}` where `{name}` writes, or remove that owner"
                 yield rule.at(lock.position, message, hint=hint)

@@ -191,7 +191,7 @@ def sync_without_period(rule: Rule, cell: ExpandedCell, node: CanopenCell) -> It
         return
     pdo = next((pdo for pdo in node.pdos if pdo.transmission < FIRST_EVENT_TYPE), None)
     if pdo is not None:
-        message = f"{pdo.label} is synchronous (type {pdo.transmission}), and the period of SYNC is not known"
+        message = f"{pdo.label} is synchronous (type {pdo.transmission}), but the period of SYNC is not known"
         hint = "add `sync: {period: 10ms}`, with `producer: true` if no other node sends SYNC"
         yield rule.at(_key_place(node, pdo, "transmission"), message, hint=hint)
 

@@ -88,7 +88,10 @@ def _loss(placement: ExpandedPlacement, bounds: tuple[float, float]) -> tuple[st
     form = f"{placement.type} at {where(placement)}"
     shows = f"{form} shows {number(low)} to {number(high)}"
     if bounds[0] < 0 <= low and bounds[0] < low - slack:
-        return f"{shows}: all below is 0" if low == 0 else shows, "use a signed type such as int16"
+        return (
+            f"{shows}: everything below becomes 0" if low == 0 else shows,
+            "use a signed type such as int16",
+        )
     if bounds[0] < low - slack or bounds[1] > high + slack:
         return (
             shows,

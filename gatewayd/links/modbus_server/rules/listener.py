@@ -154,7 +154,9 @@ def too_few_connections(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[D
         connections, needed = modbus.spec.connections, len(peers[listen])
         if connections <= needed:
             has = counted(connections, "connection")
-            message = f"{listen} has {has}, and keeps one for each writer's address: {needed}"
+            message = (
+                f"{listen} has {has} for {counted(needed, 'address')} of writers, each of which keeps one"
+            )
             hint = f"write `connections: {needed + 4}` or more, for a second connection and for those that only read"
             yield rule.at(modbus.at("connections"), message, hint=hint)
 

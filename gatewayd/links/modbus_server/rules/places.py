@@ -30,8 +30,8 @@ def beyond_last_address(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for placement in wrong(cell, PlacementProblem.BEYOND_END):
         last = placement.address + placement.words - 1
         message = (
-            f"`{placement.variable.name}` would lie at {AREA_WORDS[placement.area]} {placement.address} "
-            f"to {last}, the last address is {_LAST_ADDRESS} ({placement.area.notation(_LAST_ADDRESS)})"
+            f"`{placement.variable.name}` would lie at {AREA_WORDS[placement.area]}s {placement.address} "
+            f"to {last}, but the last address is {_LAST_ADDRESS} ({placement.area.notation(_LAST_ADDRESS)})"
         )
         hint = "begin the line at a lower address; the status block begins at 60000"
         yield rule.at(placement.position, message, hint=hint)

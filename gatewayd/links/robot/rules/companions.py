@@ -34,7 +34,7 @@ def missing_mask_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 def missing_domain(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """An analog output without the bit that says whether it is a current or a voltage."""
     for variable, domain, bit in _without(cell, lambda needs: needs.type):
-        message = f"`{variable.name}` ({variable.target}) acts as a current or a voltage without saying which"
+        message = f"`{variable.name}` ({variable.target}) is a current or a voltage, and nothing says which"
         yield rule.at(variable.at("robot"), message, hint=f"map `{domain}.{bit}` as a variable too")
 
 

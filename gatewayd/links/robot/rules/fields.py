@@ -14,6 +14,7 @@ from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Se
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 from gatewayd.mapping.rules.writers import more_places
+from gatewayd.report.wording import alternatives
 from gatewayd.rtde.catalogue import is_fieldbus_range, suggest
 from gatewayd.rtde.claims import OLD_LIST_LIMIT, list_size
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, UNTYPED, Series, SoftwareVersion
@@ -51,7 +52,7 @@ def _suggestion(name: str) -> str:
     if not close:
         newer = f"if the controller has it, declare its type: {{field: {name}, type: DOUBLE}}"
         return f"fields are listed in the RTDE guide; registers are such as output_int_register_0; {newer}"
-    return "did you mean " + " or ".join(f"`{item}`" for item in close) + "?"
+    return f"did you mean {alternatives(close)}?"
 
 
 @cell_rule("GW303")

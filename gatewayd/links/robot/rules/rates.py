@@ -25,7 +25,8 @@ def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         wanted.append((robot.spec.watchdog.frequency, robot.at("watchdog", "frequency"), "watchdog feeds"))
     for frequency, position, what in wanted:
         if frequency > series.base_rate:
-            message = f"{number(frequency)} {what} per second, but series {series.word} runs at {series.base_rate} Hz"
+            runs = f"series {series.word} runs at {series.base_rate} Hz"
+            message = f"{number(frequency)} {what} per second are asked for, but {runs}"
             yield rule.at(position, message, hint=f"ask for {series.base_rate} or less")
 
 
