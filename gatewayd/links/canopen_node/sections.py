@@ -274,8 +274,8 @@ class CanopenWriter(Section):
 
     guarding: MillisecondTime = Field(
         default=None,
-        description="time without a guarding request (remote frame to this node), from the writer's first sign of life on, "
-        "after which it is lost; for masters without a heartbeat, with `canopen: heartbeat: none`",
+        description="time without a guarding request (remote frame to this node), from the writer's first sign of life "
+        "on, after which it is lost; for masters without a heartbeat, with `canopen: heartbeat: none`",
     )
 
     @property
