@@ -32,7 +32,7 @@ TOLERANCE = 0.2
 """A slope that is greater by more than this is no longer the same line."""
 START = 60.0
 """Seconds for fifty cells to be served on a busy machine."""
-SETTLE = 1.0
+SETTLE = 2.0
 
 OF_CELLS = f"""\
 One process with the full image for each cell, a robot for each at {FREQUENCY} Hz and a PLC at {PLC_RATE} Hz (FC16 of
@@ -116,7 +116,7 @@ def _cost(count: int, seconds: float, samples: Samples) -> _Cost:
             text = one_of_many(number, host(number), robot, port, FREQUENCY)
             Path(folder, f"{number}.yaml").write_text(text)
         begin = time.monotonic()
-        with running(HERE.gatewayd("run", folder, "--control", "none"), port) as process:
+        with running(HERE.gatewayd("run", folder, "--control", Path(folder, "control")), port) as process:
             plcs = [Plc(port, number + 1) for number in range(count)]
             for plc in plcs:
                 wait_for(partial(_is_fresh, plc), "fresh values", START)

@@ -49,7 +49,7 @@ def connections(job: Job, samples: Samples) -> Table:
     with tempfile.TemporaryDirectory() as folder, simulator(FREQUENCY) as robot:
         mapping = Path(folder, "many.yaml")
         mapping.write_text(one_of_many(0, HOST, robot.port, port, FREQUENCY))
-        command = HERE.gatewayd("run", mapping, "--control", "none")
+        command = HERE.gatewayd("run", mapping, "--control", Path(folder, "control"))
         with _many_files(), running(command, port) as process, ExitStack() as stack:
             await_fresh(port)
             plcs: list[Plc] = []
@@ -73,7 +73,7 @@ def connections(job: Job, samples: Samples) -> Table:
 
 def variables() -> Table:
     """One process for each number of them."""
-    header = ("variables", "check", "start", "reload", "request", "CPU", "memory")
+    header = ("variables", "check", "start", "reload", "request", "CPU", "memory", "after reloads")
     table = Table("Growth: variables", OF_VARIABLES, header)
     with simulator(FREQUENCY) as robot:
         for count in VARIABLES:
@@ -92,6 +92,7 @@ def _sized(count: int, robot: int) -> list[str]:
         with running(command, port) as process:
             await_fresh(port)
             wait_for(control.exists, "the control socket")
+            memory = process.resident_kilobytes() / 1024
             reload = _median(partial(_time, HERE.gatewayd("reload", "--socket", control)))
             plc = Plc(port)
             before = usage(process.pid)
@@ -105,6 +106,7 @@ def _sized(count: int, robot: int) -> list[str]:
                 f"{reload:.3f} s",
                 f"{request * 1000:.3f} ms",
                 f"{100 * used.cpu / used.wall:.2f} %",
+                f"{memory:.1f} MB",
                 f"{process.resident_kilobytes() / 1024:.1f} MB",
             ]
 

@@ -78,8 +78,10 @@ def mapped_gateway(
     with tempfile.TemporaryDirectory() as folder:
         mapping = Path(folder) / "benchmark.yaml"
         mapping.write_text(image(robot, port, frequency))
-        options = ("--audit", Path(folder) / "audit") if audit else ()
-        with running(tree.gatewayd("run", mapping, "--control", "none", *options), port) as process:
+        options: tuple[str | Path, ...] = ("--control", Path(folder) / "control")
+        if audit:
+            options += ("--audit", Path(folder) / "audit")
+        with running(tree.gatewayd("run", mapping, *options), port) as process:
             yield Served(process, port)
 
 
