@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import pytest
 
 from gatewayd.canopen.describe import frame_text
 from gatewayd.canopen.errors import ControllerFlags, ErrorClass, ErrorFrame, Violation
 from gatewayd.canopen.frame import Frame
+from gatewayd.cli import status
 from gatewayd.core.adoption import adopted
-from gatewayd.core.events import EventKind
+from gatewayd.core.events import Event, EventKind
 from gatewayd.core.image import ProcessImage
+from gatewayd.core.refusal import Reason
+from gatewayd.core.refusal_log import REFUSAL_INTERVAL, RefusalLog
 from gatewayd.links.contract import TrafficDecoder
 from gatewayd.links.robot.traffic import RtdeTraffic
+from gatewayd.mapping.diagnostics import Diagnostic, Position
+from gatewayd.mapping.rules import catalogue
 from gatewayd.modbus.describe import answer_text, request_text
 from gatewayd.report.event_text import ACCEPTED, EventRecord
 from gatewayd.report.findings import CheckOutcome, as_text
@@ -85,6 +91,39 @@ def _broken_rtde(length: int) -> str:
     return " ".join(str(found) for found in ClientProtocol().receive(package))
 
 
+_MISTAKE = Diagnostic(catalogue.complete()[0], "it is wrong", Position("a", 1, 1))
+
+
+def _robot(count: int) -> Mapping[str, Any]:
+    counted = "packages skipped late pauses overtaken sessions mismatches unadopted differing lag adoption"
+    counters: dict[str, object] = dict.fromkeys(counted.split(), count)
+    return counters | {"strange": {"layout": count}, "watchdog": None}
+
+
+def _writes(count: int) -> Mapping[str, Any]:
+    asked = {"age": 0.0, "text": "plc asked unit 7"}
+    return {
+        "writes": {"accepted": 2, "refused": 2},
+        "last_refusal": {"age": 0.0, "text": "plc wrote start: refused"},
+        "unserved": {"no_such_unit": count},
+        "last_unserved": asked if count else None,
+    }
+
+
+def _repeated(count: int) -> str:
+    """What is said of refusals that were counted, the last of them in this moment."""
+    found: list[Event] = []
+    log = RefusalLog(found.append)
+    for _ in range(1 + count):
+        log.add(Event(1.0, EventKind.REFUSED, reason=Reason.HELD, writer=0))
+    log.tick(1.0 + REFUSAL_INTERVAL)
+    return " ".join(_event(event.kind.value, event.repeats, detail=event.detail) for event in found)
+
+
+def _event(what: str, times: int = 1, others: int = 0, detail: str = "") -> str:
+    return EventRecord(what, "plc", "start", lock="start", times=times, others=others, detail=detail).text()
+
+
 SENTENCES: dict[str, Callable[[int], str]] = {
     "bytes of an unknown kind of link": lambda n: TrafficDecoder().words(bytes(n), "", outgoing=False),
     "half a message": lambda n: RtdeTraffic().words(bytes(n), "", outgoing=False),
@@ -108,13 +147,18 @@ SENTENCES: dict[str, Callable[[int], str]] = {
     "several locks": lambda n: _event(EventKind.RELEASED.value, others=n),
     "several variables": lambda n: _event(EventKind.UNAVAILABLE.value, others=n),
     "files checked": lambda n: as_text(CheckOutcome(tuple("abc"[:n]), (), ())),
+    "mistakes found": lambda n: as_text(CheckOutcome(("a",), n * (_MISTAKE,))),
+    "status of the robot": lambda n: ", ".join(status._counts(_robot(n))),
+    "status of a writer": lambda n: status._writer({"name": "plc", "alive": True, "age": 1.0, "locks": n}, n),
+    "status of locks": lambda n: ", ".join(
+        status._locks([{"name": "start", "owner": None} for _ in range(n)])
+    ),
+    "status of writes": lambda n: "; ".join(status._writes(_writes(n))),
+    "status of variables": lambda n: status._variables({"total": n, "good": n}),
+    "counted refusals": _repeated,
     "files not served": lambda n: "; ".join(Startup((), n, 0).notes),
 }
 """What counts something -> the sentence for that many."""
-
-
-def _event(what: str, times: int = 1, others: int = 0) -> str:
-    return EventRecord(what, "plc", "start", lock="start", times=times, others=others).text()
 
 
 @pytest.mark.parametrize("name", SENTENCES)

@@ -125,7 +125,7 @@ class _Watched:
 class HeartbeatConsumer:
     """Watches the nodes of 1016h, each from its first heartbeat on.
 
-    `lost(node, now)`: its heartbeat stays away. `back(node, now)`: it is heard after it was lost, or its watch ended.
+    `lost(node, now)`: its heartbeat is missing. `back(node, now)`: it is heard after it was lost, or its watch ended.
     `changed()`: other nodes or times are watched now.
     """
 

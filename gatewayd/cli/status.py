@@ -231,5 +231,6 @@ def _writes(cell: Answer) -> list[str]:
         lines.append(f"last refusal {ago(last['age'])}: {last['text']}")
     count, asked = sum(cell["unserved"].values()), cell["last_unserved"]
     if asked is not None:
-        lines.append(f"{counted(count, 'request')} not served, the last {ago(asked['age'])}: {asked['text']}")
+        when = f"{'the last ' if count > 1 else ''}{ago(asked['age'])}"
+        lines.append(f"{counted(count, 'request')} not served, {when}: {asked['text']}")
     return lines

@@ -57,7 +57,7 @@ _TEXTS = {
     Reason.PARTIAL_VALUE: "only a part of a value was written",
     Reason.ROBOT_LOST: "robot not connected",
     Reason.CLAIMED_ELSEWHERE: "register claimed elsewhere",
-    Reason.HEARTBEAT_LOST: "its heartbeat stays away",
+    Reason.HEARTBEAT_LOST: "its heartbeat is missing",
     Reason.PARTIAL_TAKEOVER: "the group is taken over whole or not at all",
     Reason.WAITED: "it waited while the gateway stood still",
     Reason.NOT_MEANT: "bit of a shared register that the writer does not own",

@@ -114,7 +114,8 @@ class RefusalLog:
             if reported.last is None:
                 del self._reported[key]
                 continue
-            detail = reported.details(f"the last {_ago(now - reported.last.time)}")
+            ago = _ago(now - reported.last.time)
+            detail = reported.details(ago if reported.pending == 1 else f"the last {ago}")
             self._report(replace(reported.last, time=now, repeats=reported.pending - 1, detail=detail))
             self._reported[key] = _Reported(now)
         self._peers = {host for _, host, _, _, _ in self._reported if host}

@@ -19,7 +19,7 @@ class Requester:
     connection: int = 0
     """Number of the connection, unique in the process (`new_connection`); locks follow it. 0: there is none."""
     trusted: bool = True
-    """The link's word that the writer keeps what it promised. If it does not (its heartbeat stays away), its requests
+    """The link's word that the writer keeps what it promised. If it does not (its heartbeat is missing), its requests
     are refused and are no sign of life. The same writer may be trusted by another link."""
     waited: float = 0.0
     """Seconds for which the request may have waited while the gateway stood still; 0: it was read when it came."""

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
 from gatewayd.core.refusal_log import MAX_PEERS, REFUSAL_INTERVAL, RefusalLog
@@ -59,13 +61,14 @@ def test_what_was_counted_is_told_even_if_no_other_follows() -> None:
     assert len(reported) == 2
 
 
-def test_the_last_one_just_before_the_report_was_just_now() -> None:
+@pytest.mark.parametrize("more, said", [(1, "just now"), (2, "the last just now")])
+def test_one_just_before_the_report_was_just_now(more: int, said: str) -> None:
     reported: list[Event] = []
     log = RefusalLog(reported.append)
-    for time in (0.0, REFUSAL_INTERVAL - 0.001):
+    for time in (0.0, *more * [REFUSAL_INTERVAL - 0.001]):
         log.add(refusal(time))
     log.tick(REFUSAL_INTERVAL)
-    assert reported[1].detail == "the last just now"
+    assert reported[1].detail == said
 
 
 def test_each_interval_tells_one_at_most_and_all_are_accounted_for() -> None:

@@ -248,7 +248,7 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.WRITE_ROBOT_LOST: "an RPDO was dropped: the robot is not connected",
     ErrorCode.WRITE_CLAIMED_ELSEWHERE: "an RPDO was dropped: the controller gave a register to another client",
     ErrorCode.WRITE_NEVER: "an RPDO was dropped: this writer may never write a variable of it",
-    ErrorCode.WRITE_HEARTBEAT_LOST: "an RPDO was dropped: the heartbeat that its writer promised stays away",
+    ErrorCode.WRITE_HEARTBEAT_LOST: "an RPDO was dropped: the heartbeat that its writer promised is missing",
     ErrorCode.WRITE_PARTIAL_TAKEOVER: "an RPDO was dropped: it would take over a part of a `whole` group",
     ErrorCode.ROBOT_LOST: "the robot is not connected",
     ErrorCode.ROBOT_STALE: "it is connected, and its values are stale (byte 4: `robot_state`)",

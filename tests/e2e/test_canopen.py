@@ -348,7 +348,7 @@ def test_a_master_is_believed_only_while_its_promised_heartbeat_is_heard(plant: 
     assert master.ask("write", 0x5F00, release, 0xFFFF) == DEVICE_STATE
     assert master.ask("read", 0x2010, 1) == 0
     cell.daemon.wait_for_line(
-        "write refused", "variable=command", "writer=master", "its heartbeat stays away"
+        "write refused", "variable=command", "writer=master", "its heartbeat is missing"
     )
     assert plc.write_integers(0, 1) == 0, "others go on"
     assert plc.release(1) == 0

@@ -50,7 +50,7 @@ class _Node:
             self.answered = _PAIR.unpack(data)[0]
 
     def supervise(self) -> None:
-        """Raises ConnectionError if its heartbeat stays away."""
+        """Raises ConnectionError if its heartbeat is missing."""
         if time.monotonic() - self._heard > _LOST:
             raise ConnectionError("no heartbeat of the node")
 

@@ -10,7 +10,7 @@ What happens to the node, and what follows:
 | heartbeat that the mapping promises ends, or does not come after the first write or lock request \
 | its writer is lost, and refused until it is back | as it is | |
 | node whose heartbeat is promised boots | its writer is lost | as it is | |
-| guarding stays away | | PRE-OPERATIONAL / as it is / STOPPED | 8130h until it is back |
+| guarding is missing | | PRE-OPERATIONAL / as it is / STOPPED | 8130h until it is back |
 | RPDO deadline passes | the RPDO writer is lost | as it is | 8250h until it is received |
 | OPERATIONAL left | the RPDO writer is lost | | |
 | SDO no longer allowed (STOPPED, reset) | the SDO writer is lost | | |
@@ -94,7 +94,7 @@ class CommunicationErrors:
         """Something is wrong with an RPDO."""
         self._emergency.raise_error(fault.value, now, number.to_bytes(2, "little"), instance=number)
         if fault is Fault.TIMEOUT:
-            self._lose_rpdo(number, f"RPDO {number} stays away", now)
+            self._lose_rpdo(number, f"RPDO {number} is missing", now)
 
     def fault_cleared(self, fault: Fault, number: int, now: float) -> None:
         """It is right again."""

@@ -29,7 +29,7 @@ class Promise(Enum):
     IDLE = "its writers have written nothing since it booted"
     OWED = "they have written, and its heartbeat is awaited"
     KEPT = "its heartbeat comes in time"
-    BROKEN = "its heartbeat stays away"
+    BROKEN = "its heartbeat is missing"
 
 
 class Sign(Enum):

@@ -21,9 +21,9 @@ def watchdog_script(plan: Plan) -> str:
     if watchdog is None:
         return ""
     required = [plan.cell.writers[writer].name for writer in watchdog.requires]
-    alive = " and ".join(["the gateway", *required])
+    gone = " or ".join(["the gateway", *required])
     return (
-        f"# cell {plan.cell.name}: the program goes on only while {alive} live; at its beginning\n"
+        f"# cell {plan.cell.name}: put this line at the beginning of the program, which stops when {gone} is gone\n"
         f'rtde_set_watchdog("{watchdog.field}", {watchdog.frequency / _MARGIN:.6g}, "stop")\n'
     )
 

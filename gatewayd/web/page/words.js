@@ -42,7 +42,7 @@ export function clock(date) {
 }
 
 export function count(number, noun) {
-  return `${number} ${noun}${number === 1 ? "" : "s"}`;
+  return `${number || "no"} ${noun}${number === 1 ? "" : "s"}`;
 }
 
 // What Unicode shows as nothing, or what turns the line round: written out, as gatewayd/report/printable.py does it elsewhere.

@@ -60,7 +60,7 @@ def test_only_a_deadline_costs_the_rpdo_its_writer(bench: Bench) -> None:
     bench.errors.fault_raised(Fault.SHORT, 1, 1.0)
     assert bench.lost == []
     bench.errors.fault_raised(Fault.TIMEOUT, 1, 1.0)
-    assert (bench.lost, bench.nmt.state) == (["RPDO 1 stays away"], NmtState.OPERATIONAL)
+    assert (bench.lost, bench.nmt.state) == (["RPDO 1 is missing"], NmtState.OPERATIONAL)
 
 
 @pytest.mark.parametrize("state", [NmtState.OPERATIONAL, NmtState.PRE_OPERATIONAL])

@@ -21,7 +21,7 @@ def test_the_program_stops_after_two_missing_feeds() -> None:
     call = 'rtde_set_watchdog("input_int_register_23", 5, "stop")'
     assert script("small-cell.yaml").splitlines()[-1] == call
     assert call in (MAPPINGS / "small-cell.yaml").read_text()
-    assert "while the gateway and plc live" in script("small-cell.yaml")
+    assert "when the gateway or plc is gone" in script("small-cell.yaml")
 
 
 def test_without_a_watchdog_there_is_nothing_to_write() -> None:
