@@ -403,6 +403,11 @@ class Tester:
         self.flush()
         assert self.expect(0x700 + self.node) == bytes([state])
 
+    def guard(self) -> bytes:
+        """The answer to a guarding request."""
+        self.send(0x700 + self.node, remote=True, length=1)
+        return self.expect(0x700 + self.node)
+
     # -- PDO -----------------------------------------------------------------------------------------------------
 
     def sync(self, counter: int | None = None, can_id: int = 0x080) -> None:

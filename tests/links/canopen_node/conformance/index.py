@@ -1,4 +1,4 @@
-"""The index of the cases: which test shows which.
+"""The index of the cases: which test shows which, and how each ends.
 
 `python -m tests.links.canopen_node.conformance.index` renews its page.
 """
@@ -7,66 +7,103 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+
+from tests.links.canopen_node.conformance.cases import CASES, Case, Result
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[3]
 PAGE = ROOT / "docs" / "reference" / "conformance.md"
 
-CASES = {
-    "SDO": 28,
-    "PDO": 33,
-    "OD": 9,
-    "Emergency": 6,
-    "Synchronization": 10,
-    "Heartbeat": 7,
-    "Testing other": 10,
-    "State": 4,
-    "Transition": 4,
-}
-"""Groups of the conformance test tool, and the number of their last case."""
+_CASE, _BEYOND = "test_cct_", "test_301_"
+_BY_SLUG = {case.slug: case for case in CASES}
+_PARTS = ("count", "cases", "beyond")
 
-_NAME = re.compile(
-    r"test_cct_(" + "|".join(group.lower().replace(" ", "_") for group in CASES) + r")_(\d\d)_(\w+)"
-)
-_GROUPS = {group.lower().replace(" ", "_"): group for group in CASES}
-_PART = re.compile(r"(<!-- cases -->\n).*(<!-- end -->)", re.DOTALL)
+Shown = tuple[str, str]
+"""What a test shows, in words, and its file."""
 
 
-def case_of(name: str) -> tuple[str, int, str] | None:
-    """Group, number and words of the case that a test of this name shows; None if it shows none."""
-    found = _NAME.fullmatch(name)
-    return (_GROUPS[found[1]], int(found[2]), found[3].replace("_", " ")) if found is not None else None
+def case_of(name: str) -> tuple[Case, str] | None:
+    """The case that a test of this name shows, and what is shown of it; None if it shows none."""
+    if not name.startswith(_CASE):
+        return None
+    rest = name.removeprefix(_CASE)
+    slug = max((slug for slug in _BY_SLUG if rest.startswith(f"{slug}_")), key=len, default=None)
+    return (_BY_SLUG[slug], _words(rest.removeprefix(f"{slug}_"))) if slug is not None else None
 
 
-def shown() -> dict[tuple[str, int], list[tuple[str, str]]]:
+def shown() -> dict[Case, list[Shown]]:
     """Case -> what its tests show, and their file."""
-    cases: dict[tuple[str, int], list[tuple[str, str]]] = {}
-    for path in sorted(HERE.glob("test_*.py")):
-        for name in _tests(path):
-            case = case_of(name)
-            if case is not None:
-                group, number, words = case
-                cases.setdefault((group, number), []).append((words, path.name))
+    cases: dict[Case, list[Shown]] = {}
+    for name, file in _tests():
+        found = case_of(name)
+        if found is not None:
+            cases.setdefault(found[0], []).append((found[1], file))
     return cases
 
 
-def _tests(path: Path) -> Iterator[str]:
-    for node in ast.parse(path.read_text()).body:
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name.startswith("test_"):
-            yield node.name
+def strays() -> list[str]:
+    """Tests that name a case which does not exist."""
+    return [name for name, _ in _tests() if name.startswith(_CASE) and case_of(name) is None]
+
+
+def _tests() -> Iterator[tuple[str, str]]:
+    for path in sorted(HERE.glob("test_*.py")):
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name.startswith("test_"):
+                yield node.name, path.name
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def count() -> Counter[Result]:
+    """How many cases end in which way."""
+    return Counter(case.ours for case in CASES)
 
 
 def renewed(text: str) -> str:
-    """The page with its table made anew."""
-    lines = ["| case | what is shown | by |", "|---|---|---|"]
-    for (group, number), tests in sorted(
-        shown().items(), key=lambda item: (list(CASES).index(item[0][0]), item[0][1])
-    ):
-        lines += [f"| {group} {number:02d} | {words} | `{file}` |" for words, file in tests]
-    table = "\n".join(lines)
-    return _PART.sub(lambda found: f"{found[1]}\n{table}\n\n{found[2]}", text)
+    """The page with its tables made anew."""
+    for part, made in zip(_PARTS, (_count(), _cases(), _beyond()), strict=True):
+        pattern = re.compile(rf"(<!-- {part} -->\n).*?(<!-- end -->)", re.DOTALL)
+        text = pattern.sub(lambda found, made=made: f"{found[1]}\n{made}\n\n{found[2]}", text)  # type: ignore[misc]
+    return text
+
+
+def _count() -> str:
+    ends = count()
+    return (
+        f"Of {len(CASES)} cases gatewayd passes **{ends[Result.PASSED]}**, **{ends[Result.SKIPPED]}** are skipped, "
+        f"**{ends[Result.FAILED]}** fail."
+    )
+
+
+def _cases() -> str:
+    tests = shown()
+    lines = [
+        "| no. | case | what it asks | in the trace | gatewayd | shown by |",
+        "|---|---|---|---|---|---|",
+    ]
+    for case in CASES:
+        ours = f"{case.ours.value}: {case.why}" if case.why else case.ours.value
+        if case.ours is Result.FAILED:
+            ours = f"[{ours}](#{case.slug.replace('_', '-')})"
+        by = "; ".join(f"{words} (`{file}`)" for words, file in tests.get(case, []))
+        lines.append(f"| {case.number} | {case.name} | {case.asks} | {case.trace.value} | {ours} | {by} |")
+    return "\n".join(lines)
+
+
+def _beyond() -> str:
+    lines = ["| what is shown | by |", "|---|---|"]
+    lines += [
+        f"| {_words(name.removeprefix(_BEYOND))} | `{file}` |"
+        for name, file in _tests()
+        if name.startswith(_BEYOND)
+    ]
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""SDO 01 to 28 of the conformance tester, with the abort codes that it accepts."""
+"""SDO 01 to 30 of the conformance tester, with the abort codes that it accepts."""
 
 from __future__ import annotations
 
@@ -176,6 +176,14 @@ def test_cct_sdo_27_wrong_sequence_number(dut: Tester) -> None:
 
 def test_cct_sdo_28_there_is_one_server(dut: Tester) -> None:
     assert {dut.upload(index, 1) for index in range(0x1201, 0x1280)} == {0x0602_0000}
+
+
+def test_cct_sdo_29_there_is_one_server_after_a_reset_of_communication(dut: Tester) -> None:
+    dut.reset(130)
+    assert {dut.upload(index, 1) for index in range(0x1201, 0x1280)} == {0x0602_0000}
+
+
+def test_cct_sdo_30_there_is_no_client(dut: Tester) -> None:
     assert {dut.upload(index, 1) for index in range(0x1280, 0x1300)} == {0x0602_0000}
 
 

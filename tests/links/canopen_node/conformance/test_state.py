@@ -15,12 +15,6 @@ STOPPED, OPERATIONAL, PRE_OPERATIONAL = 4, 5, 127
 START, STOP, ENTER_PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 1, 2, 128, 129, 130
 
 
-def _guard(dut: Tester) -> bytes:
-    """The answer to a guarding request."""
-    dut.send(HEARTBEAT, remote=True, length=1)
-    return dut.expect(HEARTBEAT)
-
-
 def _sync_producer(dut: Tester) -> None:
     dut.set(0x1006, 0, 5_000, 4)
     dut.set(0x1005, 0, PRODUCER | 0x80, 4)
@@ -65,7 +59,7 @@ def test_cct_state_01_boot_up_once_and_pre_operational(dut: Tester) -> None:
     dut.reaches(PRE_OPERATIONAL)
     dut.heartbeats(0)
     dut.flush()
-    assert _guard(dut) in (b"\x7f", b"\xff")
+    assert dut.guard() in (b"\x7f", b"\xff")
 
 
 def test_cct_state_02_pre_operational(dut: Tester) -> None:
@@ -82,7 +76,7 @@ def test_cct_state_02_pre_operational(dut: Tester) -> None:
     dut.flush()
     assert dut.of(0x285, QUIET) == []
     assert dut.value("ints_in[0]") == 0
-    assert _guard(dut)[0] & 0x7F == PRE_OPERATIONAL
+    assert dut.guard()[0] & 0x7F == PRE_OPERATIONAL
 
 
 def test_cct_state_03_operational(dut: Tester) -> None:
@@ -97,7 +91,7 @@ def test_cct_state_03_operational(dut: Tester) -> None:
     dut.becomes("ints_in[0]", 0x01010101)
     dut.send(0x305, b"\1")
     dut.expect(EMCY)
-    assert _guard(dut)[0] & 0x7F == OPERATIONAL
+    assert dut.guard()[0] & 0x7F == OPERATIONAL
     dut.heartbeats(5)
     dut.reaches(OPERATIONAL)
 
@@ -109,7 +103,7 @@ def test_cct_state_04_stopped(dut: Tester) -> None:
     dut.start()
     dut.expect(0x285)
     dut.stop()
-    assert _guard(dut)[0] & 0x7F == STOPPED
+    assert dut.guard()[0] & 0x7F == STOPPED
     dut.frames(0)
     dut.unanswered(bytes.fromhex("40001000"), QUIET)
     dut.send(0x305, b"\1" * 8)
