@@ -6,10 +6,10 @@ import difflib
 import re
 from typing import TYPE_CHECKING
 
-from gatewayd.rtde.fields import BITS_PER_WORD, INPUTS, OUTPUTS
+from gatewayd.rtde.fields import BITS_PER_WORD, INPUTS, OUTPUTS, SoftwareVersion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
 _WORDS = {
     "input": ("input_bit_registers0_to_31", "input_bit_registers32_to_63"),
@@ -20,8 +20,10 @@ _REGISTER = re.compile(r"input_(?:int|double)_register_([0-9]+)")
 _FIELDBUS_REGISTERS = 24
 _UR_RTDE_LOWER = range(18, 24)
 _UR_RTDE_UPPER = range(42, 48)
-_LOWER_RANGE = "ur_rtde using its lower range (registers 18-23, from 0 on newer controllers)"
+_LOWER_RANGE = "ur_rtde using its lower range (registers 18-23)"
 _NEW_RANGE = "ur_rtde (registers from 0 on PolyScope 5.23 / X 10.9 and newer)"
+_NEW_RANGE_SINCE = (SoftwareVersion(5, 23), SoftwareVersion(10, 9))
+"""From there on ur_rtde 1.6 uses the registers from 0, whatever range it was told to use."""
 
 
 def bit_word(side: str, number: int) -> tuple[str, int]:
@@ -50,10 +52,11 @@ def is_fieldbus_range(name: str) -> bool:
     return number is not None and number < _FIELDBUS_REGISTERS
 
 
-def likely_holders(field: str) -> str:
+def likely_holders(field: str, software: SoftwareVersion | None = None) -> str:
     """Who probably controls an input field for which the controller answers IN_USE, in words for a log.
 
-    RTDE does not say; these are the clients known to claim the field (issues of UR's drivers, ur_rtde's sources).
+    RTDE does not say; these are the clients known to claim the field (issues of UR's drivers, ur_rtde's sources) on a
+    controller with this software; None: it is not known.
     """
     number = _register_number(field)
     holders = []
@@ -63,7 +66,7 @@ def likely_holders(field: str) -> str:
         holders.append("the robot's PROFINET or EtherNet/IP adapter")
         holders.append("a MODBUS unit configured on the robot")
         if number is not None:
-            holders.append(_LOWER_RANGE if number in _UR_RTDE_LOWER else _NEW_RANGE)
+            holders += _ur_rtde(number, software)
     elif number is not None:
         holders.append("a URCap or driver using the upper registers")
         if number in _UR_RTDE_UPPER:
@@ -76,6 +79,17 @@ def likely_holders(field: str) -> str:
         holders.append("the robot's PROFINET or EtherNet/IP adapter")
         holders.append("ur_rtde's IO interface or UR's ROS driver")
     return ", ".join(holders) + " or another RTDE client"
+
+
+def _ur_rtde(number: int, software: SoftwareVersion | None) -> Iterator[str]:
+    """What of ur_rtde uses a register below 24."""
+    newer = software is not None and any(
+        software.major == first.major and software >= first for first in _NEW_RANGE_SINCE
+    )
+    if number in _UR_RTDE_LOWER and not newer:
+        yield _LOWER_RANGE
+    if newer or (software is None and number not in _UR_RTDE_LOWER):
+        yield _NEW_RANGE
 
 
 def _register_number(name: str) -> int | None:

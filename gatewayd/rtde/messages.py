@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
+from gatewayd.rtde.fields import SoftwareVersion
+
 NOT_FOUND = "NOT_FOUND"
 """In place of a type: the controller does not have the field."""
 IN_USE = "IN_USE"
@@ -69,6 +71,11 @@ class ControllerVersion:
 
     def __str__(self) -> str:
         return f"{self.major}.{self.minor}.{self.bugfix}.{self.build}"
+
+    @property
+    def software(self) -> SoftwareVersion:
+        """Without the build, as fields are listed by it."""
+        return SoftwareVersion(self.major, self.minor, self.bugfix)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,11 +22,13 @@ from gatewayd.rtde.claims import REFUSED, Claims, HandshakeError, is_long, sort_
 from gatewayd.rtde.fields import Series
 from gatewayd.rtde.reading import Reading
 from gatewayd.rtde.recipe import Recipe
-from gatewayd.rtde.session import TOO_LONG, Session, Unavailable, Wishes, input_hint, output_hint
+from gatewayd.rtde.session import TOO_LONG, Session, Unavailable, Wishes, without_inputs, without_outputs
 
 _RATE_V1 = 125
 _RATE_UNKNOWN = {True: 500, False: 125}
 _NEW_HARDWARE = 5
+_ASKED_AGAIN = 3
+"""Times in a row that what the session has had before is asked for again after a wrong answer."""
 
 
 class State(Enum):
@@ -99,6 +101,8 @@ class Negotiation:
         self._agreed: Recipe | None = None
         """The working recipe of the session."""
         self._reported = False
+        self._in_vain = 0
+        """Wrong answers in a row to what the session has had before."""
         self._joined: frozenset[str] = frozenset()
         """Unread registers whose content is known all the same: they have been written."""
         self._probes = 0
@@ -281,11 +285,13 @@ class Negotiation:
 
     def _outputs_answered(self, reply: messages.OutputsSetup) -> NextStep:
         names = self._asked
+        if self._agreed is not None and (
+            reply.recipe == 0 or reply.types != tuple(each.word for each in self._agreed.types)
+        ):
+            return self._ask_again("the same output recipe answered differently than before")
         if reply.recipe == 0 and messages.NOT_FOUND not in reply.types and is_long(names):
             return self._list_refused()
         types, refused = sort_types(names, reply.types)
-        if self._agreed is not None and (refused or tuple(types) != self._agreed.types):
-            raise HandshakeError("the controller answered the same output recipe differently than before")
         if refused:
             self._reading.refused |= refused
             return self._ask_outputs()
@@ -299,9 +305,19 @@ class Negotiation:
             self.claims.separate(name for name in self._reading.refused if name.startswith("input_"))
         return self._advance()
 
+    def _ask_again(self, wrong: str) -> NextStep:
+        """A wrong answer to what the session has had before costs no session: it is asked for again.
+
+        Only a controller that goes on so has nothing more to give by this session, which needs its values.
+        """
+        self._in_vain += 1
+        if self._in_vain > _ASKED_AGAIN:
+            raise HandshakeError(f"{wrong}, {self._in_vain} times in a row")
+        resuming = self.state is State.RESUMING
+        step = self._go(self.state, messages.Start()) if resuming else self._advance()
+        return step._replace(strange=wrong)
+
     def _list_refused(self) -> NextStep:
-        if self._agreed is not None:
-            raise HandshakeError("the controller refuses an output recipe that it had accepted")
         self._reading.limited = True
         self.claims.limit()
         return self._advance()
@@ -317,6 +333,7 @@ class Negotiation:
                 return _NOTHING
         elif not message.accepted:
             return self._start_refused()
+        self._in_vain = 0
         event = Notice.RESUMED if self.state is State.RESUMING else self._complete()
         if not self._run:
             return self._go(State.PAUSING, messages.Pause(), event)
@@ -324,7 +341,9 @@ class Negotiation:
 
     def _start_refused(self) -> NextStep:
         """In version 1 the answer to a list has no place for a refusal: it shows here."""
-        if self._agreed is not None or self._outputs is None or not is_long(self._outputs.names):
+        if self._agreed is not None:
+            return self._ask_again("a refused start of the output")
+        if self._outputs is None or not is_long(self._outputs.names):
             raise HandshakeError("the controller refused to start the output")
         self._outputs = None
         self.took_long_list = False
@@ -438,17 +457,10 @@ class Negotiation:
         return package.recipe == self.outputs_id and len(package.payload) == recipe.size
 
     def _unavailable(self) -> tuple[Unavailable, ...]:
-        left_out = self._reading.left_out
-        read_backs = set(self._wishes.read_backs())
-        outputs = [
-            Unavailable(name, True, word, output_hint(word, read_back=name in read_backs))
-            for name, word in (*self._reading.refused.items(), *dict.fromkeys(left_out, TOO_LONG).items())
-        ]
-        inputs = [
-            Unavailable(name, False, word, input_hint(name, word))
-            for name, word in self.claims.refused.items()
-        ]
-        return (*outputs, *inputs)
+        assert self.controller is not None
+        outputs = self._reading.refused | dict.fromkeys(self._reading.left_out, TOO_LONG)
+        missing = without_outputs(outputs, self._wishes.read_backs())
+        return (*missing, *without_inputs(self.claims.refused, self.controller.software))
 
     _TABLE: ClassVar[Mapping[tuple[State, type], Callable[..., NextStep]]] = {
         (State.VERSION_2, messages.ProtocolVersionReply): _version_2_answered,

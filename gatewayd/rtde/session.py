@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from gatewayd.report.format import address
 from gatewayd.rtde.catalogue import likely_holders
 from gatewayd.rtde.claims import REFUSED, InputRecipe
-from gatewayd.rtde.fields import OUTPUTS, Series
+from gatewayd.rtde.fields import OUTPUTS, Series, SoftwareVersion
 from gatewayd.rtde.messages import IN_USE, NOT_FOUND, ControllerVersion
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.types import DEFAULT_PORT
@@ -147,10 +147,23 @@ def output_hint(word: str, *, read_back: bool) -> str:
     return "left out because the controller does not take so long a list of outputs: map fewer of them"
 
 
-def input_hint(name: str, word: str) -> str:
-    """What the word for an input means."""
+def input_hint(name: str, word: str, software: SoftwareVersion | None = None) -> str:
+    """What the word for an input means, on a controller with this software."""
     if word == IN_USE:
-        return f"probably claimed by {likely_holders(name)}"
+        return f"probably claimed by {likely_holders(name, software)}"
     if word == NOT_FOUND:
         return "this controller's software does not have the input"
     return f"the controller answered {word}"
+
+
+def without_outputs(words: Mapping[str, str], read_backs: Collection[str]) -> list[Unavailable]:
+    """The outputs with these words, of which `read_backs` are inputs that are read back."""
+    return [
+        Unavailable(name, True, word, output_hint(word, read_back=name in read_backs))
+        for name, word in words.items()
+    ]
+
+
+def without_inputs(words: Mapping[str, str], software: SoftwareVersion) -> list[Unavailable]:
+    """The inputs with these words, on a controller with this software."""
+    return [Unavailable(name, False, word, input_hint(name, word, software)) for name, word in words.items()]

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.rtde.catalogue import bit_word, is_fieldbus_range, likely_holders, suggest
-from gatewayd.rtde.fields import INPUTS, OUTPUTS
+from gatewayd.rtde.fields import INPUTS, OUTPUTS, SoftwareVersion
 
 
 @pytest.mark.parametrize(
@@ -65,6 +65,33 @@ def test_suggestions_come_from_given_candidates() -> None:
 )
 def test_in_use_names_the_usual_suspects(field: str, words: str) -> None:
     assert words in likely_holders(field)
+
+
+@pytest.mark.parametrize(
+    "number, software, ranges",
+    [
+        (3, (5, 12), ""),
+        (3, (5, 22, 9), ""),
+        (3, (5, 23), "from 0 on"),
+        (3, (10, 8), ""),
+        (3, (10, 9), "from 0 on"),
+        (3, (3, 15), ""),
+        (3, (11, 0), ""),
+        (3, None, "from 0 on"),
+        (19, (5, 12), "lower range"),
+        (19, (5, 23), "from 0 on"),
+        (19, (10, 9), "from 0 on"),
+        (19, (3, 15), "lower range"),
+        (19, None, "lower range"),
+    ],
+)
+def test_which_range_ur_rtde_has_depends_on_the_software(
+    number: int, software: tuple[int, ...] | None, ranges: str
+) -> None:
+    found = likely_holders(
+        f"input_double_register_{number}", SoftwareVersion(*software) if software else None
+    )
+    assert [text for text in ("from 0 on", "lower range") if text in found] == ([ranges] if ranges else [])
 
 
 def test_upper_registers_are_not_blamed_on_the_fieldbus() -> None:

@@ -246,6 +246,77 @@ def test_a_reading_that_comes_to_nothing_leaves_its_fields_unread_and_costs_no_s
     )
 
 
+TO_READ_LATER = (
+    m.InputsSetup(2, ("INT32",)),
+    m.PauseReply(True),
+    PIECE,
+    m.StartReply(True),
+    m.DataPackage(1, bytes(4)),
+    m.PauseReply(True),
+)
+"""An input that was in use is claimed and read: then the session's own recipe is set up again."""
+SAME = m.OutputsSetup(3, ("DOUBLE", "INT32"))
+
+
+def read_later() -> tuple[Negotiation, NextStep]:
+    wishes = Wishes(("output_int_register_0",), ("input_int_register_0",), read_back=False)
+    first = (*TO_OUTPUTS, m.InputsSetup(0, ("IN_USE",)), SAME, m.StartReply(True))
+    negotiation, steps = talk(wishes, first)
+    assert steps[-1].event is Notice.STARTED
+    assert negotiation.retry_claims() == m.SetupInputs(("input_int_register_0",))
+    return negotiation, [negotiation.handle(reply) for reply in TO_READ_LATER][-1]
+
+
+@pytest.mark.parametrize(
+    "answers, words",
+    [
+        ((m.OutputsSetup(3, ()),), "the same output recipe answered differently than before"),
+        ((m.OutputsSetup(3, ("DOUBLE", "UINT32")),), "the same output recipe answered differently than before"),
+        (
+            (m.OutputsSetup(0, ("DOUBLE", "NOT_FOUND")),),
+            "the same output recipe answered differently than before",
+        ),
+        ((m.OutputsSetup(0, ("DOUBLE", "INT32")),), "the same output recipe answered differently than before"),
+        ((SAME, m.StartReply(False)), "a refused start of the output"),
+    ],
+)
+def test_a_wrong_answer_within_a_session_costs_no_session(
+    answers: Sequence[m.ControllerMessage], words: str
+) -> None:
+    """It is asked again; a controller that has nothing else to say ends the session, which has no values then."""
+    negotiation, asked = read_later()
+    assert asked.send == m.SetupOutputs(("timestamp", "output_int_register_0"), 500.0)
+    *before, wrong = answers
+    for answer in before:
+        asked = negotiation.handle(answer)
+    for _attempt in range(3):
+        step = negotiation.handle(wrong)
+        assert (step.send, step.strange) == (asked.send, words)
+    if not before:
+        negotiation.handle(SAME)
+    assert negotiation.handle(m.StartReply(True)).event is Notice.INPUTS_CHANGED
+    assert negotiation.session().held["input_int_register_0"] == (0,)
+    assert not negotiation.waiting
+
+
+def test_a_controller_that_refuses_for_ever_what_it_gave_before_ends_the_session() -> None:
+    negotiation, _asked = read_later()
+    for _attempt in range(3):
+        assert negotiation.handle(m.OutputsSetup(3, ("DOUBLE", "UINT32"))).send is not None
+    with pytest.raises(HandshakeError, match="differently than before, 4 times in a row"):
+        negotiation.handle(m.OutputsSetup(3, ("DOUBLE", "UINT32")))
+
+
+def test_a_refused_restart_after_a_pause_is_asked_again() -> None:
+    negotiation, _ = talk(WISHES, TO_RUNNING)
+    assert negotiation.pause() == m.Pause()
+    negotiation.handle(m.PauseReply(True))
+    assert negotiation.resume() == m.Start()
+    step = negotiation.handle(m.StartReply(False))
+    assert (step.send, step.strange) == (m.Start(), "a refused start of the output")
+    assert negotiation.handle(m.StartReply(True)).event is Notice.RESUMED
+
+
 @pytest.mark.parametrize("package", [m.DataPackage(2, bytes(16)), m.DataPackage(1, bytes(17))])
 def test_only_data_of_the_agreed_recipe_proves_a_start(package: m.DataPackage) -> None:
     negotiation, steps = talk(WISHES, (*TO_START, package))

@@ -29,10 +29,9 @@ class ControllerNotes:
 
     def agreed(self, session: Session) -> None:
         """A session has begun."""
-        version = session.controller
-        self._version = SoftwareVersion(version.major, version.minor, version.bugfix)
+        self._version = session.controller.software
         self._figures = {
-            "controller": str(version),
+            "controller": str(session.controller),
             "series": session.series.word if session.series is not None else None,
             "protocol": session.protocol,
         }
@@ -63,14 +62,14 @@ class ControllerNotes:
             "contradiction": found.text if found is not None else None,
             "last_text": self._last_text(now),
             "unavailable": self._unavailable,
-            "held_elsewhere": [{"field": field, "probably": likely_holders(field)} for field in self._held],
+            "held_elsewhere": [{"field": field, "probably": self._holders(field)} for field in self._held],
         }
 
     def problems(self, plan: RobotPlan) -> tuple[str, ...]:
         """What of it keeps a cell that is connected from being well, in words."""
         holders: dict[str, list[str]] = {}
         for field in self._held:
-            holders.setdefault(likely_holders(field), []).append(field)
+            holders.setdefault(self._holders(field), []).append(field)
         held = (
             f"another client holds {listed(fields, _LISTED)}: probably {who}"
             for who, fields in holders.items()
@@ -83,6 +82,9 @@ class ControllerNotes:
         )
         found = contradiction(plan, self._version)
         return (*held, *reasons, *((found.text,) if found is not None and found.is_grave else ()))
+
+    def _holders(self, field: str) -> str:
+        return likely_holders(field, self._version)
 
     def _last_text(self, now: float) -> dict[str, object] | None:
         if self._text is None:
