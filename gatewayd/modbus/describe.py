@@ -18,6 +18,7 @@ from gatewayd.modbus.areas import (
     MAX_WRITE_WITH_READ,
     Area,
 )
+from gatewayd.modbus.exceptions import NAMES
 
 _SHOWN = 16
 """Values in one line."""
@@ -55,18 +56,6 @@ FUNCTIONS = {
     43: "encapsulated interface",
 }
 """Names of public function codes."""
-EXCEPTIONS = {
-    1: "illegal function",
-    2: "illegal data address",
-    3: "illegal data value",
-    4: "server device failure",
-    5: "acknowledge",
-    6: "server device busy",
-    8: "memory parity error",
-    10: "gateway path unavailable",
-    11: "gateway target device failed to respond",
-}
-"""Names of exception codes."""
 
 
 class Span(NamedTuple):
@@ -150,7 +139,7 @@ def answer_text(pdu: bytes, request: bytes | None = None) -> str:
     function = _function(pdu)
     if function & _EXCEPTION:
         code = pdu[1] if len(pdu) > 1 else 0
-        name = EXCEPTIONS.get(code, "exception")
+        name = NAMES.get(code, "exception")
         return f"refused with {code:02X}h {name}: {function_text(bytes([function & ~_EXCEPTION]))}"
     read = reading(request) if request is not None and _function(request) == function else None
     if read is not None and len(pdu) > 1 and len(pdu) == 2 + pdu[1]:

@@ -4,6 +4,19 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+NAMES = {
+    0x01: "illegal function",
+    0x02: "illegal data address",
+    0x03: "illegal data value",
+    0x04: "server device failure",
+    0x05: "acknowledge",
+    0x06: "server device busy",
+    0x08: "memory parity error",
+    0x0A: "gateway path unavailable",
+    0x0B: "gateway target device failed to respond",
+}
+"""All that there are, as the specification names them."""
+
 
 class ExceptionCode(IntEnum):
     """Those in use."""
@@ -19,4 +32,4 @@ class ExceptionCode(IntEnum):
     @property
     def text(self) -> str:
         """Its name in words: `illegal function`."""
-        return self.name.lower().replace("_", " ")
+        return NAMES[self]

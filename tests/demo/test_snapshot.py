@@ -8,8 +8,11 @@ from pymodbus.client import AsyncModbusTcpClient
 
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
+from gatewayd.demo import snapshot as snapshot_module
 from gatewayd.demo.scene import HOST, Scene
 from gatewayd.demo.snapshot import describe, snapshot
+from gatewayd.links.canopen_node.pdo.receive import Fault
+from gatewayd.links.modbus_server.functions import EXCEPTION_OF
 
 FEED = 3
 """Index of the variable for which both buses contend."""
@@ -67,3 +70,10 @@ async def test_state_of_the_node_is_told_as_the_master_hears_it(scene: Scene, un
     assert (shot.node, shot.operational) == ("operational", True)
     later = snapshot(scene, time.monotonic() + 60)
     assert (later.node, later.operational) == ("lost", False)
+
+
+def test_codes_of_refusals_are_those_that_the_links_answer_with() -> None:
+    """The demonstration may not know the kinds of links, so it has its own table."""
+    assert {reason: f"{code:02X}" for reason, code in EXCEPTION_OF.items()} == snapshot_module._EXCEPTIONS
+    refusals = [fault for fault in Fault if fault.is_refusal]
+    assert {Reason[each.name]: f"{each.value:04X}h" for each in refusals} == snapshot_module._EMERGENCIES

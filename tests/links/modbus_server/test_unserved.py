@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 
 import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.events import EventKind
@@ -13,6 +16,7 @@ from gatewayd.core.unserved import Unserved
 from gatewayd.links.modbus_server.functions import Unit, execute
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
+from gatewayd.modbus.describe import fault
 from gatewayd.modbus.frames import encode
 from gatewayd.report.event_text import EventRecord
 
@@ -171,3 +175,51 @@ def test_a_read_that_is_served_leaves_no_trace(cell: Cell, unit: Unit) -> None:
     for pdu in ("03 0064 0004", "03 ea60 0010", "01 0000 0008", "06 000a 0001"):
         execute(unit, Requester(PLC), bytes.fromhex(pdu), NOW)
     assert sum(cell.health.unserved.values()) == 0
+
+
+@st.composite
+def requests(draw: st.DrawFn) -> bytes:
+    """Requests of every served function, most of them nearly right."""
+    function = draw(st.sampled_from((1, 2, 3, 4, 5, 6, 15, 16, 22, 23)))
+    word = st.one_of(st.sampled_from((0, 1, 2, 10, 100, 121, 122, 123, 124, 125, 126, 2000, 2001)), _WORDS)
+    pdu = bytearray(struct.pack(">BHH", function, draw(_WORDS), draw(st.one_of(word, st.just(0xFF00)))))
+    if function in (15, 16):
+        count = int.from_bytes(pdu[3:5], "big")
+        size = 2 * count if function == 16 else (count + 7) // 8
+        pdu += bytes([size & 0xFF]) + bytes(min(size, 246))
+    elif function == 22:
+        pdu += struct.pack(">H", draw(_WORDS))
+    elif function == 23:
+        count = draw(word)
+        pdu += struct.pack(">HHB", draw(_WORDS), count, 2 * count & 0xFF) + bytes(min(2 * count, 240))
+    for _change in range(draw(st.integers(0, 2))):
+        position = draw(st.integers(1, len(pdu)))
+        pdu[position : position + draw(st.integers(0, 1))] = draw(st.binary(max_size=1))
+    return bytes(pdu[:253])
+
+
+_WORDS = st.integers(0, 0xFFFF)
+
+
+@given(st.one_of(requests(), st.binary(min_size=1, max_size=253)))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@example(bytes.fromhex("05 000a 0001"))
+@example(bytes.fromhex("0f 0000 0009 01 ff"))
+@example(bytes.fromhex("17 0064 0001 000a 0001 02 00"))
+def test_what_is_wrong_in_words_is_what_is_answered_with_03_before_anything_is_looked_up(
+    cell: Cell, unit: Unit, pdu: bytes
+) -> None:
+    """`modbus.describe.fault` words what the functions check by themselves: neither may know more than the other."""
+    before = cell.health.unserved[Unserved.MALFORMED]
+    accepted, refused = cell.health.writes_accepted, cell.health.writes_refused
+    answer = execute(unit, Requester(PLC), pdu, NOW)
+    malformed = cell.health.unserved[Unserved.MALFORMED] > before
+    if pdu[0] not in (1, 2, 3, 4, 5, 6, 15, 16, 22, 23):
+        assert fault(pdu) == ""
+        return
+    assert malformed == bool(fault(pdu)), "what is said"
+    if malformed:
+        assert answer == bytes((pdu[0] | 0x80, 3))
+        assert (cell.health.writes_accepted, cell.health.writes_refused) == (accepted, refused)
+    elif answer == bytes((pdu[0] | 0x80, 3)):
+        assert cell.health.writes_refused == refused + 1, "the cell has said why"
