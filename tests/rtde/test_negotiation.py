@@ -271,12 +271,18 @@ def read_later() -> tuple[Negotiation, NextStep]:
     "answers, words",
     [
         ((m.OutputsSetup(3, ()),), "the same output recipe answered differently than before"),
-        ((m.OutputsSetup(3, ("DOUBLE", "UINT32")),), "the same output recipe answered differently than before"),
+        (
+            (m.OutputsSetup(3, ("DOUBLE", "UINT32")),),
+            "the same output recipe answered differently than before",
+        ),
         (
             (m.OutputsSetup(0, ("DOUBLE", "NOT_FOUND")),),
             "the same output recipe answered differently than before",
         ),
-        ((m.OutputsSetup(0, ("DOUBLE", "INT32")),), "the same output recipe answered differently than before"),
+        (
+            (m.OutputsSetup(0, ("DOUBLE", "INT32")),),
+            "the same output recipe answered differently than before",
+        ),
         ((SAME, m.StartReply(False)), "a refused start of the output"),
     ],
 )
