@@ -69,14 +69,20 @@ def variables(contexts: list[click.Context]) -> Iterator[str]:
     yield ".TP\n.B GATEWAYD_TRACEBACK\n1: show where an internal error came from."
 
 
+def commands(root: click.Context, group: click.Group, name: str, before: str = "") -> Iterator[click.Context]:
+    """A command of a group, and those that belong to it: `locks`, `locks take`."""
+    found = group.get_command(root, name)
+    assert found is not None
+    yield click.Context(found, info_name=before + name, parent=root, **found.context_settings)
+    if isinstance(found, click.Group):
+        for inner in found.list_commands(root):
+            yield from commands(root, found, inner, f"{before}{name} ")
+
+
 def page(date: str) -> str:
     """The whole page."""
     root = click.Context(command, info_name="gatewayd", **command.context_settings)
-    contexts = []
-    for name in COMMANDS:
-        found = command.get_command(root, name)
-        assert found is not None
-        contexts.append(click.Context(found, info_name=name, parent=root, **found.context_settings))
+    contexts = [made for name in COMMANDS for made in commands(root, command, name)]
     purpose, _, example = (command.help or "").partition("\n\n")
     lines = [
         f'.TH GATEWAYD 1 {date} "gatewayd {__version__}" "User Commands"',

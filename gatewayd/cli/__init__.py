@@ -24,7 +24,7 @@ COMMANDS = {
     "locks": "Print who owns what; take and release locks.",
     "events": "Print past events, and follow new ones.",
     "trace": "Print the traffic on the links of the running gateway, decoded.",
-    "force": "Put a value in a variable's place for commissioning.",
+    "force": "Force a variable to a value, for commissioning.",
     "unforce": "End a force before its time.",
     "completion": "Print the completion script of a shell.",
 }

@@ -62,7 +62,7 @@ def command(context: click.Context, client: Client, cell: str | None, *, as_json
     epilog="""\b
 Examples:
   gatewayd locks take start                the PLC's writes to it are refused until you release it
-  gatewayd locks take motion --for 10min   given back by itself
+  gatewayd locks take motion --for 10min   given back automatically
 """,
 )
 @click.argument("name", shell_complete=complete_locks)

@@ -51,7 +51,7 @@ def on_gateway(command: Callable[..., None]) -> Callable[..., None]:
         type=click.Path(path_type=Path),
         envvar="GATEWAYD_CONTROL",
         is_eager=True,
-        help="Control socket of the gateway. Default: the only one that there is.",
+        help="Control socket of the gateway. Default: that of the only gateway here.",
     )
     @wraps(command)
     def run(**options: Any) -> None:

@@ -186,7 +186,7 @@ class EventMessage(TypedDict):
     old: NotRequired[Annotated[object, "value before"]]
     new: NotRequired[Annotated[object, "value after, or refused"]]
     repeats: NotRequired[Annotated[int, "further refusals like this one, counted since the last one"]]
-    request: NotRequired[Annotated[str, "what was asked for, in words, where no variable tells it"]]
+    request: NotRequired[Annotated[str, "what was asked for, in words, where no variable says it"]]
     detail: NotRequired[Annotated[str, "more, in words"]]
     text: Annotated[
         str,
@@ -215,7 +215,7 @@ class AuditRecord(TypedDict):
     holder: NotRequired[Annotated[str, "owner that stood in the way, or former owner"]]
     reason: NotRequired[Annotated[str, "why it was refused, in words"]]
     peer: NotRequired[Annotated[str, "address of an undeclared peer"]]
-    request: NotRequired[Annotated[str, "what was asked for, in words, where no variable tells it"]]
+    request: NotRequired[Annotated[str, "what was asked for, in words, where no variable says it"]]
     detail: NotRequired[Annotated[str, "more, in words"]]
     text: NotRequired[
         Annotated[str, "all that in one sentence, as of an event; the audit's file does not have it"]

@@ -15,7 +15,7 @@ SOURCES = {
     Source.FRESH: "fresh",
     Source.SILENT: "silent",
     Source.FROZEN: "frozen, its clock stands still",
-    Source.LATE: "values come too late",
+    Source.LATE: "values arrive too late",
 }
 """The state of the robot; `robot` stands in front where nothing else says so."""
 SOURCE_LEVELS = {

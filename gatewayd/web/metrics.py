@@ -117,7 +117,7 @@ _OF_CELLS = (
     _OfCell("gatewayd_robot_packages_skipped_total", "packages the controller left out",
         lambda at: at.health.skipped),
     _OfCell("gatewayd_robot_packages_late_total", "packages that came late", lambda at: at.health.late),
-    _OfCell("gatewayd_robot_sessions_total", "sessions with the controller; the first is no reconnect",
+    _OfCell("gatewayd_robot_sessions_total", "sessions with the controller; the first is not a reconnect",
         lambda at: at.health.sessions),
     _OfCell("gatewayd_robot_watchdog_fed", "1 while the robot's watchdog is fed",
         lambda at: at.health.watchdog_fed),

@@ -27,6 +27,14 @@ def test_every_command_and_option_is_there() -> None:
                 assert all(option.replace("-", "\\-") in text for option in parameter.opts), parameter.opts
 
 
+@pytest.mark.parametrize(
+    "name", ["export eds", "export dcf", "export urscript", "locks take", "locks release"]
+)
+def test_commands_of_commands_are_there(name: str) -> None:
+    text = PAGE.partition(f".SS {name}\n")[2].partition(".SS ")[0]
+    assert text.startswith(f".B gatewayd {name}\n"), text
+
+
 def test_options_have_their_variables() -> None:
     assert re.search(r"\.B GATEWAYD_AUDIT\nStands for the option: run \\-\\-audit\.", PAGE)
 

@@ -178,7 +178,7 @@ class CanLink(Link, Observer):
         return (
             {}
             if plan is not None
-            else dict.fromkeys(self.node.writers(), "its CANopen node boots anew or ends")
+            else dict.fromkeys(self.node.writers(), "its CANopen node restarts or ends")
         )
 
     def release(self, plan: LinkPlan | None, after: CellDefinition, now: float) -> None:

@@ -47,7 +47,7 @@ class Places:
         if missing > 0xFFFF:
             return "addresses end at 65535"
         if not span.area.of_bits and covers(missing, 1):
-            return f"the status block, {BASE}-{BASE + LENGTH - 1}, is asked for by itself"
+            return f"the status block, {BASE}-{BASE + LENGTH - 1}, needs a request of its own"
         return f"{missing} is not mapped; {self._nearest(span.area, missing)}"
 
     def _nearest(self, area: Area, address: int) -> str:

@@ -29,12 +29,12 @@ class RobotKind(LinkKind):
         "frequency": "packages per second, measured",
         "packages": "packages received",
         "skipped": "packages that the controller left out, being busy",
-        "pauses": "times that the controller sent nothing for so long that it is no skipping; its clock went on",
+        "pauses": "times that the controller sent nothing for too long to count as skipping, while its clock went on",
         "overtaken": "packages that waited too long and were not shown: newer ones had come",
-        "strange": "packages that could not be taken as they came, by what is odd about them: `unknown type`, "
+        "strange": "packages that could not be used as they were, by what was wrong with them: `unknown type`, "
         "`layout`, `recipe` (data of another one), `unexpected` (an answer to nothing)",
         "late": "packages that came late",
-        "sessions": "sessions with the controller; the first one is no reconnect",
+        "sessions": "sessions with the controller; the first one is not a reconnect",
         "mismatches": "inputs whose read-back differed from what was written",
         "lag": "seconds by which the newest package is later than the quickest ones were",
         "unadopted": "inputs whose content in the robot is not known",
@@ -65,7 +65,7 @@ class RobotKind(LinkKind):
         LinkMetric(
             "gatewayd_robot_strange_packages_total",
             "strange",
-            "packages of the controller that could not be taken as they came, by what is odd about them",
+            "packages of the controller that could not be used as they were, by what was wrong with them",
             label="oddity",
         ),
     )

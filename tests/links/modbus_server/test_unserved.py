@@ -61,7 +61,7 @@ def texts(cell: Cell) -> list[str]:
         (
             "03 fb1f 0002",
             Unserved.NO_SUCH_ADDRESS,
-            "plc read holding 64287-64288: the status block, 60000-64287, is asked for by itself",
+            "plc read holding 64287-64288: the status block, 60000-64287, needs a request of its own",
         ),
         (
             "03 ffff 0002",

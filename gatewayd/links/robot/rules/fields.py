@@ -113,7 +113,7 @@ def field_of_two_types(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         said, first = known.setdefault(variable.field, ((kind, variable.direction), variable))
         if said != (kind, variable.direction) and variable.part.name not in reported:
             reported.add(variable.part.name)
-            message = f"`{variable.field}` is declared otherwise by `{first.name}`"
+            message = f"`{variable.field}` is declared differently by `{first.name}`"
             related = (Related(first.at("robot"), "declared here"),)
             hint = "a field has one type and one direction: write the same for both"
             yield rule.at(variable.at("robot"), message, hint=hint, related=related)
