@@ -38,6 +38,11 @@ def contradiction(changes: Iterable[Change]) -> Refusal | None:
     return None
 
 
+def value_for(changes: Iterable[Change], variable: int | None) -> Value | None:
+    """What a request gives the variable; None: nothing."""
+    return next((change.value for change in changes if change.variable == variable), None)
+
+
 @dataclass(slots=True)
 class Verdict:
     """What a request would do. With a refusal only the renewals among the moves may be carried out."""

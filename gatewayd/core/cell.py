@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from gatewayd.core.admission import Admission, Change
+from gatewayd.core.admission import Admission, Change, value_for
 from gatewayd.core.adoption import Adoption, AdoptionStep, adopted, named
 from gatewayd.core.definition import CellDefinition, Direction, Value
 from gatewayd.core.delivery import Delivery
@@ -101,20 +101,27 @@ class Cell:
         verdict = self._admission.judge(requester, changes, adopted=self.delivery.ready)
         refusal = verdict.refusal
         if refusal is None or refusal.reason is not Reason.WAITED:
-            self.writer_seen(requester, now, wrote=True)
+            self.writer_seen(requester, now, wrote=True, owns=refusal is None)
         if refusal is not None:
             if refusal.reason.renews:
                 self._locking.renew(requester, verdict.moves, now)
-            self.refuse(requester, refusal, now, _value_for(changes, refusal.variable))
+            self.refuse(requester, refusal, now, value_for(changes, refusal.variable))
             return refusal
         if requester.writer is not None:
             self._locking.move(requester, verdict.moves, now, verdict.values)
-            self._report_written(requester.writer, verdict.values, now)
+        changed = self._changed(verdict.values) if self.write_listeners else ()
         self.image.store_all(verdict.values, now)
         self.delivery.give(verdict.values, now)
+        self.written(requester.writer, changed, now)
+        return None
+
+    def written(self, writer: int | None, changed: Written, now: float) -> None:
+        """A write was accepted and stands in the image."""
+        if changed and writer is not None:
+            for listener in self.write_listeners:
+                listener(writer, changed, now)
         self._notify(Direction.INPUT)
         self.health.writes_accepted += 1
-        return None
 
     def refuse(self, requester: Requester, refusal: Refusal, now: float, value: Value | None = None) -> None:
         """Count and record a refusal; equal ones are reported once in a while (`RefusalLog`)."""
@@ -184,15 +191,18 @@ class Cell:
         if writer is not None and self.writers.connected(writer, now):
             self.events.append(Event(now, EventKind.WRITER_CONNECTED, writer=writer, detail=detail))
 
-    def writer_seen(self, requester: Requester, now: float, *, wrote: bool = False) -> None:
+    def writer_seen(
+        self, requester: Requester, now: float, *, wrote: bool = False, owns: bool = False
+    ) -> None:
         """A request of a trusted writer feeds its supervision, unless it waited for too long to be a sign of life.
 
-        A read does so too where not only writes count. `wrote`: it asks to write or for a lock, refused or not.
+        A read does so too where not only writes count. `wrote`: it asks to write or for a lock, refused or not;
+        `owns`: it was allowed to, so its writer is about to own something, and who owns something lives.
         """
         writer = requester.writer
         if writer is None or not requester.trusted:
             return
-        if requester.waited and self._admission.is_late(requester):
+        if requester.waited and not owns and self._admission.is_late(requester):
             return
         if self.writers.seen(writer, now, wrote=wrote):
             self.events.append(Event(now, EventKind.WRITER_CONNECTED, writer=writer, detail="heard again"))
@@ -427,7 +437,8 @@ class Cell:
         lock = self.definition.variables[variable].lock
         judged = self._admission.judge_lock(requester, variable, act)
         if not (isinstance(judged, Refusal) and judged.reason is Reason.WAITED):
-            self.writer_seen(requester, now, wrote=True)
+            owns = isinstance(judged, Move) and judged <= Move.TAKE_OVER
+            self.writer_seen(requester, now, wrote=True, owns=owns)
         if isinstance(judged, Refusal):
             self.refuse(requester, judged, now)
             return judged
@@ -452,14 +463,9 @@ class Cell:
         elif self.delivery.ready:
             self.fall_back([first, *pending], now)
 
-    def _report_written(self, writer: int, values: Sequence[tuple[int, Value]], now: float) -> None:
-        if not self.write_listeners:
-            return
+    def _changed(self, values: Sequence[tuple[int, Value]]) -> Written:
         present = self.image.values
-        changed = [(index, present[index], value) for index, value in values if present[index] != value]
-        if changed:
-            for listener in self.write_listeners:
-                listener(writer, changed, now)
+        return [(index, present[index], value) for index, value in values if present[index] != value]
 
     def _measure_lag(self, timestamp: float | None, raw: float) -> float:
         if timestamp is None or not math.isfinite(timestamp):
@@ -489,7 +495,3 @@ class Cell:
         self.forcing.lay()
         for listener in self.listeners:
             listener(direction)
-
-
-def _value_for(changes: Sequence[Change], variable: int | None) -> Value | None:
-    return next((change.value for change in changes if change.variable == variable), None)

@@ -52,6 +52,10 @@ class Delivery:
         indices = [index for index, _value in values]
         for index in indices:
             given_at[index] = now
+        self.given(indices)
+
+    def given(self, indices: Iterable[int]) -> None:
+        """The same of inputs whose time in `given_at` is set already."""
         if self.owed:
             self.owed.difference_update(indices)
         if self.under_way:

@@ -59,6 +59,7 @@ class ProcessImage:
         self.quality: list[Quality] = [Quality.NEVER] * len(variables)
         self.available = [True] * len(variables)
         """Whether the controller has the variable's field, and gave it to us if it is an input."""
+        self.changes_of_availability = 0
         self.output_time = -math.inf
         """When what the outputs show was so in the robot: the last package that was shown came later by its lag."""
         self.running = False
@@ -162,6 +163,7 @@ class ProcessImage:
         else:
             self.quality[index] = Quality.UNAVAILABLE
         self.available[index] = available
+        self.changes_of_availability += 1
         if self.variables[index].direction is Direction.OUTPUT:
             self._outputs_stored = False
             self._covered.pop(index, None)
@@ -171,6 +173,10 @@ class ProcessImage:
     def judged(self, index: int) -> Quality:
         """The quality of a value that is its source's and current: good, if every place can show it."""
         return _judged(self.values[index], *self._bounds[index]) if index in self._bounds else Quality.GOOD
+
+    def bounds(self, index: int) -> tuple[float, float]:
+        """Between which values a value that is its source's and current is good."""
+        return self._bounds[index][:2] if index in self._bounds else _EVERY_NUMBER
 
     def succeed(self, former: ProcessImage, variables: Mapping[int, int]) -> None:
         """Go on where `former` stands, for variables that go on: old -> new index."""

@@ -77,6 +77,8 @@ class LockTable:
         """When the lease ends; infinity without a lease or owner."""
         self.connections = [0] * len(locks)
         """The connection by which the owner last wrote or requested it; 0: none, or nobody owns it."""
+        self.changes = 0
+        """How often a lock has changed hands: as long as it stands, every owner is who it was."""
         self.orphans: dict[int, float] = {}
         """Locks whose connection has ended, and until when their owner may go on with them by another one."""
         self._ranks = [{writer: rank for rank, writer in enumerate(lock.owners)} for lock in locks]
@@ -105,6 +107,8 @@ class LockTable:
     def apply(self, lock: int, writer: int, move: Move, now: float) -> None:
         """Carry out a move that `decide` returned; refusals and NOTHING change nothing."""
         if move <= Move.TAKE_OVER:
+            if self.owners[lock] != writer:
+                self.changes += 1
             self.owners[lock] = writer
             lease = self.locks[lock].lease
             if lease is not None:
@@ -113,9 +117,18 @@ class LockTable:
         elif move is Move.RELEASE:
             self.free(lock)
 
+    def renew(self, locks: slice, connection: int, expiry: float | None) -> None:
+        """Neighbouring locks were written by their owner through this connection; their leases last until `expiry`."""
+        count = locks.stop - locks.start
+        self.connections[locks] = [connection] * count
+        if expiry is not None:
+            self.expires[locks] = [expiry] * count
+            self._next_expiry = min(self._next_expiry, expiry)
+
     def hold(self, lock: int, until: float) -> int | None:
         """Give the lock to the local operator until that time, whatever its lease; returns the former owner."""
         former, self.owners[lock] = self.owners[lock], OPERATOR
+        self.changes += 1
         self.follow(lock, 0)
         self.expires[lock] = until
         self._next_expiry = min(self._next_expiry, until)
@@ -129,6 +142,7 @@ class LockTable:
     def free(self, lock: int) -> int | None:
         """Release unconditionally; returns the former owner."""
         owner, self.owners[lock] = self.owners[lock], None
+        self.changes += 1
         self.follow(lock, 0)
         self.expires[lock] = math.inf
         return owner

@@ -29,6 +29,7 @@ from gatewayd.core.definition import (
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
+from gatewayd.core.prepared import PreparedWrite
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
@@ -111,6 +112,7 @@ VARIABLES = DEFINITION.variables
 LOCKS = DEFINITION.locks
 INPUTS = [n for n, one in enumerate(VARIABLES) if one.direction is Direction.INPUT]
 OUTPUTS = [n for n, one in enumerate(VARIABLES) if one.direction is Direction.OUTPUT]
+OUTPUTS_SET = set(OUTPUTS)
 BITS = [0, 1, 2, 3]
 SUPERVISED = {0: [], 1: [0.5], 2: [0.25], 3: [0.75]}
 """How long each writer may be silent."""
@@ -264,9 +266,9 @@ class Model:
                 if self.owner[lock] == writer:
                     self.free(lock, now)
 
-    def hear(self, by: Requester, now: float, *, wrote: bool = False) -> None:
+    def hear(self, by: Requester, now: float, *, wrote: bool = False, owns: bool = False) -> None:
         writer = by.writer
-        if writer is None or not by.trusted or self.too_old(by, []):
+        if writer is None or not by.trusted or (self.too_old(by, []) and not owns):
             return
         if writer == 2 and not wrote:
             return
@@ -429,7 +431,7 @@ class Model:
             refusals.append(Refusal(Reason.WAITED, request[0].variable))
         refusal = min(refusals, key=lambda one: TELLING_ORDER.index(one.reason), default=None)
         if refusal is None or refusal.reason is not Reason.WAITED:
-            self.hear(by, now, wrote=True)
+            self.hear(by, now, wrote=True, owns=refusal is None)
         if refusal is None:
             self.carry_out(by, request, now)
             return None
@@ -475,7 +477,7 @@ class Model:
         possible = holder in (None, writer) or (take and self.outranks(writer, lock))
         if take and self.too_old(by, [lock] if possible else []):
             return self.refuse(writer, Refusal(Reason.WAITED, index), now)
-        self.hear(by, now, wrote=True)
+        self.hear(by, now, wrote=True, owns=possible and take)
         if not possible:
             return self.refuse(writer, Refusal(Reason.HELD, index, holder), now)
         if take:
@@ -606,6 +608,7 @@ class CellMachine(RuleBasedStateMachine):
         self.now = 1000.0
         self.timestamp = 0.0
         self.beats_due = self.ticked = 0
+        self.prepared: dict[tuple[int, ...], PreparedWrite] = {}
         if up:
             self.robot_connects()
             self.robot_adopts({})
@@ -645,8 +648,22 @@ class CellMachine(RuleBasedStateMachine):
         self, writer: int | None, request: list[Change], trusted: bool, line: int, waited: float
     ) -> None:
         by = requester(writer, line, trusted=trusted, waited=waited)
-        self.both(lambda c: c.write(by, request, self.now), lambda m: m.write(by, request, self.now))
+        self.both(lambda _cell: self.ask_to_write(by, request), lambda m: m.write(by, request, self.now))
         assert not self.ended_leases()
+
+    def ask_to_write(self, by: Requester, request: list[Change]) -> Refusal | None:
+        """As links do: the prepared way first, where the request can be prepared."""
+        variables = tuple(change.variable for change in request)
+        kinds = [(bool, int, float)[VARIABLES[index].kind] for index in variables]
+        if (
+            len(set(variables)) == len(variables)
+            and not OUTPUTS_SET.intersection(variables)
+            and all(type(change.value) is kind for change, kind in zip(request, kinds, strict=True))
+        ):
+            prepared = self.prepared.setdefault(variables, PreparedWrite(self.cell, variables))
+            if prepared.write(by, [change.value for change in request], self.now):
+                return None
+        return self.cell.write(by, request, self.now)
 
     @rule(data=st.data(), index=st.sampled_from(INPUTS), value=st.sampled_from([0, 1]), implied=st.booleans())
     def write_what_fits(self, data: st.DataObject, index: int, value: int, implied: bool) -> None:

@@ -57,9 +57,11 @@ class Judge(Cell):
             return Refusal(Reason.WAITED, changes[0].variable)
         return super().write(requester, changes, now)
 
-    def writer_seen(self, requester: Requester, now: float, *, wrote: bool = False) -> None:
+    def writer_seen(
+        self, requester: Requester, now: float, *, wrote: bool = False, owns: bool = False
+    ) -> None:
         self.seen.append(requester.waited)
-        super().writer_seen(requester, now, wrote=wrote)
+        super().writer_seen(requester, now, wrote=wrote, owns=owns)
 
 
 @pytest.fixture
