@@ -231,6 +231,7 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "canopen.frame": "records; tests/canopen/test_socketcan.py pins them byte by byte",
     "cli": "tests/cli/test_main.py",
     "cli.completion": "tests/cli/test_main.py",
+    "canopen.product": "two numbers; tests/canopen/test_identity.py",
     "core.requester": "a record; tests/core/test_cell.py pins what its parts mean",
     "links.canopen_node.compile": "tests/mapping/test_compile.py compiles it",
     "links.canopen_node.exports": "tests/cli/test_export.py",

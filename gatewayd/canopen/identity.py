@@ -12,11 +12,6 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Entry, Object, array, record, variable
 from gatewayd.canopen.nmt import NmtCommand, NmtState
 
-VENDOR_ID = 0
-"""No vendor-ID was assigned by CiA: 0 says so. Nobody else's is used."""
-PRODUCT_CODE = 0x4757_4401
-"""`GWD` and 1 for the product: a robot cell as one node."""
-
 
 def revision(version: str = __version__) -> int:
     """Revision number of a release: major in the high word, minor in the low one."""

@@ -62,6 +62,22 @@ class LinkLanguage:
     exports: ClassVar[str] = ""
     """Module with `EXPORTS`, a tuple of `Export`."""
 
+    def concerns(self, document: Document) -> bool:
+        """Whether the file says anything of this kind of link. Where it does not, none of the kind's rules is asked."""
+        if self.required or document.has(self.key):
+            return True
+        lines = (self._keys_of(self.variable_keys, self.variable_policies), document.variables)
+        writers = (self._keys_of(self.writer_keys), document.writers)
+        return any(
+            not keys.isdisjoint(part.spec.model_fields_set)
+            for keys, parts in (lines, writers)
+            for part in parts.values()
+        )
+
+    @staticmethod
+    def _keys_of(*tables: type[Section] | None) -> frozenset[str]:
+        return frozenset(key for table in tables if table is not None for key in table.model_fields)
+
     # -- findings about its sections ---------------------------------------------------------------------------------
 
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {}

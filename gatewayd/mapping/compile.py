@@ -108,6 +108,7 @@ def _fallback(fallback: Fallback, kind: ValueKind) -> Fallback:
     return Fallback(FallbackKind.VALUE, _CASTS[kind](fallback.value))
 
 
+_PLAIN: Final = frozenset({str, int, float, bool, type(None)})
 _FOR_PEOPLE: Final = frozenset({"comment", "source", "fingerprint"})
 _DERIVED: Final = {Variable: frozenset({"shown", "shows_nan"}), Writer: frozenset({"heartbeat"})}
 """Fields that follow from others, which count: places, and the consumers of CANopen."""
@@ -124,6 +125,8 @@ def fingerprint(plan: Plan) -> int:
 
 
 def _meaning(thing: Any) -> Any:
+    if type(thing) in _PLAIN:
+        return thing
     match thing:
         case Plan():
             absent = dict.fromkeys(language.key for language in languages() if language.counts_absent)

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
-from importlib.resources import files
 from typing import TypeVar
 
 FAMILIES = {
@@ -79,6 +78,8 @@ class Rule:
     @property
     def why(self) -> str:
         """What goes wrong in the plant and how to put it right: Markdown, shown by `gatewayd check --explain`."""
+        from importlib.resources import files  # noqa: PLC0415 - only explanations need it, and it takes 3 ms
+
         return files(self.home).joinpath(self.folder, "why.md").read_text("utf-8").strip()
 
     def at(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gatewayd.rtde.fields import BITS_PER_WORD, INPUTS, OUTPUTS, SoftwareVersion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
 _WORDS = {
     "input": ("input_bit_registers0_to_31", "input_bit_registers32_to_63"),
@@ -24,6 +24,9 @@ _LOWER_RANGE = "ur_rtde using its lower range (registers 18-23)"
 _NEW_RANGE = "ur_rtde (registers from 0 on PolyScope 5.23 / X 10.9 and newer)"
 _NEW_RANGE_SINCE = (SoftwareVersion(5, 23), SoftwareVersion(10, 9))
 """From there on ur_rtde 1.6 uses the registers from 0, whatever range it was told to use."""
+
+OLD_LIST_LIMIT = 2048
+"""Bytes of a list of names that every controller takes (older guide, "Introduction"); newer ones take far more."""
 
 
 def bit_word(side: str, number: int) -> tuple[str, int]:
@@ -96,3 +99,13 @@ def _register_number(name: str) -> int | None:
     """Number of an integer or double input register."""
     match = _REGISTER.fullmatch(name)
     return int(match[1]) if match is not None else None
+
+
+def list_size(names: Sequence[str]) -> int:
+    """Bytes of a list of names."""
+    return len(",".join(names))
+
+
+def is_long(names: Sequence[str]) -> bool:
+    """Whether an old controller may refuse a list of these names for its length."""
+    return list_size(names) > OLD_LIST_LIMIT

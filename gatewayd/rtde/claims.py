@@ -17,6 +17,7 @@ from itertools import count
 from types import MappingProxyType
 
 from gatewayd.report.format import counted
+from gatewayd.rtde.catalogue import is_long
 from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.rtde.messages import ERROR_WORDS, IN_USE, InputsSetup, SetupInputs
 from gatewayd.rtde.recipe import Recipe
@@ -29,8 +30,6 @@ WATCHDOG_KEY = "watchdog"
 REFUSED = "REFUSED"
 """Our word for fields whose recipe the controller refused without saying why."""
 
-OLD_LIST_LIMIT = 2048
-"""Bytes of a list of names that every controller takes (older guide, "Introduction"); newer ones take far more."""
 MAX_RECIPES = 255
 """Input recipes of a connection; ids count from 1."""
 
@@ -52,16 +51,6 @@ def recipe_key(name: str) -> str:
     if name.startswith("input_"):
         return REGISTERS_KEY
     return next((family for family in _FAMILIES if name.startswith(family)), name)
-
-
-def list_size(names: Sequence[str]) -> int:
-    """Bytes of a list of names."""
-    return len(",".join(names))
-
-
-def is_long(names: Sequence[str]) -> bool:
-    """Whether an old controller may refuse a list of these names for its length."""
-    return list_size(names) > OLD_LIST_LIMIT
 
 
 def sort_types(names: Sequence[str], words: Sequence[str]) -> tuple[list[DataType], dict[str, str]]:

@@ -18,7 +18,8 @@ from typing import ClassVar, NamedTuple
 
 from gatewayd.report.format import counted
 from gatewayd.rtde import messages
-from gatewayd.rtde.claims import REFUSED, Claims, HandshakeError, is_long, sort_types
+from gatewayd.rtde.catalogue import is_long
+from gatewayd.rtde.claims import REFUSED, Claims, HandshakeError, sort_types
 from gatewayd.rtde.fields import Series
 from gatewayd.rtde.reading import Reading
 from gatewayd.rtde.recipe import Recipe

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from gatewayd.rtde.claims import OLD_LIST_LIMIT
+from gatewayd.rtde.catalogue import OLD_LIST_LIMIT
 from gatewayd.rtde.codec import ProtocolError
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import Wishes

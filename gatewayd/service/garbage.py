@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 
-_ALLOCATIONS = 10_000
+_ALLOCATIONS = 100_000
 """Between two collections while a command starts: importing makes much and drops little."""
 _USUAL = gc.get_threshold()
 

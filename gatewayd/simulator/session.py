@@ -13,7 +13,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from gatewayd.rtde import messages
-from gatewayd.rtde.claims import MAX_RECIPES, OLD_LIST_LIMIT, is_long, list_size
+from gatewayd.rtde.catalogue import OLD_LIST_LIMIT, is_long, list_size
+from gatewayd.rtde.claims import MAX_RECIPES
 from gatewayd.rtde.codec import MAX_PACKAGE, ControllerProtocol, ProtocolError
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.strange import Oddity, StrangeCounts, StrangePackage

@@ -6,8 +6,6 @@ from gatewayd import __version__
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Abort, AbortCode, Access, Dictionary, Entry, Pdo, record
 from gatewayd.canopen.identity import (
-    PRODUCT_CODE,
-    VENDOR_ID,
     ErrorBehaviour,
     Identity,
     identity_objects,
@@ -15,6 +13,7 @@ from gatewayd.canopen.identity import (
     revision_of,
 )
 from gatewayd.canopen.nmt import NmtCommand, NmtState
+from gatewayd.canopen.product import PRODUCT_CODE, VENDOR_ID
 from tests.links.canopen_node.wire import Client
 
 

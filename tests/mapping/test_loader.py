@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -182,3 +184,19 @@ def test_plans_are_consistent(made: list[tuple[str, str, int, str, str]]) -> Non
         variable = cell.variables[placement.variable]
         if placement.codec is not None:
             assert len(placement.codec.encode(variable.kind.zero)) == 2 * placement.words
+
+
+def test_a_file_costs_the_kinds_that_it_speaks_of(tmp_path: Path) -> None:
+    """A start waits for what is imported: a cell without CANopen waits for none of it."""
+    mapping = tmp_path / "cell.yaml"
+    mapping.write_text((MAPPINGS / "small-cell.yaml").read_text())
+    program = f"""
+import sys
+from gatewayd.mapping.worker import compile_files
+assert compile_files([{str(mapping)!r}]).plans
+unused = ("gatewayd.canopen.dictionary", "gatewayd.links.canopen_node.plan", "gatewayd.links.canopen_node.rules",
+    "gatewayd.rtde.messages", "importlib.resources")
+print(*(name for name in sys.modules if name.startswith(unused)))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []

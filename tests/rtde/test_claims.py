@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gatewayd.rtde.catalogue import OLD_LIST_LIMIT
 from gatewayd.rtde.claims import (
-    OLD_LIST_LIMIT,
     REFUSED,
     REGISTERS_KEY,
     WATCHDOG_KEY,

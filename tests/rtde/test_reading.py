@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gatewayd.rtde import messages as m
-from gatewayd.rtde.claims import OLD_LIST_LIMIT, REGISTERS_KEY
+from gatewayd.rtde.catalogue import OLD_LIST_LIMIT
+from gatewayd.rtde.claims import REGISTERS_KEY
 from gatewayd.rtde.fields import INPUTS
 from gatewayd.rtde.negotiation import Negotiation, Notice, State
 from gatewayd.rtde.reading import Reading, fitting

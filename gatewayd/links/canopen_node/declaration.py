@@ -1,18 +1,22 @@
-"""What everybody may know of this kind of link."""
+"""What everybody may know of this kind of link.
+
+What has to do with the plan of a node is imported where there is one: most cells have none.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.core.status_layout import StatusField
-from gatewayd.links.canopen_node.continuity import goes_on, weakened
-from gatewayd.links.canopen_node.description import description
-from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.contract import Description, LinkKind, LinkMetric
 from gatewayd.mapping.plan import LinkPlan
+
+if TYPE_CHECKING:
+    from gatewayd.links.canopen_node.plan import CanopenPlan
 
 BUS_STATES = ("", "absent", "down", "bus-off", "passive", "warning", "active")
 """What the status word `can_bus` means; 0: there is no CANopen."""
@@ -27,7 +31,7 @@ def _numbered(names: Iterable[tuple[int, str]]) -> str:
 class CanopenNode(LinkKind):
     """The kind with the section `canopen`."""
 
-    key = CanopenPlan.kind
+    key = "canopen"
     title = "CANopen node"
     traffic = "gatewayd.links.canopen_node.traffic"
     fields = {  # noqa: RUF012 - never changed
@@ -62,11 +66,17 @@ class CanopenNode(LinkKind):
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
         """The node and its object dictionary."""
+        from gatewayd.links.canopen_node.description import description
+        from gatewayd.links.canopen_node.plan import CanopenPlan
+
         assert isinstance(plan, CanopenPlan)
         return description(plan, cell)
 
     def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
         """The same node goes on where nothing that its peers rely on is different."""
+        from gatewayd.links.canopen_node.continuity import goes_on
+        from gatewayd.links.canopen_node.plan import CanopenPlan
+
         assert isinstance(old, CanopenPlan)
         assert isinstance(new, CanopenPlan)
         return goes_on(old, new, before, after) and not _identities(old, new, before, after)
@@ -75,6 +85,9 @@ class CanopenNode(LinkKind):
         self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition
     ) -> Iterable[Objection]:
         """Masters would not know the node again, or could rely on it less."""
+        from gatewayd.links.canopen_node.continuity import weakened
+        from gatewayd.links.canopen_node.plan import CanopenPlan
+
         assert isinstance(old, CanopenPlan)
         assert isinstance(new, CanopenPlan)
         for text in weakened(old, new):

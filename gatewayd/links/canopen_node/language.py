@@ -1,22 +1,14 @@
-"""The CANopen node's part of the mapping language."""
+"""The CANopen node's part of the mapping language.
+
+What lays a node out and compiles it is imported where a file has one: most have none.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final, cast
 
-from gatewayd.canopen.datatypes import CanType
-from gatewayd.links.canopen_node.compile import compile_canopen
 from gatewayd.links.canopen_node.declaration import KIND
-from gatewayd.links.canopen_node.expand import (
-    CanopenCell,
-    expand_canopen,
-    node_of,
-    place_of,
-    reach_of,
-    writes_by,
-)
-from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.sections import (
     AUTO,
     NO_PDO,
@@ -40,6 +32,10 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.model import VariableSpec, WriterSpec
 from gatewayd.mapping.reach import Reach
 from gatewayd.mapping.section import Section
+
+if TYPE_CHECKING:
+    from gatewayd.links.canopen_node.expand import CanopenCell
+    from gatewayd.links.canopen_node.plan import CanopenPlan
 
 _RPDO: Final = "RPDO"
 _SDO: Final = "SDO"
@@ -119,25 +115,25 @@ class CanopenLanguage(LinkLanguage):
 
     def ways_of_variable(self, variable: ExpandedVariable, cell: ExpandedCell) -> frozenset[str]:
         """RPDO where a PDO carries it, SDO wherever it is an object."""
-        node = node_of(cell)
+        node = _node_of(cell)
         in_pdo = node is not None and variable.index in node.carried
-        ways = ((_RPDO, in_pdo), (_SDO, in_pdo or place_of(variable) is not None))
+        ways = ((_RPDO, in_pdo), (_SDO, in_pdo or variable.spec.by(CanopenPlaces).canopen is not None))
         return frozenset(way for way, has in ways if has)
 
     def writes_whole(
         self, writer: WriterSpec, variables: Sequence[ExpandedVariable], cell: ExpandedCell
     ) -> bool:
         """Whether all of them are in one PDO of the writer. SDO writes one at a time."""
-        node = node_of(cell)
+        node = _node_of(cell)
+        if node is None or not writer.by(CanopenWriter).by_rpdo:
+            return False
+        from gatewayd.links.canopen_node.expand import writes_by  # noqa: PLC0415 - see above
+
         wanted = {variable.index for variable in variables}
-        return (
-            node is not None
-            and writer.by(CanopenWriter).by_rpdo
-            and any(
-                wanted <= {entry.variable for entry in pdo.entries}
-                and writes_by(writer.by(CanopenWriter), pdo, cell)
-                for pdo in node.pdos
-            )
+        return any(
+            wanted <= {entry.variable for entry in pdo.entries}
+            and writes_by(writer.by(CanopenWriter), pdo, cell)
+            for pdo in node.pdos
         )
 
     def places_of(self, line: Part[VariableSpec], document: Document) -> bool:
@@ -149,21 +145,36 @@ class CanopenLanguage(LinkLanguage):
 
     def reaches(self, cell: ExpandedCell) -> Iterable[tuple[int, Reach]]:
         """What the objects show. A BOOLEAN is of bits only."""
-        node = node_of(cell)
-        for placed in node.objects if node is not None else ():
+        node = _node_of(cell)
+        if node is None:
+            return
+        from gatewayd.canopen.datatypes import CanType  # noqa: PLC0415 - see above
+        from gatewayd.links.canopen_node.expand import reach_of  # noqa: PLC0415
+
+        for placed in node.objects:
             if placed.plan.type is not CanType.BOOLEAN:
                 yield placed.variable, reach_of(placed.plan.type, placed.plan.linear)
 
     def expand(self, document: Document, variables: Sequence[ExpandedVariable]) -> CanopenCell | None:
         """The node, laid out."""
         part = document.part(Canopen)
-        return expand_canopen(part, variables) if part is not None else None
+        if part is None:
+            return None
+        from gatewayd.links.canopen_node.expand import expand_canopen  # noqa: PLC0415 - see above
+
+        return expand_canopen(part, variables)
 
     def compile(self, cell: ExpandedCell) -> CanopenPlan:
         """One node on one bus."""
-        node = node_of(cell)
+        from gatewayd.links.canopen_node.compile import compile_canopen  # noqa: PLC0415 - see above
+
+        node = _node_of(cell)
         assert node is not None
         return compile_canopen(cell, node)
+
+
+def _node_of(cell: ExpandedCell) -> CanopenCell | None:
+    return cast("CanopenCell | None", cell.links.get(KIND.key))
 
 
 LANGUAGE: Final = CanopenLanguage()

@@ -9,8 +9,9 @@ from typing import Final, Literal
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.heartbeat import Consumer
-from gatewayd.canopen.identity import PRODUCT_CODE, VENDOR_ID, Identity
+from gatewayd.canopen.identity import Identity
 from gatewayd.canopen.identity import revision as release_revision
+from gatewayd.canopen.product import PRODUCT_CODE, VENDOR_ID
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.mapping.plan import LinkPlan, Plan

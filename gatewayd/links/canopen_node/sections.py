@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from gatewayd.canopen.identity import PRODUCT_CODE, VENDOR_ID
+from gatewayd.canopen.product import PRODUCT_CODE, VENDOR_ID
 from gatewayd.links.canopen_node.scalars import (
     EVENT,
     CobId,

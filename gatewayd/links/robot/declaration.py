@@ -11,7 +11,6 @@ from gatewayd.links.robot.companions import all_inputs, all_outputs
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address, exact, seconds
-from gatewayd.rtde.enums import BITS, meanings
 
 
 class RobotKind(LinkKind):
@@ -84,6 +83,9 @@ class RobotKind(LinkKind):
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
         """Settings and address. Places have none: what a variable is in the robot, the definition of the cell says."""
+        # Words for people, which neither a check nor a start needs.
+        from gatewayd.rtde.enums import BITS, meanings  # noqa: PLC0415
+
         assert isinstance(plan, RobotPlan)
         where = address(plan.host, plan.port)
         return Description(

@@ -9,13 +9,14 @@ import sys
 from itertools import groupby
 from pathlib import Path
 
+from gatewayd.links.registry import languages
 from gatewayd.mapping.diagnostics import FAMILIES, RETIRED, RetiredRule, Rule, all_rules
 from gatewayd.mapping.rules import run
 
 
 def complete() -> tuple[Rule, ...]:
     """Every rule by id."""
-    assert run.RULE_MODULES
+    run.enter(languages())
     return all_rules()
 
 

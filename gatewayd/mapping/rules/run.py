@@ -1,29 +1,33 @@
-"""All rules together: importing this module fills the catalogue, `check_cell` and `check_plant` apply it."""
+"""All rules together: `check_cell` and `check_plant` apply those of the language, and those of the kinds of links that
+a file says something of. The rules of a kind are imported when the first such file comes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 
+from gatewayd.links.language import LinkLanguage
 from gatewayd.links.registry import languages
 from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules import bounds, failsafe, ownership, sharing, supervision
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
-RULE_MODULES = (
-    bounds,
-    ownership,
-    sharing,
-    failsafe,
-    supervision,
-    *(import_module(name) for language in languages() for name in language.rules),
-)
-"""The modules whose rules are applied: those of the language, and those of each kind of link."""
+RULE_MODULES = (bounds, ownership, sharing, failsafe, supervision)
+"""The modules with the rules of the language; their import enters these."""
+
+
+def enter(kinds: Iterable[LinkLanguage]) -> None:
+    """Have the rules of these kinds of links applied too."""
+    for language in kinds:
+        for name in language.rules:
+            import_module(name)
 
 
 def check_cell(cell: ExpandedCell) -> tuple[Diagnostic, ...]:
     """All findings of one cell by itself, in no particular order. Never raises."""
+    enter(language for language in languages() if language.concerns(cell.document))
     return tuple(finding for rule, check in CELL_CHECKS for finding in check(rule, cell))
 
 

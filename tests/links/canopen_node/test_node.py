@@ -17,8 +17,9 @@ from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.heartbeat import Consumer
-from gatewayd.canopen.identity import PRODUCT_CODE, revision
+from gatewayd.canopen.identity import revision
 from gatewayd.canopen.nmt import UNCONFIGURED, NmtState
+from gatewayd.canopen.product import PRODUCT_CODE
 from gatewayd.canopen.sync import SyncPlan
 from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell

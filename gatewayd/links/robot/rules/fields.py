@@ -15,8 +15,7 @@ from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
 from gatewayd.mapping.rules.writers import more_places
 from gatewayd.report.wording import alternatives
-from gatewayd.rtde.catalogue import is_fieldbus_range, suggest
-from gatewayd.rtde.claims import OLD_LIST_LIMIT, list_size
+from gatewayd.rtde.catalogue import OLD_LIST_LIMIT, is_fieldbus_range, list_size, suggest
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, UNTYPED, Series, SoftwareVersion
 
 _LONG_LISTS_SINCE = SoftwareVersion(5, 17)
