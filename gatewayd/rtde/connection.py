@@ -260,25 +260,31 @@ class Connection(asyncio.Protocol):
         self._heard = now
         self._passed_over = None
         self._patience = max(self._settings.data_timeout, _PERIODS_OF_PATIENCE * self._period)
-        *earlier, newest = agreed
-        for left, package in zip(range(len(earlier), 0, -1), earlier, strict=True):
-            values = self._counted(package, now)
-            if values is None:
-                return
-            taken = self._clocked and left <= _MOST_EARLIER and self._handler.earlier(values, now)
-            self._statistics.overtaken += not taken
-            if self.done.done():
-                return
+        newest = agreed.pop()
+        if agreed and not self._hand_on(agreed, now):
+            return
         values = self._counted(newest, now)
         if values is not None:
             self._handler.values(values, now)
+
+    def _hand_on(self, earlier: list[DataPackage], now: float) -> bool:
+        """Hand on what came together with a newer package; whether the connection goes on."""
+        for left, package in zip(range(len(earlier), 0, -1), earlier, strict=True):
+            values = self._counted(package, now)
+            if values is None:
+                return False
+            taken = self._clocked and left <= _MOST_EARLIER and self._handler.earlier(values, now)
+            self._statistics.overtaken += not taken
+            if self.done.done():
+                return False
+        return True
 
     def _counted(self, package: DataPackage, now: float) -> tuple[Scalar, ...] | None:
         """The values of a package; None if it shows that the controller has restarted, which ends the connection."""
         values, pace = self._outputs.unpack(package.payload), self._pace
         assert pace is not None
         last = pace.timestamp
-        if not self._clocked or pace.package(float(values[0]), now):
+        if not self._clocked or pace.package(values[0], now):
             return values
         text = f"the controller's clock went from {last} s to {values[0]} s: its RTDE service has restarted"
         self._fail(LossReason.RESTARTED, text)
