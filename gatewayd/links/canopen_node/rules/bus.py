@@ -57,7 +57,7 @@ def node_id_clash(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[Diagnos
     """Two cells with the same node-ID on one bus."""
     for node, other in _same(cells, lambda spec: spec.node):
         spec = node.part.spec
-        message = f"node {spec.node} on {spec.channel} is already another cell"
+        message = f"node {spec.node} on {spec.channel} already belongs to another cell"
         related = (Related(other.part.at("node"), f"node {spec.node} first used here"),)
         hint = "give each cell its own node-ID, 1 to 127"
         yield rule.at(node.part.at("node"), message, hint=hint, related=related)
