@@ -76,7 +76,10 @@ def filters(can_ids: Iterable[int], remote_ids: Iterable[int]) -> bytes:
 def seen(name: str, interface: Interface | None) -> tuple[BusSignal, str]:
     """What a look at the interface means, as a signal and in words."""
     if interface is None:
-        return BusSignal.GONE, f"there is no interface {name}"
+        return BusSignal.GONE, (
+            f"there is no interface {name}; plug in its adapter, or correct `channel` "
+            "(`ip link show type can` lists them): it is opened as soon as it is there"
+        )
     if not interface.up:
         return BusSignal.DOWN, f"{name} is down; `ip link set {name} up` brings it up"
     if not interface.carrier:
@@ -114,9 +117,12 @@ class SocketCanBus(SupervisedBus):
 
     async def open(self) -> None:
         """Start. BusError if the kernel has no CAN, the sandbox forbids it, or the name is no CAN interface's."""
-        _probe()
         self._loop = asyncio.get_running_loop()
-        self._reader = InterfaceReader()
+        try:
+            _probe()
+            self._reader = InterfaceReader()
+        except BusError as error:
+            raise BusError(f"{self._channel}: {error}") from error
         try:
             found = self._reader.read(self._channel)
         except OSError as error:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import signal
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 from tests.e2e.can_plant import NODE, Master, start_bus, start_master
@@ -371,3 +373,27 @@ def test_a_master_is_believed_only_while_its_promised_heartbeat_is_heard(plant: 
     master.emergency(0)
     assert plc.owner(1) == THE_MASTER
     assert "Traceback" not in cell.daemon.text()
+
+
+NOWHERE = """\
+canopen: {interface: socketcan, channel: nocan7, bitrate: 250000, node: 16}
+variables:
+  part: {robot: output_int_register_0, modbus: 0, canopen: auto}
+"""
+
+
+def test_a_can_interface_that_is_not_there_at_the_start_is_named_with_a_remedy(plant: Plant) -> None:
+    """In the log once and in `gatewayd status`, whether the kernel knows CAN or not; the rest of the cell serves."""
+    simulator = plant.simulator()
+    socket = plant.directory / "control.sock"
+    daemon = plant.daemon(plant.mapping(NOWHERE, simulator.port), "--control", socket)
+    daemon.wait_for_line("listening for control")
+    line = daemon.wait_for_line("socketcan:nocan7")
+    remedies = ("plug in its adapter, or correct `channel`", "load the kernel modules can and can_raw")
+    remedy = next(remedy for remedy in remedies if remedy in line)
+    command = [sys.executable, "-m", "gatewayd", "status", "--socket", str(socket)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=30)
+    said = next(line for line in done.stdout.splitlines() if "CAN bus absent" in line)
+    assert "nocan7" in said
+    assert remedy in said
+    assert len(daemon.lines("socketcan:nocan7")) == 1

@@ -3,49 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-import io
-import json
 import logging
 from collections.abc import Iterator
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
 from gatewayd.logs import merging
 from gatewayd.logs.merging import EACH, OF_ONE_TEXT, PERIOD
-from gatewayd.logs.records import Format, configure, fields
+from gatewayd.logs.records import fields
+from tests.logs.written import Log, written_log
 
 log = logging.getLogger("gatewayd.test")
 
 
-class Log:
-    """What was written, and the clock of the handler."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.stream, self.now = io.StringIO(), 1000.0
-        monkeypatch.setattr(merging, "clock", SimpleNamespace(now=lambda: self.now))
-        configure(Format.JSON, logging.DEBUG, self.stream)
-
-    def lines(self) -> list[dict[str, Any]]:
-        return [json.loads(line) for line in self.stream.getvalue().splitlines()]
-
-    def count(self) -> int:
-        """Lines that the written ones stand for."""
-        return sum(line.get("merged", 1) for line in self.lines())
-
-    def flush(self) -> None:
-        handler = logging.getLogger().handlers[0]
-        assert isinstance(handler, merging.MergingHandler)
-        handler.flush_merged()
-
-
 @pytest.fixture
 def written(monkeypatch: pytest.MonkeyPatch) -> Iterator[Log]:
-    root = logging.getLogger()
-    before = root.handlers[:], root.level, logging.raiseExceptions
-    yield Log(monkeypatch)
-    root.handlers[:], root.level, logging.raiseExceptions = before
+    with written_log(monkeypatch) as log_:
+        yield log_
 
 
 def test_texts_of_a_controller_that_talks_are_few_lines(written: Log) -> None:
@@ -94,7 +68,7 @@ def test_a_cell_that_flaps_is_told_once_in_a_while_and_nothing_is_lost(written: 
         log.warning("robot lost", extra=fields(cell="press", detail="closed"))
         written.flush()
     assert EACH <= len(written.lines()) <= EACH + 3600 / PERIOD + 2
-    logging.getLogger().handlers[0].close()
+    written.close()
     assert written.count() == 3600
 
 

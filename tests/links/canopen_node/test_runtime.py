@@ -8,16 +8,19 @@ import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
+from datetime import UTC, datetime
 from uuid import uuid4
 
 import can
 import pytest
 
-from gatewayd.canopen import pythoncan
+from gatewayd.canopen import pythoncan, socketcan
 from gatewayd.canopen.bus import BusState
 from gatewayd.canopen.frame import Frame
+from gatewayd.canopen.interface import Interface
 from gatewayd.canopen.nmt import NmtState
 from gatewayd.canopen.pythoncan import PythonCanBus
+from gatewayd.canopen.supervision import BusSignal
 from gatewayd.core.cell import Cell
 from gatewayd.core.succession import succeed
 from gatewayd.links.canopen_node import runtime as link_module
@@ -27,9 +30,12 @@ from gatewayd.links.canopen_node.plan import CanopenPlan, canopen_of
 from gatewayd.links.canopen_node.runtime import LOSS_INTERVAL, CanLink
 from gatewayd.links.canopen_node.store import Store
 from gatewayd.links.contract import Level
+from gatewayd.logs.events import EventLog
+from gatewayd.logs.merging import EACH, PERIOD
 from gatewayd.loop import clock
 from tests.links.canopen_node.conformance.bench import compiled
 from tests.links.canopen_node.recorder import until
+from tests.logs.written import written_log
 
 HEARTBEAT = 0x705
 
@@ -392,6 +398,69 @@ async def test_why_a_bus_cannot_be_used_is_in_the_health() -> None:
     assert "there-is-none" in health.words
     assert health.problems == (f"CAN bus absent: {health.figures['reason']}",)
     assert health.level is Level.BAD
+
+
+async def test_an_absent_interface_is_logged_once_and_shown_with_a_remedy(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """However often it is looked for. The kernel is asked in earnest; only CAN sockets it may not have."""
+    monkeypatch.setattr(socketcan, "_probe", lambda: None)
+    monkeypatch.setattr(socketcan, "LOOK", 0.001)
+    looks: list[str] = []
+    seen = socketcan.seen
+
+    def look(name: str, interface: Interface | None) -> tuple[BusSignal, str]:
+        looks.append(name)
+        return seen(name, interface)
+
+    monkeypatch.setattr(socketcan, "seen", look)
+    station = Station("nocan7", interface="socketcan")
+    caplog.set_level(logging.INFO)
+    async with running(station):
+        await until(lambda: len(looks) > 20)
+        health = station.link.health()
+    lines = [
+        record
+        for record in caplog.records
+        if record.name == "gatewayd.canopen" and "absent" in record.message
+    ]
+    assert [(line.levelname, line.message) for line in lines] == [("WARNING", "CAN bus absent")]
+    reason = vars(lines[0])["fields"]["reason"]
+    assert "there is no interface nocan7; plug in its adapter, or correct `channel`" in reason
+    assert (health.name, health.level) == ("CAN nocan7", Level.BAD)
+    assert health.problems == (f"CAN bus absent: {reason}",)
+
+
+def test_a_master_that_toggles_nmt_states_and_a_node_that_flaps_do_not_fill_the_log(
+    station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A line in `PERIOD` for each thing that is said, with the number of those that it stands for."""
+    now, node = 1000.0, station.link.node
+    with written_log(monkeypatch) as log:
+        station.cell.events.listeners.append(EventLog(station.cell))
+        node.bus_changed(BusState.ACTIVE, now)
+        node.start(now)
+        node.receive(Frame(0x605, bytes.fromhex("2316100132000900")), now)
+        node.tick(now)
+        for _ in range(3600):
+            now += 1.0
+            log.now = now
+            node.receive(Frame(0x709, b"\5"), now)
+            node.receive(Frame(0x000, b"\1\5"), now)
+            node.tick(now + 0.1)  # the heartbeat of node 9 is lost
+            for command in (b"\2\5", b"\x80\5"):
+                node.receive(Frame(0x000, command), now + 0.2)
+            for hour in (1, 2):  # two masters whose clocks differ
+                station.link.time_received(datetime(2026, 11, 29, hour, tzinfo=UTC), now)
+            log.flush()
+        log.close()
+        clocks = [line for line in log.lines() if line["event"] == "network time"]
+        changes = [line for line in log.lines() if line["event"].startswith("CANopen node")]
+    texts = {line["event"] for line in changes}
+    assert texts == {f"CANopen node {state}" for state in ("operational", "pre-operational", "stopped")}
+    assert len(changes) <= len(texts) * (EACH + 3600 / PERIOD + 2)
+    assert sum(line.get("merged", 1) for line in changes) >= 4 * 3600, "none is lost uncounted"
+    assert EACH <= len(clocks) <= EACH + 3600 / PERIOD + 2
 
 
 def test_a_bit_rate_that_is_not_the_mapping_s_is_a_problem(
