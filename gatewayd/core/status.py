@@ -18,6 +18,7 @@ from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.core.status_layout import (
+    BASE,
     FIELDS,
     HEADER_WORDS,
     LAYOUT_VERSION,
@@ -33,6 +34,8 @@ _U32 = 0xFFFF_FFFF
 _CODES = {1: "H", 2: "I"}
 """By words of a field."""
 _MAX = {1: _U16, 2: _U32}
+
+_WRITABLE = f"a writer may write {BASE + REQUEST} and {BASE + RELEASE}, the requests for locks"
 
 _Entries = Callable[[range, float], Iterable[int]]
 """The words of some entries of a table at one time."""
@@ -82,19 +85,22 @@ class StatusBlock:
         A request that fills both words is refused, because it could succeed by half.
         """
         cell = self._cell
+        asked = f"wrote {_span(first, len(words))}"
         if requester.writer is None or first < REQUEST or first + len(words) > RELEASE + 1:
-            return self._refuse(requester, Refusal(Reason.NOT_WRITABLE), now)
+            return self._refuse(requester, Refusal(Reason.NOT_WRITABLE, request=asked, hint=_WRITABLE), now)
         wanted = [(offset, number) for offset, number in enumerate(words, first) if number]
         if not wanted:
             return None
         offset, number = wanted[0]
         if offset == RELEASE and number == RELEASE_ALL:
             if not requester.trusted:
-                return self._refuse(requester, Refusal(Reason.HEARTBEAT_LOST), now)
+                return self._refuse(requester, Refusal(Reason.HEARTBEAT_LOST, request=asked), now)
             cell.release_all(requester, now)
             return None
-        if len(wanted) > 1 or number > len(cell.definition.variables):
-            return self._refuse(requester, Refusal(Reason.OUT_OF_LIMITS), now)
+        last = len(cell.definition.variables)
+        if len(wanted) > 1 or number > last:
+            hint = "one lock at a time" if len(wanted) > 1 else f"variables are 1 to {last}, not {number}"
+            return self._refuse(requester, Refusal(Reason.OUT_OF_LIMITS, request=asked, hint=hint), now)
         cell.health.lock_requests += 1
         act = cell.request if offset == REQUEST else cell.release
         return act(requester, number - 1, now)
@@ -196,6 +202,12 @@ def _format(fields: Iterable[StatusField]) -> str:
         found += f"{2 * (field.offset - end)}x{_CODES[field.words]}"
         end = field.offset + field.words
     return found
+
+
+def _span(first: int, count: int) -> str:
+    """Words of the block by the addresses that are documented for them."""
+    last = BASE + first + count - 1
+    return f"the status block at {BASE + first}" + (f"-{last}" if count > 1 else "")
 
 
 def _milliseconds(seconds: float, limit: int) -> int:

@@ -215,3 +215,23 @@ def test_locks_move_for_nobody_that_is_not_heard(cell: Cell, offset: int, word: 
     assert refusal is not None
     assert refusal.reason is Reason.HEARTBEAT_LOST
     assert cell.ownership.held_by(HMI) == [cell.definition.variables[PART].lock]
+
+
+WRITABLE = "a writer may write 60040 and 60041, the requests for locks"
+
+
+@pytest.mark.parametrize(
+    "writer, first, asked, said",
+    [
+        (HMI, 0, [1], ("60000", WRITABLE)),
+        (None, REQUEST, [1, 0], ("60040-60041", WRITABLE)),
+        (HMI, REQUEST, [99], ("60040", "variables are 1 to 10, not 99")),
+        (HMI, REQUEST, [3, 3], ("60040-60041", "one lock at a time")),
+    ],
+)
+def test_what_is_refused_here_says_where(
+    status: StatusBlock, writer: int | None, first: int, asked: list[int], said: tuple[str, str]
+) -> None:
+    refusal = status.write(Requester(writer), first, asked, 1.0)
+    assert refusal is not None
+    assert (refusal.request, refusal.hint) == (f"wrote the status block at {said[0]}", said[1])

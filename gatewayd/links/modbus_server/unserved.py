@@ -62,8 +62,7 @@ class Places:
             (found for found in (before, after) if found is not None),
             key=lambda found: max(found.address - address, address - found.address - found.words + 1),
         )
-        bit = "" if near.bit is None or area.of_bits else f".{near.bit}"
-        return f"nearest: {self._variables[near.variable].name} {near.address}{bit}"
+        return f"nearest: {self._variables[near.variable].name} {near.place}"
 
     def _before(self, area: Area, address: int) -> Placement | None:
         position = bisect(self._starts.get(area, ()), address)

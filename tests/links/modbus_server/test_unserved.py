@@ -16,7 +16,10 @@ from gatewayd.core.unserved import Unserved
 from gatewayd.links.modbus_server.functions import Unit, execute
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
-from gatewayd.modbus.describe import fault
+from gatewayd.links.modbus_server.unserved import Places
+from gatewayd.mapping.loader import load
+from gatewayd.modbus.areas import Area
+from gatewayd.modbus.describe import Span, fault
 from gatewayd.modbus.frames import encode
 from gatewayd.report.event_text import EventRecord
 
@@ -136,6 +139,24 @@ def test_a_refused_write_names_its_address(cell: Cell, unit: Unit, pdu: str, tex
     if "no variable" in text:
         assert found == text
     assert sum(cell.health.unserved.values()) == 0, "it is a refused write, and counts once"
+
+
+def test_what_is_nearest_is_called_as_the_file_has_it() -> None:
+    """A byte of a register is `.high` or `.low`, no bit."""
+    text = b"""
+gatewayd: 1
+cell: grip
+robot: {host: 127.0.0.1}
+modbus: {listen: '127.0.0.1:1502'}
+variables:
+  force: {robot: output_int_register_0, modbus: {holding: 7.high, type: uint8}}
+  far:   {robot: output_bit_register_3, modbus: {holding: 90.12}}
+"""
+    plan = load(text, "grip.yaml").plan
+    assert plan is not None
+    places = Places(plan.the(ModbusPlan), plan.cell)
+    found = [places.unmapped(Span(Area.HOLDING, address, 1), lambda _address: False) for address in (9, 80)]
+    assert found == ["9 is not mapped; nearest: force 7.high", "80 is not mapped; nearest: far 90.12"]
 
 
 def test_what_is_held_back_without_the_robot_is_said(cell: Cell, unit: Unit) -> None:
