@@ -51,7 +51,7 @@ Exit codes:
     type=click.Choice(["text", "json", "candump", "pcap"]),
     default="text",
     show_default=True,
-    help="Decoded text; JSON, an object a line; the log format of candump (CAN only); pcapng for Wireshark.",
+    help="Decoded text; JSON, one object per line; the log format of candump (CAN only); pcapng for Wireshark.",
 )
 @click.option(
     "-o",

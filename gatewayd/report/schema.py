@@ -190,7 +190,7 @@ class EventMessage(TypedDict):
     detail: NotRequired[Annotated[str, "more, in words"]]
     text: Annotated[
         str,
-        "all that in one sentence for people, values with their unit; it its wording may change at any time",
+        "all that in one sentence for people, values with their unit; its wording may change at any time",
     ]
     bad: Annotated[bool, "somebody should look at it"]
 
