@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import re
 from collections.abc import Hashable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ OF_ONE_TEXT = 300
 _LOOK = 1.0
 _VOLATILE = frozenset({"old", "new", "repeats", "detail", "text", "path", "time"})
 """Fields in which lines about the same thing differ."""
+_NUMBER = re.compile(r"\d+")
 
 
 @dataclass(slots=True)
@@ -106,13 +108,16 @@ class MergingHandler(logging.StreamHandler[Any]):
 
 
 def _subject(record: logging.LogRecord) -> Hashable:
-    """What the line is about; a peer is its address without the port, which is another one for each connection."""
+    """What the line is about."""
     found: dict[str, object] = getattr(record, "fields", {})
-    return tuple(
-        (name, host_of(str(value)) if name == "peer" else str(value))
-        for name, value in found.items()
-        if name not in _VOLATILE
-    )
+    return tuple((name, _known(name, str(value))) for name, value in found.items() if name not in _VOLATILE)
+
+
+def _known(name: str, value: str) -> str:
+    """A value without what differs each time: the port of a connection, the counts and times that a reason names."""
+    if name == "peer":
+        return host_of(value)
+    return _NUMBER.sub("#", value) if name == "reason" else value
 
 
 def _with_count(merged: _Merged) -> logging.LogRecord:

@@ -72,6 +72,17 @@ def test_a_cell_that_flaps_is_told_once_in_a_while_and_nothing_is_lost(written: 
     assert written.count() == 3600
 
 
+def test_a_bus_that_flaps_is_the_same_whatever_its_counters_say(written: Log) -> None:
+    for second in range(3600):
+        written.now += 1.0
+        reason = f"can0 is up (transmit errors: {second % 250}, receive errors: 0)"
+        log.warning("CAN bus passive", extra=fields(cell="press", bus="socketcan:can0", reason=reason))
+        written.flush()
+    assert EACH <= len(written.lines()) <= EACH + 3600 / PERIOD + 2
+    written.close()
+    assert written.count() == 3600
+
+
 def test_debug_is_written_as_it_comes(written: Log) -> None:
     for _ in range(1000):
         log.debug("lock acquired", extra=fields(lock="start"))
