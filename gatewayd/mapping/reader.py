@@ -23,6 +23,7 @@ from gatewayd.mapping.slips import lookalike
 from gatewayd.mapping.source import Items, MappingText, Node, Scalar, Table, TableEntry, shown
 from gatewayd.mapping.tables import read
 from gatewayd.mapping.typed import Invalid, Mistake
+from gatewayd.report.wording import alternatives, number
 
 S = TypeVar("S", bound=Section)
 Found = TypeVar("Found")
@@ -253,7 +254,9 @@ class _Reader:
                 hint = "write [least, greatest], for example [0, 150]"
             self._find(syntax.WRONG_TYPE, f"`{name}` is {text}, but must be {_EXPECTED[kind]}", value, hint)
         elif kind in _BOUNDS:
-            message = f"`{name}` is {text}, but must be {_BOUNDS[kind][0]} {context[_BOUNDS[kind][1]]}"
+            message = (
+                f"`{name}` is {text}, but must be {_BOUNDS[kind][0]} {number(context[_BOUNDS[kind][1]])}"
+            )
             self._find(syntax.OUT_OF_RANGE, message, value, _field_hint(inner, name))
         elif kind == "string_pattern_mismatch":
             message = f"{text} is not a host name or IP address"
@@ -284,11 +287,11 @@ class _Reader:
         written = text.strip("`")
         close = difflib.get_close_matches(written.lower(), [word.lower() for word in choices], n=1)
         match = next((word for word in choices if close and word.lower() == close[0]), None)
-        hint = f"did you mean `{match}`?" if match else f"write {', '.join(choices)}"
+        hint = f"did you mean `{match}`?" if match else f"write {alternatives(choices)}"
         synonyms = (language.synonyms.get((name, written.upper())) for language in languages())
         meant = next((word for word in synonyms if word in choices), None)
         if meant is not None:
-            hint = f"write {meant}: that is {written.upper()} here"
+            hint = f"write {meant} for {written}"
         message = f"`{name}` is {text}, but must be one of {', '.join(choices)}"
         self._find(syntax.BAD_CHOICE, message, position, hint)
 

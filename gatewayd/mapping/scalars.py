@@ -101,7 +101,7 @@ def _duration(value: object) -> float:
             refuse(
                 syntax.BAD_DURATION,
                 f"the duration `{text}` has no unit",
-                f"write {text}ms, {text}s or {text}min",
+                f"write {text}ms, {text}s or {text}min" if value > 0 else hint,
             )
         refuse(syntax.BAD_DURATION, f"`{text}` is not a duration", hint)
     seconds = float(match[1]) * _SECONDS[match[2]]
@@ -260,7 +260,7 @@ Networks = Annotated[
 
 
 def _name(value: object) -> str:
-    hint = "begin with a letter and go on with letters (a to z), digits and `_`"
+    hint = "a name begins with a letter and goes on with letters (a to z), digits and `_`"
     text = scalar(value, "a name", hint)
     if not _NAME.fullmatch(text):
         joined = "_".join(re.findall(r"[A-Za-z0-9_]+", text))

@@ -98,7 +98,7 @@ def test_each_mistake_is_found_once_at_its_place(text: str, slug: str, line: int
         ("variables: {a: {robot: x, timeout: 1s}}", "belongs to the writer"),
         ("variables: {}\ngroups: {g: {grace: 1s}}", "belongs to the writer"),
         ("variables: {}\nmodbus: {order: abcd}", "did you mean `ABCD`?"),
-        ("variables: {}\nmodbus: {gaps: nul}", "refuse, zero"),
+        ("variables: {}\nmodbus: {gaps: nul}", "write `refuse` or `zero`"),
         ("variables: {}\nmodbus: {zzz: 1}", "known keys: listen, unit"),
         ("variables: {}\nmodbus: {idle_timeout: 60}", "60s"),
         ("variables: {a: {robot: x, modbus: {holding: 400101}}}", "{holding: 100}"),
@@ -106,7 +106,7 @@ def test_each_mistake_is_found_once_at_its_place(text: str, slug: str, line: int
         ("variables: {a: {robot: x, modbus:1}}", "write `modbus: 1`"),
         ("variables: {a: {robot: x, modbus:\u00a01}}", "no-break space"),
         ("variables: {a: {robot: x, limits: 0..9}}", "[least, greatest]"),
-        ("variables: {a: {robot: x, modbus: {holding: 1, type: word}}}", "write uint16: that is WORD here"),
+        ("variables: {a: {robot: x, modbus: {holding: 1, type: word}}}", "write uint16 for word"),
         ("variables: {a: {robot: x, modbus: {holding: 1, type: DINT}}}", "write int32"),
     ],
 )

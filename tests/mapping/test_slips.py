@@ -58,7 +58,7 @@ def test_the_mapping_itself_is_right() -> None:
         (("bitrate: 250000", "bitrate: 10kg"), "GW110", 11, "`10kg`", "write 10, without the unit"),
         (("type: float32", "type: float"), "GW114", 19, "`type` is `float`", "write float32"),
         (("type: float32", "type: double"), "GW114", 19, "`type` is `double`", "write float64"),
-        (("series: e", "series: UR10e"), "GW114", 5, "`series` is `UR10e`", "write e: that is UR10E here"),
+        (("series: e", "series: UR10e"), "GW114", 5, "`series` is `UR10e`", "write e for UR10e"),
         (("series: e", "series: UR10"), "GW114", 5, "`series` is `UR10`", "write cb3"),
         (("host: 127.0.0.1", "host: http://127.0.0.9/x"), "GW118", 4, "`http://", "write 127.0.0.9"),
         (("  speed:", "  tool speed:"), "GW113", 17, "`tool speed` is not a name", "write tool_speed"),
