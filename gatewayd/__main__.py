@@ -9,11 +9,14 @@ import os
 import signal
 import sys
 from contextlib import suppress
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from gatewayd.service import garbage, standard_streams
 from gatewayd.service.signals import SIGNALS
 from gatewayd.service.standard_streams import OutputError
+
+if TYPE_CHECKING:
+    from gatewayd.service.compilation import Compilation
 
 INTERNAL_ERROR = 70
 """Exit code of a defect of gatewayd itself (EX_SOFTWARE of sysexits.h)."""
@@ -65,12 +68,26 @@ def _run() -> int:
 
 
 def _command() -> int:
+    if not _reads_files(sys.argv[1:]):
+        return _carried_out(None)
+    from gatewayd.service.compilation import Compilation
+
+    with Compilation() as early:
+        return _carried_out(early)
+
+
+def _reads_files(arguments: list[str]) -> bool:
+    """Whether a daemon is to start. The process that reads its files takes longest: it begins before all else."""
+    return arguments[:1] == ["run"] and len(arguments) > 1 and not {"-h", "--help"}.intersection(arguments)
+
+
+def _carried_out(early: Compilation | None) -> int:
     import click
 
     from gatewayd.cli import command
 
     try:
-        result = command.main(prog_name="gatewayd", standalone_mode=False)
+        result = command.main(prog_name="gatewayd", standalone_mode=False, obj=early)
     except click.ClickException as problem:
         problem.show()
         return problem.exit_code

@@ -162,7 +162,14 @@ LAYERS: dict[str, set[str]] = {
         "simulator",
         "web.settings",
     },
-    "__main__": {"cli", "report.printable", "service.garbage", "service.signals", "service.standard_streams"},
+    "__main__": {
+        "cli",
+        "report.printable",
+        "service.compilation",
+        "service.garbage",
+        "service.signals",
+        "service.standard_streams",
+    },
 }
 """Module or package -> what it and everything in it may import; the longest name that fits decides."""
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
+    from gatewayd.service.compilation import Compilation
     from gatewayd.web.settings import Settings
 
 
@@ -77,7 +78,9 @@ Exit codes:
     envvar="GATEWAYD_TOKEN_FILE",
     help="File with the token that the status listener demands for everything but reading.",
 )
+@click.pass_obj
 def command(
+    early: Compilation | None,
     files: tuple[Path, ...],
     *,
     log_format: str,
@@ -101,7 +104,7 @@ def command(
     page = _settings(status, token_file) if status else None
     options = Options(files, state, control, audit, page, strict=strict)
     with ExitStack() as log:
-        return main(options, lambda: _configure(log, log_format, log_level))
+        return main(options, lambda: _configure(log, log_format, log_level), early)
 
 
 def _configure(log: ExitStack, form: str, level: str) -> None:

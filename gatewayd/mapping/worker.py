@@ -4,10 +4,12 @@ output, and the end. For people there is `gatewayd check`.
 
 from __future__ import annotations
 
+import os
 import pickle
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import BinaryIO
 
 from gatewayd.mapping.compiled import Compiled, CompiledFile, Unreadable
 from gatewayd.mapping.loader import load_together, read_bytes
@@ -28,6 +30,19 @@ def compile_files(names: Iterable[str]) -> Compiled:
     )
 
 
-def main() -> None:
-    """Compile what the command line names."""
-    sys.stdout.buffer.write(pickle.dumps(compile_files(sys.argv[1:]), pickle.HIGHEST_PROTOCOL))
+def names_from(stream: BinaryIO) -> list[str]:
+    """The names of files as `service.compilation` writes them: one a line, in hexadecimal digits, then an empty line.
+
+    Raises EOFError if whoever was to say them is gone.
+    """
+    names: list[str] = []
+    while (line := stream.readline()) != b"\n":
+        if not line:
+            raise EOFError("no files were named")
+        names.append(os.fsdecode(bytes.fromhex(line.decode())))
+    return names
+
+
+def main(names: Iterable[str]) -> None:
+    """Compile these files."""
+    sys.stdout.buffer.write(pickle.dumps(compile_files(names), pickle.HIGHEST_PROTOCOL))

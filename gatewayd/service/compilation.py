@@ -15,12 +15,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
-from pathlib import Path
+from contextlib import suppress
 from typing import TYPE_CHECKING, Self
 
 import gatewayd
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gatewayd.mapping.compiled import Compiled
 
 LIMIT = 20.0
@@ -28,11 +30,12 @@ LIMIT = 20.0
 
 _BOOT = """
 import gc, os, sys, threading
-threading.Thread(target=lambda: os.read(0, 1) or os._exit(1), daemon=True).start()
 gc.disable()
 sys.path.insert(0, sys.argv.pop(1))
-from gatewayd.mapping.worker import main
-main()
+from gatewayd.mapping.worker import main, names_from
+names = names_from(sys.stdin.buffer)
+threading.Thread(target=lambda: os.read(0, 1) or os._exit(1), daemon=True).start()
+main(names)
 sys.stdout.flush()
 os._exit(0)
 """
@@ -41,7 +44,7 @@ What lives for a moment needs no collection of garbage, and is not taken apart a
 started it ends."""
 _LOOK = 0.05
 """Seconds between two looks whether the result is still wanted."""
-_ROOT = str(Path(gatewayd.__file__).parents[1])
+_ROOT = os.path.dirname(os.path.dirname(gatewayd.__file__))  # noqa: PTH120 - pathlib takes 3 ms to import
 
 
 class CompilationError(Exception):
@@ -49,24 +52,38 @@ class CompilationError(Exception):
 
 
 class Compilation:
-    """Files on their way to plans: the process runs from the beginning, and not beyond the end of the `with`."""
+    """Files on their way to plans: the process runs from the beginning, and not beyond the end of the `with`.
 
-    def __init__(self, names: Iterable[Path]) -> None:
-        """Where there can be no such process, `result` says so: whoever starts early may have no log yet."""
+    Most of its time goes into importing what reads, so it may be started before it is known which files are meant.
+    """
+
+    def __init__(self, names: Iterable[Path] | None = None) -> None:
+        """Where there can be no such process, `result` says so: whoever starts early has no log yet."""
         self._process: subprocess.Popen[bytes] | None = None
         self._failure: Exception | None = None
-        self._asked = False
+        self._asked = self._ended = False
         try:
-            self._process, self._lifeline = _start(map(str, names))
+            self._process, self._lifeline = _start()
         except (OSError, ValueError) as error:
             self._failure = error
+        if names is not None:
+            self.read(names)
+
+    def read(self, names: Iterable[Path]) -> None:
+        """Say which files are meant; to be called once, unless it was said at the beginning."""
+        if self._process is None:
+            return
+        lines = "".join(f"{os.fsencode(name).hex()}\n" for name in names)
+        with suppress(BrokenPipeError):  # what became of it, `result` tells
+            _write(self._lifeline, f"{lines}\n".encode())
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        if self._process is None:
+        if self._process is None or self._ended:
             return
+        self._ended = True
         # Whoever waits in `result`, maybe in another thread, comes back by this and closes the pipes.
         self._process.kill()
         os.close(self._lifeline)
@@ -115,14 +132,19 @@ def _communicate(process: subprocess.Popen[bytes], given_up: Callable[[], bool])
         )
 
 
-def _start(names: Iterable[str]) -> tuple[subprocess.Popen[bytes], int]:
-    """The process, and the descriptor whose end is its end too."""
+def _write(descriptor: int, data: bytes) -> None:
+    while data:
+        data = data[os.write(descriptor, data) :]
+
+
+def _start() -> tuple[subprocess.Popen[bytes], int]:
+    """The process, and the descriptor by which it learns what to read, and whose end is its end too."""
     theirs, ours = os.pipe()
     # It inherits what this thread blocks: from its first instruction on no signal reaches it.
     former = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
     try:
-        process = subprocess.Popen(  # noqa: S603 - this interpreter and files that are only read
-            [sys.executable, "-I", "-c", _BOOT, _ROOT, *names],
+        process = subprocess.Popen(  # noqa: S603 - this interpreter, and what stands above
+            [sys.executable, "-I", "-c", _BOOT, _ROOT],
             stdin=theirs,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

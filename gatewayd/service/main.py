@@ -10,7 +10,7 @@ import logging
 from collections.abc import Callable
 
 from gatewayd.service import garbage
-from gatewayd.service.compilation import CompilationError
+from gatewayd.service.compilation import Compilation, CompilationError
 from gatewayd.service.options import Options
 from gatewayd.service.signals import SIGNALS, name_of
 from gatewayd.service.startup import Startup, load_plans
@@ -22,12 +22,15 @@ DEFECT = 70
 """Worth another attempt, unlike the others: the service manager starts it again."""
 
 
-def main(options: Options, configure: Callable[[], None] = lambda: None) -> int:
+def main(
+    options: Options, configure: Callable[[], None] = lambda: None, early: Compilation | None = None
+) -> int:
     """Read the files and serve what they say until the end is asked for; the exit code.
 
-    `configure` makes the log; it is called once, while the files are being read.
+    `configure` makes the log; it is called once, while the files are being read. `early` is the process that reads
+    them, if it has been started already.
     """
-    found = _load(options, configure)
+    found = _load(options, configure, early)
     if SIGNALS.stopping:
         from gatewayd.logs.records import fields  # noqa: PLC0415 - see `_load`
 
@@ -44,7 +47,7 @@ def main(options: Options, configure: Callable[[], None] = lambda: None) -> int:
     return STOPPED
 
 
-def _load(options: Options, configure: Callable[[], None]) -> Startup | int:
+def _load(options: Options, configure: Callable[[], None], early: Compilation | None) -> Startup | int:
     """What there is to serve, or the exit code."""
 
     def meanwhile() -> None:
@@ -52,7 +55,7 @@ def _load(options: Options, configure: Callable[[], None]) -> Startup | int:
         _import_what_serves()
 
     try:
-        found = load_plans(options.files, meanwhile, lambda: SIGNALS.stopping)
+        found = load_plans(options.files, meanwhile, lambda: SIGNALS.stopping, early)
     except CompilationError as error:
         if not SIGNALS.stopping:
             logging.getLogger("gatewayd.startup").error("%s", error)  # noqa: TRY400 - the text says it all

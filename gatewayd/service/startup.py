@@ -78,13 +78,18 @@ def load_plans(
     paths: Sequence[Path],
     meanwhile: Callable[[], object] = lambda: None,
     given_up: Callable[[], bool] = lambda: False,
+    early: Compilation | None = None,
 ) -> Startup:
     """Read and check everything; log what cannot be served and why. Raises CompilationError.
 
     `meanwhile` is called while another process reads, before anything is logged; that ends early once it is `given_up`.
+    `early` is such a process that has been started already.
     """
     meant = _files_by_path(paths)
-    with Compilation(file for files in meant.values() for file in files) as compilation:
+    named = [file for files in meant.values() for file in files]
+    if early is not None:
+        early.read(named)
+    with early or Compilation(named) as compilation:
         meanwhile()
         _log_empty(meant)
         compiled = compilation.result(given_up)

@@ -108,3 +108,21 @@ print(*sorted({{"ruamel", "rich", "can", "gatewayd.mapping.tables", "gatewayd.ma
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+def test_it_may_begin_before_it_is_known_what_to_read() -> None:
+    with Compilation() as early:
+        early.read(MAPPINGS[:1])
+        assert early.result() == worker.compile_files([str(MAPPINGS[0])])
+
+
+def test_more_names_than_a_pipe_holds_are_read(tmp_path: Path) -> None:
+    names = [tmp_path / f"{'x' * 200}{number}.yaml" for number in range(400)]
+    assert len(compiled(names).unreadable) == len(names)
+
+
+def test_one_that_was_never_told_what_to_read_ends_with_whoever_started_it() -> None:
+    with Compilation() as early:
+        process = early._process
+    assert process is not None
+    assert process.returncode == -9

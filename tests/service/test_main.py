@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -44,9 +43,7 @@ def test_what_is_served_and_what_is_not(
 def test_a_process_that_cannot_read_the_files_is_a_defect(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    def fail(
-        _files: Sequence[Path], _meanwhile: Callable[[], None], _given_up: Callable[[], bool]
-    ) -> Startup:
+    def fail(*_arguments: object) -> Startup:
         raise CompilationError("it was killed")
 
     monkeypatch.setattr(main_module, "load_plans", fail)
@@ -61,7 +58,7 @@ import os, subprocess, sys
 import gatewayd.__main__ as entry
 def started(*_arguments, **_options):
     ours = {"gatewayd.core.definition", "gatewayd.links.registry", "gatewayd.logs.records"}
-    heavy = {"asyncio", "json", "pickle"} | ours
+    heavy = {"asyncio", "json", "pickle", "click", "logging", "pathlib"} | ours
     print(*sorted(heavy & sys.modules.keys()), flush=True)
     os._exit(7)
 subprocess.Popen = started
@@ -72,3 +69,15 @@ entry.main()
         [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=tmp_path
     )
     assert (done.returncode, done.stdout.split()) == (7, [])
+
+
+@pytest.mark.parametrize("arguments", [["run", "--help"], ["run"], ["run", "--no-such-option", "cell.yaml"]])
+def test_a_command_that_reads_nothing_leaves_no_process_behind(arguments: list[str], tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "gatewayd", *arguments],
+        capture_output=True,
+        check=False,
+        cwd=tmp_path,
+        timeout=20,
+    )
+    assert done.returncode == (0 if "--help" in arguments else 2)
