@@ -310,7 +310,32 @@ async def test_force_and_release_need_the_token_and_a_second_click(plant: Plant)
         await page.wait(f"{row('part', 'span.owner')} === 'free'")
         assert plc.write(10, [18]) == 0
         await open_act(page, "part", "Release lock …")
-        await confirm(page, "Take the lock part from plc.")
+        await confirm(page, "Release the lock part, which plc owns.")
+        await page.wait(f"{row('part', 'span.owner')} === 'free'")
+        await page.wait("!document.getElementById('act').open")
+        assert plc.write(10, [19]) == 0
+        await page.wait(f"{row('part', 'span.owner')} === 'plc'")
+        await open_act(page, "part", "Take lock …")
+        await fill(page, seconds="soon", token=TOKEN)
+        await page.run("document.getElementById('act-go').click()")
+        await page.wait(f"{text('#act-error')} === 'The time has to be a number of seconds.'")
+        await fill(page, seconds="", token=TOKEN[::-1])
+        await confirm(
+            page, "Take the lock part from plc until it is released. Whoever else writes what it guards"
+        )
+        await page.wait(f"{text('#act-error')}.startsWith('The token is not')")
+        assert plc.write(10, [20]) == 0, "nothing was taken so far"
+        await fill(page, seconds="90", token=TOKEN)
+        await confirm(page, "Take the lock part from plc for 90 s.")
+        await page.wait(f"{row('part', 'span.owner')}.startsWith('local operator, ')")
+        assert plc.write(10, [21]) == 6
+        await page.wait(f"{text('#owned')}.includes('local operator')")
+        await open_act(page, "part", "Take lock …")
+        await fill(page, seconds="", token=TOKEN)
+        await confirm(page, "Keep the lock part until it is released.")
+        await page.wait(f"{row('part', 'span.owner')} === 'local operator'")
+        await open_act(page, "part", "Release lock …")
+        await confirm(page, "Release the lock part, which the local operator owns.")
         await page.wait(f"{row('part', 'span.owner')} === 'free'")
         shown.daemon.kill()
         await page.wait(LOST)

@@ -1,16 +1,15 @@
-// Force and release from the page, with the token. Nothing is sent before it was said in full and confirmed.
+// Force, take and release from the page, with the token. Nothing is sent before it was said in full and confirmed.
 
-import { make, number, printable, put } from "./words.js";
+import { OPERATOR_NAME, make, number, printable, put } from "./words.js";
 
 const PATIENCE = 5000;
-const DEFAULT_SECONDS = 60;
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
 const byId = (id) => document.getElementById(id);
 
 // Each act: its button, whether it applies, what it asks for, where it goes, and what it does, in words.
 const ACTS = {
   force: {
-    title: "Force", asks: ["value", "seconds"], fits: () => true,
+    title: "Force", asks: ["value", "seconds"], seconds: 60, fits: () => true,
     path: ({ variable }) => `variables/${encodeURIComponent(variable.name)}/force`,
     says: ({ variable, state }, { value, for: seconds }) =>
       `Force ${variable.name} from ${number(state.value, variable.kind)} to ${value} ${variable.unit}`.trimEnd() + ` for ${seconds} s. ` +
@@ -24,10 +23,21 @@ const ACTS = {
     says: ({ variable }) => `End the force on ${variable.name}. ` + (variable.direction === "input"
       ? `It takes its fallback at once: ${variable.fallback}.` : "The fieldbus sees what the robot reports again."),
   },
+  take: {
+    title: "Take lock", asks: ["seconds"], seconds: 600, endless: true, of: "lock", fits: ({ lock }) => lock !== null,
+    path: ({ lock }) => `locks/${encodeURIComponent(lock.name)}/take`,
+    says: ({ lock, state }, { for: seconds }) =>
+      (state.owner === OPERATOR_NAME ? `Keep the lock ${lock.name}`
+        : `Take the lock ${lock.name}${state.owner ? ` from ${state.owner}` : ", which nobody owns,"}`) +
+      (seconds === undefined ? " until it is released. " : ` for ${seconds} s. `) +
+      `Whoever else writes what it guards is refused meanwhile: ${lock.variables.join(", ")}. ` +
+      (state.owner === OPERATOR_NAME ? "No value changes."
+        : state.owner ? "All of that takes its fallback at once." : "What was only adopted of that takes its fallback at once."),
+  },
   release: {
-    title: "Release lock", asks: [], fits: ({ state, lock }) => lock !== null && state.owner !== "",
+    title: "Release lock", asks: [], of: "lock", fits: ({ state, lock }) => lock !== null && state.owner !== "",
     path: ({ lock }) => `locks/${encodeURIComponent(lock.name)}/release`,
-    says: ({ lock, state }) => `Take the lock ${lock.name} from ${state.owner}. ` +
+    says: ({ lock, state }) => `Release the lock ${lock.name}, which ${state.owner === OPERATOR_NAME ? "the " : ""}${state.owner} owns. ` +
       `What it guards takes its fallback at once: ${lock.variables.join(", ")}.`,
   },
 };
@@ -65,10 +75,11 @@ export class Operate {
   open(name, subject) {
     Object.assign(this, { act: ACTS[name], subject });
     const { variable, cell } = subject;
-    put(byId("act-title"), `${this.act.title}: ${name === "release" ? subject.lock.name : variable.name} of ${cell}`);
+    put(byId("act-title"), `${this.act.title}: ${this.act.of === "lock" ? subject.lock.name : variable.name} of ${cell}`);
     for (const field of ["value", "seconds"]) byId(`act-${field}`).parentElement.hidden = !this.act.asks.includes(field);
     byId("act-value").value = "";
-    byId("act-seconds").value = String(DEFAULT_SECONDS);
+    byId("act-seconds").value = String(this.act.seconds ?? "");
+    put(byId("act-until"), this.act.endless ? "Seconds (empty: until it is released)" : "Seconds");
     byId("act-token").value = this.token;
     this.ask();
     this.dialog.showModal();
@@ -88,13 +99,22 @@ export class Operate {
 
   body() {
     const body = { cell: this.subject.cell };
-    if (!this.act.asks.length) return body;
+    if (this.act.asks.includes("value")) body.value = this.value();
+    if (this.act.asks.includes("seconds")) {
+      const seconds = byId("act-seconds").value.trim();
+      if (this.act.endless && !seconds) return body;
+      if (!NUMBER.test(seconds) || !(Number(seconds) > 0)) throw new Error("The time has to be a number of seconds.");
+      body.for = Number(seconds);
+    }
+    return body;
+  }
+
+  value() {
     const { kind } = this.subject.variable;
-    const value = byId("act-value").value.trim(), seconds = byId("act-seconds").value.trim();
+    const value = byId("act-value").value.trim();
     if (!NUMBER.test(value)) throw new Error(`The value has to be a number${value.includes(",") ? ", with a point: 1.5" : ""}.`);
     if (kind === "bool" && !["0", "1"].includes(value)) throw new Error("A bit is 0 or 1.");
-    if (!NUMBER.test(seconds) || !(Number(seconds) > 0)) throw new Error("The time has to be a number of seconds.");
-    return { ...body, value: Number(value), for: Number(seconds) };
+    return Number(value);
   }
 
   // The first time says what will happen; the second time, unless something was changed, does it.

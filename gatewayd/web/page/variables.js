@@ -3,7 +3,7 @@
 import { areaOf, factsOf, placesOn } from "./facts.js";
 import { Groups } from "./groups.js";
 import { History } from "./history.js";
-import { FORCED, OPERATOR, make, meaning, number, put, quality, span } from "./words.js";
+import { FORCED, OPERATOR, OPERATOR_NAME, make, meaning, number, put, quality, span } from "./words.js";
 
 const KINDS = [
   ["all", "All", () => true],
@@ -85,7 +85,7 @@ export class Variables {
     this.history.add(now, state.values, state.quality);
     for (const [index, row] of this.rows.entries()) {
       const [owner, left] = owners.get(row.variable.lock) ?? [null, null];
-      const name = owner === null ? "" : owner === OPERATOR ? "operator" : this.layout.writers[owner].name;
+      const name = owner === null ? "" : owner === OPERATOR ? OPERATOR_NAME : this.layout.writers[owner].name;
       row.keep(name, forces.has(index), state.values[index]);
       row.update(state.values[index], state.quality[index], state.ages[index], name, left, forces.get(index));
     }
@@ -189,7 +189,7 @@ class Row {
     this.truth.classList.toggle("muted", its === 0 && reported === value);
     put(this.truth, truth && its > 0 ? `${truth}, ${quality(its, null)}` : truth);
     const words = owner && left !== null ? `${owner}, ${span(left)}` : owner;
-    const source = code === FORCED ? "operator" : "robot";
+    const source = code === FORCED ? OPERATOR_NAME : "robot";
     put(this.holder, this.variable.direction === "input" ? words || "free" : source);
     if (code !== this.code) this.element.dataset.quality = code;
     this.holder.classList.toggle("muted", !owner);

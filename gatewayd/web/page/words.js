@@ -3,6 +3,7 @@
 export const QUALITIES = ["good", "stale", "unavailable", "never reported", "forced", "differs in robot", "out of range", "program not running"];
 export const FORCED = 4;
 export const OPERATOR = 254;
+export const OPERATOR_NAME = "local operator";
 
 export function number(value, kind) {
   if (typeof value === "boolean") return value ? "1" : "0";
