@@ -213,6 +213,23 @@ async def test_the_table_stays_in_its_card_at_every_width(plant: Plant) -> None:
             assert await page.run(OUTSIDE) == [], width
 
 
+@pytest.mark.parametrize("width", [360, 768, 1280, 1920])
+async def test_names_are_broken_behind_underscores_and_nothing_of_the_head_is_cut(
+    plant: Plant, width: int
+) -> None:
+    mapping = CROWDED.replace("  safety:", "  stops: {robot: safety_status_bits, modbus: 106}\n  safety:")
+    async with showing(plant, (width, 900), mapping=mapping) as shown:
+        page = shown.page
+        shown.simulator.do("set safety_status_bits 0xFFF")
+        await page.wait(f"{row('stops', '.meaning')}.endsWith('stopped due to safety, 3PE input active')")
+        assert await page.run(OUTSIDE) == []
+        assert await page.run(BROKEN_WORDS) == []
+        shown.simulator.kill()
+        await page.wait(f"{text('#worst')} === '■ Robot'")
+        cut = "[...document.querySelectorAll('header *')].filter((one) => one.scrollWidth > one.clientWidth + 1)"
+        assert await page.run(f"{cut}.filter((one) => one.clientWidth > 0).map((one) => one.id)") == []
+
+
 async def test_a_forced_value_shows_its_truth_and_the_time_left(plant: Plant) -> None:
     async with showing(plant, WIDE, mapping=CROWDED) as shown:
         page = shown.page
@@ -375,7 +392,7 @@ async def test_what_belongs_together_has_a_label_that_folds_it(plant: Plant) -> 
     """A group that is owned as one, and the elements of a vector; a folded label says what is not good in it."""
     async with showing(plant, WIDE, mapping=CROWDED) as shown:
         page = shown.page
-        labels = "[...document.querySelectorAll('.group:not([hidden]) th')].map((label) => label.textContent).join()"
+        labels = "[...document.querySelectorAll('.group:not([hidden]) td')].map((label) => label.textContent).join()"
         await page.wait(f"{labels} === 'motion2 variables, owned together,q6 variables'")
         lines = "[...document.querySelectorAll('#rows tr:not(.group)')].filter((line) => !line.hidden).length"
         assert await page.run(lines) == 12
@@ -505,6 +522,19 @@ OUTSIDE = """
     .filter((one) => one.checkVisibility() && getComputedStyle(one.closest("thead") ?? one).position !== "absolute")
     .filter((one) => one.getBoundingClientRect().right > card.right + 0.5)
     .map((one) => `${one.className} ${one.textContent}`);
+})()
+"""
+BROKEN_WORDS = """
+(() => {
+  const lines = (node) => {
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    return new Set([...range.getClientRects()].map(({ top }) => Math.round(top))).size;
+  };
+  return [...document.querySelectorAll("#variables td.name :is(button, span), #picture strong")]
+    .filter((one) => one.checkVisibility())
+    .flatMap((one) => [...one.childNodes].filter((node) => node.nodeType === 3 && lines(node) > 1))
+    .map((node) => node.data);
 })()
 """
 CONTRASTS = """

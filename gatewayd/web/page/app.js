@@ -4,7 +4,7 @@ import { Cells, worstOf } from "./cells.js";
 import { Operate } from "./operate.js";
 import { LEVELS, MARKS, Picture } from "./picture.js";
 import { Variables } from "./variables.js";
-import { OPERATOR, OPERATOR_NAME, clock, count, make, printable, put, span } from "./words.js";
+import { OPERATOR, OPERATOR_NAME, clock, count, make, printable, put, putName, span } from "./words.js";
 
 const PERIOD = 250;
 const PATIENCE = 1500;                // without an answer for so long, nothing on the page is believed
@@ -34,7 +34,7 @@ async function choose() {
   operate.allowed = acts;
   operate.close();
   cells.show(found, cell);
-  put(byId("cell"), cell);
+  putName(byId("cell"), cell);
   byId("cell").title = `gatewayd ${gatewayd}`;
   looks = 0;
   layout = await ask(`page/cells/${encodeURIComponent(cell)}`);
@@ -103,7 +103,7 @@ function showLocks(state) {
   state.owned.forEach(([lock, owner, left], index) => {
     const [name, by, rest] = owned.children[index].children;
     const { name: title, variables: members } = layout.locks[lock];
-    put(name, members.length > 1 ? `${title} (${count(members.length, "variable")})` : title);
+    putName(name, members.length > 1 ? `${title} (${count(members.length, "variable")})` : title);
     put(by, owner === OPERATOR ? OPERATOR_NAME : layout.writers[owner].name);
     put(rest, left === null ? "until released" : `${span(left)} left`);
   });

@@ -1,7 +1,7 @@
 // All cells at a glance: each with its mark and, where it is not well, why. The one that is shown is marked.
 
 import { LEVELS, MARKS } from "./picture.js";
-import { make, put } from "./words.js";
+import { make, put, putName } from "./words.js";
 
 const ORDER = ["idle", "good", "warn", "bad"];
 
@@ -44,7 +44,9 @@ export class Cells {
       const link = make("a"), mark = make("span", "mark"), level = make("span", "unseen"), words = make("span", "why");
       link.href = `#${encodeURIComponent(cell.name)}`;
       mark.setAttribute("aria-hidden", "true");
-      link.append(mark, make("strong", "", cell.name), level, words);
+      const name = make("strong");
+      putName(name, cell.name);
+      link.append(mark, name, level, words);
       return { link, mark, level, words };
     });
     this.list.replaceChildren(...this.parts.map(({ link }) => {

@@ -1,6 +1,6 @@
 // Variables that belong together, under one label that folds them: a group that is owned as one, a vector, a range.
 
-import { count, make, put } from "./words.js";
+import { count, make, put, putName } from "./words.js";
 
 // The groups by what names them, in the order of their first members; variables are indices.
 function groupsOf({ variables, locks }) {
@@ -48,11 +48,11 @@ class Label {
     this.folded = false;
     for (const row of this.rows) row.element.classList.add("member");
     this.element = make("tr", "group");
-    const cell = make("th"), button = make("button", "fold", title);
+    const cell = make("td"), button = make("button", "fold");
+    putName(button, title);
     this.words = make("span", "muted");
     this.odd = make("span", "odd");
     cell.colSpan = columns;
-    cell.scope = "colgroup";
     button.type = "button";
     button.setAttribute("aria-expanded", "true");
     button.addEventListener("click", () => {

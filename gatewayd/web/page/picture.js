@@ -1,6 +1,6 @@
 // The cell as a picture: robot - gateway - buses - writers, each with its state in words.
 
-import { make, put } from "./words.js";
+import { make, put, putName } from "./words.js";
 
 export const MARKS = { good: "●", warn: "▲", bad: "■", idle: "○" };
 export const LEVELS = { good: "in order", warn: "attention", bad: "trouble", idle: "not there" };
@@ -76,7 +76,7 @@ export class Picture {
 
   fill(part, told) {
     part.node.dataset.level = told.level;
-    put(part.name, told.name);
+    putName(part.name, told.name);
     put(part.mark, MARKS[told.level]);
     put(part.level, `${LEVELS[told.level]}: `);
     put(part.words, told.words);

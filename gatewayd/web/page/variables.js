@@ -3,7 +3,7 @@
 import { areaOf, factsOf, placesOn } from "./facts.js";
 import { Groups } from "./groups.js";
 import { History } from "./history.js";
-import { FORCED, OPERATOR, OPERATOR_NAME, make, meaning, number, put, quality, span } from "./words.js";
+import { FORCED, OPERATOR, OPERATOR_NAME, make, meaning, number, put, putName, quality, span } from "./words.js";
 
 const KINDS = [
   ["all", "All", () => true],
@@ -146,12 +146,15 @@ class Row {
       ...variable.places.flatMap((place) => [place.address, place.notation])].join(" ").toLowerCase();
     const row = this.element = make("tr", variable.direction);
     row.row = this;
-    this.button = make("button", "name", variable.name);
+    this.button = make("button", "name");
+    putName(this.button, variable.name);
     this.button.type = "button";
     this.button.setAttribute("aria-expanded", "false");
     this.button.addEventListener("click", () => toggle(this));
     this.value = make("span", "value");
     this.canvas = make("canvas", "spark");
+    const robot = make("span", "robot muted");
+    putName(robot, `${variable.direction === "input" ? "→" : "←"}\u00a0${variable.robot}`);
     this.canvas.setAttribute("aria-hidden", "true");
     this.quality = make("span", "quality");
     this.meaning = make("span", "meaning");
@@ -159,7 +162,7 @@ class Row {
     this.holder = make("span", "owner");
     const modbus = placesOn("modbus", variable), objects = placesOn("canopen", variable);
     const cells = [
-      ["name", this.button, make("span", "robot muted", `${variable.direction === "input" ? "→" : "←"}\u00a0${variable.robot}`)],
+      ["name", this.button, robot],
       ["value right", this.value, make("span", "unit muted", variable.unit), this.meaning, this.truth],
       ["plot", this.canvas],
       ["quality", this.quality],
@@ -188,7 +191,7 @@ class Row {
     const truth = its === null ? "" : `${says} ${number(reported, kind)} ${meaning(reported, this.variable) || unit}`.trimEnd();
     this.truth.classList.toggle("muted", its === 0 && reported === value);
     put(this.truth, truth && its > 0 ? `${truth}, ${quality(its, null)}` : truth);
-    const words = owner && left !== null ? `${owner}, ${span(left)}` : owner;
+    const words = owner && left !== null ? `${owner}, ${span(left).replaceAll(" ", "\u00a0")}` : owner;
     const source = code === FORCED ? OPERATOR_NAME : "robot";
     put(this.holder, this.variable.direction === "input" ? words || "free" : source);
     if (code !== this.code) this.element.dataset.quality = code;

@@ -67,6 +67,13 @@ export function make(tag, className = "", text = "") {
   return element;
 }
 
+// A name that may be broken behind its underscores, and copied as it is.
+export function putName(element, name) {
+  const shown = printable(name);
+  if (element.textContent === shown) return;
+  element.replaceChildren(...shown.split(/(?<=_)(?!_)/).flatMap((part, at) => at ? [document.createElement("wbr"), part] : [part]));
+}
+
 // Writes only what has changed: the browser then has nothing to lay out anew.
 export function put(element, text) {
   const shown = printable(text);
