@@ -43,14 +43,18 @@ def lookalike(text: str) -> str:
     return ""
 
 
+def strange_indent(key: str) -> tuple[str, str] | None:
+    """What is wrong with a key that only seems to be indented, and how to mend it: all below it is elsewhere."""
+    return _strange_space(key[0]) if key and _is_strange_space(key[0]) else None
+
+
 def slip_in(lines: Sequence[str], first: int, last: int) -> Slip | None:
     """The slip for which lines `first` to `last` (counted from 1) are no YAML, if it is a usual one."""
     for number in range(first, last + 1):
         line = _COMMENT.sub("", lines[number - 1]) if number <= len(lines) else ""
         column = next((at for at, character in enumerate(line) if _is_strange_space(character)), None)
         if column is not None:
-            message = f"a {_named(line[column])} stands in place of a space"
-            return Slip(number, column + 1, message, "retype the line with ordinary spaces")
+            return Slip(number, column + 1, *_strange_space(line[column]))
     for number in range(max(first, 1), min(last, len(lines)) + 1):
         line = _COMMENT.sub("", lines[number - 1])
         if (found := _NO_SPACE.fullmatch(line)) is not None:
@@ -70,6 +74,10 @@ def _too_deep(lines: Sequence[str], number: int) -> Slip | None:
     message = f"`{here['key']}` is indented deeper than `{above['key']}` above, which has its value already"
     hint = f"begin both with {counted(len(above['indent']), 'space')}, or put the value in quotes"
     return Slip(number, len(here["indent"]) + 1, message, hint)
+
+
+def _strange_space(character: str) -> tuple[str, str]:
+    return f"a {_named(character)} stands in place of a space", "retype the line with ordinary spaces"
 
 
 def _named(character: str) -> str:

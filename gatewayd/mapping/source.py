@@ -27,7 +27,7 @@ from ruamel.yaml.reader import ReaderError
 
 from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule
-from gatewayd.mapping.slips import slip_in
+from gatewayd.mapping.slips import slip_in, strange_indent
 
 MAX_BYTES: Final = 1 << 20
 """Greatest size of a mapping file."""
@@ -186,6 +186,9 @@ class _Reader:
             message = f"tables or lists are nested more than {MAX_DEPTH} deep"
             self._find(syntax.TOO_LARGE, message, error.position, "a mapping needs no more than five levels")
             return None
+        except _SlipError as error:
+            self._find(syntax.YAML_SYNTAX, error.message, error.position, error.hint)
+            return None
         except MarkedYAMLError as error:
             self._syntax(error)
             return None
@@ -255,6 +258,8 @@ class _Reader:
         if not isinstance(key, Scalar):
             message = "a key must be a plain text, not a list or a table"
             self._find(syntax.BAD_NAME, message, key.position, "quote it, or write `key: value`")
+        elif not key.quoted and (slip := strange_indent(key.text)) is not None:
+            raise _SlipError(key.position, *slip)
         elif key.text == "<<" and not key.quoted:
             message = "merge keys (`<<`) are not used in mappings"
             self._find(syntax.ALIAS, message, key.position, "write the keys out")
@@ -334,6 +339,12 @@ _CONTEXTS: Final = {
     "while parsing a block collection": "the list begins here",
     "while scanning a quoted scalar": "the quoted text begins here",
 }
+
+
+class _SlipError(Exception):
+    def __init__(self, position: Position, message: str, hint: str) -> None:
+        super().__init__()
+        self.position, self.message, self.hint = position, message, hint
 
 
 class _TooDeepError(Exception):
