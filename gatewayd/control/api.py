@@ -29,6 +29,7 @@ from gatewayd.core.definition import Value, ValueKind
 from gatewayd.core.events import Event, EventKind, EventRing
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.loop.share import LoopShare
+from gatewayd.report.format import interval
 from gatewayd.report.schema import EventMessage, Json, LockStatus, Status, VersionInfo
 from gatewayd.report.verdict import ServedCell
 from gatewayd.service.audit import Audit
@@ -309,7 +310,7 @@ def _why(refusal: Refusal, runtime: ServedCell) -> str:
     if refusal.reason is Reason.OUT_OF_LIMITS and refusal.variable is not None:
         limits = runtime.cell.definition.variables[refusal.variable].limits
         if limits is not None:
-            return f"{refusal.reason.text}, {limits.low:g}..{limits.high:g}"
+            return f"{refusal.reason.text}, {interval(limits.low, limits.high)}"
     return refusal.reason.text
 
 

@@ -16,6 +16,7 @@ from gatewayd.core.definition import OPERATOR, Variable
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
 from gatewayd.logs.records import fields
+from gatewayd.report.format import interval
 
 LEVELS = {
     EventKind.ROBOT_LOST: logging.WARNING,
@@ -113,7 +114,7 @@ class EventLog:
 def _limits(event: Event, variable: Variable | None) -> str | None:
     """What would have been allowed, where a value was out of it."""
     limits = None if variable is None or event.reason is not Reason.OUT_OF_LIMITS else variable.limits
-    return None if limits is None else f"{limits.low:g}..{limits.high:g}"
+    return None if limits is None else interval(limits.low, limits.high)
 
 
 def _level(event: Event) -> int:

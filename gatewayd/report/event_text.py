@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from gatewayd.core.definition import CellDefinition, Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.refusal import Reason
-from gatewayd.report.format import YOU, counted, value, verb
+from gatewayd.report.format import YOU, counted, exact, interval, value, verb
 from gatewayd.report.printable import printable
 
 ACCEPTED = "write accepted"
@@ -159,7 +159,9 @@ class EventRecord:
         return f"{text} ({inside})" if inside else text
 
     def _refusal(self, refused: str) -> str:
-        wrote = "" if self.new is None else f" = {value(self.new, self.unit)}"
+        # Beside its limits a value has every digit: rounded it would look as if it were within them.
+        new = exact(self.new) if self.limits and isinstance(self.new, float) else self.new
+        wrote = "" if new is None else f" = {value(new, self.unit)}"
         why = f"held by {self.holder}" if self.holder else self.reason
         answer = ", ".join(filter(None, (refused, why, self.limits)))
         request = self.request or f"wrote {self.variable or 'an address'}"
@@ -198,7 +200,7 @@ def _limits(event: Event, definition: CellDefinition) -> str:
     limits = None if event.variable is None else definition.variables[event.variable].limits
     if limits is None or event.reason is not Reason.OUT_OF_LIMITS:
         return ""
-    return f"{value(limits.low)}..{value(limits.high)}"
+    return interval(limits.low, limits.high)
 
 
 def _undeclared_peer(peer: str | None) -> str:

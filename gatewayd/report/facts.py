@@ -13,7 +13,7 @@ from gatewayd.core.definition import Direction, Fallback, Lock, ValueKind, Varia
 from gatewayd.links.contract import Description
 from gatewayd.links.registry import kind_of, kinds
 from gatewayd.mapping.plan import Plan
-from gatewayd.report.format import exact, seconds
+from gatewayd.report.format import exact, interval, seconds
 
 Facts = Mapping[str, str]
 """Name of a fact -> what the plan says; what stands at "nothing" is missing."""
@@ -130,11 +130,7 @@ def _type(variable: Variable) -> str:
 
 def _limits(variable: Variable) -> str:
     limits = variable.limits
-    return (
-        ""
-        if limits is None
-        else f"{exact(limits.low)}..{exact(limits.high)}" + (" clamped" if limits.clamp else "")
-    )
+    return "" if limits is None else interval(limits.low, limits.high) + (" clamped" if limits.clamp else "")
 
 
 def _when_lost(variable: Variable) -> dict[str, str]:

@@ -36,6 +36,11 @@ def exact(number: float) -> str:
     return repr(number).removesuffix(".0").lower()
 
 
+def interval(low: float, high: float) -> str:
+    """`-0.05..0.05`, with every digit that matters: what is just outside must not look as if it were within."""
+    return f"{exact(low)}..{exact(high)}"
+
+
 def seconds(duration: float | None) -> str:
     """`0.25 s`, with every digit that matters; empty for None."""
     return "" if duration is None else f"{exact(duration)} s"

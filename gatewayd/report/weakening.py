@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from itertools import combinations
 
 from gatewayd.core.definition import CellDefinition, Direction, FallbackKind, Lock, Variable, Writer
+from gatewayd.report.format import interval
 
 
 def weakened(old: CellDefinition, new: CellDefinition) -> Iterator[str]:
@@ -100,8 +101,9 @@ def _limits(old: Variable, new: Variable) -> Iterator[str]:
         return
     low, high = (-math.inf, math.inf) if new.limits is None else (new.limits.low, new.limits.high)
     if low < old.limits.low or high > old.limits.high:
-        after = "none" if new.limits is None else f"{low:g}..{high:g}"
-        yield f"`{old.name}` could be written beyond its limits: {old.limits.low:g}..{old.limits.high:g} -> {after}"
+        after = "none" if new.limits is None else interval(low, high)
+        before = interval(old.limits.low, old.limits.high)
+        yield f"`{old.name}` could be written beyond its limits: {before} -> {after}"
     elif new.limits is not None and new.limits.clamp and not old.limits.clamp:
         yield f"`{old.name}` would be brought to its limits where it is refused today: clamp"
 

@@ -36,6 +36,10 @@ def cell() -> Cell:
             "plc wrote limit = 999 N: refused, value out of limits, 0..150 (3 times)",
         ),
         (
+            Event(0, EventKind.REFUSED, LIMIT, 1, PLC, reason=Reason.OUT_OF_LIMITS, new=150.0000001),
+            "plc wrote limit = 150.0000001 N: refused, value out of limits, 0..150",
+        ),
+        (
             Event(
                 0, EventKind.REFUSED, LIMIT, 1, HMI, PLC, Reason.HELD, repeats=2, detail="the last 3.0 s ago"
             ),

@@ -8,7 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.report.format import age, ago, counted, exact, listed, plural, seconds, span, value, verb
+from gatewayd.report.format import (
+    age,
+    ago,
+    counted,
+    exact,
+    interval,
+    listed,
+    plural,
+    seconds,
+    span,
+    value,
+    verb,
+)
 
 
 @pytest.mark.parametrize(
@@ -96,3 +108,8 @@ def test_many_names_are_a_few_and_a_number() -> None:
 def test_numbers_of_mappings_keep_every_digit() -> None:
     assert (exact(0.1), exact(5.0), exact(1e-7)) == ("0.1", "5", "1e-07")
     assert (seconds(2.0), seconds(None)) == ("2 s", "")
+
+
+def test_an_interval_has_every_digit() -> None:
+    assert interval(0, 150.0) == "0..150"
+    assert interval(-0.0505, 1234567.5) == "-0.0505..1234567.5"

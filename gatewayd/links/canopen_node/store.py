@@ -99,9 +99,10 @@ class JsonStore(Store):
             ) from None
 
     def save(self, saved: Saved) -> None:
-        """Write beside the file, wait for the disk, then take its place."""
+        """Write beside the file, wait for the disk, then take its place. The directory need not exist yet."""
         beside = self.path.with_name(self.path.name + ".new")
         try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
             with beside.open("w", encoding="ascii") as file:
                 file.write(json.dumps(_encode(saved), indent=1) + "\n")
                 file.flush()

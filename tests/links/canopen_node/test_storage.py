@@ -199,10 +199,11 @@ def test_an_operational_node_does_not_wait_for_a_disk() -> None:
 
 
 def test_a_disk_that_fails_is_reported_and_nothing_changes(tmp_path: Path) -> None:
-    kept = KeptParameters(JsonStore(tmp_path / "missing" / "file.json"))
+    (tmp_path / "file").write_text("where the directory should be")
+    kept = KeptParameters(JsonStore(tmp_path / "file" / "file.json"))
     kept.client.write(0x1017, 0, 50)
     assert kept.signed(0x1010, 1, b"save").code is AbortCode.HARDWARE
-    assert "cannot be written" in kept.reports[0]
+    assert "cannot be written" in kept.reports[-1]
     kept.service.apply(NmtCommand.RESET_NODE, 5)
     assert kept.client.read(0x1017) == 1000
 

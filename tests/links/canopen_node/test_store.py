@@ -28,6 +28,14 @@ def test_an_edited_file_is_damaged(path: Path) -> None:
         JsonStore(path).load()
 
 
+def test_the_directory_is_made_with_the_first_save(tmp_path: Path) -> None:
+    """Nobody else makes ~/.local/state/gatewayd, and a master that saves would be told of a hardware error."""
+    store = JsonStore(tmp_path / "state" / "gatewayd" / "press-3.json")
+    assert store.load() == Saved()
+    store.save(Saved(layout=7))
+    assert store.load().layout == 7
+
+
 @given(
     st.dictionaries(st.tuples(st.integers(0x1000, 0xFFFF), st.integers(0, 255)), st.binary(max_size=64)),
     st.integers(0, 2**32 - 1),
@@ -70,7 +78,8 @@ async def test_the_loop_goes_on_while_the_disk_writes(path: Path) -> None:
 
 
 async def test_a_disk_that_fails_is_reported_in_the_end(tmp_path: Path) -> None:
-    store = BackgroundStore(tmp_path / "missing" / "file.json")
+    (tmp_path / "file").write_text("where the directory should be")
+    store = BackgroundStore(tmp_path / "file" / "file.json")
     ends: list[StoreError | None] = []
     store.keep(Saved(), ends.append)
     await until(lambda: ends)
