@@ -73,6 +73,10 @@ def _too_deep(lines: Sequence[str], number: int) -> Slip | None:
         return None
     message = f"`{here['key']}` is indented deeper than `{above['key']}` above, which has its value already"
     hint = f"begin both with {counted(len(above['indent']), 'space')}, or put the value in quotes"
+    section = _KEY.match(before[-2][1]) if len(before) > 1 else None
+    if section is not None and section["value"] is None and len(section["indent"]) == len(above["indent"]):
+        spaces = counted(len(here["indent"]), "space")
+        hint = f"begin both with {spaces}: they belong to `{section['key']}`, which has nothing below it otherwise"
     return Slip(number, len(here["indent"]) + 1, message, hint)
 
 

@@ -46,6 +46,7 @@ def test_the_mapping_itself_is_right() -> None:
     "slip, rule, line, message, hint",
     [
         (("  series: e", "   series: e"), "GW101", 5, "`series` is indented deeper than `host`", "2 spaces"),
+        (("  host: 127.0.0.1\n", "host: 127.0.0.1\n"), "GW101", 5, "`series`", "2 spaces: they belong to `robot`"),
         (("  host: 127", "  host:127"), "GW101", 4, "`host:127.0.0.1` has no space", "write `host: 127.0.0.1`"),
         (("  node: 5", "  node:5"), "GW101", 10, "`node:5` has no space after the colon", "write `node: 5`"),
         (("series: e", "series:\u00a0e"), "GW101", 5, "a no-break space (U+00A0) stands", "retype the line"),
