@@ -371,6 +371,28 @@ async def test_a_second_cell_takes_the_unit_ids_0_and_255_from_nobody_unasked(ri
         wires[1].close()
 
 
+async def test_who_writes_over_gaps_is_not_refused_unasked(rigged: Rigged) -> None:
+    """A whole block would be answered with 02 from then on, and its owner fall back by its time-out."""
+    async with rigged() as rig:
+        path = rig.directory / "press.yaml"
+        strict = path.read_text()
+        path.write_text(strict.replace("unit: 1}", "unit: 1, write_gaps: ignore}"))
+        assert (await rig.reloader.reload()).result is Result.APPLIED
+        path.write_text(strict)
+        assert not (await rig.reloader.reload()).kinds, "nobody has written over any"
+        path.write_text(strict.replace("unit: 1}", "unit: 1, write_gaps: ignore}"))
+        assert (await rig.reloader.reload()).result is Result.APPLIED
+        wires = await asyncio.open_connection("127.0.0.1", rig.port)
+        wires[1].write(struct.pack(">HHHBBHHBid2H", 7, 0, 23, 1, 16, 1, 8, 16, 7, 0.5, 1, 1))
+        assert (await asyncio.wait_for(wires[0].readexactly(12), 5))[7] == 16
+        path.write_text(strict)
+        outcome = await rig.reloader.reload()
+        assert outcome.kinds == (ObjectionKind.RELEASE,)
+        assert "press: who writes blocks that cover gaps would be refused with 02" in outcome.text
+        assert (await rig.reloader.reload(accept=outcome.kinds)).result is Result.APPLIED
+        wires[1].close()
+
+
 async def test_cells_are_checked_together(rigged: Rigged) -> None:
     async with rigged() as rig:
         rig.write("  count: {robot: output_int_register_5, modbus: 0}\n", name="stamp", unit=1)

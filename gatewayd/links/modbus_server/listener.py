@@ -14,7 +14,7 @@ from functools import partial
 from types import MappingProxyType
 
 from gatewayd.core.cell import Cell
-from gatewayd.core.objection import Objection
+from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.core.requester import Requester
 from gatewayd.links.contract import Tap
 from gatewayd.links.modbus_server.connection import PeerConnection
@@ -46,6 +46,9 @@ _ACCEPTED_AT_ONCE = 8
 requests. asyncio takes as many at once as it asks the kernel to queue."""
 _BACKLOG = 128
 """Connections that the kernel keeps until they are accepted; of further ones the peer tries again after a second."""
+_GAPS_WRITTEN = (
+    "who writes blocks that cover gaps would be refused with 02, and lose what it owns: write_gaps"
+)
 _NOBODY: Mapping[Cell, Cell] = MappingProxyType({})
 _REMEDIES = {
     errno.EADDRINUSE: "another program listens there; stop it or choose another port under modbus: listen:",
@@ -208,7 +211,14 @@ class ModbusListener:
         ]
 
     def disturbs(self, after: Sequence[NamedPlan]) -> Iterator[tuple[Cell, Objection]]:
-        """Cells whose clients would reach them by the unit ids 0 and 255 no more, if these were the units."""
+        """Cells whose clients would reach them by the unit ids 0 and 255 no more, if these were the units.
+
+        And those where whole blocks were written over gaps (`write_gaps: ignore`), which would be refused.
+        """
+        strict = {name for name, plan in after if not plan.ignore_gaps}
+        for unit in self._units.values():
+            if unit.ignored and unit.plan.ignore_gaps and unit.cell.definition.name in strict:
+                yield unit.cell, Objection(ObjectionKind.RELEASE, _GAPS_WRITTEN)
         cells = {unit.cell.definition.name: unit.cell for unit in self._units.values()}
         before = [(unit.cell.definition.name, unit.plan) for unit in self._units.values()]
         addresses = [its.address for its in self._connections if its.address is not None]
