@@ -146,3 +146,16 @@ def test_the_can_sample_has_bit_rate_and_restart() -> None:
     assert sample["Match"]["Name"] == ["can0"]
     assert sample["CAN"]["BitRate"] == ["500K"]
     assert sample["CAN"]["RestartSec"] == ["100ms"]
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_a_service_may_use_every_kind_of_socket_that_the_gateway_opens(unit: str) -> None:
+    """SocketCAN asks the kernel over netlink how its interface is, and refuses to open without."""
+    ((families,),) = [settings(SYSTEMD / unit)["Service"]["RestrictAddressFamilies"]]
+    opened = {
+        family
+        for path in (SYSTEMD.parent / "gatewayd").rglob("*.py")
+        for family in re.findall(r"\bsocket\.(AF_(?:CAN|NETLINK|UNIX|PACKET))\b", path.read_text())
+    }
+    assert opened >= {"AF_NETLINK"}
+    assert opened <= set(families.split())
