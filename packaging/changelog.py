@@ -28,8 +28,8 @@ def maintainer() -> str:
 
 
 def changes(text: str) -> Iterator[str]:
-    """The sections of one release, each point wrapped."""
-    for section in re.split(r"^### ", text, flags=re.MULTILINE)[1:]:
+    """The sections of one release and the parts of these, each point wrapped."""
+    for section in re.split(r"^#{3,4} ", text, flags=re.MULTILINE)[1:]:
         title, _, points = section.partition("\n")
         yield f"  [ {title} ]"
         for point in re.split(r"^- ", points, flags=re.MULTILINE)[1:]:
