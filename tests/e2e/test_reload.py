@@ -332,7 +332,7 @@ def test_a_reload_while_the_robot_is_away(plant: Plant) -> None:
 
 def test_cells_come_and_go_with_the_files_of_a_directory(plant: Plant) -> None:
     simulator = plant.simulator()
-    first = plant.mapping(CELL, simulator.port, name="first")
+    first = plant.mapping(CELL, simulator.port, name="first", modbus_options=", default_unit: true")
     daemon = plant.daemon(plant.directory)
     plc = plant.ready_plc()
     assert plc.write_integers(0, 77) == 0
