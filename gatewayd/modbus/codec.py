@@ -100,6 +100,8 @@ class Codec:
     """
     ends: Ends
     """Least and greatest value that `decode` gives exactly; None: they need no care."""
+    window: tuple[float, float]
+    """Between which raw numbers, both excluded, `read` is what scale and offset say, or the raw number itself."""
     encode: Callable[[Value], bytes] = field(compare=False, repr=False)
     """Value in the robot's unit -> the type's bytes as they go over the wire. Never raises for numbers."""
     decode: Callable[[Buffer], Value | None] = field(compare=False, repr=False)
@@ -108,11 +110,20 @@ class Codec:
     Whether the robot's type is wide enough is for `Variable.low` and `.high` to say. Raises `struct.error`
     for another number of bytes.
     """
+    read: Callable[[float], Value | None] = field(compare=False, repr=False)
+    """The same of the raw number."""
 
     @property
     def meaning(self) -> list[object]:
         """What a mapping says of it; the rest follows from the variable."""
         return [self.type, self.order, self.scale, self.offset]
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether raw numbers in the window are values of the robot's kind as they are."""
+        number = TYPES[self.type]
+        kind = ValueKind.FLOAT if number.is_real else ValueKind.INT
+        return (self.scale, self.offset) == (1, 0) and self.kind is kind and number.name != "bool"
 
     def __reduce__(self) -> tuple[Callable[..., Codec], tuple[object, ...]]:
         """Between processes it travels as what it was made of: its functions cannot."""
@@ -167,13 +178,18 @@ def _compiled(
     pack, unpack = _swapping(layout) if swapped and not number.is_byte else (layout.pack, layout.unpack)
     plain = scale == 1 and offset == 0
     encode = _plain_encoder(number, pack, kind) if plain else _encoder(number, pack, scale, offset)
-    reader = read_limits(ends, number.code, _meaning(number, scale, offset, kind), scale, offset)
+    read = _meaning(number, scale, offset, kind)
+    reader = read_limits(ends, number.code, read, scale, offset)
+    window = (-math.inf, math.inf)
     if reader is not None:
         decode = _limited_decoder(unpack, scale, offset, kind, reader)
+        window, read = (reader.below, reader.above), reader.read
     else:
         ends = _NO_ENDS
         decode = _plain_decoder(number, unpack, kind) if plain else _decoder(unpack, scale, offset, kind)
-    return Codec(type_name, order, scale, offset, kind, number.words, struct_code, ends, encode, decode)
+    return Codec(
+        type_name, order, scale, offset, kind, number.words, struct_code, ends, window, encode, decode, read
+    )
 
 
 def _is_lossless(number: NumberFormat, kind: ValueKind, low: float | None, high: float | None) -> bool:
@@ -189,10 +205,10 @@ Unpack: TypeAlias = "Callable[[Buffer], tuple[int | float, ...]]"
 
 
 def _swapping(layout: Struct) -> tuple[Pack, Unpack]:
-    return (lambda value: _swap(layout.pack(value))), (lambda data: layout.unpack(_swap(data)))
+    return (lambda value: swap(layout.pack(value))), (lambda data: layout.unpack(swap(data)))
 
 
-def _swap(data: Buffer) -> bytes:
+def swap(data: Buffer) -> bytes:
     """Exchange the two bytes of every word."""
     out = bytearray(data)
     out[0::2], out[1::2] = data[1::2], data[0::2]

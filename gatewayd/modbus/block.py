@@ -1,0 +1,139 @@
+"""Numbers and bits that come in one request, decoded together.
+
+Where each codec would unpack its registers by itself, one `struct` does it for all that have one byte order, and what
+is done with the numbers is done by loops in C.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from operator import add, itemgetter, lt, mul
+from typing import Any, Final
+
+from gatewayd.core.definition import Value, ValueKind
+from gatewayd.modbus.codec import ORDERS, TYPES, Buffer, Codec, swap
+
+BITS_OF: Final = tuple(tuple(bool(byte >> bit & 1) for bit in range(8)) for byte in range(256))
+"""The bits of every byte, least significant first."""
+
+
+@dataclass(frozen=True, slots=True)
+class BitWord:
+    """Bits of one register."""
+
+    word: int
+    """Position of the register in the request."""
+    bits: tuple[int, ...]
+    """Which bits are wanted, in this order; 0 is the least significant."""
+    others: int = 0
+    """Bits that may not be 1."""
+
+
+class Block:
+    """What a request of so many registers holds."""
+
+    def __init__(self, numbers: Sequence[tuple[int, Codec]], bits: Sequence[BitWord] = ()) -> None:
+        """`numbers`: the position of each number's first register, in ascending order, and its codec."""
+        groups: dict[tuple[str, bool], list[int]] = {}
+        for index, (_word, codec) in enumerate(numbers):
+            groups.setdefault(_layout(codec), []).append(index)
+        self.order = tuple(chain.from_iterable(groups.values()))
+        """Which of the numbers `decode` gives first, second, and so on; the bits come after them."""
+        self._groups = tuple(
+            (_unpacker(order, [numbers[index] for index in members]), is_swapped)
+            for (order, is_swapped), members in groups.items()
+        )
+        codecs = [numbers[index][1] for index in self.order]
+        windows = [codec.window for codec in codecs]
+        self._windows = tuple(zip(*windows, strict=True)) if any(map(_is_narrow, windows)) else None
+        self._convert = _converter(codecs)
+        self._bits = tuple((2 * word.word, word.others, _picker(word.bits)) for word in bits)
+
+    def decode(self, data: bytes) -> list[Value] | None:
+        """The numbers in `order`, then the bits, word by word; what each codec makes of its registers.
+
+        None: something takes more care than this, or is no value.
+        """
+        groups = self._groups
+        if len(groups) == 1:
+            ((unpack, is_swapped),) = groups
+            raws = unpack(swap(data) if is_swapped else data)
+        else:
+            raws = tuple(
+                chain.from_iterable(
+                    unpack(swap(data) if is_swapped else data) for unpack, is_swapped in groups
+                )
+            )
+        windows = self._windows
+        if windows is not None and not (all(map(lt, windows[0], raws)) and all(map(lt, raws, windows[1]))):
+            return None
+        values = self._convert(raws)
+        if values is not None:
+            for position, others, pick in self._bits:
+                high, low = data[position : position + 2]
+                if others and (high << 8 | low) & others:
+                    return None
+                values += pick(BITS_OF[low] + BITS_OF[high])
+        return values
+
+
+_Raws = tuple[Any, ...]
+_Convert = Callable[[_Raws], "list[Value] | None"]
+
+
+def _layout(codec: Codec) -> tuple[str, bool]:
+    """Byte order of `struct`, and whether bytes are swapped before; numbers of one register mostly have no order."""
+    byte_order, is_swapped = ORDERS[codec.order]
+    if codec.words == 1 and is_swapped == (byte_order == "<"):
+        return ">", False
+    return byte_order, is_swapped
+
+
+def _unpacker(byte_order: str, numbers: Iterable[tuple[int, Codec]]) -> Callable[[Buffer], _Raws]:
+    codes: list[str] = []
+    behind = 0
+    for word, codec in numbers:
+        codes.append(f"{2 * (word - behind)}x{TYPES[codec.type].code}")
+        behind = word + codec.words
+    return struct.Struct(byte_order + "".join(codes)).unpack_from
+
+
+def _is_narrow(window: tuple[float, float]) -> bool:
+    return window != (-math.inf, math.inf)
+
+
+def _converter(codecs: Sequence[Codec]) -> _Convert:
+    """What makes values of raw numbers that lie in their windows."""
+    if all(codec.is_direct for codec in codecs):
+        return list
+    if all(
+        codec.kind is ValueKind.FLOAT and codec.type != "bool" and not codec.is_direct for codec in codecs
+    ):
+        scales = tuple(codec.scale for codec in codecs)
+        offsets = tuple(codec.offset for codec in codecs)
+        return lambda raws: list(map(add, map(mul, raws, scales), offsets))
+    reads = tuple(_reader(codec) for codec in codecs)
+
+    def convert(raws: _Raws) -> list[Value] | None:
+        values = [read(raw) for read, raw in zip(reads, raws, strict=True)]
+        return None if None in values else values  # type: ignore[return-value]  # no None is among them
+
+    return convert
+
+
+def _reader(codec: Codec) -> Callable[[float], Value | None]:
+    if not codec.is_direct:
+        return codec.read
+    return float if codec.kind is ValueKind.FLOAT else int
+
+
+def _picker(bits: Sequence[int]) -> Callable[[tuple[bool, ...]], Sequence[bool]]:
+    """Takes these of the 16 bits of a register."""
+    if len(bits) == 1:
+        (only,) = bits
+        return lambda word: (word[only],)
+    return itemgetter(*bits)
