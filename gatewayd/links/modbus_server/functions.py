@@ -21,6 +21,7 @@ from gatewayd.core.status import StatusBlock
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.registers import BitTable, RegisterImage, RegisterTable
 from gatewayd.links.modbus_server.unserved import Places, named, unserved
+from gatewayd.links.modbus_server.usual import UsualWrites
 from gatewayd.links.registry import status_fields
 from gatewayd.modbus import identification
 from gatewayd.modbus.areas import (
@@ -57,6 +58,8 @@ class Unit:
         self.plan = plan
         self.cell = cell
         self.image = RegisterImage(plan, cell)
+        self.usual_registers = UsualWrites(cell, self.image.holding.usual)
+        self.usual_coils = UsualWrites(cell, self.image.coils.usual)
         self.places = Places(plan, cell.definition)
         self.status = StatusBlock(cell, status_fields())
         self.identification = Identification(cell.definition.name, cell.definition.fingerprint)
@@ -151,7 +154,7 @@ def _write_coil(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
     address, value = _TWO_WORDS.unpack_from(pdu, 1)
     if value not in {0, _COIL_ON}:
         return ExceptionCode.ILLEGAL_VALUE
-    return _apply_coils(unit, requester, pdu, (address, [value == _COIL_ON]), now) or pdu
+    return _apply_coils(unit, requester, pdu, (address, 1, bytes((value == _COIL_ON,))), now) or pdu
 
 
 def _write_register(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
@@ -163,9 +166,7 @@ def _write_coils(unit: Unit, requester: Requester, pdu: bytes, now: float) -> An
     address, count, size = _WRITE_MULTIPLE.unpack_from(pdu, 1)
     if not 1 <= count <= MAX_WRITE_BITS or size != (count + 7) >> 3 or len(pdu) != 6 + size:
         return ExceptionCode.ILLEGAL_VALUE
-    packed = int.from_bytes(pdu[6:], "little")
-    bits = [bool(packed >> position & 1) for position in range(count)]
-    return _apply_coils(unit, requester, pdu, (address, bits), now) or pdu[:5]
+    return _apply_coils(unit, requester, pdu, (address, count, pdu[6:]), now) or pdu[:5]
 
 
 def _write_multiple(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Answer:
@@ -194,35 +195,46 @@ def _read_write(unit: Unit, requester: Requester, pdu: bytes, now: float) -> Ans
         return ExceptionCode.ILLEGAL_VALUE
     if size != 2 * written or len(pdu) != 10 + size:
         return ExceptionCode.ILLEGAL_VALUE
-    table = unit.image.holding
-    refused = _refuse_registers(unit, table, first, count)
+    refused = _refuse_registers(unit, unit.image.holding, first, count)
     if refused is None:
         refused = _write_registers(unit, requester, pdu, (address, pdu[10:]), now)
     if refused is not None:
         return refused
-    return bytes((pdu[0], 2 * count)) + _registers(unit, table, first, count, now)
+    return bytes((pdu[0], 2 * count)) + _registers(unit, unit.image.holding, first, count, now)
 
 
 def _write_registers(
     unit: Unit, requester: Requester, pdu: bytes, written: tuple[int, bytes], now: float
 ) -> ExceptionCode | None:
     address, data = written
-    if status_layout.covers(address, len(data) // 2):
-        words = struct.unpack(f">{len(data) // 2}H", data)
+    count = len(data) // 2
+    if unit.usual_registers.write(requester, address, count, data, now):
+        return None
+    if status_layout.covers(address, count):
+        words = struct.unpack(f">{count}H", data)
         return _write_status(unit, requester, address, words, now)
     refused = _apply(unit, requester, pdu, unit.image.holding.changes(address, data), now)
-    if refused is None and unit.plan.ignore_gaps:
-        unit.ignored += unit.image.holding.ignored(address, data)
+    if refused is None:
+        unit.usual_registers.accepted(address, count)
+        if unit.plan.ignore_gaps:
+            unit.ignored += unit.image.holding.ignored(address, data)
     return refused
 
 
 def _apply_coils(
-    unit: Unit, requester: Requester, pdu: bytes, written: tuple[int, Sequence[bool]], now: float
+    unit: Unit, requester: Requester, pdu: bytes, written: tuple[int, int, bytes], now: float
 ) -> ExceptionCode | None:
-    address, bits = written
+    """Write so many coils from an address on; the first one is the least significant bit of the data."""
+    address, count, data = written
+    if unit.usual_coils.write(requester, address, count, data, now):
+        return None
+    packed = int.from_bytes(data, "little")
+    bits = [bool(packed >> position & 1) for position in range(count)]
     refused = _apply(unit, requester, pdu, unit.image.coils.changes(address, bits), now)
-    if refused is None and unit.plan.ignore_gaps:
-        unit.ignored += unit.image.coils.ignored(address, len(bits))
+    if refused is None:
+        unit.usual_coils.accepted(address, count)
+        if unit.plan.ignore_gaps:
+            unit.ignored += unit.image.coils.ignored(address, count)
     return refused
 
 

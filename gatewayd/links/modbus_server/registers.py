@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from gatewayd.core.admission import Change, contradiction
 from gatewayd.core.cell import Cell
@@ -19,7 +20,9 @@ from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
 from gatewayd.links.modbus_server.readable import ADDRESSES, Readable
 from gatewayd.links.modbus_server.repeated import Repeated
 from gatewayd.links.modbus_server.runs import Run, bit_runs, number_runs, words_of_bits
+from gatewayd.links.modbus_server.usual import Meaning
 from gatewayd.modbus.areas import MAX_READ_BITS, MAX_READ_REGISTERS, Area
+from gatewayd.modbus.block import BITS_OF, BitWord, Block
 from gatewayd.modbus.codec import Codec
 
 GAPS = range(BASE)
@@ -28,7 +31,7 @@ _NO_GAPS = range(0)
 _WORD = struct.Struct(">H")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Number:
     """A variable that fills whole registers."""
 
@@ -73,7 +76,7 @@ class _Byte:
         return None if value is None else Change(self.variable, value, self.implied)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Bits:
     """A register into which bits and bytes are packed."""
 
@@ -188,6 +191,24 @@ class RegisterTable(_Table):
             position = behind
         return self._repeated.settled(changes, address, data) if self._repeated else changes
 
+    def usual(self, address: int, count: int) -> Meaning | None:
+        """What a write that was accepted is, if its data can be decoded in one go."""
+        items = dict.fromkeys(self._items.get(position) for position in range(address, address + count))
+        numbers: list[tuple[int, _Number]] = []
+        words: list[tuple[BitWord, _Bits]] = []
+        for item in items:
+            if isinstance(item, _Number):
+                numbers.append((item.address - address, item))
+            elif item is None or item.numbers:
+                return None
+            else:
+                bits = tuple(mask.bit_length() - 1 for mask, _variable, _implied in item.bits)
+                words.append((BitWord(item.address - address, bits, item.unmapped), item))
+        block = Block([(at, item.codec) for at, item in numbers], [word for word, _item in words])
+        variables = [numbers[index][1].variable for index in block.order]
+        variables += [variable for _word, item in words for _mask, variable, _implied in item.bits]
+        return tuple(variables), block.decode
+
     def masked(self, address: int, and_mask: int, or_mask: int) -> list[Change] | Refusal:
         """What Mask Write Register means: (present AND and_mask) OR (or_mask AND NOT and_mask).
 
@@ -259,13 +280,25 @@ class BitTable(_Table):
             return refusal
         return changes or Refusal(Reason.NO_SUCH_ADDRESS)
 
+    def usual(self, address: int, count: int) -> Meaning | None:
+        """What a write that was accepted is; None if it covers bits with nothing mapped."""
+        variables = [self._variables.get(position) for position in range(address, address + count)]
+        mapped = tuple(variable for variable in variables if variable is not None)
+        if len(mapped) < count:
+            return None
+
+        def decode(data: bytes) -> list[Value]:
+            return list[Value](chain.from_iterable(map(BITS_OF.__getitem__, data)))[:count]
+
+        return mapped, decode
+
     def ignored(self, address: int, count: int) -> int:
         """Bits that such a write covers without effect."""
         return sum(position not in self._variables for position in range(address, address + count))
 
 
 class RegisterImage:
-    """All four tables of one unit, kept up to date by the cell until `close`."""
+    """All four tables of one unit. They follow the cell until `close`, brought up to date when somebody looks."""
 
     def __init__(self, plan: ModbusPlan, cell: Cell) -> None:
         fill, ignore = plan.fill_gaps, plan.ignore_gaps
@@ -276,16 +309,43 @@ class RegisterImage:
         def bits(area: Area) -> BitTable:
             return BitTable(_of(plan.placements, area), fill_gaps=fill, ignore_gaps=ignore)
 
-        self.holding = table(Area.HOLDING)
-        self.input = table(Area.INPUT)
-        self.coils = bits(Area.COIL)
-        self.discrete = bits(Area.DISCRETE)
+        self._holding = table(Area.HOLDING)
+        self._input = table(Area.INPUT)
+        self._coils = bits(Area.COIL)
+        self._discrete = bits(Area.DISCRETE)
         self._cell = cell
         self._held_back: frozenset[int] = frozenset()
         self._runs = {direction: tuple(self._compile(plan.placements, direction)) for direction in Direction}
-        for direction in Direction:
-            self.refresh(direction)
-        cell.listeners.append(self.refresh)
+        self.changed = set(Direction)
+        """Directions of which something has changed since the tables were brought up to date: whoever keeps a table
+        calls `refresh` before reading, if there are any. The attributes do so by themselves."""
+        # A robot sends 500 packages in a second, of which a PLC may read ten: to note a change has to cost nothing.
+        self._note = self.changed.add
+        cell.listeners.append(self._note)
+
+    @property
+    def holding(self) -> RegisterTable:
+        """Holding registers."""
+        self.refresh()
+        return self._holding
+
+    @property
+    def input(self) -> RegisterTable:
+        """Input registers."""
+        self.refresh()
+        return self._input
+
+    @property
+    def coils(self) -> BitTable:
+        """Coils."""
+        self.refresh()
+        return self._coils
+
+    @property
+    def discrete(self) -> BitTable:
+        """Discrete inputs."""
+        self.refresh()
+        return self._discrete
 
     def readable(self, area: Area) -> Readable:
         """What of an area may be read."""
@@ -294,17 +354,21 @@ class RegisterImage:
 
     def close(self) -> None:
         """Follow the cell no longer."""
-        if self.refresh in self._cell.listeners:
-            self._cell.listeners.remove(self.refresh)
+        if self._note in self._cell.listeners:
+            self._cell.listeners.remove(self._note)
 
-    def refresh(self, direction: Direction) -> None:
-        """Encode what changed of the variables of one direction; the cell calls it after every change."""
+    def refresh(self) -> None:
+        """Encode what has changed since the last call."""
+        if not self.changed:
+            return
         values = self._cell.image.values
-        for run in self._runs[direction]:
-            run.refresh(values)
+        for direction in self.changed:
+            for run in self._runs[direction]:
+                run.refresh(values)
+        self.changed.clear()
         if self._cell.unreadable is not self._held_back:
             self._held_back = self._cell.unreadable
-            for table in (self.holding, self.input, self.coils, self.discrete):
+            for table in (self._holding, self._input, self._coils, self._discrete):
                 table.hold_back(self._held_back)
 
     def _compile(self, placements: Sequence[Placement], direction: Direction) -> Iterator[Run]:
@@ -312,14 +376,14 @@ class RegisterImage:
         flowing = [
             placement for placement in placements if variables[placement.variable].direction is direction
         ]
-        for area, words in ((Area.HOLDING, self.holding), (Area.INPUT, self.input)):
+        for area, words in ((Area.HOLDING, self._holding), (Area.INPUT, self._input)):
             numbers = [placement for placement in _of(flowing, area) if placement.bit is None]
             yield from number_runs(numbers, words.image)
             # A register may mix bits of both directions: each direction then needs all of them to write it whole.
             mixed = {placement.address for placement in _of(flowing, area) if placement.bit is not None}
             packed = [placement for placement in _of(placements, area) if placement.bit is not None]
             yield from words_of_bits([bit for bit in packed if bit.address in mixed], words.image)
-        for area, bits in ((Area.COIL, self.coils), (Area.DISCRETE, self.discrete)):
+        for area, bits in ((Area.COIL, self._coils), (Area.DISCRETE, self._discrete)):
             yield from bit_runs(_of(flowing, area), bits.image)
 
 

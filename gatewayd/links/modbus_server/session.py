@@ -1,7 +1,7 @@
 """One connection's requests: bytes in, answers out, in order, whatever the depth of pipelining. No input or output.
 
-A single read of registers, nearly all of the traffic, is answered here at once; everything else goes to
-`gatewayd.links.modbus_server.functions`.
+A single read of registers, or a usual write of them, is answered here at once: nearly all of the traffic. Everything
+else goes to `gatewayd.links.modbus_server.functions`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,12 @@ _READ_FRAME = 12
 _READ_LENGTH = 6
 _unpack_read = struct.Struct(">2sHHHHH").unpack_from
 """Transaction id, protocol id, length, unit id and function, address, quantity."""
+_WRITE_REGISTERS = 16
+_WRITE_HEAD = 13
+_unpack_write = struct.Struct(">2sHHHHHB").unpack_from
+"""The same, and the count of bytes."""
+_WRITTEN = bytes((0, 0, 0, 6))
+"""What stands between transaction id and unit id in the answer to a write."""
 _HEAD = struct.Struct(">HHBBB")
 _AT_ONCE = 8
 """Requests of one connection that are answered before others have their turn, however many have come in."""
@@ -37,13 +43,15 @@ _THIS_DEVICE = (0, 255)
 class UnitAccess:
     """What a peer may do with one unit."""
 
-    __slots__ = ("requester", "unit", "writer_seen")
+    __slots__ = ("changed", "requester", "unit", "write", "writer_seen")
 
     def __init__(self, unit: Unit, requester: Requester) -> None:
         self.unit = unit
         self.requester = requester
         """The peer as a writer of the unit's cell, or as an undeclared one."""
         self.writer_seen = unit.cell.writer_seen
+        self.changed = unit.image.changed
+        self.write = unit.usual_registers.write
 
 
 class ModbusSession:
@@ -57,6 +65,7 @@ class ModbusSession:
         """Whether requests in the buffer still have to be answered, by calls with a count of 0."""
         self._accesses: dict[int, UnitAccess] = {}
         self._reads: dict[int, tuple[Any, bytearray, tuple[bytes, ...], UnitAccess]] = {}
+        self._writes: dict[int, UnitAccess] = {}
 
     def serve(self, accesses: Mapping[int, UnitAccess]) -> None:
         """Answer for these units from now on. The only one, or the one declared for it, also answers to 0 and 255."""
@@ -71,6 +80,7 @@ class ModbusSession:
             for function, table in ((_READ_HOLDING, image.holding), (_READ_INPUT, image.input)):
                 key = unit << 8 | function
                 self._reads[key] = (table.readable.reach, table.image, _heads(key), access)
+        self._writes = {unit << 8 | _WRITE_REGISTERS: access for unit, access in self._accesses.items()}
 
     def received(self, count: int, now: float) -> bytes:
         """`count` bytes were written to `buffer.space`; returns the answers to the next requests that are complete."""
@@ -80,11 +90,21 @@ class ModbusSession:
             read = self._reads.get(key)
             if read is not None and length == _READ_LENGTH and not protocol:
                 reach, image, heads, access = read
+                if access.changed:
+                    access.unit.image.refresh()
                 if 0 < quantity <= reach[address]:
                     access.writer_seen(access.requester, now)
                     first = 2 * address
                     answer: bytes = transaction + heads[quantity] + image[first : first + 2 * quantity]
                     return answer
+        elif count > _WRITE_HEAD and not buffer.end:
+            transaction, protocol, length, key, address, quantity, size = _unpack_write(buffer.data)
+            writing = self._writes.get(key)
+            whole = count == size + _WRITE_HEAD == length + _WRITE_HEAD - 7 and size == 2 * quantity
+            if writing is not None and whole and not protocol:
+                data = bytes(buffer.data[_WRITE_HEAD:count])
+                if writing.write(writing.requester, address, quantity, data, now):
+                    return bytes(transaction + _WRITTEN + buffer.data[6:12])
         return self._answers(buffer.end + count, now)
 
     def received_late(self, count: int, now: float, waited: float) -> bytes:

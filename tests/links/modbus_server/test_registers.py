@@ -78,6 +78,7 @@ def test_what_the_robot_no_longer_tells_is_cleared_or_held_back(
     holding = unit.image.holding
     assert holding.readable.reach[300] == 4
     cell.robot_lost("cable", 1001.0)
+    holding = unit.image.holding
     assert holding.image[200:204] == bytes(4)
     assert (holding.readable.reach[300], holding.readable.reach[301]) == (0, 3)
     assert unit.image.discrete.readable.reach[40] == 0
@@ -257,5 +258,5 @@ def test_an_input_is_shown_after_it_was_written(cell: Cell, unit: Unit, index_of
 @pytest.mark.parametrize("direction", list(Direction))
 def test_refreshing_what_did_not_change_changes_nothing(unit: Unit, direction: Direction) -> None:
     before = bytes(unit.image.holding.image)
-    unit.image.refresh(direction)
+    unit.image.changed.add(direction)
     assert unit.image.holding.image == before

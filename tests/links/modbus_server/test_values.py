@@ -177,7 +177,7 @@ def test_bytes_of_a_register() -> None:
     assert plant.read(100) == (0xC832,)
     for index, value in zip(plant.cell.image.outputs, (1, 2, 300, 4), strict=True):
         plant.cell.image.values[index] = value
-    plant.unit.image.refresh(Direction.OUTPUT)
+    plant.unit.image.changed.add(Direction.OUTPUT)
     assert plant.ask(struct.pack(">BHH", 4, 7, 3)) == bytes((4, 6, 0, 1, 2, 255, 4, 0))
 
 
