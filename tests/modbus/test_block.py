@@ -43,6 +43,8 @@ def requests(draw: st.DrawFn) -> tuple[list[tuple[int, Codec]], bytes]:
         data += draw(st.binary(max_size=4).map(lambda gap: gap[: len(gap) & ~1]))
         numbers.append((len(data) // 2, codec))
         near = draw(st.sampled_from([0.0, 0.05, -0.05, 100.0, 3.0, -7.0, 12.7, 0.3, 1e6, math.inf, math.nan]))
+        if codec.kind is not ValueKind.FLOAT:
+            near = int(near) if math.isfinite(near) else 0
         size = 2 * codec.words
         data += draw(st.one_of(st.binary(min_size=size, max_size=size), st.just(codec.encode(near))))
     return numbers, data
