@@ -60,7 +60,7 @@ _TEXTS = {
     Reason.HEARTBEAT_LOST: "its heartbeat is missing",
     Reason.PARTIAL_TAKEOVER: "the group is taken over whole or not at all",
     Reason.WAITED: "it waited while the gateway stood still",
-    Reason.NOT_MEANT: "bit of a shared register that the writer does not own",
+    Reason.NOT_MEANT: "bit or byte of a shared register that the writer does not own",
     Reason.CONTRADICTED: "one request gave it two values",
 }
 
