@@ -206,6 +206,7 @@ def test_keys_of_supervision_and_takeover_are_told() -> None:
 
 
 def test_status_words_in_a_pdo_are_told_by_name() -> None:
-    pdos = facts.links(plan())["canopen"]["pdos"]
-    assert "index=24384 subindex=7 bits=16 quality_of=door" in pdos
-    assert pdos.count("quality_of") == 1
+    settings = facts.links(plan())["canopen"]
+    pdos = [text for name, text in settings.items() if name.startswith(("TPDO ", "RPDO "))]
+    assert ["quality of door 5F40h:07/16" in text for text in pdos].count(True) == 1
+    assert "".join(pdos).count("quality of") == 1

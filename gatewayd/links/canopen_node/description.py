@@ -6,8 +6,9 @@ from dataclasses import fields, is_dataclass
 from typing import Any, Final
 
 from gatewayd.core.definition import CellDefinition, Direction
-from gatewayd.links.canopen_node.plan import CanopenPlan, IdentityPlan, ObjectPlan
+from gatewayd.links.canopen_node.plan import CanopenPlan, IdentityPlan, ObjectPlan, PdoEntry, PdoPlan
 from gatewayd.links.contract import Description, Place
+from gatewayd.report.format import exact
 
 
 def description(plan: CanopenPlan, cell: CellDefinition) -> Description:
@@ -19,6 +20,8 @@ def description(plan: CanopenPlan, cell: CellDefinition) -> Description:
     channel = f"{plan.interface}:{plan.channel}"
     settings = by_name(plan, cell)
     del settings["objects"]  # `places` has them
+    del settings["pdos"]
+    settings |= {_pdo_name(pdo): _pdo_text(pdo, cell) for pdo in plan.pdos}
     return Description(settings, places, address=channel, fields={"channel": channel, "node": plan.node})
 
 
@@ -31,6 +34,36 @@ def by_name(part: Any, cell: CellDefinition) -> dict[str, str]:
     Two nodes whose texts are equal are the same one for the bus, whatever else their mappings say.
     """
     return {field.name: _text(field.name, getattr(part, field.name), cell) for field in fields(part)}
+
+
+def _pdo_name(pdo: PdoPlan) -> str:
+    return f"{'RPDO' if pdo.direction is Direction.INPUT else 'TPDO'} {pdo.number}"
+
+
+def _pdo_text(pdo: PdoPlan, cell: CellDefinition) -> str:
+    """`COB-ID 0x185 by the node-ID, transmission 254, inhibit 5 ms: speed 2410h:01/32, force 2410h:02/32`."""
+    event = "event" if pdo.direction is Direction.OUTPUT else "deadline"
+    words = (
+        pdo.name,
+        f"COB-ID 0x{pdo.cob_id:03X}" + (" by the node-ID" if pdo.predefined else ""),
+        f"transmission {pdo.transmission}",
+        f"inhibit {exact(pdo.inhibit / 10)} ms" if pdo.inhibit else "",
+        f"{event} {pdo.event} ms" if pdo.event else "",
+        f"SYNC start {pdo.sync_start}" if pdo.sync_start else "",
+        f"writer {cell.writers[pdo.writer].name}" if pdo.writer is not None else "",
+    )
+    content = ", ".join(_entry_text(entry, cell) for entry in pdo.entries)
+    return f"{', '.join(filter(None, words))}: {content or 'nothing'}"
+
+
+def _entry_text(entry: PdoEntry, cell: CellDefinition) -> str:
+    """Object and size, with the variable that it is or whose quality it tells."""
+    words = (
+        cell.variables[entry.variable].name if entry.variable is not None else "",
+        f"quality of {cell.variables[entry.quality_of].name}" if entry.quality_of is not None else "",
+        f"{entry.index:04X}h:{entry.subindex:02X}/{entry.bits}",
+    )
+    return " ".join(filter(None, words))
 
 
 def _place(placed: ObjectPlan, cob_id: int | None) -> Place:

@@ -25,6 +25,11 @@ def test_objects_pdos_and_address() -> None:
     assert found.address == "socketcan:can0"
     assert found.fields == {"channel": "socketcan:can0", "node": 16}
     assert found.settings["consumers"] == "node=1 timeout=500 writer=line"
+    assert (
+        found.settings["RPDO 1"]
+        == "command, COB-ID 0x210 by the node-ID, transmission 254: order 2070h:01/16"
+    )
+    assert "pdos" not in found.settings
     (order,), (count,) = found.places[0], found.places[1]
     assert order.fields["cob_id"] == 0x210
     assert order.notation == "COB-ID 0x210"
