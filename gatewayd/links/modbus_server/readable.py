@@ -8,6 +8,7 @@ from typing import Any
 
 ADDRESSES = 65536
 """Of each Modbus table."""
+_BYTE = 0xFF
 
 
 class Readable:
@@ -21,7 +22,7 @@ class Readable:
     def __init__(self, addresses: Iterable[int], longest: int) -> None:
         self._longest = longest
         self._held_back: list[range] = []
-        self.mapped: bytearray | array[int] = _numbers([0] * ADDRESSES, longest)
+        self.mapped: bytearray | array[int] = _zeros(ADDRESSES, longest)
         falling = _numbers(range(longest, 0, -1), longest)
         for run in _runs(addresses):
             full = max(0, len(run) - longest)
@@ -43,7 +44,7 @@ class Readable:
             begin = max(0, run.start - self._longest + 1)
             reach[begin : run.stop] = self.mapped[begin : run.stop]
         for run in held_back:
-            reach[run.start : run.stop] = _numbers([0] * len(run), self._longest)
+            reach[run.start : run.stop] = _zeros(len(run), self._longest)
             for ahead in range(1, min(self._longest, run.start + 1)):
                 if reach[run.start - ahead] <= ahead:
                     break
@@ -53,7 +54,12 @@ class Readable:
 
 def _numbers(numbers: Iterable[int], longest: int) -> Any:
     """A bytearray where that is enough: it is looked at with every read."""
-    return bytearray(numbers) if longest <= 0xFF else array("H", numbers)
+    return bytearray(numbers) if longest <= _BYTE else array("H", numbers)
+
+
+def _zeros(count: int, longest: int) -> Any:
+    """The same, all zero, without an object for each: a unit has four tables, and every start makes them."""
+    return bytearray(count) if longest <= _BYTE else array("H", bytes(2 * count))
 
 
 def _runs(addresses: Iterable[int]) -> Iterator[range]:
