@@ -55,6 +55,7 @@ async def _serve(daemon: Daemon, found: Startup, options: Options) -> None:
         lambda accept: reloader.reload(accept=accept),
         stood_still=standstill.seconds,
     )
+    reporter.remarks = access.troubles
     reporting = asyncio.create_task(reporter.run(stop))
     operating = asyncio.create_task(access.run())
     besides = [operating, asyncio.create_task(reloader.run())]

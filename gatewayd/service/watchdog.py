@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Protocol
 
@@ -42,6 +42,8 @@ class ManagerReporter:
         self.notes = tuple(notes)
         self.late: tuple[str, ...] = ()
         """Parts that hang."""
+        self.remarks: Callable[[], Sequence[str]] = tuple
+        """What is wrong with audit and log; with it the cells are served all the same."""
         self._notifier = notifier
         self._daemon = daemon
         self._liveness = Liveness()
@@ -102,7 +104,7 @@ class ManagerReporter:
     def _summary(self, now: float) -> str:
         hanging = (f"hangs: {name}" for name in self.late)
         cells = [(served.cell, verdict_of(served, now)) for served in self._daemon.runtimes]
-        return summary(cells, [*hanging, *self.notes, *self._daemon.troubles()])
+        return summary(cells, [*hanging, *self.notes, *self._daemon.troubles(), *self.remarks()])
 
 
 _WITHOUT_RATES = str.maketrans("", "", "0123456789")

@@ -271,6 +271,23 @@ def test_the_service_manager_hears_of_it(plant: Plant, monkeypatch: pytest.Monke
         assert "reload" not in hear("READY=1", "STATUS=")
 
 
+def test_the_service_manager_hears_of_an_audit_that_cannot_be_written(
+    plant: Plant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address = plant.directory / "notify.sock"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(address))
+        manager.settimeout(15)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(address))
+        simulator = plant.simulator()
+        plant.daemon(
+            plant.mapping(CELL, simulator.port), "--audit", plant.directory / "no-such" / "audit.jsonl"
+        )
+        write_all(plant.ready_plc(), simulator)
+        while "the audit file cannot be written" not in manager.recv(4096).decode():
+            pass
+
+
 def test_two_signals_at_once(plant: Plant) -> None:
     simulator = plant.simulator()
     daemon = plant.daemon(plant.mapping(CELL, simulator.port))

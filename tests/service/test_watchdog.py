@@ -141,6 +141,19 @@ def test_a_changed_number_is_told_later_than_a_changed_word(manager: Manager, no
     assert [one for one in manager.read() if "STATUS" in one] == ["STATUS=at 1 Hz", "STATUS=at 2 Hz"]
 
 
+def test_the_status_has_what_is_wrong_with_audit_and_log(manager: Manager, notifier: Notifier) -> None:
+    gateway = Gateway()
+    gateway.wrong = ["no cell"]
+    reporter = ManagerReporter(notifier, gateway)
+    flooded = "press: more audit records of plc than are kept one by one"
+    reporter.remarks = lambda: [flooded]
+    reporter.look(0.0)
+    assert f"STATUS=no cell; {flooded}" in manager.read()
+    reporter.remarks = list
+    reporter.look(STATUS_PERIOD)
+    assert "STATUS=no cell" in manager.read()
+
+
 def test_a_reload_ends_ready_whatever_came_of_it(manager: Manager, notifier: Notifier) -> None:
     reporter = ManagerReporter(notifier, Gateway())
     reporter.reload_begins()
