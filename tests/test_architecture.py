@@ -180,7 +180,7 @@ LIBRARIES: dict[str, set[str]] = {
     "click": {"__main__", "cli"},
     "prometheus_client": {"web.metrics"},
     "pymodbus": {"demo.plc"},
-    "rich": {"cli", "demo", "report.table"},
+    "rich": {"cli", "demo", "report.screen"},
     "ruamel": {"mapping.source"},
 }
 """Third-party package -> the only modules or packages that may know its types."""

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal
 
 from rich import box
-from rich.console import Group, RenderableType
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
 from gatewayd.demo.snapshot import Line, Snapshot
 from gatewayd.report.format import counted
+from gatewayd.report.screen import wrapped
 from gatewayd.report.words import QUALITY_COLOURS
 
 Poke = tuple[str, str]
 """What a command shows, and the command."""
 
-_WIDE = 98
-"""Columns of a terminal that has room for the CANopen side too."""
+_TINY, _NARROW, _WIDE = 60, 80, 98
+"""Columns of a terminal that has room for the Modbus address and the age, for the robot's register, for CANopen."""
 _SPACIOUS = 115
 """Columns of one that has room for everything, the 4xxxxx form among it."""
 _MIN_EVENTS, _MOST_EVENTS = 3, 8
-_LINES_OF_LINKS = 2
 _FRAME_OF_TABLE = 5
 """Lines of the table that are no variables: title, rules and blank ones."""
+_EDGES = 2
+"""Blank ones above and below it, which a narrow window spares."""
 _FRAME_OF_POKES = 2
 _ABOVE = 4
 """Lines that are left to what was printed before."""
@@ -46,22 +49,20 @@ def commands(port: int, python: str) -> tuple[list[Poke], Poke]:
 def screen(shot: Snapshot, before: Snapshot | None, pokes: Sequence[Poke], width: int, height: int) -> Group:
     """One picture of at most `height` lines; values that differ from `before` are bright."""
     old = {line.row.number: line.value for line in before.lines} if before is not None else {}
-    wide, spacious = width >= _WIDE, width >= _SPACIOUS
-    table = _table(shot.lines, old, wide=wide, spacious=spacious)
-    fixed = _LINES_OF_LINKS + _FRAME_OF_TABLE + len(shot.lines)
+    table = _table(shot.lines, old, width)
+    links = [line for text in _parties(shot, width) for line in wrapped(text, width)]
+    fixed = len(links) + _FRAME_OF_TABLE - (_EDGES if width < _NARROW else 0) + len(shot.lines)
     tall = height >= fixed + _MIN_EVENTS + len(pokes) + _FRAME_OF_POKES
     shown = list(pokes) if tall and width >= _width_of(pokes) else []
     room = height - fixed - (len(shown) + _FRAME_OF_POKES if shown else 0) - _ABOVE
     # A small window gives one event's line to the hint.
     events = min(max(room, _MIN_EVENTS) - (not shown), _MOST_EVENTS)
-    links = _links(shot, spacious=spacious), _canopen(shot, spacious=spacious)
-    left_out = "" if spacious else "4xxxxx" if wide else "4xxxxx, CANopen, PDO"
-    parts: list[RenderableType] = [*links, table, *_events(shot, events)]
-    if shown:
-        parts.extend(_hints(shown, left_out))
-    else:
-        parts.append(_hint(pokes[1], left_out))
-    return Group(*parts)
+    left_out = ", ".join(name for name, needed in _NEEDED.items() if width < needed)
+    hints = list(_hints(shown, left_out)) if shown else wrapped(_hint(pokes[1], left_out), width)
+    if width < _NARROW:
+        # As many as fit below a table that is never cut; there may be none.
+        events = max(0, min(height - fixed - len(hints) - 1, _MOST_EVENTS))
+    return Group(*links, table, *_events(shot, events, width), *hints)
 
 
 def plain(shot: Snapshot) -> str:
@@ -86,77 +87,115 @@ def plain(shot: Snapshot) -> str:
     return "\n".join([links, *lines, *(f"  {event.clock} {event.text}" for event in shot.events[-3:]), ""])
 
 
-def _links(shot: Snapshot, *, spacious: bool) -> Text:
+def _parties(shot: Snapshot, width: int) -> list[Text]:
+    """Who takes part, and how it goes: two to a line, or each on its own where there is no room for two."""
+    robot, plc = _links(shot, spacious=width >= _SPACIOUS)
+    node, line = _canopen(shot, spacious=width >= _SPACIOUS)
+    if width < _NARROW:
+        return [robot, plc, node, line]
+    return [Text("  ").join((left, right)) for left, right in ((robot, plc), (node, line))]
+
+
+def _links(shot: Snapshot, *, spacious: bool) -> tuple[Text, Text]:
     health, program = shot.health, shot.plc.program
     rate = f"{health.frequency:.1f} Hz" if shot.fresh and health.frequency else shot.robot
     packages = f", {counted(health.packages, 'package')}, {health.skipped} skipped" if spacious else ""
-    text = _party(" ● ", "robot", rate + packages, good=shot.fresh)
+    robot = _party("robot", rate + packages, good=shot.fresh)
     right = f"{counted(program.handshakes, 'handshake')}, {counted(program.verified, 'value')} right"
-    text += _party("   ● ", "PLC", right, len(program.wrong), good=shot.plc.connected)
+    text = _party("PLC", right, len(program.wrong), good=shot.plc.connected)
     text.append(f"   {counted(health.writes_accepted, 'write')}, " if spacious else "   ")
-    return text.append(f"{health.writes_refused} refused", "bold red" if health.writes_refused else "")
+    return robot, text.append(f"{health.writes_refused} refused", "bold red" if health.writes_refused else "")
 
 
-def _canopen(shot: Snapshot, *, spacious: bool) -> Text:
+def _canopen(shot: Snapshot, *, spacious: bool) -> tuple[Text, Text]:
     master, good, wrong = shot.master, shot.operational, len(shot.master.feeder.wrong)
     beats = f"{counted(master.heartbeats, 'heartbeat')}, " if spacious else ""
-    text = _party(" ● ", "CANopen", f"{shot.node}, {beats}{shot.pdo_rate} PDOs/s", good=good)
+    node = _party("CANopen", f"{shot.node}, {beats}{shot.pdo_rate} PDOs/s", good=good)
     sent = f"{counted(master.sent, 'RPDO')}, " if spacious else ""
     right = f"{sent}{counted(master.feeder.verified, 'value')} right"
-    text += _party("   ● ", "line", right, wrong, good=good and not wrong)
-    return text.append("   ").append(f"{master.emergencies} EMCY", "bold red" if master.emergencies else "")
+    text = _party("line", right, wrong, good=good and not wrong)
+    return node, text.append("   ").append(
+        f"{master.emergencies} EMCY", "bold red" if master.emergencies else ""
+    )
 
 
-def _party(dot: str, name: str, words: str, wrong: int = 0, *, good: bool) -> Text:
+def _party(name: str, words: str, wrong: int = 0, *, good: bool) -> Text:
     """A party to the demonstration, with a dot that says how it is."""
-    text = Text(no_wrap=True, overflow="ellipsis").append(dot, "green" if good else "red")
+    text = Text().append(" ● ", "green" if good else "red")
     text.append(f"{name} ", "bold").append(words)
     return text.append(f", {wrong} wrong", "bold red") if wrong else text
 
 
-def _table(lines: Sequence[Line], old: dict[int, str], *, wide: bool, spacious: bool) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, int(spacious), 0, 0), pad_edge=False)
-    table.add_column("   variable", no_wrap=True, min_width=14)
-    table.add_column("robot register", no_wrap=True)
-    table.add_column("Modbus", justify="right", no_wrap=True, min_width=6)
-    if spacious:
-        table.add_column("4xxxxx", no_wrap=True)
-    if wide:
-        table.add_column("CANopen", no_wrap=True)
-        table.add_column("PDO", no_wrap=True)
-    table.add_column("value", justify="right", no_wrap=True, min_width=7)
-    table.add_column("quality" if spacious else "state", no_wrap=True, min_width=5)
-    table.add_column("age", justify="right", no_wrap=True, min_width=6)
-    table.add_column("owner", no_wrap=True, min_width=16)
+_COLUMNS: Sequence[tuple[str, Literal["left", "right"], int]] = (
+    ("   variable", "left", 14),
+    ("robot register", "left", 0),
+    ("Modbus", "right", 6),
+    ("4xxxxx", "left", 0),
+    ("CANopen", "left", 0),
+    ("PDO", "left", 0),
+    ("value", "right", 7),
+    ("state", "left", 5),
+    ("age", "right", 6),
+    ("owner", "left", 16),
+)
+"""Head, side and least width."""
+_OF_LEASE = len(" left")
+_NEEDED: Mapping[str, int] = {
+    "4xxxxx": _SPACIOUS,
+    "CANopen": _WIDE,
+    "PDO": _WIDE,
+    "robot register": _NARROW,
+    "Modbus": _TINY,
+    "age": _TINY,
+}
+"""Columns for which a terminal has to be so wide."""
+
+
+def _table(lines: Sequence[Line], old: dict[int, str], width: int) -> Table:
+    spacious = width >= _SPACIOUS
+    table = Table(
+        box=box.SIMPLE_HEAD, padding=(0, int(spacious), 0, 0), pad_edge=False, show_edge=width >= _NARROW
+    )
+    for name, justify, least in _COLUMNS:
+        if width >= _NEEDED.get(name, 0):
+            head = "quality" if name == "state" and spacious else name
+            spared = _OF_LEASE if name == "owner" and width < _TINY else 0
+            table.add_column(head, justify=justify, no_wrap=True, min_width=least - spared)
     previous = lines[0].row.direction if lines else ""
     for line in lines:
         if line.row.direction != previous:
             table.add_section()
             previous = line.row.direction
         changed = old.get(line.row.number, line.value) != line.value
-        table.add_row(*_cells(line, changed=changed, wide=wide, spacious=spacious))
+        cells = _cells(line, changed=changed, width=width)
+        table.add_row(*(cell for name, cell in cells if width >= _NEEDED.get(name, 0)))
     return table
 
 
-def _cells(line: Line, *, changed: bool, wide: bool, spacious: bool) -> Iterator[Text]:
+def _cells(line: Line, *, changed: bool, width: int) -> Iterator[tuple[str, Text]]:
+    """By name of the column."""
     towards = line.row.direction == "input"
     colour = "cyan" if towards else "green"
-    yield Text(" → " if towards else " ← ", f"bold {colour}").append(line.row.name, "bold default")
+    yield (
+        "   variable",
+        Text(" → " if towards else " ← ", f"bold {colour}").append(line.row.name, "bold default"),
+    )
     # Where there is no room for all of the name, its number must not be what is cut.
-    yield Text(line.row["robot"] if wide else line.row["robot"].replace("_register_", " "), colour)
-    yield Text(line.address)
-    if spacious:
-        yield Text(line.row["notation"], "dim")
-    if wide:
-        yield Text(line.row["object"])
-        yield Text(line.row["cob_id"] or ("SDO" if line.row["object"] else ""), "dim")
-    yield Text(line.value, "bold yellow" if changed and line.row.name != "tool_height" else "bold")
-    yield Text(line.quality.name.lower(), QUALITY_COLOURS[line.quality])
-    yield Text(line.age, "dim")
+    robot = line.row["robot"]
+    yield "robot register", Text(robot if width >= _WIDE else robot.replace("_register_", " "), colour)
+    yield "Modbus", Text(line.address)
+    yield "4xxxxx", Text(line.row["notation"], "dim")
+    yield "CANopen", Text(line.row["object"])
+    yield "PDO", Text(line.row["cob_id"] or ("SDO" if line.row["object"] else ""), "dim")
+    yield "value", Text(line.value, "bold yellow" if changed and line.row.name != "tool_height" else "bold")
+    yield "state", Text(line.quality.name.lower(), QUALITY_COLOURS[line.quality])
+    yield "age", Text(line.age, "dim")
     if line.refused:
-        yield Text(line.refused, "bold red")
+        # The answer says it all where there is no room: 06, FF01h.
+        yield "owner", Text(line.refused.rpartition(": ")[2] if width < _TINY else line.refused, "bold red")
     else:
-        yield Text(_owner(line), "yellow" if line.lease else "" if towards else "dim")
+        owner = _owner(line) if width >= _TINY else _owner(line).removesuffix(" left")
+        yield "owner", Text(owner, "yellow" if line.lease else "" if towards else "dim")
 
 
 def _owner(line: Line) -> str:
@@ -165,18 +204,22 @@ def _owner(line: Line) -> str:
     return f"{line.owner}, {line.lease} left" if line.lease else line.owner or "free"
 
 
-def _events(shot: Snapshot, count: int) -> Iterator[Text]:
-    """`count` lines, empty ones above, so that the picture keeps its height."""
-    latest = shot.events[max(0, len(shot.events) - count) :]
-    for event in latest:
-        text = Text(f" {event.clock} ", "dim", no_wrap=True, overflow="ellipsis")
-        yield text.append(event.text, "bold red" if event.bad else "default")
-    yield from (Text("") for _ in range(count - len(latest)))
+def _events(shot: Snapshot, count: int, width: int) -> Iterator[Text]:
+    """`count` lines of the latest events, then empty ones, so that the picture keeps its height."""
+    lines: list[Text] = []
+    for event in reversed(shot.events):
+        text = Text(f" {event.clock} ", "dim").append(event.text, "bold red" if event.bad else "default")
+        broken = wrapped(text, width)
+        if len(lines) + len(broken) > count:
+            break
+        lines[:0] = broken
+    yield from lines
+    yield from (Text("") for _ in range(count - len(lines)))
 
 
 def _hint(poke: Poke, left_out: str) -> Text:
     """What a small window has room for, and the columns for which it has none."""
-    text = Text(" try: ", "dim", no_wrap=True, overflow="ellipsis")
+    text = Text(" try: ", "dim")
     return text.append(poke[1], "bold cyan").append(
         f"   wider: {left_out}" if left_out else "   more in a taller window", "dim"
     )

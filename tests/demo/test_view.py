@@ -6,6 +6,7 @@ import io
 import time
 
 import pytest
+from click import unstyle
 from rich.console import Console
 
 from gatewayd.demo.scene import Scene
@@ -41,6 +42,24 @@ async def test_picture_fits(shot: Snapshot, width: int, height: int) -> None:
     assert "mbpoll -0 -p 1502 -r 10 127.0.0.1 50" in text, "how to take part, in every window"
     assert (" try: " in text) is (height < 30 or (width, height) == (80, 50))
     assert "\u2026" not in text or width > 80, "nothing is cut in the smallest one"
+
+
+@pytest.mark.parametrize("width", [40, 60, 72, 80, 120])
+async def test_nothing_is_cut_and_no_number_broken_at_any_width(shot: Snapshot, width: int) -> None:
+    """Columns without room are named, lines are broken between words, and the height is kept."""
+    picture = [unstyle(line) for line in drawn(shot, width, 24)]
+    assert len(picture) <= 24
+    assert max(map(len, picture)) <= width
+    assert "\u2026" not in "".join(picture)
+    text = " ".join("\n".join(picture).split())
+    for name in ("robot register", "Modbus", "4xxxxx", "CANopen", "PDO", "age"):
+        assert name in text, "as a column or in the hint"
+    assert "mbpoll -0 -p 1502 -r 10 127.0.0.1 50" in text
+    for line in shot.lines:
+        (row,) = [drawn_line for drawn_line in picture if f" {line.row.name} " in drawn_line]
+        assert f" {line.value} " in row
+        assert line.quality.name.lower() in row
+        assert (line.refused.rpartition(": ")[2] or line.owner or "free") in row
 
 
 @pytest.mark.parametrize("width,height", [(80, 24), (80, 50), (100, 24), (100, 50)])
