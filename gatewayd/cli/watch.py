@@ -127,7 +127,7 @@ def _live(console: Console, look: Callable[[], Glimpse], first: Glimpse, view: V
     with _raw(sys.stdin.fileno()), Live(console=console, screen=True, auto_refresh=False) as picture:
         while not view.over:
             width, height = console.size
-            view = settled(view, glimpse, height)
+            view = settled(view, glimpse, width, height)
             picture.update(screen(glimpse, before, view, width), refresh=True)
             for key in keys(sys.stdin.fileno(), max(0.0, due - time.monotonic())):
                 view = press(view, key)

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Any
 
-from rich import box
-from rich.console import Group, RenderableType
-from rich.table import Table
+from rich.console import Group
 from rich.text import Text
 
 from gatewayd.cli import phrases
+from gatewayd.cli.watch_table import Answer, TableLayout, layout
 from gatewayd.report.format import age
-from gatewayd.report.words import LEVEL_COLOURS, QUALITY_COLOURS, SOURCE_LEVELS, quality, source
-
-Answer = Mapping[str, Any]
+from gatewayd.report.screen import wrapped
+from gatewayd.report.words import LEVEL_COLOURS, SOURCE_LEVELS, source
 
 KEYS = "q quit   / filter   Esc clear   d direction   b only bad   space pause   ↑↓ PgUp PgDn scroll"
-_FRAME = 6
-"""Lines that are neither links nor variables nor events: heads, rules, keys."""
+_SHORTER_KEYS = (
+    "q quit   / filter   Esc clear   d b space ↑↓ PgUp PgDn",
+    "q / filter Esc d b space ↑↓ PgUp PgDn",
+)
+_HEAD_OF_TABLE, _SPARE = 2, 1
 _EVENTS = 4
-_NARROW, _WIDE, _SPACIOUS = 80, 96, 124
-"""Columns from which on generous columns, the places, and the robot's name, have room."""
+_LOW = 20
+"""Lines of a screen that is too low for more than the last event."""
 
 
 class Show(Enum):
@@ -61,6 +61,11 @@ class View:
     top: int = 0
     """First variable shown."""
     page: int = field(default=10, compare=False)
+    """Variables that are shown at one time."""
+    room: int = field(default=10, compare=False)
+    """Lines for them."""
+    events: int = field(default=_EVENTS, compare=False)
+    """Lines for events."""
     over: bool = False
 
 
@@ -121,30 +126,49 @@ def chosen(variables: Sequence[Answer], view: View) -> list[Answer]:
     ]
 
 
-def settled(view: View, glimpse: Glimpse, height: int) -> View:
+def settled(view: View, glimpse: Glimpse, width: int, height: int) -> View:
     """The view with its page as high as the screen allows, and scrolled no further than there is anything."""
-    page = _page_height(glimpse, height)
-    last = max(0, len(chosen(glimpse.variables, view)) - page)
-    return replace(view, page=page, top=min(view.top, last))
+    variables = chosen(glimpse.variables, view)
+    found = _layout(variables, glimpse, width)
+    above = len(_above(glimpse, view, width)) + _HEAD_OF_TABLE
+    below = len(_range(_where(0, len(variables), len(variables)), view, found, width)) + 1
+    events = _EVENTS if height >= _LOW else 1
+    room = max(1, height - above - below - events - _SPARE)
+    last = len(variables) - found.shown(variables[::-1], room)
+    top = max(0, min(view.top, last))
+    page = found.shown(variables[top:], room)
+    return replace(view, page=max(1, page), room=room, events=events, top=top)
 
 
-def _page_height(glimpse: Glimpse, height: int) -> int:
-    """How many variables a screen of `height` lines has room for."""
-    return max(1, height - _FRAME - _EVENTS - len(glimpse.status.get("cells", ())))
+def _layout(variables: Sequence[Answer], glimpse: Glimpse, width: int) -> TableLayout:
+    return layout(variables, width, several=len(glimpse.status.get("cells", ())) > 1)
 
 
 def screen(glimpse: Glimpse, before: Glimpse | None, view: View, width: int) -> Group:
     """One picture of a `settled` view; values that differ from `before` are bright."""
     variables = chosen(glimpse.variables, view)
-    room, top = view.page, view.top
+    top = view.top
     former = before.variables if before is not None else ()
     old = {(variable["cell"], variable["name"]): variable["value"] for variable in former}
-    shown = variables[top : top + room]
-    parts: list[RenderableType] = [_head(glimpse, view), *_links(glimpse)]
-    parts.append(_table(shown, old, glimpse, width))
-    parts += [Text("")] * (room - len(shown))
-    parts += [_range(top, len(shown), len(variables), view, width), *_events(glimpse), _keys(view)]
-    return Group(*parts)
+    shown = variables[top : top + view.page]
+    found = _layout(variables, glimpse, width)
+    empty = view.room - sum(map(found.height, shown))
+    return Group(
+        *_above(glimpse, view, width),
+        found.table(shown, old, "dim" if glimpse.lost else ""),
+        *[Text("")] * empty,
+        *_range(_where(top, len(shown), len(variables)), view, found, width),
+        *_events(glimpse, view.events, width),
+        _keys(view, width),
+    )
+
+
+def _where(top: int, shown: int, found: int) -> str:
+    return f"{top + 1}-{top + shown} of {found}" if shown else ""
+
+
+def _above(glimpse: Glimpse, view: View, width: int) -> list[Text]:
+    return [line for text in (_head(glimpse, view), *_links(glimpse)) for line in wrapped(text, width)]
 
 
 def plain(glimpse: Glimpse, view: View) -> str:
@@ -163,7 +187,7 @@ def plain(glimpse: Glimpse, view: View) -> str:
 
 
 def _head(glimpse: Glimpse, view: View) -> Text:
-    text = Text(no_wrap=True, overflow="ellipsis")
+    text = Text()
     if glimpse.lost:
         return text.append(f" everything below is old: {glimpse.lost} ", "bold white on red")
     status = glimpse.status
@@ -184,7 +208,7 @@ def _health(status: Answer) -> str:
 def _links(glimpse: Glimpse) -> Iterator[Text]:
     for cell in glimpse.status.get("cells", ()):
         style = "dim" if glimpse.lost else LEVEL_COLOURS[SOURCE_LEVELS[source(cell["robot"]["state"])]]
-        text = Text(no_wrap=True, overflow="ellipsis").append(" ● ", style).append(cell["name"], "bold")
+        text = Text().append(" ● ", style).append(cell["name"], "bold")
         yield text.append(f"  {_link_words(cell)}")
 
 
@@ -199,84 +223,35 @@ def _link_words(cell: Answer) -> str:
     return "   ".join(words)
 
 
-def _table(shown: Sequence[Answer], old: Mapping[Any, Any], glimpse: Glimpse, width: int) -> Table:
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1 if width < _NARROW else 2, 0, 0),
-        pad_edge=False,
-        expand=False,
-        show_edge=False,
-    )
-    several = len(glimpse.status.get("cells", ())) > 1
-    narrow = width < _NARROW
-    longest = max((len(phrases.value(variable)) for variable in shown), default=0)
-    table.add_column(
-        "   variable", no_wrap=True, min_width=None if narrow else 18, max_width=16 if narrow else 32
-    )
-    table.add_column("value", justify="right", no_wrap=True, min_width=max(5 if narrow else 10, longest))
-    table.add_column("quality", no_wrap=True, min_width=6 if narrow else 12)
-    table.add_column("age", justify="right", no_wrap=True, min_width=6 if narrow else 7)
-    table.add_column("owner", no_wrap=True, min_width=5 if narrow else 18, max_width=14 if narrow else None)
-    if width >= _WIDE:
-        table.add_column("places", no_wrap=True, min_width=8, max_width=24)
-    if width >= _SPACIOUS:
-        table.add_column("robot register", no_wrap=True)
-    for variable in shown:
-        table.add_row(*_cells(variable, old, width, several=several), style="dim" if glimpse.lost else "")
-    return table
-
-
-def _cells(variable: Answer, old: Mapping[Any, Any], width: int, *, several: bool) -> Iterator[Text]:
-    towards = variable["direction"] == "input"
-    colour = "cyan" if towards else "green"
-    name = f"{variable['cell']}:{variable['name']}" if several else variable["name"]
-    yield Text(" → " if towards else " ← ", f"bold {colour}").append(name, "bold default")
-    changed = old.get((variable["cell"], variable["name"]), variable["value"]) != variable["value"]
-    yield Text(phrases.value(variable), "bold yellow" if changed else "bold")
-    yield Text(phrases.quality(variable["quality"]), QUALITY_COLOURS[quality(variable["quality"])])
-    yield Text(age(variable["age"]), "dim")
-    style = (
-        "magenta"
-        if variable["forced"] or variable["owner"] == "operator"
-        else "yellow"
-        if variable["lease"]
-        else ""
-    )
-    yield Text(phrases.owner(variable), style if towards or variable["forced"] else "dim")
-    if width >= _WIDE:
-        yield Text(phrases.places(variable), "dim")
-    if width >= _SPACIOUS:
-        yield Text(variable["robot"], "dim")
-
-
-_ONLY_WIDE = {"places": _WIDE, "robot register": _SPACIOUS}
-"""Columns that a narrow screen leaves out, and the width that each needs."""
-
-
-def _range(top: int, shown: int, found: int, view: View, width: int) -> Text:
-    text = Text(" ", no_wrap=True, overflow="ellipsis")
-    text.append(
-        f"{top + 1}-{top + shown} of {found}" if shown else "no variable matches",
-        "dim" if shown else "yellow",
-    )
+def _range(where: str, view: View, table: TableLayout, width: int) -> list[Text]:
+    text = Text(" ").append(where or "no variable matches", "dim" if where else "yellow")
     text.append(f"   direction: {view.show.value}" if view.show is not Show.ALL else "", "cyan")
     text.append("   only bad" if view.only_bad else "", "cyan")
     if view.typing:
         text.append(f"   filter: {view.filter}▏", "bold yellow")
     elif view.filter:
         text.append(f"   filter: {view.filter}", "yellow")
-    left_out = [name for name, needed in _ONLY_WIDE.items() if width < needed]
-    return text.append(f"   wider: {', '.join(left_out)}" if left_out else "", "dim")
+    text.append(f"   wider: {', '.join(table.left_out)}" if table.left_out else "", "dim")
+    return wrapped(text, width)
 
 
-def _events(glimpse: Glimpse) -> Iterator[Text]:
-    latest = glimpse.events[-_EVENTS:]
-    for event in latest:
-        text = Text(f" {phrases.clock(event['time'])} ", "dim", no_wrap=True, overflow="ellipsis")
-        yield text.append(event["text"], "yellow" if event["bad"] else "default")
-    yield from (Text("") for _ in range(_EVENTS - len(latest)))
+def _events(glimpse: Glimpse, count: int, width: int) -> list[Text]:
+    """The latest, in `count` lines, the last of them at the bottom; of the newest at least its beginning."""
+    lines: list[Text] = []
+    for event in reversed(glimpse.events):
+        text = Text(f" {phrases.clock(event['time'])} ", "dim")
+        broken = wrapped(text.append(event["text"], "yellow" if event["bad"] else "default"), width)
+        if lines and len(lines) + len(broken) > count:
+            break
+        lines[:0] = broken
+    return lines[:count] + [Text("")] * (count - len(lines))
 
 
-def _keys(view: View) -> Text:
-    keys = "type to filter by name, register or owner   Enter keep   Esc clear" if view.typing else KEYS
-    return Text(f" {keys}", "reverse", no_wrap=True, overflow="ellipsis")
+def _keys(view: View, width: int) -> Text:
+    typing = (
+        "type to filter by name, register or owner   Enter keep   Esc clear",
+        "type   Enter keep   Esc clear",
+    )
+    keys = typing if view.typing else (KEYS, *_SHORTER_KEYS)
+    shown = next((text for text in keys if len(text) < width), keys[-1])
+    return Text(f" {shown}", "reverse", no_wrap=True, overflow="crop")

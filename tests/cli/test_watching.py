@@ -41,7 +41,7 @@ def test_lines_without_a_match_say_so(served: Served) -> None:
 def picture(found: Glimpse, view: View, width: int, height: int, before: Glimpse | None = None) -> list[str]:
     console = Console(width=width, height=height, record=True, file=None, force_terminal=False, quiet=False)
     with console.capture() as captured:
-        console.print(screen(found, before, settled(view, found, height), width))
+        console.print(screen(found, before, settled(view, found, width, height), width))
     return captured.get().rstrip("\n").split("\n")
 
 
@@ -51,6 +51,19 @@ def test_it_fits_and_shows_the_keys(served: Served, width: int, height: int) -> 
     assert len(lines) <= height
     assert all(len(line) <= width for line in lines)
     assert lines[-1].strip().startswith(KEYS[:30])
+
+
+@pytest.mark.parametrize("width", [40, 60, 72, 80, 120])
+def test_long_lines_are_broken_and_not_cut(served: Served, width: int) -> None:
+    assert served.cell.operator.force(CYCLES, 1234567890, 1.0, 31.0) is None
+    served.cell.robot_lost("connection refused: the robot is booting, or its RTDE service is off", 1.0)
+    lines = picture(glimpse(served), View(), width, 40)
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= width
+    text = " ".join("\n".join(lines).split())
+    assert "\u2026" not in text
+    for whole in ("robot lost", "writes 0 accepted, 0 refused", "modbus listening", "1234567890"):
+        assert whole in text
 
 
 @pytest.mark.parametrize(
@@ -142,9 +155,9 @@ class TestKeys:
 
     def test_scrolling_stops_at_both_ends(self, served: Served) -> None:
         found = glimpse(served)
-        view = settled(press(View(), "end"), found, 15)
+        view = settled(press(View(), "end"), found, 100, 15)
         assert view.top == 12 - view.page
-        assert settled(press(view, "up"), found, 15).top == view.top - 1
+        assert settled(press(view, "up"), found, 100, 15).top == view.top - 1
         assert press(view, "home").top == 0
         assert press(View(), "up").top == 0
         assert press(replace(view, top=0), "pgdn").top == view.page
