@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
+from gatewayd.cli.printing import echo
 from gatewayd.cli.remote import (
     DURATION,
     UNREACHABLE,
@@ -220,4 +221,4 @@ def _print(found: Mapping[str, Any], *, as_json: bool) -> None:
         return
     found = readable(found)
     text = click.style(found["text"], fg="yellow" if found["bad"] else None)
-    click.echo(f"{found['time']} {found['cell']}  {text}")
+    echo(f"{found['time']} {found['cell']}  {text}")

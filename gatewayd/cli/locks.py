@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gatewayd.cli.printing import on_screen
 from gatewayd.cli.remote import (
     DURATION,
     cell_option,
@@ -123,8 +123,7 @@ def _lined_up(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
     """The rows in columns, each broken between words where the terminal is narrow; those of a pipe are not."""
     from gatewayd.report.fitting import fitted, folded
 
-    known = sys.stdout.isatty() or "COLUMNS" in os.environ
-    width = shutil.get_terminal_size().columns if known else sys.maxsize
+    width = shutil.get_terminal_size().columns if on_screen() else sys.maxsize
     texts = {str(place): column for place, column in enumerate(zip(*rows, strict=True))}
     widths = list(fitted(texts, width - len(texts) + 1, ()).widths.values())
     for row in rows:

@@ -8,14 +8,19 @@ import sys
 import click
 
 
+def on_terminal() -> bool:
+    """Whether a person looks at what is printed."""
+    return sys.stdout.isatty()
+
+
 def on_screen() -> bool:
-    """Whether it is known how wide lines may be: by a terminal, or by COLUMNS."""
-    return sys.stdout.isatty() or "COLUMNS" in os.environ
+    """Whether it is known how wide a table may be: by a terminal, or by COLUMNS."""
+    return on_terminal() or "COLUMNS" in os.environ
 
 
-def echo(line: str) -> None:
-    """Print a line, which may have colours: broken where a screen is known to be narrower."""
-    if not on_screen():
+def echo(line: str, *, broken: bool | None = None) -> None:
+    """Print a line, which may have colours; `broken` where it is longer than the screen (None: on a terminal)."""
+    if not (on_terminal() if broken is None else broken):
         click.echo(line)
         return
     from rich.console import Console

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from gatewayd.cli.files import format_option, load_plan
+from gatewayd.cli.printing import echo, on_screen
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
@@ -73,18 +74,14 @@ def command(context: click.Context, file: str, form: str, *, every: bool) -> Non
 
 
 def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
-    import os
-    import sys
-
     from rich.console import Console
 
     from gatewayd.links.registry import tables
     from gatewayd.report.table import by_line, rows
 
     entries = [(row, row) for row in rows(loaded.cell)] if every else list(by_line(loaded.cell))
-    known = sys.stdout.isatty() or "COLUMNS" in os.environ
-    console = Console(width=None if known else PIPE_WIDTH, markup=False, highlight=False)
-    console.print(printable(_heading(plan)), style="bold")
+    console = Console(width=None if on_screen() else PIPE_WIDTH, markup=False, highlight=False)
+    echo(click.style(printable(_heading(plan)), bold=True), broken=on_screen())
     table, dropped = _table(entries, console.width)
     console.print(table)
     for link in tables():
@@ -92,11 +89,14 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
         if further is not None:
             console.print(_further_table(further, console.width))
             for line in further.notes:
-                console.print(line, soft_wrap=True)
+                echo(line, broken=on_screen())
     if dropped:
-        click.echo(f"left out, as the screen is narrow: {', '.join(dropped)}; --format csv has all columns")
+        echo(
+            f"left out, as the screen is narrow: {', '.join(dropped)}; --format csv has all columns",
+            broken=on_screen(),
+        )
     for line in _notes(loaded, plan, shortened=any(first is not last for first, last in entries)):
-        console.print(printable(line), style="dim", soft_wrap=True)
+        echo(click.style(printable(line), dim=True), broken=on_screen())
 
 
 def _heading(plan: Plan) -> str:

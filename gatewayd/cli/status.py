@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gatewayd.cli.printing import echo
 from gatewayd.cli.remote import cell_option, echo_json, json_option, on_gateway, readable
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def command(context: click.Context, client: Client, cell: str | None, *, as_json
         echo_json(answer)
     else:
         for line in _lines(*readable([answer, locks, events])):
-            click.echo(line)
+            echo(line)
     context.exit(0 if answer["healthy"] else DEGRADED)
 
 
