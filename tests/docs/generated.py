@@ -251,22 +251,24 @@ def status_tables() -> str:
 
 
 _QUALITIES = {
-    Quality.GOOD: "the value is what its source told last, and the source is alive",
-    Quality.STALE: "the source has stopped telling; outputs show `on_stale`",
+    Quality.GOOD: "the value is the latest from its source, and the source is alive",
+    Quality.STALE: "the source has stopped sending; outputs show `on_stale`",
     Quality.UNAVAILABLE: "the controller does not have the field, or gave the register to another client",
-    Quality.NEVER: "nothing has been told yet",
-    Quality.FORCED: "the local operator put the value there for commissioning",
+    Quality.NEVER: "no value yet",
+    Quality.FORCED: "the local operator has set the value for commissioning",
     Quality.DIFFERS: "the robot holds something else than it was given",
-    Quality.OUT_OF_RANGE: "one of its places cannot show the value: there it is saturated, or 0 for what is no number",
-    Quality.NOT_RUNNING: "it is valid only while the robot program runs, and it does not; outputs show `on_stale`",
+    Quality.OUT_OF_RANGE: "one of its addresses cannot show the value: there it is saturated, or 0 for NaN",
+    Quality.NOT_RUNNING: (
+        "it is valid only while the robot program runs, and the program does not; outputs show `on_stale`"
+    ),
 }
 _SOURCES = {
     Source.LOST: "no connection to the controller",
     Source.WAITING: "connected, no package yet",
-    Source.FRESH: "packages come and tell something new",
+    Source.FRESH: "packages arrive, in time and with advancing time",
     Source.SILENT: "connected, but no package for longer than `stale_after`",
-    Source.FROZEN: "packages come, but the controller's own time stands still",
-    Source.LATE: "packages come, but what they report is older than `stale_after`",
+    Source.FROZEN: "packages arrive, but the controller's own time does not advance",
+    Source.LATE: "packages arrive, but their values are older than `stale_after`",
 }
 
 
@@ -295,13 +297,13 @@ def refusals() -> str:
         (reason.value, reason.text, f"{EXCEPTION_OF[reason]:02X}", PRECEDENCE[reason] + 1)
         for reason in Reason
     ]
-    return table(("reason", "in words", "exception", "told first"), rows)
+    return table(("reason", "in words", "exception", "precedence"), rows)
 
 
 _EXCEPTIONS = {
     ExceptionCode.ILLEGAL_FUNCTION: "a function code that is not served",
-    ExceptionCode.ILLEGAL_ADDRESS: "nothing is mapped there, or this peer may never write it",
-    ExceptionCode.ILLEGAL_VALUE: "a malformed request, a value out of limits, or a part of a value",
+    ExceptionCode.ILLEGAL_ADDRESS: "an unmapped address, or this peer may never write it",
+    ExceptionCode.ILLEGAL_VALUE: "a malformed request, a value out of limits, or part of a value",
     ExceptionCode.DEVICE_FAILURE: "in place of 0B, where `robot_away: device_failure` says so",
     ExceptionCode.BUSY: "another writer owns it now: try again later",
     ExceptionCode.PATH_UNAVAILABLE: "the controller gave the register to another client, or does not have it",
