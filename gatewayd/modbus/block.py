@@ -12,13 +12,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from operator import add, itemgetter, lt, mul
-from typing import Any, Final
+from typing import Any
 
 from gatewayd.core.definition import Value, ValueKind
+from gatewayd.encoding.bits import BITS_OF, unpacked
 from gatewayd.modbus.codec import ORDERS, TYPES, Buffer, Codec, swap
-
-BITS_OF: Final = tuple(tuple(bool(byte >> bit & 1) for bit in range(8)) for byte in range(256))
-"""The bits of every byte, least significant first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,3 +135,8 @@ def _picker(bits: Sequence[int]) -> Callable[[tuple[bool, ...]], Sequence[bool]]
         (only,) = bits
         return lambda word: (word[only],)
     return itemgetter(*bits)
+
+
+def coils(data: bytes, count: int) -> list[Value]:
+    """So many coils, as a request packs them: the first one in the least significant bit of the first byte."""
+    return list(unpacked(data, count))

@@ -70,6 +70,7 @@ class CanLink(Link, Observer):
         )
         self._timer: asyncio.TimerHandle | None = None
         self._catching: asyncio.Handle | None = None
+        self._inputs_changed: asyncio.Handle | None = None
         self._due = math.inf
         self._runs = False
         self._started = False
@@ -411,10 +412,26 @@ class CanLink(Link, Observer):
         if self._catching is not None:
             self._catching.cancel()
             self.node.caught_up()
-        self._timer, self._catching, self._due = None, None, math.inf
+        if self._inputs_changed is not None:
+            self._inputs_changed.cancel()
+        self._timer, self._catching, self._inputs_changed, self._due = None, None, None, math.inf
         self._switching.clear()
 
     def _on_image(self, direction: Direction) -> None:
+        """The cell has changed. Of inputs the node hears once in a turn of the loop, however many were written in it.
+
+        Of outputs at once: packages may come together, and a pulse of one of them must not be lost.
+        """
+        if direction is Direction.OUTPUT or not self._runs:
+            self._look_at_image(direction)
+        elif self._inputs_changed is None:
+            self._inputs_changed = asyncio.get_running_loop().call_soon(self._look_at_inputs)
+
+    def _look_at_inputs(self) -> None:
+        self._inputs_changed = None
+        self._look_at_image(Direction.INPUT)
+
+    def _look_at_image(self, direction: Direction) -> None:
         now = clock.now()
         self.node.image_changed(direction, now)
         self._schedule(now)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from functools import partial
 
 from gatewayd.core.admission import Change, contradiction
 from gatewayd.core.cell import Cell
@@ -22,7 +22,7 @@ from gatewayd.links.modbus_server.repeated import Repeated
 from gatewayd.links.modbus_server.runs import Run, bit_runs, number_runs, words_of_bits
 from gatewayd.links.modbus_server.usual import Meaning
 from gatewayd.modbus.areas import MAX_READ_BITS, MAX_READ_REGISTERS, Area
-from gatewayd.modbus.block import BITS_OF, BitWord, Block
+from gatewayd.modbus.block import BitWord, Block, coils
 from gatewayd.modbus.codec import Codec
 
 GAPS = range(BASE)
@@ -286,11 +286,7 @@ class BitTable(_Table):
         mapped = tuple(variable for variable in variables if variable is not None)
         if len(mapped) < count:
             return None
-
-        def decode(data: bytes) -> list[Value]:
-            return list[Value](chain.from_iterable(map(BITS_OF.__getitem__, data)))[:count]
-
-        return mapped, decode
+        return mapped, partial(coils, count=count)
 
     def ignored(self, address: int, count: int) -> int:
         """Bits that such a write covers without effect."""

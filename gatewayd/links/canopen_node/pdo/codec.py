@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain, groupby
+from itertools import groupby
 from operator import itemgetter
 from typing import Any, Final
 
@@ -25,6 +25,7 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.admission import Change, contradiction
 from gatewayd.core.definition import Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
+from gatewayd.encoding.bits import unpacked
 from gatewayd.encoding.limits import LimitReader, Meaning, ends_of, read_limits
 from gatewayd.encoding.linear import meaning_of, saturated, whole
 
@@ -33,8 +34,6 @@ MAX_BITS: Final = 64
 
 _DIGITS: Final = b"0" + b"1" * 255
 """Truth of a byte as a binary digit, for `bytes.translate`."""
-_BITS_OF: Final = tuple(tuple(byte >> bit & 1 for bit in range(8)) for byte in range(256))
-"""The bits of every byte, least significant first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,16 +169,24 @@ class Layout:
             [fit(value, entry.type, entry.linear) for value, entry in zip(content, self.content, strict=True)]
         )
 
-    def changes(self, data: bytes) -> list[Change] | Refusal:
-        """What `size` bytes mean for the cell. Every bit is meant: who maps it into an RPDO sends it on purpose.
-
-        A refusal says which variable has no value for what was received, or is given two.
-        """
-        changes: list[Change] = []
+    def values(self, data: bytes) -> list[Value] | Refusal:
+        """What `size` bytes say, for `variables`. A refusal says which variable has no value for what was received."""
+        values: list[Value] = []
         for receive, raw in zip(self._receivers, self._unpack(data), strict=True):
-            refusal = receive(raw, changes)
+            refusal = receive(raw, values)
             if refusal is not None:
                 return refusal
+        return values
+
+    def changes(self, data: bytes) -> list[Change] | Refusal:
+        """What they mean for the cell. Every bit is meant: who maps it into an RPDO sends it on purpose.
+
+        Refused also if a variable is given two values.
+        """
+        values = self.values(data)
+        if isinstance(values, Refusal):
+            return values
+        changes = [Change(variable, value) for variable, value in zip(self.variables, values, strict=True)]
         return (contradiction(changes) if self._is_repeated else None) or changes
 
     def _packed(self, content: Sequence[Value]) -> bytes:
@@ -252,8 +259,8 @@ def _slices(runs: Iterable[_Run]) -> Iterator[tuple[slice, int]]:
         position += run.values
 
 
-Receive = Callable[[Any, list[Change]], Refusal | None]
-"""Appends what an item of the unpacked PDO means to the changes, or returns why not."""
+Receive = Callable[[Any, list[Value]], Refusal | None]
+"""Appends what an item of the unpacked PDO says to the values, or returns why not."""
 
 
 def _number_receiver(variable: int, mapped: Mapped, declared: Variable) -> Receive:
@@ -264,23 +271,24 @@ def _number_receiver(variable: int, mapped: Mapped, declared: Variable) -> Recei
     # Without limits to mind every number is between these; only infinities and NaN are read to come out the same.
     below, above = (reader.below, reader.above) if reader is not None else (-math.inf, math.inf)
 
-    def receive(raw: Any, changes: list[Change]) -> Refusal | None:
+    def receive(raw: Any, values: list[Value]) -> Refusal | None:
         value = raw if is_direct and below < raw < above else read(raw)
         if value is None:
             return Refusal(Reason.OUT_OF_LIMITS, variable)
-        changes.append(Change(variable, value))
+        values.append(value)
         return None
 
     return receive
 
 
 def _bit_receiver(members: Sequence[int], variables: Sequence[Variable]) -> Receive:
-    """Both changes of every bit are made in advance."""
-    values = {ValueKind.BOOL: (False, True), ValueKind.INT: (0, 1), ValueKind.FLOAT: (0.0, 1.0)}
-    pairs = [tuple(Change(index, value) for value in values[variables[index].kind]) for index in members]
+    """Bits of variables that are no truths are numbers."""
+    count, kinds = len(members), [variables[index].kind for index in members]
+    truth = {ValueKind.BOOL: bool, ValueKind.INT: int, ValueKind.FLOAT: float}
+    convert = None if set(kinds) == {ValueKind.BOOL} else [truth[kind] for kind in kinds]
 
-    def receive(raw: Any, changes: list[Change]) -> None:
-        bits = chain.from_iterable(map(_BITS_OF.__getitem__, raw))
-        changes += [pair[bit] for pair, bit in zip(pairs, bits)]  # noqa: B905 - the last byte may have bits to spare
+    def receive(raw: Any, values: list[Value]) -> None:
+        bits = unpacked(raw, count)
+        values += bits if convert is None else [kind(bit) for kind, bit in zip(convert, bits, strict=True)]
 
     return receive

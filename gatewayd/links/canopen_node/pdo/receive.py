@@ -21,13 +21,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import replace
 from enum import Enum
 from typing import Final
 
 from gatewayd.canopen.gap import spared
-from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
+from gatewayd.core.definition import Value
+from gatewayd.core.prepared import PreparedWrite
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.core.unserved import Unserved
@@ -67,7 +69,7 @@ ReportFault = Callable[[Fault, int, float], None]
 class ReceivePdo:
     """One valid RPDO and what is known of the last reception."""
 
-    def __init__(self, configuration: Configuration) -> None:
+    def __init__(self, configuration: Configuration, cell: Cell) -> None:
         self.configuration = configuration
         self.size = configuration.layout.size
         self.faults: set[Fault] = set()
@@ -81,15 +83,26 @@ class ReceivePdo:
         self.spared = False
         """The process stood still since the last frame."""
         self.data: bytes | None = None
-        """What `changes` was made of. Masters repeat themselves, so that it is worth keeping."""
-        self.changes: list[Change] | Refusal = []
+        """What `said` was made of. Masters repeat themselves, so that it is worth keeping."""
+        self.said: list[Value] | Refusal = []
+        self._cell = cell
+        self._prepared: PreparedWrite | None = None
+        with suppress(ValueError):  # it maps a variable twice
+            self._prepared = PreparedWrite(cell, configuration.layout.variables)
 
-    def meaning(self, data: bytes) -> list[Change] | Refusal:
-        """What the bytes mean for the cell."""
+    def write(self, requester: Requester, data: bytes, now: float) -> Refusal | None:
+        """Write what the bytes say, or return why not."""
         if data != self.data:
-            self.changes = self.configuration.layout.changes(data)
+            self.said = self.configuration.layout.values(data)
             self.data = data
-        return self.changes
+        said, prepared = self.said, self._prepared
+        if prepared is not None and isinstance(said, list) and prepared.write(requester, said, now):
+            return None
+        changes = self.configuration.layout.changes(data)
+        if isinstance(changes, Refusal):
+            self._cell.refuse(requester, changes, now)
+            return changes
+        return self._cell.write(requester, changes, now)
 
 
 class ReceiveEngine:
@@ -139,7 +152,7 @@ class ReceiveEngine:
         if former is not None:
             self._clear(former, tuple(former.faults), self._now)
         if configuration is not None:
-            self._pdos[number] = ReceivePdo(configuration)
+            self._pdos[number] = ReceivePdo(configuration, self._cell)
         by_can_id: dict[int, tuple[ReceivePdo, ...]] = {}
         for pdo in self.pdos:
             can_id = pdo.configuration.can_id
@@ -273,12 +286,7 @@ class ReceiveEngine:
         self._cell.unserved(requester, Unserved.MALFORMED, text, now)
 
     def _write(self, pdo: ReceivePdo, data: bytes, now: float, requester: Requester) -> None:
-        changes = pdo.meaning(data)
-        if isinstance(changes, Refusal):
-            refusal: Refusal | None = changes
-            self._cell.refuse(requester, changes, now)
-        else:
-            refusal = self._cell.write(requester, changes, now)
+        refusal = pdo.write(requester, data, now)
         if refusal is not None:
             if refusal.reason is Reason.WAITED:
                 self._cell.drop_waited(requester, pdo.configuration.layout.variables, now)
