@@ -63,32 +63,32 @@ _MEANINGS: Mapping[int, str | Mapping[int, str]] = {
     0x1001: "bit 0 any error, bit 4 communication, bit 7 manufacturer's (a refused RPDO, the robot)",
     0x1002: "the flags of the status block, as 5F00h:02",
     0x1003: {
-        0: "how many; write 0 to forget them",
+        0: "number of errors; write 0 to clear them",
         1: "EMCY codes, the newest first; high word: bytes 4-5 of the EMCY",
     },
-    0x1005: "where SYNC is heard; bit 30: this node sends it",
-    0x1006: "microseconds from SYNC to SYNC; needed to send it",
-    0x1007: "microseconds after SYNC within which synchronous RPDOs are taken; 0: always",
+    0x1005: "COB-ID of SYNC; bit 30: this node sends it",
+    0x1006: "period of SYNC in microseconds; needed to send it",
+    0x1007: "microseconds after SYNC within which synchronous RPDOs are accepted; 0: always",
     0x1008: "`gatewayd`",
     0x1009: "`none`",
     0x100A: "version of gatewayd",
     0x100C: "milliseconds between two remote frames of a guarding master; 0: no life guarding",
-    0x100D: "how many guard times may pass without one",
-    0x1010: "write `save` to keep what was changed; not while OPERATIONAL",
-    0x1011: "write `load` to forget it; takes effect with the next reset; not while OPERATIONAL",
-    0x1012: "where TIME is heard, bit 31: at all; for the log",
-    0x1014: "where EMCY is sent; bit 31: not at all",
-    0x1015: "least time between two EMCYs in 0.1 ms",
-    0x1016: "a node whose heartbeat is watched: bits 16-22 its node-ID, bits 0-15 milliseconds; "
-    "makes what the mapping promises shorter, never longer",
+    0x100D: "number of guard times that may pass without one",
+    0x1010: "write `save` to store changes; not while OPERATIONAL",
+    0x1011: "write `load` to delete them; takes effect with the next reset; not while OPERATIONAL",
+    0x1012: "COB-ID of TIME; bit 31: it is received, for the log",
+    0x1014: "COB-ID of EMCY; bit 31: it is not sent",
+    0x1015: "minimum time between two EMCYs in 0.1 ms",
+    0x1016: "a node whose heartbeat is supervised: bits 16-22 its node-ID, bits 0-15 milliseconds; "
+    "may shorten the time in the mapping, not lengthen it",
     0x1017: "milliseconds between two heartbeats; 0: none, and guarding is answered",
     0x1018: {
-        1: "0: CiA has assigned none",
-        2: "47574401h",
-        3: "release: major in the high word, minor in the low one",
-        4: "fingerprint of the mapping",
+        1: "0: none assigned by CiA",
+        2: "47574401h by default",
+        3: "by default the release: major in the high word, minor in the low one",
+        4: "by default derived from the name of the cell",
     },
-    0x1019: "greatest value of the counter in SYNC; 0: SYNC carries none",
+    0x1019: "maximum of the counter in SYNC; 0: no counter",
     0x1029: "after a communication error: 0 PRE-OPERATIONAL if it was OPERATIONAL, 1 nothing, 2 STOPPED",
     0x1200: {1: "600h + node-ID", 2: "580h + node-ID"},
 }
@@ -99,17 +99,17 @@ _PDO_MEANINGS: Mapping[int, Mapping[int, str]] = {
         5: "deadline in milliseconds: EMCY 8250h, and the writer is lost; 0: none",
     },
     0x1600: {
-        0: "how many; 0 while they are changed",
+        0: "number of entries; 0 while they are changed",
         1: "index, sub-index, length in bits; 00020008h and so on skip bits",
     },
     0x1800: {
         1: "bit 31: not used; to change it, first set bit 31",
         2: "0 with SYNC after a change, 1-240 every n-th SYNC, 254 and 255 when it changes",
-        3: "least time between two of them in 0.1 ms; changed while bit 31 is set",
-        5: "greatest time between two of them in ms; 0: no limit",
+        3: "minimum time between two of them in 0.1 ms; changed while bit 31 is set",
+        5: "maximum time between two of them in ms; 0: no limit",
         6: "counter of the SYNC that counts as the first; 0: any; changed while bit 31 is set",
     },
-    0x1A00: {0: "how many; 0 while they are changed", 1: "index, sub-index, length in bits"},
+    0x1A00: {0: "number of entries; 0 while they are changed", 1: "index, sub-index, length in bits"},
 }
 _PDO_NAMES = {
     0x1400: ("1400h-15FFh", "RPDO communication parameter"),
@@ -232,11 +232,11 @@ def connection_set() -> str:
 
 
 _ERRORS: Mapping[ErrorCode, str] = {
-    ErrorCode.NONE: "the last active error has gone",
+    ErrorCode.NONE: "the last active error is cleared",
     ErrorCode.STORED_PARAMETERS: "the stored parameters cannot be read; defaults are used",
-    ErrorCode.OVERRUN: "received frames were lost for want of room",
+    ErrorCode.OVERRUN: "received frames were lost because the buffer was full",
     ErrorCode.PASSIVE: "the controller is error-passive",
-    ErrorCode.HEARTBEAT: "the heartbeat of a node of 1016h ended (byte 4: its node-ID), or the guarding did",
+    ErrorCode.HEARTBEAT: "the heartbeat of a node of 1016h, or the guarding, is missing (byte 4: the node-ID)",
     ErrorCode.BUS_OFF_RECOVERED: "the controller was off the bus and is back",
     ErrorCode.PDO_TOO_SHORT: "an RPDO was shorter than its mapping and was dropped (bytes 4-5: its number)",
     ErrorCode.PDO_TOO_LONG: "an RPDO was longer than its mapping; its first bytes were used",
@@ -249,13 +249,13 @@ _ERRORS: Mapping[ErrorCode, str] = {
     ErrorCode.WRITE_CLAIMED_ELSEWHERE: "an RPDO was dropped: the controller gave a register to another client",
     ErrorCode.WRITE_NEVER: "an RPDO was dropped: this writer may never write a variable of it",
     ErrorCode.WRITE_HEARTBEAT_LOST: "an RPDO was dropped: the heartbeat that its writer promised is missing",
-    ErrorCode.WRITE_PARTIAL_TAKEOVER: "an RPDO was dropped: it would take over a part of a `whole` group",
+    ErrorCode.WRITE_PARTIAL_TAKEOVER: "an RPDO was dropped: it would take over part of a `whole` group",
     ErrorCode.ROBOT_LOST: "the robot is not connected",
-    ErrorCode.ROBOT_STALE: "it is connected, and its values are stale (byte 4: `robot_state`)",
-    ErrorCode.ROBOT_DIFFERS: "the robot holds something else than it was given (bytes 4-5: how many inputs)",
-    ErrorCode.ROBOT_UNAVAILABLE: "the controller does not have, or gave to another client, what is mapped "
-    "(bytes 4-5: how many variables)",
-    ErrorCode.WRITE_WAITED: "an RPDO was dropped: it waited too long while the gateway stood still",
+    ErrorCode.ROBOT_STALE: "the robot is connected, but its values are stale (byte 4: `robot_state`)",
+    ErrorCode.ROBOT_DIFFERS: "the robot holds something else than it was given (bytes 4-5: number of inputs)",
+    ErrorCode.ROBOT_UNAVAILABLE: "the controller does not have mapped fields, or gave them to another client "
+    "(bytes 4-5: number of variables)",
+    ErrorCode.WRITE_WAITED: "an RPDO was dropped: it waited too long during a gap",
     ErrorCode.WRITE_CONTRADICTED: "an RPDO was dropped: it has a variable twice, with two values",
 }
 
@@ -263,7 +263,7 @@ _ERRORS: Mapping[ErrorCode, str] = {
 def emergencies() -> str:
     """The EMCY codes with the bits of 1001h."""
     rows = [
-        (f"{code.value:04X}h", f"{register_of(code):02X}h" if code else "of what is left", _ERRORS[code])
+        (f"{code.value:04X}h", f"{register_of(code):02X}h" if code else "remaining errors", _ERRORS[code])
         for code in ErrorCode
     ]
     return table(("code", "1001h", "meaning"), rows)
@@ -315,12 +315,15 @@ def aborts() -> str:
 
 
 _STATES: Mapping[BusState, tuple[str, str]] = {
-    BusState.ABSENT: ("there is no such interface", "opened by its name as soon as it is there"),
-    BusState.DOWN: ("it is not configured, or was taken down", "used as soon as it is up"),
-    BusState.BUS_OFF: ("the controller has cut itself off", "used as soon as the kernel has restarted it"),
-    BusState.PASSIVE: ("frames go through; the controller can no longer signal errors", "EMCY 8120h"),
-    BusState.WARNING: ("an error counter has reached 96", "nothing; look at the cable"),
-    BusState.ACTIVE: ("all is well", ""),
+    BusState.ABSENT: ("there is no such interface", "opens it by its name as soon as it exists"),
+    BusState.DOWN: ("it is not configured, or was taken down", "uses it as soon as it is up"),
+    BusState.BUS_OFF: ("the controller has cut itself off", "uses it as soon as the kernel has restarted it"),
+    BusState.PASSIVE: (
+        "frames are transmitted, but the controller can no longer signal errors",
+        "sends EMCY 8120h",
+    ),
+    BusState.WARNING: ("an error counter has reached 96", "nothing; check the cable"),
+    BusState.ACTIVE: ("no fault", ""),
 }
 
 
@@ -370,13 +373,13 @@ def frame_lengths() -> str:
         )
         for length in (0, 1, 2, 4, 8)
     ]
-    return table(("bytes of data", "bits at most", *(f"{rate // 1000} kbit/s" for rate in rates)), rows)
+    return table(("bytes of data", "maximum bits", *(f"{rate // 1000} kbit/s" for rate in rates)), rows)
 
 
 class _Image(Enum):
     """Ways to put 64 bits, 24 integers and 24 reals of each direction on one bus."""
 
-    PLAIN = ("REAL64, sent when something changes", "", "REAL64")
+    PLAIN = ("REAL64, sent on change", "", "REAL64")
     REAL32 = ("REAL32 instead", "", "REAL32")
     INHIBIT = ("and an inhibit time of 20 ms", "pdo: {inhibit: 20ms}", "REAL32")
     SLOWER = ("an inhibit time of 50 ms", "pdo: {inhibit: 50ms}", "REAL32")
