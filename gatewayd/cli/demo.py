@@ -106,7 +106,7 @@ async def _play(console: Console, port: int, note: str, seconds: float | None, *
         console.print(
             f"[bold]gatewayd demo[/]: robot on port {scene.robot.port}, "
             f"Modbus TCP [bold]{HOST}:{port}[/], PLC {PLC_ADDRESS}{note}",
-            soft_wrap=True,
+            soft_wrap=not live,
         )
         if live:
             await _live(console, scene, stop, seconds)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gatewayd.cli.printing import echo
 from gatewayd.cli.remote import (
     DURATION,
     cell_option,
@@ -107,10 +108,15 @@ def _look(client: Client, cell: str | None) -> Glimpse:
 def _lines(client: Client, cell: str | None, first: Glimpse, view: View, interval: float) -> None:
     from gatewayd.cli.watching import plain
 
-    click.echo(plain(first, view))
+    _print(plain(first, view))
     while interval:
         time.sleep(interval)
-        click.echo(plain(_look(client, cell), view))
+        _print(plain(_look(client, cell), view))
+
+
+def _print(lines: str) -> None:
+    for line in lines.split("\n"):
+        echo(line)
 
 
 def _live(console: Console, look: Callable[[], Glimpse], first: Glimpse, view: View, interval: float) -> None:
