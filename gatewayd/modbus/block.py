@@ -10,7 +10,8 @@ import math
 import struct
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from functools import partial
+from itertools import chain, groupby
 from operator import add, itemgetter, lt, mul
 from typing import Any
 
@@ -104,23 +105,69 @@ def _is_narrow(window: tuple[float, float]) -> bool:
     return window != (-math.inf, math.inf)
 
 
-def _converter(codecs: Sequence[Codec]) -> _Convert:
-    """What makes values of raw numbers that lie in their windows."""
-    if all(codec.is_direct for codec in codecs):
-        return list
-    if all(
-        codec.kind is ValueKind.FLOAT and codec.type != "bool" and not codec.is_direct for codec in codecs
-    ):
-        scales = tuple(codec.scale for codec in codecs)
-        offsets = tuple(codec.offset for codec in codecs)
-        return lambda raws: list(map(add, map(mul, raws, scales), offsets))
-    reads = tuple(_reader(codec) for codec in codecs)
+_ROUNDABLE = 1e200
+"""Scale and offset up to which every integer of a register is finite afterwards."""
+_MOST_RUNS = 4
+"""Runs of numbers that are converted alike, up to which a loop in C for each is quicker than one over all."""
 
-    def convert(raws: _Raws) -> list[Value] | None:
-        values = [read(raw) for read, raw in zip(reads, raws, strict=True)]
-        return None if None in values else values  # type: ignore[return-value]  # no None is among them
+
+def _converter(codecs: Sequence[Codec]) -> _Convert:
+    """What makes values of raw numbers that lie in their windows; None: something has no value."""
+    runs = [(convert, list(run)) for convert, run in groupby(codecs, key=_loop)]
+    if len(runs) > _MOST_RUNS or any(loop is None for loop, _run in runs):
+        return partial(_one_by_one, tuple(map(_reader, codecs)))
+    loops: list[tuple[slice, _Convert]] = []
+    first = 0
+    for loop, run in runs:
+        assert loop is not None
+        loops.append((slice(first, first + len(run)), loop(run)))
+        first += len(run)
+    if len(loops) == 1:
+        return loops[0][1]
+
+    def convert(raws: _Raws) -> list[Value]:
+        values: list[Value] = []
+        for part, convert_run in loops:
+            values += convert_run(raws[part]) or ()
+        return values
 
     return convert
+
+
+def _loop(codec: Codec) -> Callable[[Sequence[Codec]], _Convert] | None:
+    """What makes a loop for neighbours of this kind; None: each is to be converted by its codec."""
+    if codec.is_direct:
+        return _as_they_are
+    if codec.type == "bool" or codec.kind is ValueKind.BOOL:
+        return None
+    if codec.kind is ValueKind.FLOAT:
+        return _scaled
+    if TYPES[codec.type].is_real or abs(codec.scale) > _ROUNDABLE or abs(codec.offset) > _ROUNDABLE:
+        return None
+    return _scaled_and_rounded
+
+
+def _as_they_are(_codecs: Sequence[Codec]) -> _Convert:
+    return list
+
+
+def _scaled(codecs: Sequence[Codec]) -> _Convert:
+    scales, offsets = _linear(codecs)
+    return lambda raws: list(map(add, map(mul, raws, scales), offsets))
+
+
+def _scaled_and_rounded(codecs: Sequence[Codec]) -> _Convert:
+    scales, offsets = _linear(codecs)
+    return lambda raws: list(map(round, map(add, map(mul, raws, scales), offsets)))
+
+
+def _linear(codecs: Sequence[Codec]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    return tuple(codec.scale for codec in codecs), tuple(codec.offset for codec in codecs)
+
+
+def _one_by_one(reads: Sequence[Callable[[float], Value | None]], raws: _Raws) -> list[Value] | None:
+    values = [read(raw) for read, raw in zip(reads, raws, strict=True)]
+    return None if None in values else values  # type: ignore[return-value]  # no None is among them
 
 
 def _reader(codec: Codec) -> Callable[[float], Value | None]:

@@ -13,7 +13,7 @@ from gatewayd.modbus.codec import ORDERS, TYPES, Codec, make_codec
 LOW, HIGH = -(2.0**31), 2.0**31 - 1
 
 whole_types = st.sampled_from([name for name, number in TYPES.items() if not number.is_byte])
-linears = st.sampled_from([(1.0, 0.0), (1.0, 0.0), (0.1, 0.0), (-0.5, 3.0), (1.0, 1e-9)])
+linears = st.sampled_from([(1e300, 0.0), (1.0, 0.0), (1.0, 0.0), (0.1, 0.0), (-0.5, 3.0), (1.0, 1e-9)])
 limits = st.sampled_from([None, None, (-0.05, 0.05), (-100.0, 100.0), (0.3, 12.7)])
 
 
