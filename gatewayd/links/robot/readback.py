@@ -121,7 +121,7 @@ class ReadBack:
         if recent is None:
             return
         # The newest are the likely ones.
-        is_in_flight = any(same(held, values) for values in reversed(recent))
+        is_in_flight = any(same(held, earlier.values) for earlier in reversed(recent))
         present = list(sent)
         for part in parts:
             index, value = part.variable, part.of(held)
@@ -132,7 +132,7 @@ class ReadBack:
                     part.put(present, value)
             elif is_in_flight:
                 self._since.pop(index, None)
-            elif any(same((value,), (part.of(values),)) for values in recent):
+            elif any(same((value,), (part.of(earlier.values),)) for earlier in recent):
                 self._since.pop(index, None)
                 if index in package.differing and same((value,), (part.of(sent),)):
                     finding.agree.add(index)
@@ -157,16 +157,16 @@ class ReadBack:
         for part in transfer.parts[name]:
             part.put(present, part.of(own))
 
-    def _recent(self, name: str, since: float) -> list[Sequence[Value]] | None:
+    def _recent(self, name: str, since: float) -> deque[_Sent] | None:
         """What the controller may rightly hold: the last value sent before `since`, and all after it."""
         history = self._history.get(name)
         if not history:
-            return []
+            return deque()
         while len(history) > 1 and history[1].at <= since:
             history.popleft()
         if len(history) == _MAX_SENDS and history[0].at > since:
             return None
-        return [sent.values for sent in history]
+        return history
 
     def _measure(self, name: str, held: Sequence[Value], now: float) -> None:
         """A field reads back something else than before: how long ago was it sent?"""
@@ -184,9 +184,12 @@ class ReadBack:
 
 def same(left: Sequence[Value], right: Sequence[Value]) -> bool:
     """Equal, where NaN equals NaN."""
-    return len(left) == len(right) and all(
-        a == b or (a != a and b != b)  # noqa: PLR0124
-        for a, b in zip(left, right, strict=True)
+    return left == right or (
+        len(left) == len(right)
+        and all(
+            a == b or (a != a and b != b)  # noqa: PLR0124
+            for a, b in zip(left, right, strict=True)
+        )
     )
 
 
