@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from ipaddress import ip_address, ip_network
+from ipaddress import IPv4Address, IPv6Address, ip_address, ip_network
 
 from gatewayd.links.modbus_server.plan import Network, network_text
 from gatewayd.links.modbus_server.sections import Modbus, ModbusWriter
@@ -101,6 +101,14 @@ def unreachable_listener(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
     if modbus is None:
         return
     listen = ip_address(modbus.spec.listen.host)
+    if _is_nobodys(listen):
+        message = f"nobody can connect to {modbus.spec.listen}: no machine has this address as its own"
+        yield rule.at(modbus.at("listen"), message, hint="write an address of this machine, or 0.0.0.0")
+        return
+    if isinstance(listen, IPv6Address) and listen.is_link_local and not listen.scope_id:
+        message = f"{modbus.spec.listen} cannot be listened on: a link-local address needs its interface"
+        yield rule.at(modbus.at("listen"), message, hint=f"write [{listen}%eth0]:{modbus.spec.listen.port}")
+        return
     near = _LOOPBACK if listen.is_loopback else _EVERYWHERE
     reached = [network for network in near if network.version == listen.version]
     who = "this machine" if listen.is_loopback else f"peers with an address of IPv{listen.version}"
@@ -181,6 +189,11 @@ def _meet(networks: Sequence[Network], allowed: Sequence[Network]) -> bool:
     return any(
         item.version == network.version and item.overlaps(network)
         for network in networks
-        if not (network.is_multicast or (network.is_unspecified and network.num_addresses == 1))
+        if not _is_nobodys(network) and not (network.is_unspecified and network.num_addresses == 1)
         for item in allowed
     )
+
+
+def _is_nobodys(place: IPv4Address | IPv6Address | Network) -> bool:
+    """Whether no peer can connect from it or to it: addresses of groups, and of IPv4 those from 240.0.0.0 on."""
+    return place.is_multicast or (place.version == 4 and place.is_reserved)
