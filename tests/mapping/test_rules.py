@@ -371,6 +371,12 @@ def test_a_wildcard_takes_the_port_of_its_own_family_alone(first: str, second: s
         ("[::1]:502", "'::1'", True),
         ("0.0.0.0:502", "0.0.0.0", False),
         ("0.0.0.0:502", "224.0.0.1", False),
+        ("0.0.0.0:502", "255.255.255.255", False),
+        ("224.0.0.1:502", "192.168.1.20", False),
+        ("255.255.255.255:502", "192.168.1.20", False),
+        ("[ff02::1]:502", "'fd00::20'", False),
+        ("[fe80::1]:502", "'fe80::2'", False),
+        ("[fe80::1%eth0]:502", "'fe80::2'", True),
     ],
 )
 def test_a_writer_that_can_never_connect_is_a_finding(listen: str, peer: str, *, reaches: bool) -> None:
