@@ -35,6 +35,8 @@ def main() -> NoReturn:
     standard_streams.prepare()
     if is_daemon:
         SIGNALS.install()
+    else:
+        sys.unraisablehook = _interrupt_again
     try:
         code = _run()
     except KeyboardInterrupt:
@@ -100,6 +102,20 @@ def _was_interrupted(defect: BaseException) -> bool:
     """Whether Ctrl-C is behind it: Python 3.11 makes a RuntimeError of one that falls into a `__set_name__`."""
     cause = defect.__cause__
     return cause is not None and (isinstance(cause, KeyboardInterrupt) or _was_interrupted(cause))
+
+
+def _interrupt_again(lost: sys.UnraisableHookArgs) -> None:
+    """Ctrl-C fell into a callback of Python, from which nothing can be raised: let it come once more."""
+    if lost.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(lost)
+        return
+    import threading
+
+    main_thread = threading.main_thread().ident
+    assert main_thread is not None
+    later = threading.Timer(0.01, signal.pthread_kill, (main_thread, signal.SIGINT))
+    later.daemon = True
+    later.start()
 
 
 def _leave(code: int) -> NoReturn:

@@ -217,3 +217,27 @@ def test_ctrl_c_in_a_process() -> None:
     assert time.monotonic() - began < 5
     assert process.stderr is not None
     assert "Traceback" not in process.stderr.read()
+
+
+def test_an_interrupt_that_python_cannot_raise_comes_once_more() -> None:
+    """As in the callbacks of imports, where it would be printed and forgotten."""
+    program = """
+import sys, time
+from gatewayd import __main__
+
+class Callback:
+    def __del__(self):
+        raise KeyboardInterrupt
+
+def command():
+    Callback()
+    time.sleep(60)
+
+__main__._command = command
+sys.argv[1:] = ["check"]
+__main__.main()
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (130, "")

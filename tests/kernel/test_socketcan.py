@@ -203,7 +203,7 @@ async def test_interface_replaced_between_two_looks(vcan: str) -> None:
 
 async def test_what_is_no_can_interface_is_refused() -> None:
     bus = SocketCanBus("lo", Recorder())
-    with pytest.raises(BusError, match="lo is no CAN interface"):
+    with pytest.raises(BusError, match="lo is not a CAN interface"):
         await bus.open()
 
 

@@ -16,6 +16,7 @@ from tests.soak.rig import PATIENCE, Rig
 _STOP, _PRE_OPERATIONAL, _RESET_NODE, _RESET_COMMUNICATION = 2, 128, 129, 130
 """NMT commands (CiA 301, 7.2.8.3.1)."""
 _SDO_REQUEST = 0x600
+_HEARTBEAT_OF_THE_NODE = 0x700 + NODE
 _OBJECTS = ((0x1000, 0x1FFF), (0x2000, 0x24FF), (0x5F00, 0x5F50))
 """Where the node has some."""
 _MALFORMED = (
@@ -98,8 +99,10 @@ def flood(rig: Rig, chance: Random) -> None:
 
 
 def _any_frame(chance: Random) -> bytes:
-    # Not NMT: the others on the bus have a claim to their node as well.
-    return _line(chance.randrange(1, 0x800), chance.randbytes(chance.randint(0, 8)))
+    # Not NMT: the others on the bus have a claim to their node as well. Nor the node's own heartbeat: that there is
+    # another node of its number is rightly reported for a minute, which would hide what the next faults do.
+    identifier = chance.choice([number for number in range(1, 0x800) if number != _HEARTBEAT_OF_THE_NODE])
+    return _line(identifier, chance.randbytes(chance.randint(0, 8)))
 
 
 def _sdo_request(chance: Random) -> bytes:

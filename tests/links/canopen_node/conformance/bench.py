@@ -383,20 +383,21 @@ class Tester:
     def pre_operational(self) -> None:
         self.nmt(128)
 
-    def reset(self, command: int = 129) -> None:
-        """Reset, and wait for the boot-up."""
+    def reset(self, command: int = 129) -> float:
+        """Reset, and wait for the boot-up; returns when it came."""
         self.nmt(command)
-        self.reaches(0)
+        return self.reaches(0)
 
     def heartbeats(self, milliseconds: int = 20) -> None:
         """Let the node send its state."""
         self.set(0x1017, 0, milliseconds, 2)
 
-    def reaches(self, state: int) -> None:
-        """Heartbeats of the former state are followed by one of this one; 0 is the boot-up."""
+    def reaches(self, state: int) -> float:
+        """Heartbeats of the former state are followed by one of this one; 0 is the boot-up. Returns when it came."""
         deadline = self.device.now + PATIENCE
-        while (reported := self.expect(0x700 + self.node)) != bytes([state]):
-            assert self.device.now < deadline, f"the node is in state {reported.hex()}"
+        while (heard := self.timed(0x700 + self.node))[1] != bytes([state]):
+            assert self.device.now < deadline, f"the node is in state {heard[1].hex()}"
+        return heard[0]
 
     def stays(self, state: int) -> None:
         """What was sent so far has not changed the state."""
