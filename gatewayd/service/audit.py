@@ -159,9 +159,10 @@ class _Watch:
 
     def written(self, writer: int, changes: Written, now: float) -> None:
         """A write was accepted: the hot path."""
+        known, merged_since = self._series.get, now - MERGED
         for index, old, new in changes:
-            current = self._series.get(index)
-            if current is not None and current.writer == writer and now - current.recorded < MERGED:
+            current = known(index)
+            if current is not None and current.writer == writer and current.recorded > merged_since:
                 if not current.pending:
                     current.old = old
                     self._next = min(self._next, current.recorded + MERGED)

@@ -170,7 +170,7 @@ METRICS = (
     *(_info(metric.name, metric.meaning, *metric.labels) for kind in kinds() for metric in kind.metrics),
     _info(
         "gatewayd_package_to_image_seconds",
-        "from the arrival of a robot's package to its values standing in every fieldbus's image",
+        "from the arrival of a robot's package to the moment when every fieldbus can be given its values",
         "cell",
         kind=_TIMES,
     ),

@@ -33,7 +33,7 @@ class CellProbe:
 
     def __init__(self) -> None:
         self.package_to_image = Histogram()
-        """From the arrival of a package's bytes to its values standing in every fieldbus's image."""
+        """From the arrival of a package's bytes to the moment when every fieldbus can be given its values."""
         self.write_to_package = Histogram()
         """From the arrival of a write to the package with it; the wait for the control cycle is part of it."""
         self.history = LastMinute()
