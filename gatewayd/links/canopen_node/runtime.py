@@ -71,6 +71,7 @@ class CanLink(Link, Observer):
         self._timer: asyncio.TimerHandle | None = None
         self._catching: asyncio.Handle | None = None
         self._inputs_changed: asyncio.Handle | None = None
+        self._receives = self._wrote = False  # frames are being received; one of them has written an input
         self._due = math.inf
         self._runs = False
         self._started = False
@@ -225,8 +226,15 @@ class CanLink(Link, Observer):
         if self._tap is not None:
             self._pass(self._tap, frames, now, outgoing=False)
         receive = self.node.receive
-        for frame in frames:
-            receive(frame, now)
+        self._receives = True
+        try:
+            for frame in frames:
+                receive(frame, now)
+        finally:
+            self._receives = False
+        if self._wrote:
+            self._wrote = False
+            self.node.image_changed(Direction.INPUT, now)
         self._schedule(now)
 
     def on_error(self, error: ErrorFrame, now: float) -> None:
@@ -418,12 +426,14 @@ class CanLink(Link, Observer):
         self._switching.clear()
 
     def _on_image(self, direction: Direction) -> None:
-        """The cell has changed. Of inputs the node hears once in a turn of the loop, however many were written in it.
+        """The cell has changed. Of inputs the node hears once in a turn of the loop, or for frames that came together.
 
         Of outputs at once: packages may come together, and a pulse of one of them must not be lost.
         """
         if direction is Direction.OUTPUT or not self._runs:
             self._look_at_image(direction)
+        elif self._receives:
+            self._wrote = True
         elif self._inputs_changed is None:
             self._inputs_changed = asyncio.get_running_loop().call_soon(self._look_at_inputs)
 

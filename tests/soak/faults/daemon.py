@@ -9,6 +9,7 @@ from pathlib import Path
 from random import Random
 
 from gatewayd.service.audit_file import KEPT, MAX_SIZE
+from gatewayd.service.audit_merging import EACH_PERIOD
 from tests.e2e.plc import STRANGER, Plc
 from tests.e2e.processes import HOST, wait_for
 from tests.soak.cell import MOMENT, STALE_AFTER, VARIANTS
@@ -101,14 +102,17 @@ def unwritable_audit(rig: Rig, chance: Random) -> None:
 
 
 def full_audit(rig: Rig, _chance: Random) -> None:
-    """A file of the size at which it is rotated, put in the audit's place; over when a new one is begun."""
+    """A file of the size at which it is rotated, put in the audit's place; over when a new one is begun.
+
+    That is with the next record, and of equal ones there is one in `EACH_PERIOD` seconds.
+    """
     full = rig.audit.with_suffix(".full")
     with full.open("wb") as stream:
         stream.truncate(MAX_SIZE)
     number = full.stat().st_ino
     full.replace(rig.audit)
     former = rig.audit.with_name(rig.audit.name + ".1")
-    wait_for(lambda: _inode(former) == number, "the rotation", PATIENCE)
+    wait_for(lambda: _inode(former) == number, "the rotation", EACH_PERIOD + PATIENCE)
     wait_for(rig.audit.exists, "the new file", PATIENCE)
     kept = list(rig.audit.parent.glob(rig.audit.name + ".*"))
     assert len(kept) <= KEPT, f"{len(kept)} former audit files"
