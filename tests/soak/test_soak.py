@@ -180,12 +180,13 @@ def test_a_value_that_is_sent_again_and_again_may_be_the_one_that_was_being_serv
 def test_a_process_that_does_not_get_the_processor_stands_still() -> None:
     core = str(min(os.sched_getaffinity(0)))
     burning = ["taskset", "-c", core, sys.executable, "-c", "while True: pass"]
-    burners = [subprocess.Popen(burning) for _ in range(3)]
+    # So many that one waits for longer than the watcher's least: by turns of 3 ms, two others would not do.
+    burners = [subprocess.Popen(burning) for _ in range(14)]
     stops: list[Stop] = []
     watcher = Starvation(lambda: [burners[0].pid], stops)
     watcher.start()
     try:
-        wait_for(lambda: bool(stops), "two processes on one core to keep a third waiting")
+        wait_for(lambda: bool(stops), "others on its core to keep a process waiting")
     finally:
         watcher.stop()
         for burner in burners:
