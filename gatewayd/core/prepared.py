@@ -47,7 +47,12 @@ class PreparedWrite:
         self._changes = (-1, -1)
 
     def write(self, requester: Requester, values: list[Value], now: float) -> bool:
-        """Write the variables' values, each of its kind. False: nothing was done, it is for `Cell.write` to judge."""
+        """Write the variables' values, each of its kind. False: nothing was done, it is for `Cell.write` to judge.
+
+        ValueError for another number of values: stored by slices, they would move what lies behind them.
+        """
+        if len(values) != len(self._variables):
+            raise ValueError(f"{len(values)} values for {len(self._variables)} variables")
         cell = self._cell
         cell.operator.release_expired(now)
         if not self._is_usual(requester):

@@ -159,3 +159,11 @@ def test_what_has_to_be_clamped_or_refused_is_left_to_be_judged(
 def test_what_is_always_refused_cannot_be_prepared(cell: Cell, variables: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="refused"):
         PreparedWrite(cell, variables)
+
+
+@pytest.mark.parametrize("values", [VALUES[:-1], [*VALUES, 1], []], ids=len)
+def test_another_number_of_values_is_a_defect_that_changes_nothing(owned: Cell, values: list[Value]) -> None:
+    before = state(owned)
+    with pytest.raises(ValueError, match="values for 6 variables"):
+        PreparedWrite(owned, ALL).write(OWNER, values, 1.5)
+    assert state(owned) == before
