@@ -52,7 +52,7 @@ class PreparedWrite:
         ValueError for another number of values: stored by slices, they would move what lies behind them.
         """
         if len(values) != len(self._variables):
-            raise ValueError(f"{len(values)} values for {len(self._variables)} variables")
+            raise ValueError("not one value for each variable")
         cell = self._cell
         cell.operator.release_expired(now)
         if not self._is_usual(requester):

@@ -164,6 +164,6 @@ def test_what_is_always_refused_cannot_be_prepared(cell: Cell, variables: tuple[
 @pytest.mark.parametrize("values", [VALUES[:-1], [*VALUES, 1], []], ids=len)
 def test_another_number_of_values_is_a_defect_that_changes_nothing(owned: Cell, values: list[Value]) -> None:
     before = state(owned)
-    with pytest.raises(ValueError, match="values for 6 variables"):
+    with pytest.raises(ValueError, match="one value for each"):
         PreparedWrite(owned, ALL).write(OWNER, values, 1.5)
     assert state(owned) == before
