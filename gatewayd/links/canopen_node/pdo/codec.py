@@ -184,8 +184,10 @@ class Layout:
         Refused also if a variable is given two values.
         """
         values = self.values(data)
-        if isinstance(values, Refusal):
-            return values
+        return values if isinstance(values, Refusal) else self.meant(values)
+
+    def meant(self, values: Sequence[Value]) -> list[Change] | Refusal:
+        """The same of what `values` returned."""
         changes = [Change(variable, value) for variable, value in zip(self.variables, values, strict=True)]
         return (contradiction(changes) if self._is_repeated else None) or changes
 

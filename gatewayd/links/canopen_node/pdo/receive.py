@@ -98,7 +98,7 @@ class ReceivePdo:
         said, prepared = self.said, self._prepared
         if prepared is not None and isinstance(said, list) and prepared.write(requester, said, now):
             return None
-        changes = self.configuration.layout.changes(data)
+        changes = said if isinstance(said, Refusal) else self.configuration.layout.meant(said)
         if isinstance(changes, Refusal):
             self._cell.refuse(requester, changes, now)
             return changes
