@@ -33,7 +33,7 @@ def compile_files(names: Iterable[str]) -> Compiled:
 def names_from(stream: BinaryIO) -> list[str]:
     """The names of files as `service.compilation` writes them: one a line, in hexadecimal digits, then an empty line.
 
-    Raises EOFError if whoever was to say them is gone.
+    Raises EOFError if the process that was to send them is gone.
     """
     names: list[str] = []
     while (line := stream.readline()) != b"\n":

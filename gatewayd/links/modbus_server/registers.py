@@ -313,7 +313,7 @@ class RegisterImage:
         self._held_back: frozenset[int] = frozenset()
         self._runs = {direction: tuple(self._compile(plan.placements, direction)) for direction in Direction}
         self.changed = set(Direction)
-        """Directions of which something has changed since the tables were brought up to date: whoever keeps a table
+        """Directions of which something has changed since the tables were brought up to date: code that keeps a table
         calls `refresh` before reading, if there are any. The attributes do so by themselves."""
         # A robot sends 500 packages in a second, of which a PLC may read ten: to note a change has to cost nothing.
         self._note = self.changed.add

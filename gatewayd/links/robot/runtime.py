@@ -292,7 +292,7 @@ class RobotLink(SourceLink):
             self._client.probe()
 
     def earlier(self, flat: Sequence[Value], now: float) -> bool:
-        """A package that waited together with newer ones. What inputs hold is told by the newest of them alone."""
+        """A package that waited together with newer ones. What inputs hold shows in the newest of them alone."""
         clock.judged_now()
         return self._outputs.show_earlier(self._cell, flat, now, clock.raw())
 
