@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from gatewayd.core.definition import Value, Variable
 from gatewayd.links.robot.companions import CYCLES, DOMAINS, STAGE, Actuation, Driven, Key, Stage
-from gatewayd.links.robot.readback import Finding, Package, ReadBack, same
+from gatewayd.links.robot.readback import Echo, Finding, Package, ReadBack, same
 from gatewayd.links.robot.transfer import InputTransfer, Slots
 from gatewayd.rtde.claims import WATCHDOG_KEY, InputRecipe
 from gatewayd.rtde.session import Session
@@ -35,13 +35,17 @@ class _Recipe:
     sent_at: float
     unknown: set[str]
     """Fields that were neither read nor given in this session."""
-    echo: slice | None
-    """Where packages read the whole recipe back in its own order; None if they do not."""
+    echo: Echo | None
+    """Set where packages read the whole recipe back in its own order."""
     is_settled: bool = True
     """Whether everything read back as it was sent, when it was last compared."""
 
     def values_of(self, name: str) -> Sequence[Value]:
         return self.sent[self.transfer.slots[name]]
+
+    def is_given(self, given_at: Sequence[float]) -> bool:
+        """Whether all of it was given in this session."""
+        return min((given_at[index] for index in self.transfer.members), default=-math.inf) > -math.inf
 
     def last_given(self, given_at: Sequence[float]) -> float:
         return max((given_at[index] for index in self.transfer.members), default=-math.inf)
@@ -170,13 +174,13 @@ class ClaimedInputs:
         shown = {name: flat[self._slots[name]] for name in names if name in self._slots}
         return {**session.held, **shown}
 
-    def _echo(self, names: Sequence[str]) -> slice | None:
+    def _echo(self, names: Sequence[str]) -> Echo | None:
         slots = [self._slots[name] for name in names if name in self._slots]
         if len(slots) < len(names) or any(
             slot.stop != following.start for slot, following in pairwise(slots)
         ):
             return None
-        return slice(slots[0].start, slots[-1].stop)
+        return Echo(slice(slots[0].start, slots[-1].stop))
 
     # -- sending -------------------------------------------------------------------------------------------------
 
@@ -216,6 +220,8 @@ class ClaimedInputs:
             if due.values[slot] != former[slot] or name in recipe.unknown:
                 self._read_back.note(name, due.values[slot], now, is_sent=True)
                 recipe.is_settled = False
+        if recipe.echo is not None:
+            recipe.echo.note(due.values, now, is_sent=True)
         recipe.actuation.sent(due.values, now + self._stage)
         alone = [name for name in recipe.unknown if name == due.recipe.key]
         self._known |= recipe.unknown
@@ -306,9 +312,14 @@ class ClaimedInputs:
         """What a package reads back otherwise than it was sent."""
         result = Finding()
         for recipe in self._recipes:
-            if recipe.is_settled and recipe.echo is not None and package.flat[recipe.echo] == recipe.sent:
-                continue
-            found = self._read_back.compare(recipe.transfer, recipe.sent, package)
+            echo = recipe.echo
+            if echo is not None:
+                if recipe.is_settled and package.flat[echo.place] == recipe.sent:
+                    continue
+                if recipe.is_given(package.given_at) and self._read_back.is_echoed(echo, package):
+                    recipe.is_settled = echo.shown == recipe.sent
+                    continue
+            found = self._read_back.compare(recipe.transfer, recipe.sent, package, echo)
             recipe.is_settled = found.is_settled
             if found.sent:
                 recipe.transfer.rebase(found.sent)

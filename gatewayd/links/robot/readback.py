@@ -63,6 +63,38 @@ class Finding:
     """Whether everything read back as it was sent."""
 
 
+class Echo:
+    """A recipe that packages read back whole and in its own order: one comparison can stand for all its fields."""
+
+    __slots__ = ("_sends", "place", "shown")
+
+    def __init__(self, place: slice) -> None:
+        self.place = place
+        """Where packages have it."""
+        self.shown: Sequence[Value] | None = None
+        """What it read back last; None: not known, or something that was not sent."""
+        self._sends: deque[_Sent] = deque(maxlen=_MAX_SENDS)
+
+    def note(self, values: Sequence[Value], now: float, *, is_sent: bool) -> None:
+        """The recipe was sent, or is known to hold this."""
+        self._sends.append(_Sent(values, now, is_sent))
+
+    def settled(self, values: Sequence[Value], now: float) -> None:
+        """Everything reads back as it was sent: what is to be expected from now on if nothing is sent."""
+        if not self._sends:
+            self.note(values, now, is_sent=False)
+
+    def forget(self) -> None:
+        """The controller's own values are in it, which were not sent: earlier packages are no measure any more."""
+        self._sends.clear()
+        self.shown = None
+
+    def find(self, held: Sequence[Value], since: float) -> _Sent | None:
+        """The package that brought the controller these values, if it may hold them rightly."""
+        recent = _since(self._sends, since)
+        return next((sent for sent in reversed(recent or ()) if sent.values == held), None)
+
+
 class ReadBack:
     """The read-backs of one session. `slots` are those of the output recipe, without what it reads as another type."""
 
@@ -84,8 +116,37 @@ class ReadBack:
         """The variables are others from now on."""
         self._since.clear()
 
-    def compare(self, transfer: InputTransfer, sent: Sequence[Value], package: Package) -> Finding:
+    def is_echoed(self, echo: Echo, package: Package) -> bool:
+        """Whether a recipe, all of it given, reads back as it was sent a moment ago: then no field is to be judged."""
+        if self._since or package.differing:
+            return False
+        held = package.flat[echo.place]
+        sent = echo.find(held, package.now - self._window(package))
+        if sent is None:
+            return False
+        if held != echo.shown:
+            if sent.is_sent and echo.shown is not None:
+                self._took(package.now - sent.at)
+            echo.shown = held
+        return True
+
+    def compare(
+        self, transfer: InputTransfer, sent: Sequence[Value], package: Package, echo: Echo | None = None
+    ) -> Finding:
         """Judge the fields of a recipe by a package."""
+        if echo is not None and echo.shown is not None:
+            self._shown |= {name: echo.shown[place] for name, place in transfer.slots.items()}
+        finding = self._compare(transfer, sent, package)
+        if echo is not None:
+            if finding.sent:
+                echo.forget()
+            elif finding.is_settled:
+                echo.settled(sent, package.now)
+            is_ours = all(self._shown.get(name) is not None for name in transfer.slots)
+            echo.shown = package.flat[echo.place] if is_ours else None
+        return finding
+
+    def _compare(self, transfer: InputTransfer, sent: Sequence[Value], package: Package) -> Finding:
         finding = Finding()
         is_calm = not self._since and not package.differing
         for name, wanted in transfer.slots.items():
@@ -159,14 +220,7 @@ class ReadBack:
 
     def _recent(self, name: str, since: float) -> deque[_Sent] | None:
         """What the controller may rightly hold: the last value sent before `since`, and all after it."""
-        history = self._history.get(name)
-        if not history:
-            return deque()
-        while len(history) > 1 and history[1].at <= since:
-            history.popleft()
-        if len(history) == _MAX_SENDS and history[0].at > since:
-            return None
-        return history
+        return _since(self._history.get(name, deque()), since)
 
     def _measure(self, name: str, held: Sequence[Value], now: float) -> None:
         """A field reads back something else than before: how long ago was it sent?"""
@@ -177,9 +231,21 @@ class ReadBack:
         self._shown[name] = held if sent is not None else None
         if sent is None or not sent.is_sent or not shown:
             return
-        took = now - sent.at
+        self._took(now - sent.at)
+
+    def _took(self, took: float) -> None:
+        """A round trip of so many seconds."""
         if took <= _MAX_ROUND_TRIP:
             self.round_trip = max(took, self.round_trip + _FADING * (took - self.round_trip))
+
+
+def _since(history: deque[_Sent], since: float) -> deque[_Sent] | None:
+    """The last of what was sent before `since`, and all after it; None: not all of that is remembered."""
+    while len(history) > 1 and history[1].at <= since:
+        history.popleft()
+    if len(history) == _MAX_SENDS and history[0].at > since:
+        return None
+    return history
 
 
 def same(left: Sequence[Value], right: Sequence[Value]) -> bool:
