@@ -8,8 +8,9 @@ does write, `Cell.write` would have come to the same.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from itertools import groupby
+from itertools import groupby, zip_longest
 from operator import le
 
 from gatewayd.core.cell import Cell
@@ -21,8 +22,13 @@ from gatewayd.core.requester import Requester
 class PreparedWrite:
     """A request that writes these inputs of one cell, each of them once."""
 
-    def __init__(self, cell: Cell, variables: Sequence[int]) -> None:
-        """ValueError for a variable that nobody may write, or that is named twice."""
+    def __init__(
+        self, cell: Cell, variables: Sequence[int], bounds: Sequence[tuple[float, float]] = ()
+    ) -> None:
+        """ValueError for a variable that nobody may write, or that is named twice.
+
+        `bounds`: of the first variables, between which values the caller's are right; others are left to `Cell.write`.
+        """
         declared = [cell.definition.variables[index] for index in variables]
         locks = {variable.lock for variable in declared}
         if None in locks or len(set(variables)) < len(declared):
@@ -39,9 +45,10 @@ class PreparedWrite:
             )
             for first, image in _neighbours(variables)
         )
-        bounds = [_bounds(cell, index, variable) for index, variable in zip(variables, declared, strict=True)]
-        self._lows = tuple(low for low, _high in bounds)
-        self._highs = tuple(high for _low, high in bounds)
+        own = [_bounds(cell, index, variable) for index, variable in zip(variables, declared, strict=True)]
+        pairs = list(zip_longest(own, bounds, fillvalue=(-math.inf, math.inf)))
+        self._lows = tuple(max(low, least) for (low, _), (least, _) in pairs)
+        self._highs = tuple(min(high, greatest) for (_, high), (_, greatest) in pairs)
         self._owner: int | None = None
         """Who owned all the locks, with all the registers there, as long as neither of these has changed."""
         self._changes = (-1, -1)

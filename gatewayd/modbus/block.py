@@ -12,12 +12,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, groupby
-from operator import add, itemgetter, lt, mul
-from typing import Any
+from operator import add, itemgetter, mul
+from typing import Any, TypeAlias
 
 from gatewayd.core.definition import Value, ValueKind
 from gatewayd.encoding.bits import BITS_OF, unpacked
 from gatewayd.modbus.codec import ORDERS, TYPES, Buffer, Codec, swap
+
+Bounds: TypeAlias = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +49,19 @@ class Block:
             for (order, is_swapped), members in groups.items()
         )
         codecs = [numbers[index][1] for index in self.order]
-        windows = [codec.window for codec in codecs]
-        self._windows = tuple(zip(*windows, strict=True)) if any(map(_is_narrow, windows)) else None
+        self.bounds = tuple(_bounds(codec) for codec in codecs)
+        """For each number that `decode` gives: least and greatest that is what its codec makes of the registers.
+
+        One that lies outside is to be decoded by its codec: it may mean a limit. The caller compares, who has limits to
+        compare with anyway.
+        """
         self._convert = _converter(codecs)
         self._bits = tuple((2 * word.word, word.others, _picker(word.bits)) for word in bits)
 
     def decode(self, data: bytes) -> list[Value] | None:
-        """The numbers in `order`, then the bits, word by word; what each codec makes of its registers.
+        """The numbers in `order`, then the bits, word by word; within `bounds` they are what the codecs make of them.
 
-        None: something takes more care than this, or is no value.
+        None: something has no value, or a bit is 1 that may not be.
         """
         groups = self._groups
         if len(groups) == 1:
@@ -67,9 +73,6 @@ class Block:
                     unpack(swap(data) if is_swapped else data) for unpack, is_swapped in groups
                 )
             )
-        windows = self._windows
-        if windows is not None and not (all(map(lt, windows[0], raws)) and all(map(lt, raws, windows[1]))):
-            return None
         values = self._convert(raws)
         if values is not None:
             for position, others, pick in self._bits:
@@ -101,8 +104,27 @@ def _unpacker(byte_order: str, numbers: Iterable[tuple[int, Codec]]) -> Callable
     return struct.Struct(byte_order + "".join(codes)).unpack_from
 
 
-def _is_narrow(window: tuple[float, float]) -> bool:
-    return window != (-math.inf, math.inf)
+def _bounds(codec: Codec) -> Bounds:
+    """The values of the raw numbers next to the ends of the window, towards its middle, or less.
+
+    The values ascend, or descend, with the raw numbers. So a value that is not as far out as that of the window's end
+    comes from a raw number in the window.
+    """
+    ends = [raw if codec.is_direct else raw * codec.scale + codec.offset for raw in codec.window]
+    is_open = [math.isinf(raw) for raw in codec.window]
+    if codec.scale < 0:
+        ends.reverse()
+        is_open.reverse()
+    low = -math.inf if is_open[0] else _beside(codec.kind, ends[0], math.inf)
+    high = math.inf if is_open[1] else _beside(codec.kind, ends[1], -math.inf)
+    return low, high
+
+
+def _beside(kind: ValueKind, value: float, towards: float) -> float:
+    """The next value of a number's kind in that direction."""
+    if kind is ValueKind.INT and math.isfinite(value):
+        return round(value) + (1 if towards > 0 else -1)
+    return math.nextafter(value, towards)
 
 
 _ROUNDABLE = 1e200
@@ -112,7 +134,7 @@ _MOST_RUNS = 4
 
 
 def _converter(codecs: Sequence[Codec]) -> _Convert:
-    """What makes values of raw numbers that lie in their windows; None: something has no value."""
+    """What makes values of raw numbers; None: something has no value."""
     runs = [(convert, list(run)) for convert, run in groupby(codecs, key=_loop)]
     if len(runs) > _MOST_RUNS or any(loop is None for loop, _run in runs):
         return partial(_one_by_one, tuple(map(_reader, codecs)))

@@ -63,12 +63,16 @@ def test_numbers_are_what_their_codecs_make_of_them(request: tuple[list[tuple[in
     block = Block(numbers)
     values = block.decode(data)
     each = [codec.decode(data[2 * word : 2 * (word + codec.words)]) for word, codec in numbers]
-    if values is not None:
-        assert sorted(block.order) == list(range(len(numbers)))
-        assert all(same(value, each[index]) for value, index in zip(values, block.order, strict=True))
-    elif None not in each:
-        # Only at and beyond the limits may it ask for care where there is a value.
-        assert any(codec.window != (-math.inf, math.inf) for _word, codec in numbers)
+    if values is None:
+        assert None in each
+        return
+    assert sorted(block.order) == list(range(len(numbers)))
+    for value, index, (low, high) in zip(values, block.order, block.bounds, strict=True):
+        if low <= value <= high:
+            assert same(value, each[index])
+        else:
+            # Only at and beyond the limits, or with NaN, may it ask for care.
+            assert numbers[index][1].window != (-math.inf, math.inf) or value != value  # noqa: PLR0124
 
 
 def test_between_its_limits_a_request_needs_no_care() -> None:
@@ -77,7 +81,11 @@ def test_between_its_limits_a_request_needs_no_care() -> None:
     whole = make_codec("int32", "CDAB", kind=ValueKind.INT, low=LOW, high=HIGH)
     block = Block([(0, real), (2, scaled), (4, whole)])
     assert block.decode(bytes.fromhex("3d000000 0064 0000 0001 0002")) == [0.03125, 10.0, 0x20001]
-    assert block.decode(real.encode(0.05) + bytes(8)) is None
+    (least, greatest), *_others = block.bounds  # they are compared by who has limits, too
+    assert least < 0.03125 < greatest
+    values = block.decode(real.encode(0.05) + bytes(8))
+    assert values is not None
+    assert values[0] > greatest
 
 
 @given(

@@ -207,7 +207,7 @@ class RegisterTable(_Table):
         block = Block([(at, item.codec) for at, item in numbers], [word for word, _item in words])
         variables = [numbers[index][1].variable for index in block.order]
         variables += [variable for _word, item in words for _mask, variable, _implied in item.bits]
-        return tuple(variables), block.decode
+        return Meaning(tuple(variables), block.decode, block.bounds)
 
     def masked(self, address: int, and_mask: int, or_mask: int) -> list[Change] | Refusal:
         """What Mask Write Register means: (present AND and_mask) OR (or_mask AND NOT and_mask).
@@ -286,7 +286,7 @@ class BitTable(_Table):
         mapped = tuple(variable for variable in variables if variable is not None)
         if len(mapped) < count:
             return None
-        return mapped, partial(coils, count=count)
+        return Meaning(mapped, partial(coils, count=count))
 
     def ignored(self, address: int, count: int) -> int:
         """Bits that such a write covers without effect."""

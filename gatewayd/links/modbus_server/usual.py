@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Value
@@ -18,8 +18,16 @@ from gatewayd.core.requester import Requester
 
 Decode: TypeAlias = Callable[[bytes], list[Value] | None]
 """Values of the variables, in their order; None: not in one go."""
-Meaning: TypeAlias = tuple[tuple[int, ...], Decode]
-"""Variables that a request of so much data at an address writes, and what decodes it."""
+
+
+class Meaning(NamedTuple):
+    """What a request of so much data at an address writes."""
+
+    variables: tuple[int, ...]
+    decode: Decode
+    bounds: tuple[tuple[float, float], ...] = ()
+    """Of the first values: between which they are right; the others need more care."""
+
 
 _Write: TypeAlias = Callable[[Requester, list[Value], float], bool]
 
@@ -55,6 +63,6 @@ class UsualWrites:
         self._known[key] = None
         meaning = self._meaning(address, count)
         if meaning is not None:
-            variables, decode = meaning
             with suppress(ValueError):  # a bit of the robot's is among them, or a variable twice
-                self._known[key] = decode, PreparedWrite(self._cell, variables).write
+                prepared = PreparedWrite(self._cell, meaning.variables, meaning.bounds)
+                self._known[key] = meaning.decode, prepared.write
