@@ -238,6 +238,8 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "canopen.frame": "records; tests/canopen/test_socketcan.py pins them byte by byte",
     "cli": "tests/cli/test_main.py",
     "cli.completion": "tests/cli/test_main.py",
+    "cli.importing": "a table; tests/cli/test_main.py",
+    "cli.rtde": "a table; tests/cli/test_main.py",
     "canopen.product": "two numbers; tests/canopen/test_identity.py",
     "core.requester": "a record; tests/core/test_cell.py pins what its parts mean",
     "links.canopen_node.compile": "tests/mapping/test_compile.py compiles it",

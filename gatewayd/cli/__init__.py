@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-
 import click
-from click.shell_completion import CompletionItem
 
 from gatewayd import __version__
 from gatewayd.cli.help_text import FittingFormatter
+from gatewayd.cli.lazy import LazyGroup
 
 COMMANDS = {
     "demo": "Simulator, gateway, a PLC and a CANopen master in one terminal.",
@@ -26,9 +24,14 @@ COMMANDS = {
     "trace": "Print the traffic on the links of the running gateway, decoded.",
     "force": "Force a variable to a value, for commissioning.",
     "unforce": "End a force before its time.",
+    "rtde": "Work with a robot's RTDE interface, without a mapping.",
+    "import": "Make a mapping file from another tool's file.",
     "completion": "Print the completion script of a shell.",
 }
 """Name -> what the list of commands says. Module `gatewayd.cli.NAME` has the click command as `command`."""
+
+_MODULES = {"import": "importing"}
+"""Command -> its module, where no module can have its name."""
 
 HELP = """\
 gatewayd puts the fieldbus registers of a Universal Robots controller, and any other RTDE field, on Modbus TCP and
@@ -59,50 +62,11 @@ Exit codes:
 click.Context.formatter_class = FittingFormatter
 
 
-class LazyGroup(click.Group):
-    """A group that knows its commands' names and one-line helps, and imports a command only to use it."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """The names in the order in which people meet them."""
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of that name; None when there is none."""
-        if cmd_name not in COMMANDS:
-            return None
-        found = import_module(f"gatewayd.cli.{cmd_name}").command
-        assert isinstance(found, click.Command)
-        return found
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that was named; fails with the one that was meant."""
-        try:
-            return super().resolve_command(ctx, args)
-        except click.UsageError as error:
-            from difflib import get_close_matches
-
-            close = get_close_matches(args[0], COMMANDS, n=1)
-            if not close:
-                raise
-            raise click.UsageError(f"{error.message} Did you mean {close[0]!r}?", ctx) from error
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the list of commands."""
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
-
-    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Command names and options that begin with `incomplete`."""
-        names = [
-            CompletionItem(name, help=text) for name, text in COMMANDS.items() if name.startswith(incomplete)
-        ]
-        return names + click.Command.shell_complete(self, ctx, incomplete)
-
-
 @click.group(
     cls=LazyGroup,
+    package="gatewayd.cli",
+    summaries=COMMANDS,
+    modules=_MODULES,
     help=HELP,
     epilog=EPILOG,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},

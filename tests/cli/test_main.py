@@ -16,7 +16,7 @@ import click
 import pytest
 
 import gatewayd
-from gatewayd.cli import COMMANDS
+from gatewayd.cli import COMMANDS, command
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -87,18 +87,22 @@ def test_a_misspelt_command_is_answered_with_the_right_one(run: Run) -> None:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_listed_command_can_be_imported_and_has_help(name: str) -> None:
-    command = import_module(f"gatewayd.cli.{name}").command
-    assert isinstance(command, click.Command)
-    assert command.name == name
-    assert command.help
+    found = command.get_command(click.Context(command), name)
+    assert isinstance(found, click.Command)
+    assert found.name == name
+    assert found.help
 
 
 def test_every_command_module_is_listed() -> None:
-    """A module of gatewayd/cli with a `command` is in COMMANDS."""
+    """A module of gatewayd/cli, or of the folder of a group, with a `command` is in the table of its group."""
     folder = Path(gatewayd.__file__).parent / "cli"
     commands = re.compile(r"^(command = |def command\()", re.MULTILINE)
-    found = {path.stem for path in folder.glob("*.py") if commands.search(path.read_text())}
-    assert found - {"__init__"} == set(COMMANDS)
+    for group in (path.parent for path in folder.rglob("__init__.py")):
+        inner = {path.parent.name: path for path in group.glob("*/__init__.py")}
+        inner |= {path.stem: path for path in group.glob("*.py") if path.stem != "__init__"}
+        found = {name for name, path in inner.items() if commands.search(path.read_text())}
+        package = import_module(".".join(("gatewayd", *group.relative_to(folder.parent).parts)))
+        assert {"import" if name == "importing" else name for name in found} == set(package.COMMANDS)
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -22,6 +22,7 @@ from typing import Any
 import click
 
 from gatewayd.cli import COMMANDS
+from gatewayd.cli import command as root_command
 from gatewayd.core.events import EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
@@ -166,8 +167,9 @@ def _default(key: str, schema: Mapping[str, Any], required: Iterable[str]) -> st
 def command_names() -> list[str]:
     """Every command as it is typed after `gatewayd`; the empty one first, groups before what is in them."""
     names = [""]
+    root = click.Context(root_command)
     for name in COMMANDS:
-        command = import_module(f"gatewayd.cli.{name}").command
+        command = root_command.get_command(root, name)
         names.append(name)
         if isinstance(command, click.Group):
             names += [f"{name} {inner}" for inner in command.list_commands(click.Context(command))]

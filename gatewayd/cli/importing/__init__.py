@@ -1,0 +1,15 @@
+"""`gatewayd import`: mapping files made from files of other tools; one module for each kind of file."""
+
+from __future__ import annotations
+
+import click
+
+from gatewayd.cli.lazy import LazyGroup
+
+COMMANDS: dict[str, str] = {}
+"""Name -> what the list of commands says. Module `gatewayd.cli.importing.NAME` has the click command as `command`."""
+
+
+@click.group(name="import", cls=LazyGroup, package="gatewayd.cli.importing", summaries=COMMANDS)
+def command() -> None:
+    """Make a mapping file from files of other tools, with a finding for whatever cannot be carried over."""

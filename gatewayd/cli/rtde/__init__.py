@@ -1,0 +1,15 @@
+"""`gatewayd rtde`: what a person does with a robot's RTDE interface; one module for each command."""
+
+from __future__ import annotations
+
+import click
+
+from gatewayd.cli.lazy import LazyGroup
+
+COMMANDS: dict[str, str] = {}
+"""Name -> what the list of commands says. Module `gatewayd.cli.rtde.NAME` has the click command as `command`."""
+
+
+@click.group(name="rtde", cls=LazyGroup, package="gatewayd.cli.rtde", summaries=COMMANDS)
+def command() -> None:
+    """Work with a robot's RTDE interface directly, without a mapping file."""
