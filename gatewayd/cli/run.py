@@ -101,7 +101,7 @@ def command(
     from gatewayd.service.main import main
     from gatewayd.service.options import Options
 
-    page = _settings(status, token_file) if status else None
+    page = _settings(status, token_file)
     options = Options(files, state, control, audit, page, strict=strict)
     with ExitStack() as log:
         return main(options, lambda: _configure(log, log_format, log_level), early)
@@ -118,7 +118,14 @@ def _configure(log: ExitStack, form: str, level: str) -> None:
     log.callback(logging.shutdown)  # lines that were merged are written before the stream ends
 
 
-def _settings(status: str, token_file: Path | None) -> Settings:
+def _settings(status: str | None, token_file: Path | None) -> Settings | None:
+    if not status:
+        if token_file is not None:
+            raise click.UsageError(
+                f"the token in {token_file} protects the status listener, and there is none: "
+                "add --status 127.0.0.1:9502 (GATEWAYD_STATUS), or leave --token-file (GATEWAYD_TOKEN_FILE) out"
+            )
+        return None
     from gatewayd.web.settings import Settings, SettingsError
 
     try:

@@ -39,6 +39,13 @@ def test_no_file_is_wrong_usage(run: Run) -> None:
     assert "FILES" in done.stderr
 
 
+def test_a_token_without_a_listener_is_wrong_usage(run: Run, tmp_path: Path) -> None:
+    """Silently ignored, it would be taken for a protection."""
+    done = run("--token-file", tmp_path / "token", tmp_path / "cell.yaml")
+    assert done.returncode == 2
+    assert "add --status 127.0.0.1:9502" in done.stderr
+
+
 @pytest.mark.parametrize(
     "contents, code",
     [(None, 2), (BROKEN, 1), ("", 1), ("\x00", 1)],

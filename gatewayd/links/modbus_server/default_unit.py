@@ -13,7 +13,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.objection import Objection, ObjectionKind
 from gatewayd.core.requester import Requester
 from gatewayd.links.modbus_server.peers import Address, may_connect
-from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, default_of
 from gatewayd.links.modbus_server.session import UnitAccess
 from gatewayd.report.format import verb
 from gatewayd.report.wording import names_and_more
@@ -25,14 +25,8 @@ _UNLISTED = (ip_address("255.255.255.255"), ip_address("ffff::ffff"))
 """Nobody's addresses: they stand for those that no list names."""
 
 
-def default_of(units: Sequence[NamedPlan]) -> str | None:
-    """The cell that answers to 0 and 255, of those that a client may reach: the only one, or the declared one."""
-    named = units if len(units) == 1 else [unit for unit in units if unit[1].default_unit]
-    return named[0][0] if len(named) == 1 else None
-
-
 def default_for(address: Address, units: Sequence[NamedPlan]) -> str | None:
-    """The same for the client at this address."""
+    """The cell that answers the client at this address."""
     return default_of(_reached(address, units))
 
 

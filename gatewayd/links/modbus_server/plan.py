@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from ipaddress import IPv4Network, IPv6Network
+from typing import TypeVar
 
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.modbus.areas import Area
@@ -106,3 +108,13 @@ class ModbusPlan(LinkPlan):
     def max_per_peer(self) -> int:
         """The greatest number of connections of one address."""
         return self.connections_per_peer or max(4, self.connections // 2)
+
+
+_Key = TypeVar("_Key")
+
+
+def default_of(units: Iterable[tuple[_Key, ModbusPlan]]) -> _Key | None:
+    """Which answers to the unit ids 0 and 255, of those that a client may reach: the only one, or the declared one."""
+    reached = list(units)
+    candidates = reached if len(reached) == 1 else [unit for unit in reached if unit[1].default_unit]
+    return candidates[0][0] if len(candidates) == 1 else None

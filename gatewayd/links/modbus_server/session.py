@@ -15,6 +15,7 @@ from typing import Any
 from gatewayd.core.requester import Requester
 from gatewayd.core.unserved import Unserved
 from gatewayd.links.modbus_server.functions import Unit, exception, execute
+from gatewayd.links.modbus_server.plan import default_of
 from gatewayd.links.modbus_server.unserved import unknown_unit
 from gatewayd.loop import clock
 from gatewayd.modbus.areas import MAX_READ_REGISTERS
@@ -70,10 +71,9 @@ class ModbusSession:
     def serve(self, accesses: Mapping[int, UnitAccess]) -> None:
         """Answer for these units from now on. The only one, or the one declared for it, also answers to 0 and 255."""
         self._accesses = dict(accesses)
-        declared = [access for access in accesses.values() if access.unit.plan.default_unit]
-        default = declared if len(accesses) > 1 else list(accesses.values())
-        if len(default) == 1:
-            self._accesses.update(dict.fromkeys(_THIS_DEVICE, default[0]))
+        default = default_of((unit, access.unit.plan) for unit, access in accesses.items())
+        if default is not None:
+            self._accesses.update(dict.fromkeys(_THIS_DEVICE, accesses[default]))
         self._reads = {}
         for unit, access in self._accesses.items():
             image = access.unit.image

@@ -13,9 +13,9 @@ from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
 from gatewayd.core.objection import ObjectionKind
 from gatewayd.core.requester import Requester
-from gatewayd.links.modbus_server.default_unit import NamedPlan, default_cell, default_of, losing, lost
+from gatewayd.links.modbus_server.default_unit import NamedPlan, default_cell, losing, lost
 from gatewayd.links.modbus_server.functions import Unit
-from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.plan import ModbusPlan, default_of
 from gatewayd.links.modbus_server.session import ModbusSession, UnitAccess
 
 from .conftest import NOW, PLC
