@@ -260,6 +260,7 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "mapping.section": "three settings; tests/mapping/test_model.py pins what they do",
     "mapping.syntax": "declarations; tests/mapping/test_rules.py",
     "modbus.areas": "an enumeration; tests/mapping/test_compile.py",
+    "rtde.recipes": "names of its modules; tests/rtde/recipes",
     "rtde.messages": "records; tests/rtde/test_codec.py pins them byte by byte",
     "rtde.types": "records; tests/rtde/test_recipe.py pins their formats",
 }
