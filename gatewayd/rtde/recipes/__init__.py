@@ -11,6 +11,7 @@ from gatewayd.rtde.recipes.declared import (
     RecipeFileError,
     RecipeProblem,
 )
+from gatewayd.rtde.recipes.doubts import doubts
 from gatewayd.rtde.recipes.reading import parse_recipes, read_recipes
 from gatewayd.rtde.recipes.writing import plain_text, xml_text
 
@@ -20,6 +21,7 @@ __all__ = [
     "RecipeFile",
     "RecipeFileError",
     "RecipeProblem",
+    "doubts",
     "parse_recipes",
     "plain_text",
     "read_recipes",

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from gatewayd.report.format import listed
 from gatewayd.rtde.catalogue import suggest
-from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.types import DataType
 
 OUTPUT_KEY = "out"
@@ -96,15 +95,11 @@ def problems_of_name(name: str) -> Iterator[str]:
 
 
 def problems_of_type(name: str, word: str) -> Iterator[str]:
-    """What is wrong with the type that is declared for a field."""
+    """What keeps a word from being the type of a field. Whether the field has it, only a controller can say."""
     if word not in DataType.__members__:
         near = suggest(word, DataType.__members__, limit=1)
         meant = f"did you mean {near[0]}?" if near else f"the types are {', '.join(DataType.__members__)}"
         yield f"{name} has the type {word[:100]!r}, which RTDE does not have; {meant}"
-        return
-    known = {side[name].type.word for side in (INPUTS, OUTPUTS) if name in side}
-    if known and word not in known:
-        yield f"{name} is declared as {word}, but is {' or '.join(sorted(known))}; correct the type"
 
 
 def problems_of_key(key: str) -> Iterator[str]:

@@ -27,10 +27,6 @@ def within(field: str) -> str:
             "3: timestamp has the type 'DUOBLE', which RTDE does not have; did you mean DOUBLE?",
         ),
         (
-            within('<field name="runtime_state" type="INT32"/>'),
-            "3: runtime_state is declared as INT32, but is UINT32; correct the type",
-        ),
-        (
             within('<field name="timestamp"/>'),
             '3: timestamp has no type; write one, as in type="DOUBLE"',
         ),
