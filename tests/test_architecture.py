@@ -209,6 +209,7 @@ IMPURE = {
     "rtde.connection": "has the socket",
     "rtde.loss": "has the socket",
     "rtde.resolve": "has the socket",
+    "rtde.visit": "runs a client",
     "web.guard": "speaks HTTP",
     "web.launch": "has the socket",
     "web.listener": "speaks HTTP",

@@ -6,7 +6,9 @@ import click
 
 from gatewayd.cli.lazy import LazyGroup
 
-COMMANDS: dict[str, str] = {}
+COMMANDS: dict[str, str] = {
+    "fields": "Print which fields a controller has, and of what type.",
+}
 """Name -> what the list of commands says. Module `gatewayd.cli.rtde.NAME` has the click command as `command`."""
 
 
