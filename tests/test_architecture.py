@@ -262,6 +262,8 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "mapping.syntax": "declarations; tests/mapping/test_rules.py",
     "modbus.areas": "an enumeration; tests/mapping/test_compile.py",
     "rtde.recipes": "names of its modules; tests/rtde/recipes",
+    "rtde.recording": "names of its modules; tests/rtde/recording",
+    "rtde.recording.errors": "errors; tests/rtde/recording/test_writing.py",
     "rtde.messages": "records; tests/rtde/test_codec.py pins them byte by byte",
     "rtde.types": "records; tests/rtde/test_recipe.py pins their formats",
 }

@@ -1,0 +1,31 @@
+"""Recordings of RTDE packages, in the formats of the official Python client.
+
+with create_recording("robot_data.csv", recipe) as recording:
+    recording.write(values)
+
+with open_recording("robot_data.csv") as recording:
+    for values in recording:
+        print(values[recording.recipe.slots["actual_q"]])
+"""
+
+from gatewayd.rtde.recording.errors import MissingExtraError, RecordingError, RecordingExistsError
+from gatewayd.rtde.recording.gaps import GapWatch, GapWriter, RecordedGap, read_gaps
+from gatewayd.rtde.recording.layout import HOST_TIME, columns
+from gatewayd.rtde.recording.reading import RecordingReader, open_recording
+from gatewayd.rtde.recording.writing import RecordingWriter, create_recording
+
+__all__ = [
+    "HOST_TIME",
+    "GapWatch",
+    "GapWriter",
+    "MissingExtraError",
+    "RecordedGap",
+    "RecordingError",
+    "RecordingExistsError",
+    "RecordingReader",
+    "RecordingWriter",
+    "columns",
+    "create_recording",
+    "open_recording",
+    "read_gaps",
+]
