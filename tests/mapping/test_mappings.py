@@ -46,6 +46,7 @@ FINGERPRINTS = {
     "small-cell.yaml": 0x8261FCB6,
     "two-buses.yaml": 0x317A2AE8,
     "two-plcs.yaml": 0x9A171BB0,
+    "ur-native-map.yaml": 0x4B2B63BD,
 }
 """What a PLC compares with the status block. A new key of the language must not change them; a change of what a file
 says does, and belongs into the changelog."""
@@ -83,6 +84,7 @@ def test_ready_made_files_are_there() -> None:
         "small-cell.yaml",
         "two-buses.yaml",
         "two-plcs.yaml",
+        "ur-native-map.yaml",
     }
 
 
