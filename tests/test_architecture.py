@@ -174,10 +174,13 @@ LAYERS: dict[str, set[str]] = {
 """Module or package -> what it and everything in it may import; the longest name that fits decides."""
 
 LIBRARIES: dict[str, set[str]] = {
+    "arro3": {"rtde.recording"},
     "aiohttp": {"control.server", "web.guard", "web.listener"},
     "can": {"canopen.pythoncan", "demo.master"},
     "canopen": {"canopen.importer"},
     "click": {"__main__", "cli"},
+    "matplotlib": {"cli.rtde"},
+    "numpy": {"cli.rtde", "rtde.recording"},
     "prometheus_client": {"web.metrics"},
     "pymodbus": {"demo.plc"},
     "rich": {"cli", "demo", "report.screen"},

@@ -8,6 +8,7 @@ from gatewayd.cli.lazy import LazyGroup
 
 COMMANDS: dict[str, str] = {
     "fields": "Print which fields a controller has, and of what type.",
+    "convert": "Write a finished recording in another format.",
 }
 """Name -> what the list of commands says. Module `gatewayd.cli.rtde.NAME` has the click command as `command`."""
 

@@ -8,6 +8,8 @@ with open_recording("robot_data.csv") as recording:
         print(values[recording.recipe.slots["actual_q"]])
 """
 
+from gatewayd.rtde.recording.arrays import read_arrays
+from gatewayd.rtde.recording.conversion import RecordingFormat, convert
 from gatewayd.rtde.recording.errors import MissingExtraError, RecordingError, RecordingExistsError
 from gatewayd.rtde.recording.gaps import GapWatch, GapWriter, RecordedGap, read_gaps
 from gatewayd.rtde.recording.layout import HOST_TIME, columns
@@ -22,10 +24,13 @@ __all__ = [
     "RecordedGap",
     "RecordingError",
     "RecordingExistsError",
+    "RecordingFormat",
     "RecordingReader",
     "RecordingWriter",
     "columns",
+    "convert",
     "create_recording",
     "open_recording",
+    "read_arrays",
     "read_gaps",
 ]

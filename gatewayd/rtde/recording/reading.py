@@ -11,6 +11,7 @@ from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.recording.binary_reader import BinaryReader
 from gatewayd.rtde.recording.csv_reader import CsvReader
 from gatewayd.rtde.recording.errors import RecordingError
+from gatewayd.rtde.recording.parquet import MAGIC, ParquetReader
 from gatewayd.rtde.types import DataType
 
 MAX_LINE = 1 << 20
@@ -28,7 +29,7 @@ class RecordingReader(Protocol):
     """
 
     recipe: Recipe
-    """The fields: with the types of the file if it is binary, else with those of the guides, and DOUBLE for others."""
+    """The fields. Text has no types: they are those of the guides then, and DOUBLE for other names."""
     host_time: bool
     """Whether the recording has host time."""
     torn: str
@@ -53,9 +54,10 @@ class RecordingReader(Protocol):
 
 
 def open_recording(path: str | Path, *, delimiter: str | None = None) -> RecordingReader:
-    """A recording for reading; whether it is text or binary, and what separates its columns, its head shows.
+    """A recording for reading; whether it is text, binary or Parquet, and what separates its columns, its head shows.
 
-    Raises RecordingError for a file that cannot be opened or is no recording.
+    Raises RecordingError for a file that cannot be opened or is no recording, MissingExtraError for Parquet without its
+    extra.
     """
     try:
         file = Path(path).open("rb")  # noqa: SIM115 - the reader closes it
@@ -70,18 +72,22 @@ def open_recording(path: str | Path, *, delimiter: str | None = None) -> Recordi
 
 
 def _opened(file: BinaryIO, path: str, delimiter: str | None) -> RecordingReader:
-    first = _text(file.readline(MAX_LINE))
+    start = file.readline(MAX_LINE)
+    if start.startswith(MAGIC):
+        file.close()
+        return ParquetReader(path)
+    first = _text(start)
     if not first.endswith("\n"):
         raise RecordingError(f"{path}:1: no recording: it has no line with the names of its columns")
     header = first.strip("\r\n").removeprefix(_BOM)
     separator = delimiter if delimiter is not None else _separator(header)
     names = [name.strip('"') for name in header.split(separator)]
-    start = file.tell()
+    second = file.tell()
     types = _text(file.readline(MAX_LINE)).removesuffix("\n").split(separator)
     try:
         if set(types) <= _ELEMENTS and len(types) == len(names):
             return BinaryReader(file, path, names, [DataType.from_word(word) for word in types])
-        file.seek(start)
+        file.seek(second)
         return CsvReader(file, path, names, separator)
     except (OSError, ValueError) as error:
         raise RecordingError(f"{path}:1: no recording: {error}") from error

@@ -1,0 +1,106 @@
+"""`gatewayd rtde convert` as a person uses it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from gatewayd.cli import command
+from gatewayd.rtde.recording import GapWriter, RecordedGap, open_recording, read_gaps
+
+
+def convert(*arguments: object) -> Result:
+    return CliRunner().invoke(command, ["rtde", "convert", *map(str, arguments)], prog_name="gatewayd")
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    path = tmp_path / "robot_data.csv"
+    path.write_text("timestamp robot_mode\n" + "".join(f"{number / 500} 7\n" for number in range(1000)))
+    return path
+
+
+@pytest.mark.parametrize("name", ["x.parquet", "x.bin", "x.txt"])
+def test_the_name_says_the_format(source: Path, tmp_path: Path, name: str) -> None:
+    target = tmp_path / name
+    done = convert(source, target)
+    assert done.exit_code == 0
+    assert done.stdout.startswith(f"{target}: 1000 packages, ")
+    assert done.stdout.endswith(f" ({source}: {source.stat().st_size / 1000:.3g} kB)\n")
+    with open_recording(source) as first, open_recording(target) as second:
+        assert list(first) == list(second)
+
+
+def test_delimiters_have_words(source: Path, tmp_path: Path) -> None:
+    assert convert("--delimiter", "tab", source, tmp_path / "x.csv").exit_code == 0
+    assert (tmp_path / "x.csv").read_text().startswith("timestamp\trobot_mode\n0.0\t7\n")
+    assert (
+        convert(
+            "--delimiter", ";", "--input-delimiter", "tab", tmp_path / "x.csv", tmp_path / "y.csv"
+        ).exit_code
+        == 0
+    )
+    assert (tmp_path / "y.csv").read_text().startswith("timestamp;robot_mode\n0.0;7\n")
+    refused = convert("--delimiter", ".", source, tmp_path / "z.csv")
+    assert refused.exit_code == 2
+    assert "'.' cannot separate columns" in refused.stderr
+
+
+def test_gaps_go_along(source: Path, tmp_path: Path) -> None:
+    with GapWriter(source) as gaps:
+        gaps.write(RecordedGap(3, "skipped", 2))
+    convert(source, tmp_path / "x.bin")
+    assert read_gaps(tmp_path / "x.bin") == (RecordedGap(3, "skipped", 2),)
+
+
+def test_an_existing_file_wants_force(source: Path, tmp_path: Path) -> None:
+    target = tmp_path / "x.bin"
+    target.write_text("precious")
+    refused = convert(source, target)
+    assert (refused.exit_code, target.read_text()) == (2, "precious")
+    assert (
+        refused.stderr == f"{target}: is there already; choose another name, or overwrite it with --force\n"
+    )
+    assert convert("--force", source, target).exit_code == 0
+
+
+def test_a_name_that_stands_for_no_format(source: Path, tmp_path: Path) -> None:
+    refused = convert(source, tmp_path / "x")
+    assert refused.exit_code == 2
+    assert "stands for no format: choose one with --format" in refused.stderr
+    assert convert("--format", "binary", source, tmp_path / "x").exit_code == 0
+
+
+def test_what_cannot_be_read_is_said_and_leaves_nothing(source: Path, tmp_path: Path) -> None:
+    source.write_text(source.read_text() + "17 7 7\n")
+    done = convert(source, tmp_path / "x.bin")
+    assert done.exit_code == 1
+    assert done.stderr == f"{source}:1002: 3 columns, where the first line has 2\n"
+    assert [path.name for path in tmp_path.iterdir()] == [source.name]
+
+
+def test_a_torn_end_is_reported_and_no_failure(source: Path, tmp_path: Path) -> None:
+    source.write_text(source.read_text() + "17")
+    done = convert(source, tmp_path / "x.bin")
+    assert done.exit_code == 0
+    assert done.stderr == f"{source}:1002: the last line is not whole and was left out\n"
+    assert "1000 packages" in done.stdout
+
+
+def test_without_the_package_for_parquet(
+    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "arro3", None)
+    done = convert(source, tmp_path / "x.parquet")
+    assert done.exit_code == 2
+    assert "pip install 'gatewayd[parquet]'" in done.stderr
+
+
+def test_no_recording(tmp_path: Path) -> None:
+    assert "does not exist" in convert(tmp_path / "no", tmp_path / "x.csv").stderr
+    (tmp_path / "empty").touch()
+    done = convert(tmp_path / "empty", tmp_path / "x.csv")
+    assert (done.exit_code, done.stderr.count("\n")) == (1, 1)
