@@ -15,6 +15,7 @@ from typing import Any, Protocol, TypeVar
 
 from gatewayd import __version__
 from gatewayd.control.names import NamePattern
+from gatewayd.control.packages import PackageFeeds
 from gatewayd.control.trace import TracedGateway, Traces
 from gatewayd.control.views import (
     Declarations,
@@ -110,6 +111,8 @@ class Api:
         self._declarations = Declarations()
         self.traces = Traces(traced) if traced is not None else None
         """What passes the links of `traced`; for the control socket alone."""
+        self.feeds = PackageFeeds(gateway)
+        """Packages of the robots, for recordings; for the control socket alone."""
         self.share = LoopShare()
         """Of the loop's time, for answers."""
 

@@ -19,6 +19,7 @@ from aiohttp.typedefs import Middleware
 
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
 from gatewayd.control.endpoint import Reload
+from gatewayd.control.packages import MAX_FEEDS, PackageFeeds
 from gatewayd.control.trace import MAX_TRACES, Traces
 from gatewayd.core.objection import ObjectionKind
 from gatewayd.logs.records import fields
@@ -57,6 +58,7 @@ async def serving(listening: socket.socket, api: Api, reload: Reload | None) -> 
     served = application(api, reload)
     if api.traces is not None:
         served.router.add_get("/v1/trace", partial(_trace, api.traces, api.share))
+    served.router.add_get("/v1/packages", partial(_packages, api.feeds, api.share))
     served.middlewares.insert(0, _in_turn(api.share))
     runner = web.AppRunner(served, access_log=None, handle_signals=False, shutdown_timeout=0.1)
     await runner.setup()
@@ -243,6 +245,49 @@ async def _trace(traces: Traces, share: LoopShare, request: web.Request) -> web.
             await response.write(_line({"passed": trace.passed, "dropped": trace.dropped}).encode())
     finally:
         traces.close(trace)
+    return response
+
+
+async def _packages(feeds: PackageFeeds, share: LoopShare, request: web.Request) -> web.StreamResponse:
+    """Every package of the robot of `cell` from now on."""
+    try:
+        cell = feeds.named(request.query.get("cell"))
+    except ValueError as error:
+        raise ApiError(404, "no_such_cell", str(error)) from None
+    feed = feeds.open(cell)
+    if feed is None:
+        raise ApiError(503, "busy", f"{MAX_FEEDS} recordings are running already")
+    response = web.StreamResponse(
+        headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"}
+    )
+    try:
+        await response.prepare(request)
+        sent_at, dropped = clock.now(), 0
+
+        def news() -> Generator[None, None, str]:
+            ahead, lines = time.time() - clock.now(), []
+            for row in (yield from feed.rows(ahead)):
+                lines.append(_line(row))
+                yield
+            return "".join(lines)
+
+        with suppress(ConnectionError, TimeoutError):
+            while True:
+                feeds.refresh()
+                lines = ""
+                # First what the packages lack: the oldest went.
+                if feed.dropped != dropped:
+                    dropped = feed.dropped
+                    lines = _line({"dropped": dropped})
+                with suppress(Busy):
+                    lines += await share.done(asker(request), news())
+                if lines or clock.now() - sent_at >= ALIVE_PERIOD:
+                    sent_at = clock.now()
+                    async with asyncio.timeout(_WRITE_TIME):
+                        await response.write(lines.encode() or b"\n")
+                await asyncio.sleep(_FOLLOW_PERIOD)
+    finally:
+        feeds.close(feed)
     return response
 
 

@@ -197,6 +197,35 @@ class TrafficDecoder:
         return f"length {len(data)}: {data[:16].hex(' ')}" + (" ..." if len(data) > 16 else "")
 
 
+@dataclass(frozen=True, slots=True)
+class PackageLayout:
+    """What the packages of a robot have, the same for all of one session."""
+
+    robot: str
+    """Its address and software, for people."""
+    names: tuple[str, ...]
+    """Fields in their order."""
+    types: tuple[str, ...]
+    """Their types, as the controller spells them."""
+    period: float
+    """Seconds between two packages."""
+    pack: Callable[[Sequence[Value]], bytes]
+    """The bytes of a package, big-endian and without gaps, of its flat values."""
+
+
+class PackageTap(Protocol):
+    """Takes every package of a robot, while somebody records. Must not raise, and never waits."""
+
+    def begin(self, layout: PackageLayout) -> None:
+        """A session has begun, or was there already; packages of this layout follow."""
+
+    def package(self, values: Sequence[Value], time: float) -> None:
+        """A package, flat, received at `time` (monotonic seconds)."""
+
+    def lost(self, reason: str) -> None:
+        """The session has ended, for this reason in words."""
+
+
 # -- runtime -----------------------------------------------------------------------------------------------------
 
 
@@ -298,6 +327,9 @@ class SourceLink(Link):
     def read_back(self, variable: int) -> Value | None:
         """What the other side holds of an input, as it said last in this session; None: it does not say so."""
         return None
+
+    def tap_packages(self, tap: PackageTap | None) -> None:
+        """Hand `tap` every package from now on; None: nobody records any more. Called again and again with the same."""
 
 
 class PrepareError(OSError):

@@ -48,7 +48,7 @@ class ConditionError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ValuePlace:
     """Where a value is found in a package."""
 
     field: str
@@ -60,7 +60,7 @@ class Place:
 class Comparison:
     """A value against a number."""
 
-    place: Place
+    place: ValuePlace
     sign: str
     number: Scalar
 
@@ -170,7 +170,7 @@ class _Parser:
         self._next += 1
         return Comparison(place, sign, self._number(place))
 
-    def _number(self, place: Place) -> Scalar:
+    def _number(self, place: ValuePlace) -> Scalar:
         kind, text = self._peek()
         states = {word.replace(" ", "_").lower(): number for number, word in _words(place).items()}
         if kind == "number":
@@ -197,10 +197,10 @@ class _Parser:
         raise ConditionError(f"column {at + 1}: {wanted} is expected, not {found}; {_EXAMPLE}")
 
 
-def _place(text: str) -> Place:
+def _place(text: str) -> ValuePlace:
     found = _PLACE.fullmatch(text)
     assert found is not None
-    return Place(found[1], *(None if part is None else int(part) for part in found.groups()[1:]))
+    return ValuePlace(found[1], *(None if part is None else int(part) for part in found.groups()[1:]))
 
 
 def _number(text: str) -> Scalar:
@@ -209,7 +209,7 @@ def _number(text: str) -> Scalar:
     return int(text) if text.lstrip("+-").isdigit() else float(text)
 
 
-def _words(place: Place) -> Mapping[int, str]:
+def _words(place: ValuePlace) -> Mapping[int, str]:
     return MEANINGS.get(place.field, {}) if place.bit is None else {}
 
 
@@ -241,7 +241,7 @@ def _comparison_test(comparison: Comparison, recipe: Recipe) -> Test:
     return lambda values: compare(int(values[slot]) >> bit & 1, number)
 
 
-def _slot(place: Place, recipe: Recipe) -> int:
+def _slot(place: ValuePlace, recipe: Recipe) -> int:
     """The index of the value in the flat tuple."""
     name, kind = place.field, recipe.kinds.get(place.field)
     if kind is None:

@@ -18,7 +18,16 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, FallbackKind, Value
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
-from gatewayd.links.contract import Context, Level, LinkHealth, LinkRuntime, Passage, SourceLink, Tap
+from gatewayd.links.contract import (
+    Context,
+    Level,
+    LinkHealth,
+    LinkRuntime,
+    PackageTap,
+    Passage,
+    SourceLink,
+    Tap,
+)
 from gatewayd.links.robot.availability import unavailable
 from gatewayd.links.robot.companions import Driven, all_inputs, all_outputs
 from gatewayd.links.robot.controller import ControllerNotes
@@ -27,6 +36,7 @@ from gatewayd.links.robot.inputs import ClaimedInputs
 from gatewayd.links.robot.outputs import SessionOutputs
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.links.robot.readback import Package
+from gatewayd.links.robot.recording import RecordedPackages
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.mapping.plan import LinkPlan
@@ -93,6 +103,7 @@ class RobotLink(SourceLink):
         self._feeds = 0
         self._loss_reported: tuple[str, float] = ("", -math.inf)
         self._closing = False
+        self._recorded = RecordedPackages(address(plan.host, plan.port))
         self.sent_listeners = []
         cell.listeners.append(self._on_change)
 
@@ -202,6 +213,10 @@ class RobotLink(SourceLink):
 
         self._client.trace(passed)
 
+    def tap_packages(self, tap: PackageTap | None) -> None:
+        """Every package that the client hands on, also those that come too late for the image."""
+        self._recorded.hand_to(tap, self._client.session)
+
     def read_back(self, variable: int) -> Value | None:
         """What the controller's newest package says of an input, where the session reads it back."""
         return self._inputs.held(variable)
@@ -263,6 +278,7 @@ class RobotLink(SourceLink):
             now, f"controller {session.controller}, RTDE protocol {session.protocol}, {rate}"
         )
         self._report_availability(reasons, now)
+        self._recorded.begin(session)
 
     def inputs_changed(self, session: Session) -> None:
         """Registers that were in use elsewhere are ours now, or others share a recipe.
@@ -274,6 +290,7 @@ class RobotLink(SourceLink):
     def values(self, flat: Sequence[Value], now: float) -> None:
         """A package."""
         clock.judged_now()
+        self._recorded.package(flat, now)
         cell = self._cell
         self._measure()
         news = self._outputs.show(cell, flat, now, clock.raw())
@@ -294,6 +311,7 @@ class RobotLink(SourceLink):
     def earlier(self, flat: Sequence[Value], now: float) -> bool:
         """A package that waited together with newer ones. What inputs hold shows in the newest of them alone."""
         clock.judged_now()
+        self._recorded.package(flat, now)
         return self._outputs.show_earlier(self._cell, flat, now, clock.raw())
 
     def session_lost(self, loss: Loss) -> None:
@@ -305,6 +323,7 @@ class RobotLink(SourceLink):
         self._cell.health.watchdog_fed = False
         if loss.started:
             self._cell.robot_lost(loss.text, now)
+            self._recorded.lost(loss.text)
         reported, at = self._loss_reported
         if not loss.started and (loss.text != reported or now - at >= LOSS_INTERVAL):
             self._loss_reported = (loss.text, now)

@@ -113,6 +113,9 @@ def test_random_conditions_mean_what_python_means_by_them(text: str, values: tup
     assert parse_condition(text).test(recipe)(values) is bool(expected)
 
 
+WORDS = ["a", "and", "or", "not", "(", ")", "==", "<", "1", "0x", ".5", "[1]", ".3"]
+
+
 @given(
     st.text(max_size=60)
     | st.lists(
