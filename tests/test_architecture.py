@@ -208,10 +208,15 @@ IMPURE = {
     "links.modbus_server.runtime": "a link at work",
     "links.modbus_server.sockets": "has the sockets",
     "links.robot.runtime": "a link at work",
+    "rtde.api.feed": "waits for what happens",
+    "rtde.api.properties": "waits for an answer",
+    "rtde.api.robot": "has the client as a task",
+    "rtde.api.stream": "an asynchronous iterator",
     "rtde.client": "has the socket",
     "rtde.connection": "has the socket",
     "rtde.loss": "has the socket",
     "rtde.resolve": "has the socket",
+    "rtde.sending": "has the transport",
     "rtde.visit": "runs a client",
     "web.guard": "speaks HTTP",
     "web.launch": "has the socket",
@@ -235,7 +240,9 @@ MAX_LENGTH = 500
 """Lines of a module."""
 
 WITHOUT_TEST_FILE: dict[str, str] = {
+    "rtde": "names of the API; tests/rtde/test_standing_alone.py",
     "rtde.handler": "a protocol; tests/rtde/test_connection.py",
+    "rtde.steps": "records; tests/rtde/test_negotiation.py",
     "service.options": "a record; tests/service/test_main.py",
     "gatewayd": "the version",
     "__main__": "tests/cli/test_main.py tests it as a process",

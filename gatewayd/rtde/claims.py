@@ -90,6 +90,8 @@ class _Group:
     held: InputRecipe | None = None
     refused: dict[str, str] = field(default_factory=dict)
     asking: tuple[str, ...] = ()
+    named: bool = False
+    """Made as it was asked for: never split, none of its fields in a recipe of its own."""
 
     def retriable(self) -> bool:
         return any(word in _RETRIED for word in self.refused.values())
@@ -101,7 +103,7 @@ class _Group:
         return self.held.recipe.names if self.held is not None else ()
 
     def is_of_registers(self) -> bool:
-        return self.key.split(" ")[0] == REGISTERS_KEY
+        return not self.named and self.key.split(" ")[0] == REGISTERS_KEY
 
     def part(self, number: int, names: Sequence[str]) -> _Group:
         """A group for some of the names; nothing is held by it."""
@@ -114,15 +116,23 @@ class Claims:
     """The claims of one connection.
 
     Where lists are limited none is longer than `OLD_LIST_LIMIT`; groups that are go into several recipes, the later
-    ones under the keys "registers 2" and so on.
+    ones under the keys "registers 2" and so on. Those of `recipes` stay as they are, under their own keys.
     """
 
-    def __init__(self, fields: Sequence[str], watchdog: str | None = None, *, limited: bool = False) -> None:
+    def __init__(
+        self,
+        fields: Sequence[str],
+        watchdog: str | None = None,
+        *,
+        limited: bool = False,
+        recipes: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
+    ) -> None:
         members: dict[str, list[str]] = {}
         for name in dict.fromkeys((*fields, *((watchdog,) if watchdog else ()))):
             members.setdefault(WATCHDOG_KEY if name == watchdog else recipe_key(name), []).append(name)
         self._order = {name: place for place, name in enumerate(members.get(REGISTERS_KEY, ()))}
         self._groups = [_Group(key, tuple(names)) for key, names in members.items()]
+        self._groups += [_Group(key, names, named=True) for key, names in recipes.items()]
         self._queue: deque[_Group] = deque()
         self._joining: dict[str, None] = {}
         self._accepted: dict[int, InputRecipe] = {}
@@ -177,8 +187,22 @@ class Claims:
         """Ask by lists that old controllers take from now on; only while no answer is awaited."""
         self._limited = True
         for group in tuple(self._groups):
-            if group.held is None and is_long(group.wanted):
+            if group.held is None and not group.named and is_long(group.wanted):
                 self._split(group)
+
+    def change(self, recipes: Mapping[str, tuple[str, ...]]) -> None:
+        """Have these recipes in place of those named before; only while no answer is awaited.
+
+        What stays as it was keeps its id. Fields that are no longer wanted stay claimed until the connection ends.
+        """
+        former = {group.key: group for group in self._groups if group.named}
+        self._groups = [group for group in self._groups if not group.named]
+        for key, names in recipes.items():
+            known = former.get(key)
+            stays = known is not None and known.wanted == names
+            self._groups.append(known if known is not None and stays else _Group(key, names, named=True))
+        self._changed = True
+        self._enqueue([group for group in self._groups if group.named and group.held is None])
 
     def retry(self) -> None:
         """Ask again for the fields that were in use; no effect while asking."""
@@ -232,7 +256,7 @@ class Claims:
             msg = "the controller answered an input setup that was not asked for"
             raise HandshakeError(msg)
         group = self._queue[0]
-        if _refused_for_length(group.asking, reply):
+        if _refused_for_length(group.asking, reply) and not group.named:
             self._asked = False
             self._split(group)
             return
@@ -307,7 +331,11 @@ class Claims:
 
     def _refuse(self, group: _Group, refused: Mapping[str, str]) -> None:
         """Note refusals; a register that was to join stays in the recipe of its own that it has."""
-        alone = {other.key for other in self._groups if other is not group and other.held is not None}
+        alone = {
+            other.key
+            for other in self._groups
+            if other is not group and other.held is not None and not other.named
+        }
         group.wanted = tuple(name for name in group.wanted if not (name in refused and name in alone))
         group.refused.update({name: word for name, word in refused.items() if name not in alone})
         group.asking = tuple(name for name in group.asking if name not in refused)

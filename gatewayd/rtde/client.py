@@ -11,18 +11,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from gatewayd.loop.progress import wait_with_progress
 from gatewayd.rtde.claims import InputRecipe
-from gatewayd.rtde.connection import Connection, StreamTap
-from gatewayd.rtde.handler import ClientHandler
+from gatewayd.rtde.connection import Connection
+from gatewayd.rtde.handler import ClientHandler, ConnectionObserver
 from gatewayd.rtde.lists import ListMemory
 from gatewayd.rtde.loss import Loss, connect_failure
+from gatewayd.rtde.messages import PropertiesReply, TextMessage
 from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.resolve import resolve
+from gatewayd.rtde.sending import StreamTap
 from gatewayd.rtde.session import ClientSettings, Session
 
 _KEEPALIVE = (("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCNT", 3))
@@ -31,11 +33,14 @@ _KEEPALIVE = (("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCNT", 3))
 class RtdeClient:
     """One robot controller, for as long as `run` runs."""
 
-    def __init__(self, settings: ClientSettings, handler: ClientHandler) -> None:
+    def __init__(
+        self, settings: ClientSettings, handler: ClientHandler, observer: ConnectionObserver | None = None
+    ) -> None:
         self.statistics = Statistics()
         """Counters over all sessions."""
         self._settings = settings
         self._handler = handler
+        self._observer = observer or ConnectionObserver()
         self._connection: Connection | None = None
         self._tap: StreamTap | None = None
         self._lists = ListMemory()
@@ -45,6 +50,21 @@ class RtdeClient:
     def session(self) -> Session | None:
         """What is agreed with the controller now; None without a session."""
         return self._connection.session if self._connection is not None else None
+
+    @property
+    def settings(self) -> ClientSettings:
+        """What is wanted now."""
+        return self._settings
+
+    @property
+    def own_address(self) -> tuple[str, int] | None:
+        """Our end of the connection; None without one."""
+        return self._connection.sender.own if self._connection is not None else None
+
+    @property
+    def peer_address(self) -> tuple[str, int] | None:
+        """The controller's end of the connection; None without one."""
+        return self._connection.sender.peer if self._connection is not None else None
 
     def send(self, recipe: InputRecipe, values: Sequence[Scalar]) -> bool:
         """Send values of one of `session.inputs`, flat in the order of its `recipe`, in one package.
@@ -71,11 +91,32 @@ class RtdeClient:
         """
         return self._connection is not None and self._connection.probe()
 
+    def say(self, message: TextMessage) -> bool:
+        """Send a text for the controller's log, cut to 255 bytes; False without a session."""
+        return self._connection is not None and self._connection.say(message)
+
+    def properties(self, names: tuple[str, ...], answered: Callable[[PropertiesReply], None]) -> bool:
+        """Ask for properties; `answered` is called if an answer comes, which an old controller does not give.
+
+        False if nothing was asked: without a session, and when too many questions are unanswered already.
+        """
+        return self._connection is not None and self._connection.properties(names, answered)
+
+    def change(self, settings: ClientSettings) -> None:
+        """Want something else from now on: set up at once where a session is paused, else by the next connection.
+
+        On the same connection only outputs, frequency and `Wishes.recipes` change; `ConnectionObserver.changed` says
+        when they have.
+        """
+        self._settings = settings
+        if self._connection is not None:
+            self._connection.change(settings)
+
     def trace(self, tap: StreamTap | None) -> None:
         """Hand `tap` the bytes of this connection and of those to come; None: no more."""
         self._tap = tap
         if self._connection is not None:
-            self._connection.tap = tap
+            self._connection.sender.tap = tap
 
     def gap(self) -> None:
         """The process stood still until now: for that time nobody is taken for silent."""
@@ -151,8 +192,8 @@ class RtdeClient:
         return connection
 
     def _new_connection(self, settings: ClientSettings) -> Connection:
-        connection = Connection(settings, self._handler, self.statistics)
-        connection.tap = self._tap
+        connection = Connection(settings, self._handler, self.statistics, self._observer)
+        connection.sender.tap = self._tap
         return connection
 
     async def _open_socket(self, loop: asyncio.AbstractEventLoop) -> socket.socket:

@@ -10,7 +10,8 @@ from typing import ClassVar, cast
 from gatewayd.report.format import counted
 from gatewayd.rtde.claims import HandshakeError, InputRecipe
 from gatewayd.rtde.codec import ClientProtocol, ProtocolError
-from gatewayd.rtde.handler import ClientHandler
+from gatewayd.rtde.delivery import OutputDelivery
+from gatewayd.rtde.handler import ClientHandler, ConnectionObserver
 from gatewayd.rtde.lists import ListOutcome
 from gatewayd.rtde.loss import Loss, LossReason, connection_failure
 from gatewayd.rtde.messages import (
@@ -19,32 +20,35 @@ from gatewayd.rtde.messages import (
     DataPackage,
     ExecutableMessage,
     Pause,
+    PropertiesReply,
+    ReadProperties,
     TextLevel,
     TextMessage,
 )
-from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice
-from gatewayd.rtde.pace import Pace, Statistics
-from gatewayd.rtde.recipe import Recipe, Scalar
-from gatewayd.rtde.session import TIMESTAMP, ClientSettings, Session
+from gatewayd.rtde.negotiation import Negotiation
+from gatewayd.rtde.pace import Statistics
+from gatewayd.rtde.properties import PropertyQuestions
+from gatewayd.rtde.recipe import Scalar
+from gatewayd.rtde.sending import PackageSender
+from gatewayd.rtde.session import ClientSettings, Session, Wishes
+from gatewayd.rtde.steps import NextStep, Notice
 from gatewayd.rtde.strange import Oddity, StrangePackage, odd_data
-from gatewayd.rtde.types import DataType
 
 _FIRST_CLAIM_RETRY = 0.1
 _MEASURE_EVERY = 1.0
 _PERIODS_OF_PATIENCE = 5
-_MOST_EARLIER = 64
-"""Packages that are handed on before the newest of those that came together: a burst takes a bounded time."""
-_GOODBYE = 0.2
-
-
-StreamTap = Callable[[bytes, bool, tuple[str, int] | None], None]
-"""Takes bytes, whether we sent them, and our end of the connection as its socket has it."""
 
 
 class Connection(asyncio.Protocol):
     """Sockets to negotiation and back. `done` becomes the loss, or the exception of a handler."""
 
-    def __init__(self, settings: ClientSettings, handler: ClientHandler, statistics: Statistics) -> None:
+    def __init__(
+        self,
+        settings: ClientSettings,
+        handler: ClientHandler,
+        statistics: Statistics,
+        observer: ConnectionObserver,
+    ) -> None:
         loop = asyncio.get_running_loop()
         self.done: asyncio.Future[Loss] = loop.create_future()
         """How the connection ended."""
@@ -52,16 +56,15 @@ class Connection(asyncio.Protocol):
         """What was agreed; None before the set-up is complete and after the end."""
         self.started_at: float | None = None
         """When the set-up was complete."""
-        self.tap: StreamTap | None = None
-        """Gets all bytes as they pass, while somebody traces."""
-        self._own: tuple[str, int] | None = None
         self._loop = loop
         self._settings = settings
         self._handler = handler
+        self._observer = observer
         self._statistics = statistics
         self._codec = ClientProtocol()
+        self.sender = PackageSender(self._codec)
+        """The way out, and whoever looks on."""
         self._negotiation = Negotiation(settings)
-        self._transport: asyncio.Transport | None = None
         self._complained = False
         self._lost = loop.create_future()
         self._waiters: list[asyncio.Future[None]] = []
@@ -73,10 +76,9 @@ class Connection(asyncio.Protocol):
         self._probed_at = 0.0
         self._asked_at: float | None = None
         self._round_trip = 0.0
-        self._outputs = Recipe((), ())
-        self._clocked = False
-        self._period = 0.0
-        self._pace: Pace | None = None
+        self._delivery: OutputDelivery | None = None
+        self._change: Wishes | None = None
+        self._questions = PropertyQuestions()
         self._patience = settings.first_data_timeout
         self._heard = 0.0
         self._measured = 0.0
@@ -135,33 +137,47 @@ class Connection(asyncio.Protocol):
         """Have the output resumed; returns when it is or the connection is lost."""
         await self._ask(self._negotiation.resume())
 
+    def change(self, wishes: Wishes) -> None:
+        """Set up other recipes while paused: `ConnectionObserver.changed` says when it is done."""
+        if self.session is not None and not self.done.done():
+            self._change = wishes
+            self._begin_change()
+
+    def say(self, message: TextMessage) -> bool:
+        """Send a text; False without a session."""
+        if self.session is None or self.done.done():
+            return False
+        self._write(message)
+        return not self.done.done()
+
+    def properties(self, names: tuple[str, ...], answered: Callable[[PropertiesReply], None]) -> bool:
+        """Ask for properties; `answered` is called if an answer comes: old controllers are silent.
+
+        False if nothing was asked: without a session, and when too many questions are unanswered already.
+        """
+        if self.session is None or self.done.done() or not self._questions.ask(names, answered):
+            return False
+        self._write(ReadProperties(names))
+        return not self.done.done()
+
     async def close(self) -> None:
         """Let what was sent reach the controller, then close. No handler is called any more."""
         self._end()
         self.done.cancel()
-        transport = self._transport
-        if transport is None or self._lost.done():
-            return
-        try:
-            if not transport.is_closing():
-                transport.write_eof()
-                await asyncio.wait((self._lost,), timeout=_GOODBYE)
-        finally:
-            transport.abort()
+        await self.sender.close(self._lost)
 
     # what asyncio calls
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """See asyncio.Protocol."""
-        self._transport = cast("asyncio.Transport", transport)
-        self._own = transport.get_extra_info("sockname")
+        self.sender.open(cast("asyncio.Transport", transport))
+        self._observer.connected(self.sender.own, self.sender.peer)
         self._request(self._negotiation.begin())
         self._watch()
 
     def data_received(self, data: bytes) -> None:
         """See asyncio.Protocol."""
-        if self.tap is not None:
-            self.tap(data, False, self._own)
+        self.sender.received(data)
         self._guarded(lambda: self._receive(data))
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -215,6 +231,11 @@ class Connection(asyncio.Protocol):
             self._complained |= self._negotiation.awaits_long_list and message.level <= TextLevel.ERROR
             self._handler.text(message)
             return
+        if isinstance(message, PropertiesReply):
+            strange = self._questions.answer(message)
+            if strange:
+                self._pass_over(StrangePackage(Oddity.UNEXPECTED, ANSWER_TYPES[type(message)], strange))
+            return
         try:
             step = self._negotiation.handle(message)
         except HandshakeError as error:
@@ -239,6 +260,20 @@ class Connection(asyncio.Protocol):
             self._give_up_recipes()
         elif step.event is not None:
             self._EVENTS[step.event](self)
+        self._begin_change()
+
+    def _begin_change(self) -> None:
+        """Set up the other recipes that are wanted, as soon as nothing else is under way."""
+        wishes, negotiation = self._change, self._negotiation
+        if wishes is None or negotiation.waiting or negotiation.running or self.done.done():
+            return
+        self._change = None
+        try:
+            step = negotiation.change(wishes)
+        except HandshakeError as error:
+            self._fail(LossReason.HANDSHAKE, str(error))
+        else:
+            self._follow(step)
 
     def _measure_round_trip(self, message: ControllerMessage) -> None:
         if self._asked_at is not None and not isinstance(message, DataPackage):
@@ -247,9 +282,10 @@ class Connection(asyncio.Protocol):
 
     def _deliver(self, packages: list[DataPackage], now: float) -> None:
         """Hand on the packages that are of the agreed recipe, in their order, and count them all."""
-        if self._pace is None or not packages or self.done.done():
+        delivery = self._delivery
+        if delivery is None or not packages or self.done.done():
             return
-        recipe, size = self._negotiation.outputs_id, self._outputs.size
+        recipe, size = self._negotiation.outputs_id, delivery.outputs.size
         agreed = [one for one in packages if one.recipe == recipe and len(one.payload) == size]
         if len(agreed) < len(packages):
             for odd in odd_data(packages, recipe, size):
@@ -259,48 +295,35 @@ class Connection(asyncio.Protocol):
             return
         self._heard = now
         self._passed_over = None
-        self._patience = max(self._settings.data_timeout, _PERIODS_OF_PATIENCE * self._period)
-        newest = agreed.pop()
-        if agreed and not self._hand_on(agreed, now):
-            return
-        values = self._counted(newest, now)
-        if values is not None:
-            self._handler.values(values, now)
-
-    def _hand_on(self, earlier: list[DataPackage], now: float) -> bool:
-        """Hand on what came together with a newer package; whether the connection goes on."""
-        for left, package in zip(range(len(earlier), 0, -1), earlier, strict=True):
-            values = self._counted(package, now)
-            if values is None:
-                return False
-            taken = self._clocked and left <= _MOST_EARLIER and self._handler.earlier(values, now)
-            self._statistics.overtaken += not taken
-            if self.done.done():
-                return False
-        return True
-
-    def _counted(self, package: DataPackage, now: float) -> tuple[Scalar, ...] | None:
-        """The values of a package; None if it shows that the controller has restarted, which ends the connection."""
-        values, pace = self._outputs.unpack(package.payload), self._pace
-        assert pace is not None
-        last = pace.timestamp
-        if not self._clocked or pace.package(values[0], now):
-            return values
-        text = f"the controller's clock went from {last} s to {values[0]} s: its RTDE service has restarted"
-        self._fail(LossReason.RESTARTED, text)
-        return None
+        self._patience = max(self._settings.data_timeout, _PERIODS_OF_PATIENCE * delivery.period)
+        restarted = delivery.deliver(agreed, now, self.done.done)
+        if restarted is not None:
+            self._fail(LossReason.RESTARTED, restarted)
 
     def _started(self) -> None:
         now = self._loop.time()
         session = self.session = self._negotiation.session(self._round_trip)
         self.started_at = self._heard = self._measured = now
         self._statistics.sessions += 1
-        self._outputs = session.outputs
-        self._clocked = session.outputs.names[0] == TIMESTAMP and session.outputs.types[0] is DataType.DOUBLE
-        self._period = session.period
-        self._pace = Pace(session.period, self._statistics, now)
+        self._expect_packages(session)
         self._schedule_retry()
         self._handler.session_started(session)
+
+    def _expect_packages(self, session: Session) -> None:
+        handler, statistics, every = self._handler, self._statistics, self._settings.every
+        self._delivery = OutputDelivery(session, handler, statistics, self._heard, every=every)
+
+    def _changed(self) -> None:
+        self._pause_answered()
+        session = self.session = self._negotiation.session(self._round_trip)
+        self._was_paused = False
+        self._expect_packages(session)
+        self._schedule_retry()
+        self._observer.changed(session)
+
+    def _paused(self) -> None:
+        self._pause_answered()
+        self._observer.paused()
 
     def _inputs_changed(self) -> None:
         self._heard = self._loop.time()
@@ -312,11 +335,12 @@ class Connection(asyncio.Protocol):
     def _resumed(self) -> None:
         self._resume_pace()
         self._pause_answered()
+        self._observer.resumed()
 
     def _resume_pace(self) -> None:
-        if self._was_paused and self._pace is not None:
+        if self._was_paused and self._delivery is not None:
             self._was_paused = False
-            self._pace.resume()
+            self._delivery.pace.resume()
 
     def _pause_answered(self) -> None:
         self._heard = self._loop.time()
@@ -338,7 +362,8 @@ class Connection(asyncio.Protocol):
     _EVENTS: ClassVar[dict[Notice, Callable[[Connection], None]]] = {
         Notice.STARTED: _started,
         Notice.INPUTS_CHANGED: _inputs_changed,
-        Notice.PAUSED: _pause_answered,
+        Notice.CHANGED: _changed,
+        Notice.PAUSED: _paused,
         Notice.RESUMED: _resumed,
         Notice.PROBED: _probe_answered,
     }
@@ -346,13 +371,7 @@ class Connection(asyncio.Protocol):
     # sending
 
     def _write(self, message: ExecutableMessage) -> None:
-        transport = self._transport
-        assert transport is not None
-        package = self._codec.send(message)
-        if self.tap is not None:
-            self.tap(package, True, self._own)
-        transport.write(package)
-        waiting = transport.get_write_buffer_size()
+        waiting = self.sender.write(message)
         if waiting > self._settings.write_buffer:
             self._fail(
                 LossReason.CONGESTED,
@@ -407,19 +426,19 @@ class Connection(asyncio.Protocol):
     def gap(self) -> None:
         """The process stood still until now: what the controller sent meanwhile is still to be read."""
         self._heard = self._loop.time()
-        if self._pace is not None:
-            self._pace.gap(self._heard)
+        if self._delivery is not None:
+            self._delivery.pace.gap(self._heard)
 
     def _watch(self) -> None:
         self._statistics.progress += 1
         now = self._loop.time()
         silence = now - self._heard
         if self._negotiation.running and silence > self._patience:
-            first = self._pace is None or self._pace.timestamp is None
+            first = self._delivery is None or self._delivery.pace.timestamp is None
             self._fall_silent(silence, first=first)
             return
-        if self._pace is not None and now - self._measured >= _MEASURE_EVERY:
-            self._pace.measure(now)
+        if self._delivery is not None and now - self._measured >= _MEASURE_EVERY:
+            self._delivery.pace.measure(now)
             self._measured = now
         self._check = self._loop.call_later(
             min(self._settings.data_timeout / 4, _MEASURE_EVERY / 2), self._watch
@@ -452,8 +471,7 @@ class Connection(asyncio.Protocol):
 
     def _fail(self, reason: LossReason, text: str) -> None:
         self._conclude(Loss(reason, f"{self._settings.address}: {text}"))
-        if self._transport is not None:
-            self._transport.abort()
+        self.sender.abort()
 
     def _conclude(self, loss: Loss) -> None:
         self._end()

@@ -128,7 +128,16 @@ def _text(message: object) -> str:
             | messages.PauseReply(accepted)
         ):
             return f"{_ANSWERED[type(message)]} {'accepted' if accepted else 'refused'}"
-    return _BARE[type(message)]
+    return _BARE.get(type(message)) or _properties_text(message)
+
+
+def _properties_text(message: object) -> str:
+    match message:
+        case messages.ReadProperties(names):
+            return f"read properties: {_list(names)}"
+        case messages.PropertiesReply(types, values):
+            return f"properties of types {_list(types)}, {counted(len(values), 'byte')} of values"
+    raise TypeError(message)
 
 
 _ANSWERED: dict[type, str] = {

@@ -11,6 +11,25 @@ from gatewayd.rtde.session import Session
 from gatewayd.rtde.strange import StrangePackage
 
 
+class ConnectionObserver:
+    """What else happens to the connections of a client, for whoever wants to know; does nothing by itself.
+
+    Called as `ClientHandler` is. Addresses are as the socket has them: host and port first.
+    """
+
+    def connected(self, own: tuple[str, int] | None, peer: tuple[str, int] | None) -> None:
+        """A connection is open; the set-up begins."""
+
+    def changed(self, session: Session) -> None:
+        """Other recipes have been set up on the same connection."""
+
+    def paused(self) -> None:
+        """The controller has paused the output."""
+
+    def resumed(self) -> None:
+        """It sends again."""
+
+
 class ClientHandler(Protocol):
     """What the user of a client gets to know, by synchronous calls from the event loop. They must not block.
 

@@ -16,6 +16,8 @@ NOT_FOUND = "NOT_FOUND"
 """In place of a type: the controller does not have the field."""
 IN_USE = "IN_USE"
 """In place of an input's type: another client controls it."""
+NOT_SET = "NOT_SET"
+"""In place of a property's type: the controller knows it, and it has no value now."""
 ERROR_WORDS = frozenset({NOT_FOUND, IN_USE})
 
 
@@ -30,6 +32,8 @@ class PackageType(IntEnum):
     SETUP_INPUTS = 73
     START = 83
     PAUSE = 80
+    READ_PROPERTIES = 82
+    """In no guide: UR's newest client libraries have it."""
 
 
 class TextLevel(IntEnum):
@@ -154,6 +158,21 @@ class PauseReply:
     accepted: bool
 
 
+@dataclass(frozen=True, slots=True)
+class ReadProperties:
+    """EE -> CON: what the controller is made of. Software before 5.26 and 10.15 does not answer."""
+
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PropertiesReply:
+    """CON -> EE: a type word, NOT_FOUND or NOT_SET for each name; values, packed, only if all are type words."""
+
+    types: tuple[str, ...]
+    payload: bytes
+
+
 ExecutableMessage = (
     RequestProtocolVersion
     | GetControllerVersion
@@ -163,6 +182,7 @@ ExecutableMessage = (
     | SetupInputs
     | Start
     | Pause
+    | ReadProperties
 )
 """What a client sends and a controller receives."""
 
@@ -175,6 +195,7 @@ ControllerMessage = (
     | InputsSetup
     | StartReply
     | PauseReply
+    | PropertiesReply
 )
 """What a controller sends and a client receives."""
 ANSWER_TYPES: Mapping[type, PackageType] = {
@@ -184,5 +205,6 @@ ANSWER_TYPES: Mapping[type, PackageType] = {
     InputsSetup: PackageType.SETUP_INPUTS,
     StartReply: PackageType.START,
     PauseReply: PackageType.PAUSE,
+    PropertiesReply: PackageType.READ_PROPERTIES,
 }
 """Answers of a controller -> type of their packages."""

@@ -13,69 +13,24 @@ they prove (a controller may send data before the answer to a start, or instead 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from enum import Enum, auto
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from gatewayd.report.format import counted
 from gatewayd.rtde import messages
 from gatewayd.rtde.catalogue import is_long
 from gatewayd.rtde.claims import REFUSED, Claims, HandshakeError, sort_types
 from gatewayd.rtde.fields import Series
+from gatewayd.rtde.rates import V1_RATE, max_frequency, package_interval, requested_frequency
 from gatewayd.rtde.reading import Reading
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.session import TOO_LONG, Session, Unavailable, Wishes, without_inputs, without_outputs
+from gatewayd.rtde.steps import NextStep, Notice, State
 
-_RATE_V1 = 125
-_RATE_UNKNOWN = {True: 500, False: 125}
-_NEW_HARDWARE = 5
 _ASKED_AGAIN = 3
 """Times in a row that what the session has had before is asked for again after a wrong answer."""
-
-
-class State(Enum):
-    """What is awaited; the value completes "waiting for ..."."""
-
-    NEW = "the first message"
-    VERSION_2 = "the answer to protocol version 2"
-    VERSION_1 = "the answer to protocol version 1"
-    CONTROLLER = "the controller version"
-    INPUTS = "the answer to an input recipe"
-    READING_SETUP = "the answer to the output recipe of a reading"
-    READING_START = "the answer to the start of a reading"
-    READING = "the package of a reading"
-    READING_PAUSE = "the answer to the pause of a reading"
-    OUTPUTS = "the answer to the output recipe"
-    STARTING = "the answer to the start"
-    RUNNING = "data"
-    PAUSING = "the answer to the pause"
-    PAUSED = "nothing, being paused"
-    RESUMING = "the answer to the restart"
-
-
-class Notice(Enum):
-    """Something to report to the user of the client."""
-
-    STARTED = auto()
-    INPUTS_CHANGED = auto()
-    PAUSED = auto()
-    RESUMED = auto()
-    PROBED = auto()
-
-
-class NextStep(NamedTuple):
-    """What follows from a message."""
-
-    send: messages.ExecutableMessage | None = None
-    event: Notice | None = None
-    strange: str = ""
-    """What is odd about the message, if anything is."""
-    taken: bool = True
-    """Whether the message was an answer to what is awaited; else nothing has changed."""
-
-
 _NOTHING = NextStep()
 _AT_REST = frozenset({State.RUNNING, State.PAUSED})
-_BEFORE_PROBES = frozenset({State.NEW, State.VERSION_2, State.VERSION_1, State.CONTROLLER})
+_BEFORE_PROBES = frozenset({State.NEW, State.VERSION, State.VERSION_2, State.VERSION_1, State.CONTROLLER})
 
 
 class Negotiation:
@@ -84,7 +39,7 @@ class Negotiation:
     def __init__(self, wishes: Wishes) -> None:
         self.state = State.NEW
         """What is awaited."""
-        self.claims = Claims(wishes.wanted_inputs(), wishes.watchdog, limited=wishes.limited)
+        self.claims = Claims(wishes.inputs, wishes.watchdog, limited=wishes.limited, recipes=wishes.recipes)
         """The inputs."""
         self.controller: messages.ControllerVersion | None = None
         """The controller's software, once it is known."""
@@ -102,12 +57,13 @@ class Negotiation:
         self._agreed: Recipe | None = None
         """The working recipe of the session."""
         self._reported = False
+        self._changing = False
         self._in_vain = 0
         """Wrong answers in a row to what the session has had before."""
         self._joined: frozenset[str] = frozenset()
         """Unread registers whose content is known all the same: they have been written."""
         self._probes = 0
-        self._period = 1 / _RATE_V1
+        self._period = 1 / V1_RATE
 
     @property
     def running(self) -> bool:
@@ -142,8 +98,9 @@ class Negotiation:
 
     def begin(self) -> messages.ExecutableMessage:
         """The first message."""
-        self.state = State.VERSION_2
-        return messages.RequestProtocolVersion(2)
+        forced = self._wishes.protocol
+        self.state = State.VERSION_2 if forced is None else State.VERSION
+        return messages.RequestProtocolVersion(forced or 2)
 
     def handle(self, message: messages.ControllerMessage) -> NextStep:
         """Take an answer; one that nobody awaits, and a data package out of season, change nothing."""
@@ -210,9 +167,35 @@ class Negotiation:
             {name: values for name, values in self._reading.held.items() if name not in unread},
             unread,
             round_trip,
+            float(V1_RATE if self._version == 1 else max_frequency(self.controller)),
+            self.outputs_id,
         )
 
+    def change(self, wishes: Wishes) -> NextStep:
+        """Set up what `wishes` has in place of what there is; only while paused and not `waiting`.
+
+        `Notice.CHANGED` when it is done. Of the inputs only `Wishes.recipes` are changed: those that stay as they were
+        keep their ids, what is no longer wanted stays claimed until the connection ends. HandshakeError as in `handle`.
+        """
+        limited = self._reading.limited
+        self._wishes = wishes
+        self._reading = Reading(wishes, limited=limited)
+        self._outputs = self._agreed = None
+        self._in_vain = 0
+        self._changing = True
+        self.claims.change(wishes.recipes)
+        return self._set_out()
+
     # the way to the session
+
+    def _version_answered(self, reply: messages.ProtocolVersionReply) -> NextStep:
+        forced = self._wishes.protocol
+        assert forced is not None
+        if not reply.accepted:
+            message = f"the controller does not speak protocol version {forced}, which was forced"
+            raise HandshakeError(message)
+        self._version = forced
+        return self._go(State.CONTROLLER, messages.GetControllerVersion())
 
     def _version_2_answered(self, reply: messages.ProtocolVersionReply) -> NextStep:
         if reply.accepted:
@@ -227,6 +210,10 @@ class Negotiation:
 
     def _controller_answered(self, version: messages.ControllerVersion) -> NextStep:
         self.controller = version
+        return self._set_out()
+
+    def _set_out(self) -> NextStep:
+        """The first thing to do for what is wanted."""
         if self._wishes.read_back and not self._reading.limited:
             return self._ask_outputs()
         return self._advance()
@@ -278,10 +265,8 @@ class Negotiation:
         assert self.controller is not None
         if self._version == 1:
             return None
-        series = Series.from_major(self.controller.major)
-        rate = series.base_rate if series else _RATE_UNKNOWN[self.controller.major >= _NEW_HARDWARE]
-        frequency = min(max(self._wishes.frequency, 1.0), rate) if self._wishes.frequency else float(rate)
-        self._period = (rate // frequency) / rate
+        frequency = requested_frequency(self._wishes.frequency, self.controller)
+        self._period = package_interval(frequency, self.controller)
         return frequency
 
     def _outputs_answered(self, reply: messages.OutputsSetup) -> NextStep:
@@ -354,6 +339,7 @@ class Negotiation:
         """The working recipe is set up and, if wanted, started: what that is to the user."""
         self._agreed = self._outputs
         event = Notice.INPUTS_CHANGED if self._reported else Notice.STARTED
+        event, self._changing = (Notice.CHANGED if self._changing else event), False
         self._reported = True
         return event
 
@@ -464,6 +450,7 @@ class Negotiation:
         return (*missing, *without_inputs(self.claims.refused, self.controller.software))
 
     _TABLE: ClassVar[Mapping[tuple[State, type], Callable[..., NextStep]]] = {
+        (State.VERSION, messages.ProtocolVersionReply): _version_answered,
         (State.VERSION_2, messages.ProtocolVersionReply): _version_2_answered,
         (State.VERSION_1, messages.ProtocolVersionReply): _version_1_answered,
         (State.CONTROLLER, messages.ControllerVersion): _controller_answered,

@@ -123,6 +123,15 @@ def _setup_reply(reply: Callable[[int, tuple[str, ...]], _Message]) -> Callable[
     return decode
 
 
+def _decode_properties(payload: bytes) -> messages.PropertiesReply:
+    _at_least(payload, _UINT16.size)
+    end = _UINT16.size + _UINT16.unpack_from(payload)[0]
+    if end > len(payload):
+        msg = f"types of {counted(end - _UINT16.size, 'byte')} reach beyond the package"
+        raise MalformedPayloadError(msg)
+    return messages.PropertiesReply(_names(payload[_UINT16.size : end]), payload[end:])
+
+
 def _acceptance(reply: Callable[[bool], _Message]) -> Callable[[bytes], _Message]:
     """Decoder of one byte that accepts or refuses."""
     return _fixed(1, lambda payload: reply(payload[0] != 0))
@@ -150,6 +159,7 @@ FROM_CONTROLLER: ControllerDecoders = {
     PackageType.SETUP_INPUTS: _setup_reply(messages.InputsSetup),
     PackageType.START: _acceptance(messages.StartReply),
     PackageType.PAUSE: _acceptance(messages.PauseReply),
+    PackageType.READ_PROPERTIES: _decode_properties,
 }
 """Package type -> decoder of what a controller sends in protocol version 2."""
 FROM_CONTROLLER_V1: ControllerDecoders = {
@@ -168,6 +178,7 @@ FROM_EXECUTABLE: ExecutableDecoders = {
     PackageType.SETUP_INPUTS: lambda payload: messages.SetupInputs(_names(payload)),
     PackageType.START: _bare(messages.Start()),
     PackageType.PAUSE: _bare(messages.Pause()),
+    PackageType.READ_PROPERTIES: lambda payload: messages.ReadProperties(_names(payload)),
 }
 """Package type -> decoder of what a client sends in protocol version 2."""
 FROM_EXECUTABLE_V1: ExecutableDecoders = {
@@ -212,6 +223,8 @@ def encode_executable(message: ExecutableMessage, version: int) -> tuple[Package
             return PackageType.START, b""
         case messages.Pause():
             return PackageType.PAUSE, b""
+        case messages.ReadProperties(names):
+            return PackageType.READ_PROPERTIES, _joined(names)
 
 
 def _frequency(frequency: float | None, version: int) -> bytes:
@@ -232,8 +245,6 @@ def encode_controller(message: ControllerMessage, version: int) -> tuple[Package
     match message:
         case messages.DataPackage(recipe, payload):
             return PackageType.DATA_PACKAGE, payload if version == 1 else _recipe(recipe) + payload
-        case messages.ProtocolVersionReply(accepted):
-            return PackageType.REQUEST_PROTOCOL_VERSION, bytes((accepted,))
         case messages.ControllerVersion(major, minor, bugfix, build):
             return PackageType.GET_URCONTROL_VERSION, _VERSION.pack(major, minor, bugfix, build)
         case TextMessage(text, _, level):
@@ -244,7 +255,12 @@ def encode_controller(message: ControllerMessage, version: int) -> tuple[Package
             return PackageType.SETUP_OUTPUTS, (b"" if version == 1 else _recipe(recipe)) + _joined(types)
         case messages.InputsSetup(recipe, types):
             return PackageType.SETUP_INPUTS, _recipe(recipe) + _joined(types)
-        case messages.StartReply(accepted):
-            return PackageType.START, bytes((accepted,))
-        case messages.PauseReply(accepted):
-            return PackageType.PAUSE, bytes((accepted,))
+        case (
+            messages.ProtocolVersionReply(accepted)
+            | messages.StartReply(accepted)
+            | messages.PauseReply(accepted)
+        ):
+            return messages.ANSWER_TYPES[type(message)], bytes((accepted,))
+        case messages.PropertiesReply(types, values):
+            words = _joined(types)
+            return PackageType.READ_PROPERTIES, _UINT16.pack(len(words)) + words + values

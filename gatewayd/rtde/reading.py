@@ -30,8 +30,8 @@ def fitting(names: Iterable[str], limit: int = OLD_LIST_LIMIT) -> tuple[str, ...
 class Reading:
     """The lists of outputs of one connection."""
 
-    def __init__(self, wishes: Wishes) -> None:
-        self.limited = wishes.limited
+    def __init__(self, wishes: Wishes, *, limited: bool = False) -> None:
+        self.limited = wishes.limited or limited
         """Whether lists are limited."""
         self._outputs = wishes.wanted_outputs()
         self._read_backs = wishes.read_backs()

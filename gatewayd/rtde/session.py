@@ -27,6 +27,8 @@ class Wishes:
     """Fields to subscribe; `timestamp` is put first by itself."""
     inputs: tuple[str, ...] = ()
     """Fields to claim."""
+    recipes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Input recipes by name, each claimed and sent by itself, besides those that are made of `inputs`."""
     watchdog: str | None = None
     """Input field that gets a recipe of its own, so that nothing else feeds it; need not be in `inputs`."""
     frequency: float = 0.0
@@ -40,10 +42,13 @@ class Wishes:
     """Send no list of names of more than `OLD_LIST_LIMIT` bytes: the controller does not take it."""
     running: bool = True
     """Start the output; else stay paused."""
+    protocol: int | None = None
+    """The protocol version to speak; None: 2, or 1 where the controller refuses it."""
 
     def wanted_inputs(self) -> tuple[str, ...]:
         """Fields to claim, the watchdog included."""
-        return tuple(dict.fromkeys((*self.inputs, *((self.watchdog,) if self.watchdog else ()))))
+        named = (name for names in self.recipes.values() for name in names)
+        return tuple(dict.fromkeys((*self.inputs, *named, *((self.watchdog,) if self.watchdog else ()))))
 
     def wanted_outputs(self) -> tuple[str, ...]:
         """Fields to subscribe whatever becomes of the inputs."""
@@ -78,6 +83,8 @@ class ClientSettings(Wishes):
     """Before the first new connection; doubles with each failure."""
     backoff_limit: float = 2.0
     """Longest wait before a new connection."""
+    every: bool = False
+    """Hand on every package; else only the newest of a long burst."""
     write_buffer: int = 65536
     """Unsent bytes at which a controller that does not read is given up."""
 
@@ -132,6 +139,10 @@ class Session:
     """
     round_trip: float = 0.0
     """Longest time from a request to its answer so far, in seconds."""
+    max_frequency: float = 0.0
+    """Packages that the controller can send per second."""
+    outputs_id: int | None = None
+    """Recipe id of the outputs; None in protocol version 1."""
 
 
 def output_hint(word: str, *, read_back: bool) -> str:

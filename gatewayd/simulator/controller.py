@@ -10,12 +10,14 @@ from collections.abc import Hashable, Iterable, Sequence
 
 from gatewayd.rtde.enums import ProgramState
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field, Series, SoftwareVersion
+from gatewayd.rtde.messages import PropertiesReply
 from gatewayd.rtde.types import DataType
 from gatewayd.simulator.arm import ControllerMoment
 from gatewayd.simulator.claims import ControllerClaims
 from gatewayd.simulator.faults import ADAPTER_FIELDS, ADAPTERS, Faults
 from gatewayd.simulator.interpreter import Interpreter
 from gatewayd.simulator.program import ProgramRule
+from gatewayd.simulator.properties import PROPERTIES_SINCE, answer_properties
 from gatewayd.simulator.signals import CYCLE_FIELDS, INITIAL, SIGNALS
 from gatewayd.simulator.store import FieldStore, Scalar
 
@@ -111,6 +113,13 @@ class Controller:
         if not 0 < frequency < self.rate:
             return 1
         return int(self.rate / max(frequency, 1.0))
+
+    def properties(self, names: tuple[str, ...]) -> PropertiesReply | None:
+        """The answer to a question for properties; None: the software does not know the question."""
+        first = PROPERTIES_SINCE.get(self.series)
+        if first is None or self.version < first:
+            return None
+        return answer_properties(names, self.version)
 
     def advance(self, cycles: int = 1) -> None:
         """Run one control cycle, `cycles` after the last: more than 1 where some could not be run in time."""

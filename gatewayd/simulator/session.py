@@ -142,14 +142,29 @@ class SimulatorSession:
                 self._answer(messages.ProtocolVersionReply(1 <= message.version <= newest))
             case messages.GetControllerVersion():
                 self._answer(messages.ControllerVersion(*self._controller.version, build=0))
-            case messages.Start():
-                self._started = self._view is not None
-                self._answer(messages.StartReply(self._started))
-            case messages.Pause():
-                self._started = False
-                self._answer(messages.PauseReply(accepted=True))
+            case messages.Start() | messages.Pause():
+                self._run(message)
+            case messages.ReadProperties(names):
+                self._read_properties(names)
             case messages.TextMessage():
                 _log.info("%s says (level %d) %s: %s", self, message.level, message.source, message.message)
+
+    def _run(self, message: messages.Start | messages.Pause) -> None:
+        if isinstance(message, messages.Pause):
+            self._started = False
+            self._answer(messages.PauseReply(accepted=True))
+        else:
+            self._started = self._view is not None
+            self._answer(messages.StartReply(self._started))
+
+    def _read_properties(self, names: tuple[str, ...]) -> None:
+        """Answer with types and values, with types alone if some name has no value; older software is silent."""
+        reply = self._controller.properties(names)
+        if reply is None:
+            kind = messages.PackageType.READ_PROPERTIES
+            self._pass_over(StrangePackage(Oddity.UNKNOWN_TYPE, kind, f"unknown package type {kind:d}"))
+        else:
+            self._answer(reply)
 
     def _answer(self, message: messages.ControllerMessage) -> None:
         self._out.append(self._protocol.send(message))

@@ -18,7 +18,7 @@ _EARLY = 0.5 * PERIOD
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class HistoryRow:
     """All values of one moment."""
 
     time: float
@@ -32,12 +32,12 @@ class LastMinute:
     """Samples of one cell, oldest first. A mapping of other variables begins anew."""
 
     def __init__(self) -> None:
-        self._samples: deque[Sample] = deque(maxlen=round(SECONDS / PERIOD))
+        self._samples: deque[HistoryRow] = deque(maxlen=round(SECONDS / PERIOD))
         self._fingerprint = -1
         self.period = PERIOD
 
     @property
-    def samples(self) -> Sequence[Sample]:
+    def samples(self) -> Sequence[HistoryRow]:
         """A copy."""
         return tuple(self._samples)
 
@@ -52,4 +52,4 @@ class LastMinute:
             return
         while self._samples and now - self._samples[0].time > SECONDS:
             self._samples.popleft()
-        self._samples.append(Sample(now, array("d", values), bytes(cell.image.quality)))
+        self._samples.append(HistoryRow(now, array("d", values), bytes(cell.image.quality)))

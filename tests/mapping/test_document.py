@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gatewayd.links.modbus_server.sections import Modbus
-from gatewayd.links.robot.sections import Robot
+from gatewayd.links.robot.sections import RobotSection
 from gatewayd.mapping.document import Document
 from gatewayd.mapping.reader import read_document
 from gatewayd.mapping.source import parse
@@ -29,7 +29,7 @@ def test_parts_know_their_places() -> None:
 
 def test_a_section_is_found_by_its_type() -> None:
     document = read(HEAD + "variables: {}")
-    robot = document.part(Robot)
+    robot = document.part(RobotSection)
     assert robot is not None
     assert robot.spec.host == "r"
     assert document.part(Modbus) is None

@@ -8,7 +8,7 @@ import pytest
 
 from gatewayd.core.definition import Fallback
 from gatewayd.links.modbus_server.sections import Modbus, PlacementSpec
-from gatewayd.links.robot.sections import Robot, Watchdog
+from gatewayd.links.robot.sections import RobotSection, Watchdog
 from gatewayd.mapping.language import FILE, VARIABLE, WRITER
 from gatewayd.mapping.model import Group
 from gatewayd.mapping.section import Section
@@ -16,7 +16,7 @@ from gatewayd.mapping.typed import Invalid
 
 SECTIONS = [
     FILE,
-    Robot,
+    RobotSection,
     Watchdog,
     Modbus,
     WRITER,
@@ -42,12 +42,12 @@ def test_unknown_keys_are_refused(section: type[Section]) -> None:
 @pytest.mark.parametrize(
     "section, value",
     [
-        (Robot, {"host": "r", "port": 0}),
-        (Robot, {"host": "r", "frequency": 501}),
-        (Robot, {"host": ""}),
-        (Robot, {"host": "no host"}),
-        (Robot, {"host": "r", "verify": "yes"}),
-        (Robot, {"host": "r", "port": "30004"}),
+        (RobotSection, {"host": "r", "port": 0}),
+        (RobotSection, {"host": "r", "frequency": 501}),
+        (RobotSection, {"host": ""}),
+        (RobotSection, {"host": "no host"}),
+        (RobotSection, {"host": "r", "verify": "yes"}),
+        (RobotSection, {"host": "r", "port": "30004"}),
         (Modbus, {"unit": 0}),
         (Modbus, {"unit": 248}),
         (Modbus, {"connections": 0}),
@@ -65,7 +65,7 @@ def test_values_out_of_their_range_are_refused(section: type[Section], value: An
 
 def test_defaults_are_the_documented_ones() -> None:
     """The contract names these; changing one changes the meaning of every file that relies on it."""
-    robot = Robot.model_validate({"host": "r"})
+    robot = RobotSection.model_validate({"host": "r"})
     assert (robot.port, robot.frequency, robot.on_connect, robot.verify) == (30004, 0, "adopt", True)
     modbus = Modbus()
     assert (str(modbus.listen), modbus.unit, modbus.allow, modbus.connections) == ("127.0.0.1:502", 1, (), 32)

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.fields import INPUTS, OUTPUTS
-from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice
+from gatewayd.rtde.negotiation import Negotiation
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import Session
+from gatewayd.rtde.steps import NextStep, Notice
 from gatewayd.rtde.types import DataType
 
 E_SERIES = m.ControllerVersion(5, 12, 0, 1101)

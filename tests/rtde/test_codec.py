@@ -222,7 +222,7 @@ def test_a_size_less_than_the_header_is_refused(size: int) -> None:
 
 GOOD = messages.StartReply(True)
 ODD = [
-    ("0003 52", Oddity.UNKNOWN_TYPE, 82, "unknown package type 82", ()),
+    ("0003 63", Oddity.UNKNOWN_TYPE, 99, "unknown package type 99", ()),
     ("0009 00 010203040506", Oddity.UNKNOWN_TYPE, 0, "unknown package type 0", ()),
     ("0005 53 0101", Oddity.LAYOUT, 83, "START with payload of 2 bytes, 1 expected", (GOOD,)),
     ("0003 53", Oddity.LAYOUT, 83, "START with payload of no bytes, 1 expected", ()),

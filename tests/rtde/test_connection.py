@@ -28,8 +28,8 @@ async def test_small_writes_are_not_delayed_and_dead_peers_are_noticed(
     async with connected() as (client, seen):
         await until(lambda: seen.packages)
         assert client._connection is not None
-        assert client._connection._transport is not None
-        own: Any = client._connection._transport.get_extra_info("socket")
+        assert client._connection.sender._transport is not None
+        own: Any = client._connection.sender._transport.get_extra_info("socket")
         assert own.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
         assert own.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
 
@@ -204,7 +204,7 @@ async def test_bytes_that_cannot_be_cut_into_packages_end_the_connection(
 
 ODD = {
     "unknown type": (b"\x00\x05\xff\x00\x00", Oddity.UNKNOWN_TYPE, "unknown package type 255"),
-    "properties": (b"\x00\x03\x52", Oddity.UNKNOWN_TYPE, "unknown package type 82"),
+    "properties": (b"\x00\x05\x52\0\0", Oddity.UNEXPECTED, "properties that were not asked for"),
     "data too short": (
         b"\x00\x05\x55\x01\x00",
         Oddity.RECIPE,

@@ -11,8 +11,9 @@ from gatewayd.report.format import counted
 from gatewayd.rtde import messages as m
 from gatewayd.rtde.claims import HandshakeError
 from gatewayd.rtde.fields import Series
-from gatewayd.rtde.negotiation import Negotiation, NextStep, Notice, State
+from gatewayd.rtde.negotiation import Negotiation
 from gatewayd.rtde.session import Wishes
+from gatewayd.rtde.steps import NextStep, Notice, State
 from tests.rtde.pure_controller import PureController
 
 E_SERIES = m.ControllerVersion(5, 12, 0, 1101)

@@ -13,10 +13,11 @@ from gatewayd.rtde import messages as m
 from gatewayd.rtde.catalogue import OLD_LIST_LIMIT
 from gatewayd.rtde.claims import REGISTERS_KEY
 from gatewayd.rtde.fields import INPUTS
-from gatewayd.rtde.negotiation import Negotiation, Notice, State
+from gatewayd.rtde.negotiation import Negotiation
 from gatewayd.rtde.reading import Reading, fitting
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.session import Session, Wishes
+from gatewayd.rtde.steps import Notice, State
 from gatewayd.rtde.types import DataType
 from tests.rtde.pure_controller import Conversation, PureController
 

@@ -6,7 +6,7 @@ from typing import Final
 
 from gatewayd.core.definition import Direction, ValueKind
 from gatewayd.links.robot.reference import FieldDeclaration, Target, resolve
-from gatewayd.links.robot.sections import Robot, RobotField, RobotPlace, RobotValidity
+from gatewayd.links.robot.sections import RobotField, RobotPlace, RobotSection, RobotValidity
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import Defined, ExpandedVariable
 from gatewayd.mapping.model import VariableSpec
@@ -32,7 +32,7 @@ def define(line: Part[VariableSpec], document: Document) -> tuple[list[Defined],
     place = line.spec.by(RobotPlace).robot
     reference = place.field
     targets = resolve(reference, declared(place))
-    robot = document.part(Robot)
+    robot = document.part(RobotSection)
     of_all = robot is not None and robot.spec.valid is not None
     is_asked = line.spec.by(RobotValidity).valid is not None
     values = [

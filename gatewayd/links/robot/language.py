@@ -12,7 +12,14 @@ from gatewayd.links.robot.definition import define, type_of
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
 from gatewayd.links.robot.rates import package_period, package_rate
 from gatewayd.links.robot.reference import is_bit_register, is_known
-from gatewayd.links.robot.sections import ADOPT_FOR, Robot, RobotField, RobotPlace, RobotValidity, Watchdog
+from gatewayd.links.robot.sections import (
+    ADOPT_FOR,
+    RobotField,
+    RobotPlace,
+    RobotSection,
+    RobotValidity,
+    Watchdog,
+)
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import CellSettings, Defined, ExpandedCell
@@ -25,7 +32,7 @@ _MIN_STALE_AFTER: Final = 0.1
 _TIMESTAMP: Final = "timestamp"
 _PROGRAM_STATE: Final = "runtime_state"
 """The field that says whether the robot program runs."""
-_UNKNOWN: Final = Robot(host="unknown")
+_UNKNOWN: Final = RobotSection(host="unknown")
 
 _SERIES: Final = {
     "cb3": ("UR3", "UR5", "UR10", "CB", "CB3.1", "CB-SERIES"),
@@ -39,7 +46,7 @@ class RobotLanguage(DefiningLanguage):
     """Section `robot`, and the keys `robot` and `valid` of a variable."""
 
     key = KIND.key
-    section = Robot
+    section = RobotSection
     meaning = "the controller"
     required = True
     variable_keys = RobotPlace
@@ -50,11 +57,11 @@ class RobotLanguage(DefiningLanguage):
     tables = "gatewayd.links.robot.tables"
     exports = "gatewayd.links.robot.urscript"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
-        (Robot, "watchdog"): Watchdog,
+        (RobotSection, "watchdog"): Watchdog,
         (VariableSpec, "robot"): RobotField,
     }
     articles: ClassVar[Mapping[type[Section], str]] = {
-        Robot: "the section `robot`",
+        RobotSection: "the section `robot`",
         Watchdog: "the watchdog",
         RobotField: "a field of the robot",
     }
@@ -67,7 +74,7 @@ class RobotLanguage(DefiningLanguage):
 
     def without_effect(self, document: Document) -> Iterable[tuple[Position, str, str]]:
         """`adopt_for` where nothing is adopted, and what is declared of a field that the name says already."""
-        robot = document.part(Robot)
+        robot = document.part(RobotSection)
         if (
             robot is not None
             and robot.spec.on_connect == "fallback"
@@ -86,7 +93,7 @@ class RobotLanguage(DefiningLanguage):
 
     def names_writers(self, document: Document) -> Iterable[WriterName]:
         """The writers that the watchdog requires."""
-        robot = document.part(Robot)
+        robot = document.part(RobotSection)
         if robot is not None and robot.spec.watchdog is not None:
             for index, name in enumerate(robot.spec.watchdog.requires or ()):
                 position = robot.at("watchdog", "requires", index)
@@ -108,7 +115,7 @@ class RobotLanguage(DefiningLanguage):
 
     def settings(self, document: Document) -> CellSettings:
         """When values are stale, and what becomes of those that the controller holds."""
-        part = document.part(Robot)
+        part = document.part(RobotSection)
         robot = part.spec if part is not None else _UNKNOWN
         return CellSettings(
             robot.stale_after or max(_STALE_PERIODS * package_period(robot), _MIN_STALE_AFTER),
@@ -119,7 +126,7 @@ class RobotLanguage(DefiningLanguage):
 
     def compile(self, cell: ExpandedCell) -> RobotPlan:
         """How to reach the controller and what to ask of it."""
-        part = cell.document.part(Robot)
+        part = cell.document.part(RobotSection)
         assert part is not None
         robot, writers = part.spec, list(cell.document.writers)
         watchdog = robot.watchdog

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from gatewayd.links.robot.sections import Robot
+from gatewayd.links.robot.sections import RobotSection
 from gatewayd.rtde.fields import Series
 
 MIN_RATE: Final = 0.1
@@ -12,7 +12,7 @@ MIN_RATE: Final = 0.1
 _MIN_FREQUENCY: Final = 0.001
 
 
-def package_period(robot: Robot) -> float:
+def package_period(robot: RobotSection) -> float:
     """Seconds between output packages: the controller divides its base rate by a whole number.
 
     Where the series is not known the slowest that may answer counts: CB3 with 125 Hz for its own rate.
@@ -23,7 +23,7 @@ def package_period(robot: Robot) -> float:
     return 1 / robot.frequency if robot.series is None else max(int(base / robot.frequency), 1) / base
 
 
-def package_rate(robot: Robot) -> float:
+def package_rate(robot: RobotSection) -> float:
     """The largest number of packages per second that the controller may send; 500 where nothing is known."""
     base = max(series.base_rate for series in Series)
     if robot.series is not None:

@@ -32,7 +32,7 @@ class Watchdog(Section):
     )
 
 
-class Robot(Section):
+class RobotSection(Section):
     """The controller and what is asked of it."""
 
     host: Host = Field(description="name or IP address of the controller")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.links.robot.rates import package_period, package_rate
-from gatewayd.links.robot.sections import Robot
+from gatewayd.links.robot.sections import RobotSection
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ from gatewayd.links.robot.sections import Robot
     ],
 )
 def test_packages_per_second_at_most(robot: dict[str, object], packages: float) -> None:
-    assert package_rate(Robot.model_validate({"host": "r", **robot})) == pytest.approx(packages)
+    assert package_rate(RobotSection.model_validate({"host": "r", **robot})) == pytest.approx(packages)
 
 
 @pytest.mark.parametrize(
@@ -33,4 +33,4 @@ def test_packages_per_second_at_most(robot: dict[str, object], packages: float) 
     ],
 )
 def test_time_between_packages(robot: dict[str, object], period: float) -> None:
-    assert package_period(Robot.model_validate({"host": "r", **robot})) == pytest.approx(period)
+    assert package_period(RobotSection.model_validate({"host": "r", **robot})) == pytest.approx(period)

@@ -307,10 +307,10 @@ async def test_a_package_that_cannot_be_taken_is_counted_and_logged_once(
     async with rigged() as rig:
         await until(lambda: rig.cell.accepts_writes)
         for count in (1, 2, 3):
-            rig.robot.raw(bytes.fromhex("0004 52 00"))
+            rig.robot.raw(bytes.fromhex("0004 63 00"))
             await until(lambda: rig.link.health().figures["strange"]["unknown type"] == count)  # type: ignore[index]  # noqa: B023
         lines = [record for record in caplog.records if record.message == "strange package"]
-        assert [line.fields["reason"] for line in lines] == ["unknown package type 82: 00 04 52 00"]  # type: ignore[attr-defined]
+        assert [line.fields["reason"] for line in lines] == ["unknown package type 99: 00 04 63 00"]  # type: ignore[attr-defined]
         assert rig.cell.health.sessions == 1
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gatewayd.links.robot.reference import UnresolvedReference
-from gatewayd.links.robot.sections import Robot
+from gatewayd.links.robot.sections import RobotSection
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import ExpandedCell
@@ -15,7 +15,7 @@ from gatewayd.rtde.fields import Series, SoftwareVersion
 
 def controller(document: Document) -> tuple[Series | None, SoftwareVersion | None]:
     """What the file says of the controller; the series may follow from the version."""
-    robot = document.part(Robot)
+    robot = document.part(RobotSection)
     if robot is None:
         return None, None
     version = SoftwareVersion(*robot.spec.version) if robot.spec.version is not None else None
@@ -28,7 +28,7 @@ def controller(document: Document) -> tuple[Series | None, SoftwareVersion | Non
 
 def watchdog_field(document: Document) -> tuple[str, Position] | None:
     """The field that is fed, and the place that names it."""
-    robot = document.part(Robot)
+    robot = document.part(RobotSection)
     if robot is None or robot.spec.watchdog is None:
         return None
     return robot.spec.watchdog.field, robot.at("watchdog", "field")

@@ -9,7 +9,7 @@ from gatewayd.core.definition import Direction
 from gatewayd.links.robot.definition import field_of, type_of
 from gatewayd.links.robot.reference import ReferenceProblem, UnresolvedReference
 from gatewayd.links.robot.rules.controller import controller, unresolved, watchdog_field
-from gatewayd.links.robot.sections import Robot, RobotPlace
+from gatewayd.links.robot.sections import RobotPlace, RobotSection
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.rules.registry import cell_rule, plant_rule
@@ -121,7 +121,7 @@ def field_of_two_types(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW312")
 def series_and_version(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A software version that does not belong to the series."""
-    robot = cell.document.part(Robot)
+    robot = cell.document.part(RobotSection)
     if robot is None or robot.spec.version is None:
         return
     version = SoftwareVersion(*robot.spec.version)
@@ -199,7 +199,7 @@ def input_mapped_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 def long_recipe(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """More field names than an old controller takes in one request."""
     series, version = controller(cell.document)
-    robot = cell.document.part(Robot)
+    robot = cell.document.part(RobotSection)
     limited = series is Series.CB3 or (
         series is Series.E and version is not None and version < _LONG_LISTS_SINCE
     )
@@ -252,7 +252,7 @@ def robot_claimed_twice(rule: Rule, cells: Sequence[ExpandedCell]) -> Iterator[D
     """Two cells that claim the same input of one robot."""
     claimed: dict[tuple[str, int, str], tuple[ExpandedCell, str, Position]] = {}
     for cell in cells:
-        robot = cell.document.part(Robot)
+        robot = cell.document.part(RobotSection)
         if robot is None:
             continue
         watchdog = watchdog_field(cell.document)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from gatewayd.links.robot.rates import MIN_RATE, package_period
 from gatewayd.links.robot.rules.controller import controller
-from gatewayd.links.robot.sections import Robot
+from gatewayd.links.robot.sections import RobotSection
 from gatewayd.mapping.diagnostics import Diagnostic, Rule
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
@@ -17,7 +17,7 @@ from gatewayd.report.wording import number, seconds
 def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A rate above the controller's own."""
     series, _ = controller(cell.document)
-    robot = cell.document.part(Robot)
+    robot = cell.document.part(RobotSection)
     if robot is None or series is None:
         return
     wanted = [(robot.spec.frequency, robot.at("frequency"), "packages")]
@@ -33,7 +33,7 @@ def rate_above_base(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW314")
 def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A rate of less than one package in ten seconds."""
-    robot = cell.document.part(Robot)
+    robot = cell.document.part(RobotSection)
     if robot is not None and 0 < robot.spec.frequency < MIN_RATE:
         message = f"{number(robot.spec.frequency)} Hz is less than one package in ten seconds"
         hint = f"`frequency` is in Hz: write at least {number(MIN_RATE)}, or 0 for the controller's own rate"
@@ -43,7 +43,7 @@ def rate_too_low(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 @cell_rule("GW607")
 def stale_too_soon(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Stale_after shorter than the time between two packages."""
-    robot = cell.document.part(Robot)
+    robot = cell.document.part(RobotSection)
     if robot is None or robot.spec.stale_after is None or 0 < robot.spec.frequency < MIN_RATE:
         return
     period = package_period(robot.spec)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from gatewayd.core.definition import Direction
 from gatewayd.links.robot.definition import is_program_output
-from gatewayd.links.robot.sections import Robot, RobotValidity
+from gatewayd.links.robot.sections import RobotSection, RobotValidity
 from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
@@ -25,7 +25,7 @@ def valid_without_program(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic
             message = f"`{variable.part.name}` ({variable.target}) is just as valid while no program runs"
             hint = "remove `valid`; it is for output registers"
             yield rule.at(variable.part.key_at("valid"), message, hint=hint)
-    robot = cell.document.part(Robot)
+    robot = cell.document.part(RobotSection)
     complete = len(cell.document.declared("variables")) == len(cell.document.variables)
     if robot is None or robot.spec.valid is None or not complete or cell.unresolved:
         return

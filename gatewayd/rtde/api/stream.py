@@ -1,0 +1,93 @@
+"""Bounded buffers between the connection and whoever iterates: what is lost is counted and reported, never silent."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from typing import Generic, Self, TypeVar
+
+_Item = TypeVar("_Item")
+
+
+class BoundedStream(Generic[_Item]):
+    """An asynchronous iterator over everything that is put in, for one reader at a time.
+
+    When `limit` items wait, each further one drives out the oldest; `overflow(lost, total)` is called at the first one
+    and when reading goes on. Ends by StopAsyncIteration or, after what is left in it, by the error it was ended with.
+    """
+
+    def __init__(self, limit: int, overflow: Callable[[int, int], None] = lambda _lost, _total: None) -> None:
+        self.overflowed = 0
+        """Items lost so far."""
+        self._limit = limit
+        self._overflow = overflow
+        self._items: deque[_Item] = deque()
+        self._lost = 0
+        self._read = False
+        self._ended = False
+        self._error: Exception | None = None
+        self._waiter: asyncio.Future[None] | None = None
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> _Item:
+        if self._lost or not self._read:
+            self._begin_reading()
+        while not self._items:
+            if self._ended:
+                raise StopAsyncIteration if self._error is None else self._error
+            if self._waiter is None:
+                self._waiter = asyncio.get_running_loop().create_future()
+            await asyncio.shield(self._waiter)
+        return self._items.popleft()
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    async def next(self, timeout: float | None = None) -> _Item:  # noqa: ASYNC109  a public API in seconds
+        """The next item; TimeoutError after `timeout` seconds, StopAsyncIteration at the end."""
+        async with asyncio.timeout(timeout):
+            return await self.__anext__()
+
+    def take(self) -> list[_Item]:
+        """All that is there, without waiting."""
+        self._begin_reading()
+        items = list(self._items)
+        self._items.clear()
+        return items
+
+    def put(self, item: _Item) -> None:
+        """Add an item, at the cost of the oldest if the buffer is full."""
+        items = self._items
+        if len(items) >= self._limit:
+            items.popleft()
+            self.overflowed += 1
+            self._lost += 1
+            if self._lost == 1 and self._read:
+                self._overflow(1, self.overflowed)
+        items.append(item)
+        if self._waiter is not None:
+            self._wake()
+
+    def end(self, error: Exception | None = None) -> None:
+        """No more items come; whoever waits gets `error`, or the end."""
+        self._ended, self._error = True, error
+        if self._waiter is not None:
+            self._wake()
+
+    def reopen(self) -> None:
+        """Items come again."""
+        self._ended, self._error = False, None
+
+    def _begin_reading(self) -> None:
+        lost, self._lost = self._lost, 0
+        if lost > 1 or (lost and not self._read):
+            self._overflow(lost, self.overflowed)
+        self._read = True
+
+    def _wake(self) -> None:
+        waiter, self._waiter = self._waiter, None
+        if waiter is not None and not waiter.done():
+            waiter.set_result(None)
