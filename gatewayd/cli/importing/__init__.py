@@ -6,7 +6,9 @@ import click
 
 from gatewayd.cli.lazy import LazyGroup
 
-COMMANDS: dict[str, str] = {}
+COMMANDS = {
+    "rtde": "Make a mapping from a recipe of another RTDE client.",
+}
 """Name -> what the list of commands says. Module `gatewayd.cli.importing.NAME` has the click command as `command`."""
 
 
