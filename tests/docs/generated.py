@@ -65,7 +65,7 @@ def renewed(text: str) -> str:
 
 _SECTIONS = {
     "": "The file",
-    "Robot": "`robot:`",
+    "RobotSection": "`robot:`",
     "Watchdog": "`robot: watchdog:`",
     "Modbus": "`modbus:`",
     "Canopen": "`canopen:`",
