@@ -63,7 +63,9 @@ on every change of SOURCE from 0. A DURATION has its unit: 200ms, 1.5s. A # star
 \b
 Commands on standard input (--control stdin), each answered with `ok`, `ok RESULT` or `error REASON`:
   get FIELD                          set FIELD VALUE[,VALUE...]
-  hold FIELD[,FIELD...]              free FIELD[,FIELD...]
+  hold FIELD[,FIELD...] [by NAME]    free FIELD[,FIELD...]
+  power on|off|release               program play|pause|stop
+  safety CONDITION: normal, reduced, protective-stop, safeguard-stop, robot-emergency-stop, ...
   freeze on|off                      creep on|off
   silence on|off                     overwrite FIELD VALUE[,...]|off
   pause SECONDS                      delay SECONDS

@@ -138,18 +138,23 @@ def _words(state: IntEnum) -> str:
     return " ".join(_SPELLED.get(word, word) for word in state.name.lower().split("_"))
 
 
+STATES: Mapping[str, type[IntEnum]] = MappingProxyType(
+    {
+        "robot_mode": RobotMode,
+        "safety_status": SafetyStatus,
+        "safety_mode": SafetyMode,
+        "joint_mode": JointMode,
+        "tool_mode": ToolMode,
+        "runtime_state": ProgramState,
+        "time_scale_source": TimeScaleSource,
+    }
+)
+"""Field -> the names of its numbers."""
+
 MEANINGS: Mapping[str, Mapping[int, str]] = MappingProxyType(
     {
         field: MappingProxyType({int(state): _words(state) for state in states})
-        for field, states in {
-            "robot_mode": RobotMode,
-            "safety_status": SafetyStatus,
-            "safety_mode": SafetyMode,
-            "joint_mode": JointMode,
-            "tool_mode": ToolMode,
-            "runtime_state": ProgramState,
-            "time_scale_source": TimeScaleSource,
-        }.items()
+        for field, states in STATES.items()
     }
 )
 """Field -> number -> what it means, in words."""

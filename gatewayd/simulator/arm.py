@@ -1,8 +1,8 @@
-"""The arm: a periodic joint trajectory, and what follows from it by forward kinematics.
+"""The arm in motion: a periodic joint trajectory, run at the speed that the controller allows.
 
-Geometry is a UR5e's (Denavit-Hartenberg parameters as published by Universal Robots). The trajectory is a sum of one
-sine per joint, so positions, speeds and accelerations agree exactly, and any moment can be computed without its past.
-Lengths in metres, angles in radians, rotations as rotation vectors, all in the base frame.
+The trajectory is a sum of one sine per joint, so positions, speeds and accelerations agree exactly, and any moment can
+be computed without its past. The actual joints follow the target ones with a small error that is a function of the
+trajectory as well: `actual_qd` is the derivative of `actual_q`, and an arm that stands shows no speed at all.
 """
 
 from __future__ import annotations
@@ -11,18 +11,15 @@ import math
 from functools import lru_cache
 from typing import NamedTuple
 
-Vector = tuple[float, ...]
-_Triple = tuple[float, float, float]
-_Matrix = tuple[_Triple, _Triple, _Triple]
+from gatewayd.simulator import kinematics
+from gatewayd.simulator.kinematics import ARMS, ArmGeometry, Frames, Vector
 
-ELBOW = 2
-"""Joint whose frame carries the elbow: the origin after the upper arm."""
-FLANGE = 6
-"""Index of the tool flange's frame."""
+DRIVEN, BRAKED, OFF = 2, 1, 0
+"""Power of the arm: motors carry it; powered with the brakes applied; without power."""
 
 
 class ControllerMoment(NamedTuple):
-    """A point in time of the simulated controller."""
+    """A point in time of the simulated controller, and all that its moving fields follow from."""
 
     step: int
     """Control cycles since the controller was started."""
@@ -32,25 +29,23 @@ class ControllerMoment(NamedTuple):
     """Seconds of the trajectory that have been run."""
     rate: float
     """Seconds of trajectory run per second: 0 = standing, 1 = full speed."""
+    change: float = 0.0
+    """Change of `rate` per second: the arm brakes or speeds up along its trajectory."""
+    power: int = DRIVEN
+    """`DRIVEN`, `BRAKED` or `OFF`."""
+    arm: ArmGeometry = ARMS["ur5e"]
+    posture: Vector | None = None
+    """Joint angles at which the arm stands for good, in place of the trajectory."""
 
 
-class Frames(NamedTuple):
-    """Origins and z axes of the base and the six link frames, and the flange's rotation."""
+class JointMotion(NamedTuple):
+    """Angles, speeds and accelerations of the six joints."""
 
-    origins: tuple[_Triple, ...]
-    axes: tuple[_Triple, ...]
-    rotation: _Matrix
+    q: Vector
+    qd: Vector
+    qdd: Vector
 
 
-# (a, d, cos alpha, sin alpha) of each link
-_LINKS = (
-    (0.0, 0.1625, 0.0, 1.0),
-    (-0.425, 0.0, 1.0, 0.0),
-    (-0.3922, 0.0, 1.0, 0.0),
-    (0.0, 0.1333, 0.0, 1.0),
-    (0.0, 0.0997, 0.0, -1.0),
-    (0.0, 0.0996, 1.0, 0.0),
-)
 # (centre, amplitude, angular frequency, phase) of each joint
 _JOINTS = (
     (0.30, 0.60, 2 * math.pi / 8.0, 0.0),
@@ -60,90 +55,58 @@ _JOINTS = (
     (-1.55, 0.15, 2 * math.pi / 8.0, 2.0),
     (0.10, 0.50, 2 * math.pi / 16.0, 0.0),
 )
-_DIFFERENCE = 1e-4  # seconds either side for the numeric derivative of a twist
-_REMEMBERED = 8  # moments: now and its neighbours, asked for by several fields of one package
+# the same for what the actual joints deviate by
+_DEVIATIONS = tuple((0.0, 2e-5, 41.0 + 7.3 * joint, float(joint)) for joint in range(6))
+_STANDING: Vector = (0.0,) * 6
+_REMEMBERED = 4  # moments: several fields of one package ask for the same
 
 
 @lru_cache(_REMEMBERED)
-def joints(path: float) -> tuple[Vector, Vector, Vector]:
-    """Positions, speeds and accelerations of the six joints at full speed."""
-    angles = [(c, a, w, w * path + p) for c, a, w, p in _JOINTS]
-    return (
+def target(moment: ControllerMoment) -> JointMotion:
+    """What the controller asks of the joints."""
+    return _motion(moment, _waves(moment.path, _JOINTS))
+
+
+@lru_cache(_REMEMBERED)
+def actual(moment: ControllerMoment) -> JointMotion:
+    """What the joints do."""
+    wanted, off = _waves(moment.path, _JOINTS), _waves(moment.path, _DEVIATIONS)
+    return _motion(moment, JointMotion(*(_sum(a, b) for a, b in zip(wanted, off, strict=True))))
+
+
+@lru_cache(_REMEMBERED)
+def target_frames(moment: ControllerMoment) -> Frames:
+    """The frames at the target joints."""
+    return kinematics.frames(moment.arm, target(moment).q)
+
+
+@lru_cache(_REMEMBERED)
+def actual_frames(moment: ControllerMoment) -> Frames:
+    """The frames at the actual joints."""
+    return kinematics.frames(moment.arm, actual(moment).q)
+
+
+def _waves(path: float, joints: tuple[tuple[float, float, float, float], ...]) -> JointMotion:
+    """The trajectory at full speed."""
+    angles = [(c, a, w, w * path + p) for c, a, w, p in joints]
+    return JointMotion(
         tuple(c + a * math.sin(x) for c, a, _, x in angles),
         tuple(a * w * math.cos(x) for _, a, w, x in angles),
         tuple(-a * w * w * math.sin(x) for _, a, w, x in angles),
     )
 
 
-@lru_cache(_REMEMBERED)
-def frames(path: float) -> Frames:
-    """The link frames on the trajectory."""
-    x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    origin = (0.0, 0.0, 0.0)
-    origins, axes = [origin], [z]
-    for angle, (a, d, ca, sa) in zip(joints(path)[0], _LINKS, strict=True):
-        c, s = math.cos(angle), math.sin(angle)
-        turned = _mix(c, x, s, y)
-        across = _mix(-s, x, c, y)
-        origin = (
-            origin[0] + a * turned[0] + d * z[0],
-            origin[1] + a * turned[1] + d * z[1],
-            origin[2] + a * turned[2] + d * z[2],
-        )
-        x, y, z = turned, _mix(ca, across, sa, z), _mix(-sa, across, ca, z)
-        origins.append(origin)
-        axes.append(z)
-    return Frames(tuple(origins), tuple(axes), (x, y, z))
+def _motion(moment: ControllerMoment, full: JointMotion) -> JointMotion:
+    """The trajectory at the moment's rate."""
+    if moment.posture is not None:
+        return JointMotion(moment.posture, _STANDING, _STANDING)
+    rate, change = moment.rate, moment.change
+    return JointMotion(
+        full.q,
+        tuple(speed * rate for speed in full.qd),
+        tuple(a * rate * rate + v * change for v, a in zip(full.qd, full.qdd, strict=True)),
+    )
 
 
-def pose(path: float) -> Vector:
-    """x, y, z, rx, ry, rz of the flange."""
-    at = frames(path)
-    return at.origins[FLANGE] + _rotation_vector(at.rotation)
-
-
-def twist(path: float, rate: float, point: int = FLANGE) -> Vector:
-    """Linear and angular velocity of the origin of frame `point`."""
-    return tuple(part * rate for part in _jacobian(path, joints(path)[1], point))
-
-
-def thrust(path: float, rate: float) -> Vector:
-    """What the joints' accelerations make of the flange's: near enough for a force, and cheap."""
-    return tuple(part * rate * rate for part in _jacobian(path, joints(path)[2], FLANGE))
-
-
-def acceleration(path: float, rate: float) -> Vector:
-    """Linear and angular acceleration of the flange: the change of its twist along the trajectory."""
-    before, after = twist(path - _DIFFERENCE, rate), twist(path + _DIFFERENCE, rate)
-    scale = rate / (2 * _DIFFERENCE)
-    return tuple((b - a) * scale for a, b in zip(before, after, strict=True))
-
-
-def _jacobian(path: float, rates: Vector, point: int) -> Vector:
-    """The geometric Jacobian of the origin of frame `point`, times a rate for each joint before it."""
-    at = frames(path)
-    target = at.origins[point]
-    vx = vy = vz = wx = wy = wz = 0.0
-    for rate, origin, axis in zip(rates[:point], at.origins, at.axes, strict=False):
-        ax, ay, az = axis[0] * rate, axis[1] * rate, axis[2] * rate
-        rx, ry, rz = target[0] - origin[0], target[1] - origin[1], target[2] - origin[2]
-        vx += ay * rz - az * ry
-        vy += az * rx - ax * rz
-        vz += ax * ry - ay * rx
-        wx, wy, wz = wx + ax, wy + ay, wz + az
-    return (vx, vy, vz, wx, wy, wz)
-
-
-def _mix(p: float, u: _Triple, q: float, v: _Triple) -> _Triple:
-    return (p * u[0] + q * v[0], p * u[1] + q * v[1], p * u[2] + q * v[2])
-
-
-def _rotation_vector(columns: _Matrix) -> _Triple:
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = columns
-    sx, sy, sz = yz - zy, zx - xz, xy - yx
-    sine = math.sqrt(sx * sx + sy * sy + sz * sz) / 2
-    angle = math.atan2(sine, (xx + yy + zz - 1) / 2)
-    if sine < 1e-9:  # no axis to be read off: the trajectory never turns the flange by exactly 0 or pi
-        return (0.0, 0.0, 0.0) if angle < 1 else (angle, 0.0, 0.0)
-    scale = angle / (2 * sine)
-    return (sx * scale, sy * scale, sz * scale)
+def _sum(a: Vector, b: Vector) -> Vector:
+    return tuple(x + y for x, y in zip(a, b, strict=True))

@@ -3,8 +3,12 @@
     get FIELD                    ok VALUE[,VALUE...]
     set FIELD VALUE[,VALUE...]   write as the robot would; a moving field stays there
     overwrite FIELD VALUE[,...]  the same in every cycle, whatever clients send; `overwrite FIELD off` ends it
-    hold FIELD[,FIELD...]        claim inputs for the controller itself
+    hold FIELD[,...] [by NAME]   claim inputs for the controller itself, or for another client of that name
     free FIELD[,FIELD...]        give them up again
+    power on|off|release         switch the arm on or off, or release its brakes, through all modes in between
+    program play|pause|stop      start, pause or end the robot program; the arm brakes
+    safety CONDITION             normal, reduced, protective-stop, safeguard-stop, recovery, robot-emergency-stop,
+                                 system-emergency-stop, violation or fault; program and power follow
     freeze on|off                timestamp stands still, packages go on
     creep on|off                 as freeze, but the timestamp goes on by 1 ns a cycle
     silence on|off               no data packages
@@ -18,18 +22,22 @@
     clients                      ok COUNT
     quit                         stop the simulator
 
-An answer is `ok`, `ok RESULT` or `error REASON`. Bits are `true` and `false`, as are their values in `set`.
+An answer is `ok`, `ok RESULT` or `error REASON`. Bits are `true` and `false`, as are their values in `set`; a mode or
+state may be written as its name: `set robot_mode POWER_OFF`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from enum import IntEnum
 from functools import partial
 
 from gatewayd.rtde.catalogue import suggest
+from gatewayd.rtde.enums import STATES
 from gatewayd.rtde.types import INTEGER_RANGES
 from gatewayd.simulator.faults import DropAt
+from gatewayd.simulator.modes import POWER_COMMANDS, PROGRAM, SAFETY, RobotModes
 from gatewayd.simulator.server import SimulatedController
 from gatewayd.simulator.store import Scalar
 
@@ -49,8 +57,11 @@ class Control:
             "get": self._get,
             "set": self._set,
             "overwrite": self._overwrite,
-            "hold": lambda rest: self._controller.hold(_fields(rest)),
+            "hold": self._hold,
             "free": lambda rest: self._controller.free(_fields(rest)),
+            "power": lambda rest: self._modes.switch_power(_choice(rest, POWER_COMMANDS)),
+            "program": lambda rest: self._modes.run_program(_choice(rest, PROGRAM)),
+            "safety": lambda rest: self._modes.set_safety(_choice(rest, SAFETY)),
             "freeze": partial(self._switch, "freeze"),
             "creep": partial(self._switch, "creep"),
             "silence": partial(self._switch, "silence"),
@@ -64,6 +75,10 @@ class Control:
             "clients": lambda _: str(simulator.clients),
             "quit": self._quit,
         }
+
+    @property
+    def _modes(self) -> RobotModes:
+        return self._controller.modes
 
     async def execute(self, line: str) -> str:
         """Run one command line and return its answer, without a line end. Never raises for what the line says."""
@@ -85,6 +100,10 @@ class Control:
     def _get(self, rest: str) -> str:
         values = self._controller.get(rest)
         return ",".join(str(value).lower() if isinstance(value, bool) else str(value) for value in values)
+
+    def _hold(self, rest: str) -> None:
+        names, _, holder = rest.partition(" by ")
+        self._controller.hold(_fields(names), *filter(None, [holder.strip()]))
 
     def _set(self, rest: str) -> None:
         field, _, text = rest.partition(" ")
@@ -113,7 +132,8 @@ class Control:
 
     def _values(self, field: str, text: str) -> list[Scalar]:
         code = self._controller.store.type(field).code
-        return [_value(item.strip(), code) for item in text.split(",")]
+        names = STATES.get(field)
+        return [_value(item.strip(), code, names) for item in text.split(",")]
 
 
 def _fields(text: str) -> list[str]:
@@ -132,12 +152,24 @@ def _seconds(text: str) -> float:
     return seconds
 
 
-def _value(text: str, code: str) -> Scalar:
-    """A number that an element of format `code` can hold."""
+def _choice(text: str, words: Iterable[str]) -> str:
+    if text not in words:
+        message = f"{text!r} is not one of {', '.join(words)}"
+        raise ValueError(message)
+    return text
+
+
+def _value(text: str, code: str, names: type[IntEnum] | None) -> Scalar:
+    """A number that an element of format `code` can hold, or one of `names`."""
     if text in _WORDS:
         return _WORDS[text]
+    if names is not None and text in names.__members__:
+        return names[text]
     if code == "d":
         return float(text)
+    if names is not None and not text.lstrip("-").isdecimal():
+        message = f"{text!r} is neither a number nor one of {', '.join(names.__members__)}"
+        raise ValueError(message)
     value = int(text, 0)
     low, high = INTEGER_RANGES.get(code, (0, 1))
     if not low <= value <= high:

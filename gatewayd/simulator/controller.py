@@ -6,16 +6,19 @@ what was written and from the switches in `faults`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Iterable, Sequence
 
 from gatewayd.rtde.enums import ProgramState
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field, Series, SoftwareVersion
 from gatewayd.rtde.messages import PropertiesReply
 from gatewayd.rtde.types import DataType
-from gatewayd.simulator.arm import ControllerMoment
+from gatewayd.simulator.arm import DRIVEN, ControllerMoment
 from gatewayd.simulator.claims import ControllerClaims
 from gatewayd.simulator.faults import ADAPTER_FIELDS, ADAPTERS, Faults
 from gatewayd.simulator.interpreter import Interpreter
+from gatewayd.simulator.kinematics import ARMS, MODELS, Vector, geometry
+from gatewayd.simulator.modes import RobotModes
 from gatewayd.simulator.program import ProgramRule
 from gatewayd.simulator.properties import PROPERTIES_SINCE, answer_properties
 from gatewayd.simulator.signals import CYCLE_FIELDS, INITIAL, SIGNALS
@@ -35,16 +38,17 @@ INTERNAL = "the controller itself"
 """Owner of the inputs that were claimed with `hold`."""
 
 _CREEP = 1e-9  # seconds a cycle
-_PROGRAM_RUNNING = 0b10  # robot_status_bits
+_POSTURES = ("actual_q", "target_q")  # setting one of them moves the arm there
 
 
 class Controller:
     """One simulated controller.
 
     `frequency` is the rate of its control cycle in Hz (default: that of the series), `uptime` its first timestamp in
-    seconds. `fields` are outputs that the catalogue does not have, or has with another type; they rest at zero. Raises
-    ProgramError if `program` names what the controller does not have, ValueError for inputs to be
-    held that do not exist, and for fields that are inputs or tell the time.
+    seconds. `model` is the size of the arm, one of `MODELS`. `fields` are outputs that the catalogue does not have, or
+    has with another type; they rest at zero. Raises ProgramError if `program` names what the controller does not have,
+    ValueError for inputs to be held that do not exist, for an unknown model, and for fields that are inputs or tell
+    the time.
     """
 
     def __init__(
@@ -57,6 +61,7 @@ class Controller:
         program: Iterable[ProgramRule] = (),
         faults: Faults | None = None,
         fields: Iterable[Field] = (),
+        model: str = "ur5e",
     ) -> None:
         self.series = series
         self.version = version or DEFAULT_VERSIONS[series]
@@ -78,12 +83,18 @@ class Controller:
         initial = {name: value for name, value in INITIAL.items() if name not in own}
         types = {name: field.type for name, field in {**INPUTS, **self._outputs}.items()}
         self.store = FieldStore(types, signals, initial)
+        if model not in MODELS:
+            message = f"no arm {model!r}; there are: {', '.join(MODELS)}"
+            raise ValueError(message)
+        self._arm = ARMS[model]
+        self._posture: Vector | None = None
         self._overwritten: dict[str, tuple[Scalar, ...]] = {}
         self._rules = tuple(program)
         self._interpreter = self._load()
         if uptime is None:
             uptime = DEFAULT_UPTIME if self.faults.boot_restart is None else 0.0
-        self._set_step(round(uptime * self.rate), 0.0, 1.0)
+        self._boot(round(uptime * self.rate))
+        self._holders: set[Hashable] = {INTERNAL, *ADAPTERS.values()}
         if self.faults.adapter is not None:
             taken_by_it = [name for name in ADAPTER_FIELDS if self.input_type(name)]
             self.claims.claim(ADAPTERS[self.faults.adapter], taken_by_it)
@@ -132,39 +143,48 @@ class Controller:
             self.store.moment = moment._replace(time=moment.time + _CREEP)
         if self.faults.freeze or self.faults.creep:
             return
-        running = self._running()
-        fraction = self._fraction() if running else 0.0
-        path = self.store.moment.path + fraction * cycles / self.rate
-        self._set_step(self.step + cycles, path, fraction)
-        if running:
+        self.modes.advance(cycles)
+        before = self.store.moment
+        fraction = self._fraction() * self.modes.share if self.modes.power == DRIVEN else 0.0
+        elapsed = cycles / self.rate
+        path = before.path + (before.rate + fraction) / 2 * elapsed
+        # A program stopped by a write to `runtime_state` stands at once; only a sequence of modes brakes.
+        change = (fraction - before.rate) / elapsed if self.modes.gliding else 0.0
+        step = self.step + cycles
+        self._set_step(step, step / self.rate, path, fraction, change)
+        if int(self.store.cells[self._state]) == ProgramState.RUNNING:
             self._interpreter.run(cycles)
 
     def restart(self) -> None:
         """Boot again: timestamp and registers from the beginning, no claims but internal ones, nothing overwritten."""
         self._overwritten.clear()
         self.store.reset()
+        self._posture = None
         self._interpreter = self._load()
-        self._set_step(0, 0.0, 1.0)
+        self._boot(0)
 
-    def hold(self, fields: Iterable[str]) -> None:
-        """Claim inputs for the controller itself; ValueError names those that do not exist or are a client's."""
+    def hold(self, fields: Iterable[str], holder: str = INTERNAL) -> None:
+        """Claim inputs for `holder`: the controller itself, or a client that has no connection here.
+
+        ValueError names those that do not exist or are somebody else's.
+        """
         wanted = tuple(fields)
         unknown = [name for name in wanted if self.input_type(name) is None]
         if unknown:
             message = f"no such input: {', '.join(unknown)}"
             raise ValueError(message)
-        taken = self.claims.claim(INTERNAL, wanted)
+        taken = self.claims.claim(holder, wanted)
+        self._holders.add(holder)
         if taken:
             name = min(taken)
             message = f"{name} is in use by {self.claims.owner(name)}"
             raise ValueError(message)
 
     def free(self, fields: Iterable[str]) -> None:
-        """Give up inputs held by the controller or an adapter; ValueError for what neither holds."""
-        internal: set[Hashable] = {INTERNAL, *ADAPTERS.values()}
+        """Give up inputs that `hold` or an adapter has claimed; ValueError for what nobody or a connection holds."""
         for name in tuple(fields):
             owner = self.claims.owner(name)
-            if owner not in internal:
+            if owner not in self._holders:
                 message = f"{name} is not held" if owner is None else f"{name} is in use by {owner}"
                 raise ValueError(message)
             self.claims.release(owner, (name,))
@@ -176,11 +196,16 @@ class Controller:
     def set(self, field: str, values: Sequence[Scalar]) -> None:
         """Write any field, as the robot would; one that moves by itself stays there from now on.
 
-        KeyError if there is no such field, ValueError for the wrong number of values or the cycle counter.
+        Joint angles take the arm along: it stands at `actual_q` or `target_q`, and its pose follows. KeyError if there
+        is no such field, ValueError for the wrong number of values or the cycle counter.
         """
         if field in CYCLE_FIELDS:
             message = f"{field} follows the controller's cycles; use freeze to stop it"
             raise ValueError(message)
+        if field in _POSTURES and len(values) == self.store.type(field).count:
+            self._posture = tuple(float(value) if math.isfinite(value) else 0.0 for value in values)
+            self._set_step(*self.store.moment[:4])
+            return
         self.store.pin(field, values)
 
     def overwrite(self, field: str, values: Sequence[Scalar] | None) -> None:
@@ -200,6 +225,9 @@ class Controller:
     def _load(self) -> Interpreter:
         self._speed = self.store.place("target_speed_fraction").start
         self._state = self.store.place("runtime_state").start
+        self._tool = self.store.place("tcp_offset")
+        self.modes = RobotModes(self.store, self.rate)
+        """Power, safety and program, by commands."""
         return Interpreter(self._rules, self.store, self.rate, INPUTS)
 
     def _fraction(self) -> float:
@@ -207,13 +235,12 @@ class Controller:
         fraction = float(self.store.cells[self._speed])
         return fraction if 0 <= fraction <= 1 else 1.0
 
-    def _running(self) -> bool:
-        """Whether the robot program runs; keeps the bit that says so in step."""
-        running = int(self.store.cells[self._state]) == ProgramState.RUNNING
-        bits = int(self.store.read("robot_status_bits")[0])
-        if bool(bits & _PROGRAM_RUNNING) != running:
-            self.store.write("robot_status_bits", (bits ^ _PROGRAM_RUNNING,))
-        return running
+    def _boot(self, step: int) -> None:
+        self._set_step(step, step / self.rate, 0.0, self.modes.share)
 
-    def _set_step(self, step: int, path: float, rate: float) -> None:
-        self.store.moment = ControllerMoment(step, step / self.rate, path, rate)
+    def _set_step(self, step: int, time: float, path: float, rate: float, change: float = 0.0) -> None:
+        tool = tuple(self.store.cells[self._tool])
+        if tool != self._arm.tool and all(map(math.isfinite, tool)):
+            self._arm = geometry(self._arm.model, tool)
+        power = self.modes.power
+        self.store.moment = ControllerMoment(step, time, path, rate, change, power, self._arm, self._posture)

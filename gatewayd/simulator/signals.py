@@ -13,16 +13,16 @@ from functools import lru_cache
 
 from gatewayd.rtde.enums import JointMode, ProgramState, RobotMode, SafetyStatus, TimeScaleSource
 from gatewayd.simulator.arm import (
-    ELBOW,
+    DRIVEN,
+    OFF,
     ControllerMoment,
-    Vector,
-    acceleration,
-    frames,
-    joints,
-    pose,
-    thrust,
-    twist,
+    JointMotion,
+    actual,
+    actual_frames,
+    target,
+    target_frames,
 )
+from gatewayd.simulator.kinematics import ELBOW, FLANGE, Frames, Vector, acceleration, pose, twist
 
 Signal = Callable[[ControllerMoment], Vector]
 """The elements of a field's value at a moment; a scalar has one."""
@@ -38,8 +38,9 @@ _INERTIA = (2.1, 2.6, 0.9, 0.12, 0.08, 0.02)  # kg m2 seen by each joint
 _FRICTION = (4.0, 5.0, 3.5, 1.2, 1.0, 0.8)  # Nm s/rad
 _TORQUE_CONSTANT = (13.26, 13.26, 13.26, 9.76, 9.76, 9.76)  # Nm/A at the joint's output
 _WARMTH = (31.0, 33.5, 32.0, 35.0, 36.5, 37.0)  # degrees Celsius
-_TRACKING_ERROR = 2e-5  # rad
 _SENSOR_RIPPLE = 0.35  # N, Nm/10
+_NONE: Vector = (0.0,) * 6
+_Motion = Callable[[ControllerMoment], JointMotion]
 
 
 def _ripple(moment: ControllerMoment, number: int) -> float:
@@ -48,32 +49,12 @@ def _ripple(moment: ControllerMoment, number: int) -> float:
     return 0.6 * math.sin(phase) + 0.4 * math.sin(2.7 * phase)
 
 
-def _target_q(moment: ControllerMoment) -> Vector:
-    return joints(moment.path)[0]
-
-
-def _target_qd(moment: ControllerMoment) -> Vector:
-    rate = moment.rate
-    return tuple(speed * rate for speed in joints(moment.path)[1])
-
-
-def _target_qdd(moment: ControllerMoment) -> Vector:
-    square = moment.rate * moment.rate
-    return tuple(change * square for change in joints(moment.path)[2])
-
-
-def _actual_q(moment: ControllerMoment) -> Vector:
-    return tuple(q + _TRACKING_ERROR * _ripple(moment, n) for n, q in enumerate(_target_q(moment)))
-
-
-def _actual_qd(moment: ControllerMoment) -> Vector:
-    return tuple(qd + 0.001 * moment.rate * _ripple(moment, 6 + n) for n, qd in enumerate(_target_qd(moment)))
-
-
 @lru_cache(4)
 def _torques(moment: ControllerMoment) -> Vector:
-    """Joint torques in Nm: gravity by the horizontal reach, inertia and friction."""
-    (_, lift, elbow, wrist, *_), qd, qdd = _target_q(moment), _target_qd(moment), _target_qdd(moment)
+    """Joint torques in Nm: gravity by the horizontal reach, inertia, friction; none while brakes hold the arm."""
+    if moment.power != DRIVEN:
+        return _NONE
+    (_, lift, elbow, wrist, *_), qd, qdd = target(moment)
     lever = (0.0, math.cos(lift), math.cos(lift + elbow), math.cos(lift + elbow + wrist), 0.3, 0.0)
     parts = zip(_LOADED, lever, _INERTIA, qdd, _FRICTION, qd, strict=True)
     return tuple(g * c + i * a + f * v for g, c, i, a, f, v in parts)
@@ -84,6 +65,8 @@ def _target_current(moment: ControllerMoment) -> Vector:
 
 
 def _actual_current(moment: ControllerMoment) -> Vector:
+    if moment.power != DRIVEN:
+        return _NONE
     return tuple(a + 0.02 * _ripple(moment, 12 + n) for n, a in enumerate(_target_current(moment)))
 
 
@@ -91,22 +74,29 @@ def _actual_current_as_torque(moment: ControllerMoment) -> Vector:
     return tuple(a * k for a, k in zip(_actual_current(moment), _TORQUE_CONSTANT, strict=True))
 
 
+def _pose(frames: Callable[[ControllerMoment], Frames]) -> Signal:
+    """The TCP of the target or of the actual joints."""
+    return lambda moment: pose(frames(moment))
+
+
+def _tcp_speed(frames: Callable[[ControllerMoment], Frames], motion: _Motion) -> Signal:
+    """The change of that pose: its position's derivative, and its angular velocity."""
+    return lambda moment: twist(frames(moment), motion(moment).qd)
+
+
+def _tcp_acceleration(motion: _Motion) -> Signal:
+    """The change of that speed."""
+    return lambda moment: acceleration(moment.arm, *motion(moment))
+
+
 @lru_cache(2)
-def _pose(moment: ControllerMoment) -> Vector:
-    return pose(moment.path)
+def _thrust(moment: ControllerMoment) -> Vector:
+    """What the joints' accelerations make of the flange's: near enough for a force, and cheap."""
+    return twist(target_frames(moment), target(moment).qdd, FLANGE)
 
 
-def _actual_pose(moment: ControllerMoment) -> Vector:
-    return tuple(x + 1e-5 * _ripple(moment, 18 + n) for n, x in enumerate(_pose(moment)))
-
-
-def _tcp_speed(moment: ControllerMoment) -> Vector:
-    return twist(moment.path, moment.rate)
-
-
-@lru_cache(2)
-def _tcp_acceleration(moment: ControllerMoment) -> Vector:
-    return acceleration(moment.path, moment.rate)
+def _elbow_velocity(moment: ControllerMoment) -> Vector:
+    return twist(actual_frames(moment), actual(moment).qd, ELBOW)[:3]
 
 
 @lru_cache(2)
@@ -114,7 +104,7 @@ def _wrench(moment: ControllerMoment) -> Vector:
     """Force and torque at the tool beyond its payload: what the payload's inertia makes of the acceleration."""
     inertia = (-_PAYLOAD,) * 3 + (-0.02,) * 3
     ripple = (_SENSOR_RIPPLE,) * 3 + (_SENSOR_RIPPLE / 10,) * 3
-    parts = zip(inertia, thrust(moment.path, moment.rate), ripple, strict=True)
+    parts = zip(inertia, _thrust(moment), ripple, strict=True)
     return tuple(m * a + r * _ripple(moment, 24 + n) for n, (m, a, r) in enumerate(parts))
 
 
@@ -125,14 +115,16 @@ def _raw_wrench(moment: ControllerMoment) -> Vector:
 
 def _accelerometer(moment: ControllerMoment) -> Vector:
     """Acceleration plus gravity's reaction, turned into the flange's frame."""
-    ax, ay, az, *_ = thrust(moment.path, moment.rate)
+    ax, ay, az, *_ = _thrust(moment)
     az += _GRAVITY
-    return tuple(ax * x + ay * y + az * z for x, y, z in frames(moment.path).rotation)
+    return tuple(ax * x + ay * y + az * z for x, y, z in actual_frames(moment).rotation)
 
 
 def _power(moment: ControllerMoment) -> float:
-    """Electrical power in W: standby plus what the joints do."""
-    return 85.0 + sum(abs(t * v) for t, v in zip(_torques(moment), _target_qd(moment), strict=True))
+    """Electrical power of the arm in W: standby plus what the joints do."""
+    if moment.power == OFF:
+        return 0.0
+    return 85.0 + sum(abs(t * v) for t, v in zip(_torques(moment), target(moment).qd, strict=True))
 
 
 def _temperatures(moment: ControllerMoment) -> Vector:
@@ -148,7 +140,7 @@ def _digital_inputs(moment: ControllerMoment) -> Vector:
 
 def _base_wrench(moment: ControllerMoment) -> Vector:
     """What the mounting carries: the arm's weight, and its inertia along the flange's acceleration."""
-    x, y, z, *torque = thrust(moment.path, moment.rate)
+    x, y, z, *torque = _thrust(moment)
     share = 0.4 * _ARM_MASS
     return (share * x, share * y, share * z + _ARM_MASS * _GRAVITY, *(share * part for part in torque))
 
@@ -156,6 +148,11 @@ def _base_wrench(moment: ControllerMoment) -> Vector:
 def _around(value: float, spread: float, number: int) -> Signal:
     """A scalar that stays within `spread` of `value`."""
     return lambda moment: (value + spread * _ripple(moment, number),)
+
+
+def _while_powered(signal: Signal) -> Signal:
+    """A voltage that the arm has only with power."""
+    return lambda moment: signal(moment) if moment.power != OFF else (0.0,) * len(signal(moment))
 
 
 def _encoder(counts_per_second: float) -> Signal:
@@ -168,34 +165,32 @@ def _encoder(counts_per_second: float) -> Signal:
 SIGNALS: Mapping[str, Signal] = {
     "timestamp": lambda moment: (moment.time,),
     "control_step": lambda moment: (moment.step,),
-    "target_q": _target_q,
-    "target_qd": _target_qd,
-    "target_qdd": _target_qdd,
+    "target_q": lambda moment: target(moment).q,
+    "target_qd": lambda moment: target(moment).qd,
+    "target_qdd": lambda moment: target(moment).qdd,
     "target_current": _target_current,
     "target_moment": _torques,
-    "actual_q": _actual_q,
-    "actual_qd": _actual_qd,
-    "actual_qdd": _target_qdd,
+    "actual_q": lambda moment: actual(moment).q,
+    "actual_qd": lambda moment: actual(moment).qd,
+    "actual_qdd": lambda moment: actual(moment).qdd,
     "actual_current": _actual_current,
     "actual_current_as_torque": _actual_current_as_torque,
     "actual_moment": _actual_current_as_torque,
     "joint_control_output": _actual_current,
-    "actual_TCP_pose": _actual_pose,
-    "target_TCP_pose": _pose,
-    "actual_TCP_speed": _tcp_speed,
-    "target_TCP_speed": _tcp_speed,
-    "actual_TCP_acceleration": _tcp_acceleration,
-    "target_TCP_acceleration": _tcp_acceleration,
+    "actual_TCP_pose": _pose(actual_frames),
+    "target_TCP_pose": _pose(target_frames),
+    "actual_TCP_speed": _tcp_speed(actual_frames, actual),
+    "target_TCP_speed": _tcp_speed(target_frames, target),
+    "actual_TCP_acceleration": _tcp_acceleration(actual),
+    "target_TCP_acceleration": _tcp_acceleration(target),
     "actual_TCP_force": _wrench,
     "ft_raw_wrench": _raw_wrench,
     "wrench_calc_from_currents": _wrench,
     "tcp_force_scalar": lambda moment: (math.hypot(*_wrench(moment)[:3]),),
     "actual_tool_accelerometer": _accelerometer,
-    "elbow_position": lambda moment: frames(moment.path).origins[ELBOW],
-    "elbow_velocity": lambda moment: twist(moment.path, moment.rate, ELBOW)[:3],
-    "actual_momentum": lambda moment: (
-        0.4 * _ARM_MASS * math.hypot(*twist(moment.path, moment.rate, ELBOW)[:3]),
-    ),
+    "elbow_position": lambda moment: actual_frames(moment).origins[ELBOW],
+    "elbow_velocity": _elbow_velocity,
+    "actual_momentum": lambda moment: (0.4 * _ARM_MASS * math.hypot(*_elbow_velocity(moment)),),
     "target_base_wrench": _base_wrench,
     "actual_digital_input_bits": _digital_inputs,
     "actual_configurable_digital_input_bits": lambda moment: (int(_digital_inputs(moment)[0]) >> 8 & 0xFF,),
@@ -204,9 +199,11 @@ SIGNALS: Mapping[str, Signal] = {
     "tool_temperature": lambda moment: (27 + 8 * (1 - math.exp(-moment.time / 2400)),),
     "actual_execution_time": _around(0.31, 0.04, 31),
     "actual_main_voltage": _around(48.1, 0.05, 32),
-    "actual_robot_voltage": _around(48.0, 0.08, 33),
+    "actual_robot_voltage": _while_powered(_around(48.0, 0.08, 33)),
     "actual_robot_current": lambda moment: (_power(moment) / 48,),
-    "actual_joint_voltage": lambda moment: tuple(48 - 0.3 * abs(a) for a in _actual_current(moment)),
+    "actual_joint_voltage": _while_powered(
+        lambda moment: tuple(48 - 0.3 * abs(a) for a in _actual_current(moment))
+    ),
     "io_current": _around(42.0, 1.5, 34),
     "tool_output_current": _around(61.0, 2.0, 35),
     "euromap67_24V_voltage": _around(24.0, 0.05, 36),

@@ -15,7 +15,8 @@ from weakref import WeakValueDictionary
 from gatewayd.report.format import counted
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.types import INTEGER_RANGES, DataType
-from gatewayd.simulator.arm import ControllerMoment, Vector
+from gatewayd.simulator.arm import ControllerMoment
+from gatewayd.simulator.kinematics import Vector
 from gatewayd.simulator.signals import Signal
 
 Scalar = int | float

@@ -6,8 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gatewayd.rtde.enums import ProgramState
 from gatewayd.simulator.control import Control
 from gatewayd.simulator.faults import DropAt, FaultStep
+from gatewayd.simulator.modes import SAFETY
 from gatewayd.simulator.server import SimulatedController
 
 
@@ -45,6 +47,23 @@ def control(simulator: SimulatedController) -> Control:
         ("hold", "error which field?"),
         ("hold nothing", "error no such input: nothing"),
         ("free input_int_register_0", "error input_int_register_0 is not held"),
+        ("hold input_int_register_0,input_int_register_1 by hmi", "ok"),
+        ("set robot_mode POWER_OFF", "ok"),
+        (
+            "set runtime_state PAUSE",
+            f"error 'PAUSE' is neither a number nor one of {', '.join(ProgramState.__members__)}",
+        ),
+        ("power", "error '' is not one of on, off, release"),
+        ("power brake", "error 'brake' is not one of on, off, release"),
+        ("power on", "error the robot is RUNNING; it has to be POWER_OFF"),
+        ("power off", "ok"),
+        ("program pause", "ok"),
+        ("program run", "error 'run' is not one of play, pause, stop"),
+        ("safety protective-stop", "ok"),
+        (
+            "safety stop",
+            f"error 'stop' is not one of {', '.join(SAFETY)}",
+        ),
     ],
 )
 async def test_an_answer(control: Control, line: str, answer: str) -> None:
@@ -132,3 +151,21 @@ async def test_any_line_has_one_line_of_answer(line: str) -> None:
     answer = await Control(SimulatedController()).execute(line)
     assert answer.split(" ")[0] in ("ok", "error")
     assert len(answer.splitlines()) == 1
+
+
+async def test_a_claim_names_its_holder(control: Control) -> None:
+    await control.execute("hold input_int_register_0 by hmi")
+    assert await control.execute("hold input_int_register_0") == "error input_int_register_0 is in use by hmi"
+    assert await control.execute("free input_int_register_0") == "ok"
+    assert await control.execute("hold input_int_register_0") == "ok"
+
+
+async def test_a_state_has_a_name(control: Control) -> None:
+    await control.execute("set joint_mode IDLE,IDLE,RUNNING,253,IDLE,IDLE")
+    assert await control.execute("get joint_mode") == "ok 255,255,253,253,255,255"
+
+
+async def test_a_protective_stop_is_one_command(control: Control, simulator: SimulatedController) -> None:
+    await control.execute("safety protective-stop")
+    simulator.controller.advance(500)
+    assert await control.execute("get runtime_state") == "ok 4"
