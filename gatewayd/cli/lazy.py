@@ -60,9 +60,8 @@ class LazyGroup(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands."""
-        if self._summaries:
-            with formatter.section("Commands"):
-                formatter.write_dl(list(self._summaries.items()))
+        with formatter.section("Commands"):
+            formatter.write_dl(list(self._summaries.items()))
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Command names and options that begin with `incomplete`."""

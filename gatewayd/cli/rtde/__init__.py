@@ -9,6 +9,7 @@ from gatewayd.cli.lazy import LazyGroup
 COMMANDS: dict[str, str] = {
     "fields": "Print which fields a controller has, and of what type.",
     "convert": "Write a finished recording in another format.",
+    "plot": "Draw a recording: PNG, SVG or PDF.",
 }
 """Name -> what the list of commands says. Module `gatewayd.cli.rtde.NAME` has the click command as `command`."""
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
+from gatewayd.cli.rtde.progress import size_text
 from gatewayd.cli.rtde.recordings import Progress, delimiter_option, reported
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
 
 _WORDS = ("csv", "binary", "parquet")
-_UNITS = ("B", "kB", "MB", "GB")
 
 
 @click.command(
@@ -77,12 +77,5 @@ def command(
         )
     if done.torn:
         click.echo(printable(done.torn), err=True)
-    before, after = (_size(Path(path)) for path in (file, out))
+    before, after = (size_text(Path(path).stat().st_size) for path in (file, out))
     click.echo(printable(f"{out}: {counted(done.packages, 'package')}, {after} ({file}: {before})"))
-
-
-def _size(path: Path) -> str:
-    """`12.3 MB`."""
-    size = path.stat().st_size
-    power = min(max(0, len(str(size)) - 1) // 3, len(_UNITS) - 1)
-    return f"{size / 1000**power:.3g} {_UNITS[power]}"

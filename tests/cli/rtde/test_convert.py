@@ -29,7 +29,7 @@ def test_the_name_says_the_format(source: Path, tmp_path: Path, name: str) -> No
     done = convert(source, target)
     assert done.exit_code == 0
     assert done.stdout.startswith(f"{target}: 1000 packages, ")
-    assert done.stdout.endswith(f" ({source}: {source.stat().st_size / 1000:.3g} kB)\n")
+    assert done.stdout.endswith(f" ({source}: {source.stat().st_size / 1000:.1f} kB)\n")
     with open_recording(source) as first, open_recording(target) as second:
         assert list(first) == list(second)
 

@@ -1,0 +1,84 @@
+"""The values of a recording that are drawn, and where their curves are interrupted. Pure."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, field
+
+from gatewayd.cli.rtde.panels import TIMESTAMP
+from gatewayd.rtde.recipe import Recipe, Scalar
+
+Row = tuple[tuple[Scalar, ...], float | None]
+"""Flat values, and the host time of a recording that has it."""
+Runs = Callable[[Sequence[Scalar]], bool]
+
+_PLAYING = 2
+"""`runtime_state` of a program that runs, as the official reader's filter takes it."""
+_PROGRAM_RUNNING = 1 << 1
+"""Bit of `robot_status_bits`."""
+
+
+@dataclass(slots=True)
+class Plotted:
+    """Columns over time. Where a curve is interrupted, they have NaN."""
+
+    time: array[float] = field(default_factory=lambda: array("d"))
+    """Seconds since the first package, or numbers of packages where the recording has no time."""
+    values: dict[int, array[float]] = field(default_factory=dict)
+    """Column -> values, as many as `time` has."""
+    packages: int = 0
+    """Packages that are drawn."""
+
+    def add(self, moment: float, row: Sequence[Scalar], *, apart: bool) -> None:
+        """Take in a package; `apart`: its curve is not joined to the package before."""
+        if self.time and (apart or moment < self.time[-1]):
+            self.time.append(self.time[-1])
+            for values in self.values.values():
+                values.append(math.nan)
+        self.time.append(moment)
+        for place, values in self.values.items():
+            values.append(row[place])
+        self.packages += 1
+
+
+def program_runs(recipe: Recipe) -> Runs | None:
+    """Whether the robot program runs in a package; None: the recording does not have what tells it."""
+    if "runtime_state" in recipe.slots:
+        state = recipe.slots["runtime_state"].start
+        return lambda row: row[state] == _PLAYING
+    if "robot_status_bits" in recipe.slots:
+        bits = recipe.slots["robot_status_bits"].start
+        return lambda row: bool(int(row[bits]) & _PROGRAM_RUNNING)
+    return None
+
+
+def time_label(recipe: Recipe, *, host_time: bool) -> str:
+    """What the horizontal axis shows."""
+    return "time in s" if TIMESTAMP in recipe.slots or host_time else "package"
+
+
+def plotted(
+    rows: Iterable[Row],
+    recipe: Recipe,
+    columns: Iterable[int],
+    *,
+    gaps: Collection[int] = (),
+    runs: Runs | None = None,
+) -> Plotted:
+    """The columns of the packages in which `runs` holds; `gaps` are the packages before which some are missing."""
+    found = Plotted(values={place: array("d") for place in columns})
+    slot = recipe.slots.get(TIMESTAMP)
+    apart = False
+    begin: float | None = None
+    for number, (row, host_time) in enumerate(rows):
+        apart = apart or number in gaps
+        if runs is not None and not runs(row):
+            apart = True
+            continue
+        moment = float(row[slot.start]) if slot is not None else number if host_time is None else host_time
+        begin = moment if begin is None else begin
+        found.add(moment - begin, row, apart=apart)
+        apart = False
+    return found
