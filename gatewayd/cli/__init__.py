@@ -13,7 +13,7 @@ COMMANDS = {
     "check": "Find every mistake in mapping files, without a robot.",
     "diff": "Print what a new mapping file changes.",
     "show": "Print the register table of a mapping file.",
-    "export": "Write the EDS, the DCF or robot program lines of a mapping file.",
+    "export": "Write the EDS, the DCF or robot program functions of a mapping.",
     "simulate": "Simulate a robot controller to connect to.",
     "run": "Serve the cells of mapping files: the daemon.",
     "reload": "Make the running gateway read its mapping files again.",

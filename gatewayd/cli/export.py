@@ -10,7 +10,9 @@ from gatewayd.cli.files import load_plan, reason_of
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
-    from gatewayd.links.exports import Export
+    from collections.abc import Mapping
+
+    from gatewayd.links.exports import Export, ExportOption
 
 BROKEN, UNREADABLE = 1, 2
 """Exit codes."""
@@ -50,26 +52,27 @@ class ExportGroup(click.Group):
 Examples:
   gatewayd export eds my-cell.yaml -o my-cell.eds      for the CANopen master's configurator
   gatewayd export dcf my-cell.yaml -o my-cell.dcf      the same with node-ID, bit-rate and values
-  gatewayd export urscript my-cell.yaml                the watchdog line of the robot program
+  gatewayd export urscript my-cell.yaml                functions for the robot program
   gatewayd show --format csv my-cell.yaml              the register list, for a spreadsheet
 """,
 )
 def command() -> None:
-    """Write files for other tools from a mapping FILE: the CANopen data sheet, robot program lines."""
+    """Write files for other tools from a mapping FILE: the CANopen data sheet, functions for the robot program."""
 
 
 def _command(export: Export) -> click.Command:
     from inspect import cleandoc
 
-    def run(file: str, output: str) -> None:
+    def run(file: str, output: str, **options: object) -> None:
         context = click.get_current_context()
-        _write(context, output, _made(context, export, file))
+        _write(context, output, _made(context, export, file, options))
 
     return click.Command(
         export.name,
         callback=run,
         params=[
             click.Argument(["file"], type=click.Path(allow_dash=True)),
+            *map(_option, export.options),
             click.Option(
                 ["-o", "--output"],
                 metavar="OUT",
@@ -84,11 +87,25 @@ def _command(export: Export) -> click.Command:
     )
 
 
-def _made(context: click.Context, export: Export, file: str) -> str:
+def _option(option: ExportOption) -> click.Option:
+    return click.Option(
+        [option.flag, option.name],
+        help=option.help,
+        metavar=option.metavar or None,
+        type=click.Choice(option.choices) if option.choices else None,
+        default=option.default,
+        show_default=option.default is not None,
+        required=option.required,
+        multiple=option.multiple,
+        is_flag=not option.metavar,
+    )
+
+
+def _made(context: click.Context, export: Export, file: str, options: Mapping[str, object]) -> str:
     from gatewayd.links.exports import ExportError
 
     try:
-        return export.make(load_plan(context, file)[1])
+        return export.make(load_plan(context, file)[1], **options)
     except ExportError as error:
         click.echo(printable(str(error)), err=True)
         context.exit(BROKEN)

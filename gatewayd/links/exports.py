@@ -5,11 +5,30 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from gatewayd.mapping.plan import Plan
-
 
 class ExportError(Exception):
     """There is nothing to write, or it must not be written; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportOption:
+    """Something that the mapping cannot say: an option of the command."""
+
+    flag: str
+    """`--writer`; what `make` gets has this name without the dashes."""
+    help: str
+    metavar: str = ""
+    """Empty: it takes no value."""
+    default: str | None = None
+    choices: tuple[str, ...] = ()
+    """The only values, if there are any."""
+    required: bool = False
+    multiple: bool = False
+
+    @property
+    def name(self) -> str:
+        """What `make` gets the value by."""
+        return self.flag.lstrip("-").replace("-", "_")
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,5 +42,6 @@ class Export:
     help: str
     example: str
     """A command line."""
-    make: Callable[[Plan], str]
-    """The text. Raises ExportError."""
+    make: Callable[..., str]
+    """The text, of a plan and of the options by name. Raises ExportError."""
+    options: tuple[ExportOption, ...] = ()

@@ -40,10 +40,11 @@ def test_a_configuration_names_the_node() -> None:
     assert "LastEDS=two-buses.eds" in lines
 
 
-def test_the_watchdog_line() -> None:
-    assert export("urscript", WATCHED).stdout.endswith(
-        'rtde_set_watchdog("input_int_register_23", 5, "stop")\n'
-    )
+def test_options_reach_the_export() -> None:
+    done = export("urscript", WATCHED, "--prefix", "press", "--handshake", "start:busy")
+    assert done.exit_code == 0
+    assert 'rtde_set_watchdog("input_int_register_23", 5, "stop")\n' in done.stdout
+    assert "def press_acknowledge_start():\n" in done.stdout
 
 
 def test_standard_input() -> None:
@@ -56,7 +57,7 @@ def test_standard_input() -> None:
     [
         (["eds", MODBUS_ONLY], 1, "the cell is on no CAN bus"),
         (["dcf", MODBUS_ONLY], 1, "the cell is on no CAN bus"),
-        (["urscript", MODBUS_ONLY], 1, "declares no watchdog"),
+        (["urscript", MODBUS_ONLY, "--handshake", "in_bits"], 1, "TOGGLE:ACKNOWLEDGE"),
         (["eds", BROKEN], 1, "error GW402 pdo-too-long"),
         (["eds", "nowhere.yaml"], 2, "nowhere.yaml: cannot be read: No such file or directory"),
         (["eds", TWO_BUSES, "-o", "nowhere/a.eds"], 2, "nowhere/a.eds: cannot be written"),

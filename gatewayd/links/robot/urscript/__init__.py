@@ -1,0 +1,1 @@
+"""What the robot program has of a mapping, in URScript: accessors, watchdog, handshakes, self test."""
