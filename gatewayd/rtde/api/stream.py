@@ -38,9 +38,10 @@ class BoundedStream(Generic[_Item]):
         while not self._items:
             if self._ended:
                 raise StopAsyncIteration if self._error is None else self._error
-            if self._waiter is None:
+            if self._waiter is None or self._waiter.done():  # a reader that was cancelled has cancelled it
                 self._waiter = asyncio.get_running_loop().create_future()
-            await asyncio.shield(self._waiter)
+            # Awaited by itself: behind a shield, each item would take one more turn of the loop.
+            await self._waiter
         return self._items.popleft()
 
     def __len__(self) -> int:

@@ -48,3 +48,11 @@ async def test_an_overflow_drops_the_oldest_and_is_reported_at_both_ends() -> No
 async def test_next_gives_up_in_time() -> None:
     with pytest.raises(TimeoutError):
         await BoundedStream[int](1).next(0.001)
+
+
+async def test_a_reader_that_gave_up_reads_on() -> None:
+    stream: BoundedStream[int] = BoundedStream(3)
+    with pytest.raises(TimeoutError):
+        await stream.next(0.001)
+    asyncio.get_running_loop().call_soon(stream.put, 7)
+    assert await stream.next(5) == 7
