@@ -217,6 +217,7 @@ IMPURE = {
     "rtde.loss": "has the socket",
     "rtde.resolve": "has the socket",
     "rtde.sending": "has the transport",
+    "rtde.sync": "has a loop in a thread",
     "rtde.visit": "runs a client",
     "web.guard": "speaks HTTP",
     "web.launch": "has the socket",

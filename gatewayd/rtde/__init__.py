@@ -104,12 +104,16 @@ _HOMES = {
     "messages": ("ControllerVersion", "TextLevel"),
     "types": ("DataType",),
 }
+_MODULES = ("enums", "fields", "recipes", "recording", "sync", "testing")
+"""Modules that `rtde.NAME` imports likewise."""
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> object:
+        if name in _MODULES:
+            return import_module(f"{__name__}.{name}")
         home = _HOME_OF.get(name)
         if home is None:
             message = f"module {__name__!r} has no attribute {name!r}"

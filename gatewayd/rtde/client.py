@@ -45,6 +45,7 @@ class RtdeClient:
         self._tap: StreamTap | None = None
         self._lists = ListMemory()
         self._paused = not settings.running
+        self._delay = settings.backoff
 
     @property
     def session(self) -> Session | None:
@@ -112,6 +113,12 @@ class RtdeClient:
         if self._connection is not None:
             self._connection.change(settings)
 
+    def back_off(self, first: float, longest: float) -> None:
+        """Wait so long before new connections from now on, in seconds; no effect if it is so already."""
+        if (self._settings.backoff, self._settings.backoff_limit) != (first, longest):
+            self._settings = replace(self._settings, backoff=first, backoff_limit=longest)
+            self._delay = first
+
     def trace(self, tap: StreamTap | None) -> None:
         """Hand `tap` the bytes of this connection and of those to come; None: no more."""
         self._tap = tap
@@ -142,16 +149,17 @@ class RtdeClient:
 
     async def run(self) -> None:
         """Stay connected until cancelled; what was sent before is still delivered. Raises what a handler raises."""
-        delay = self._settings.backoff
+        self._delay = self._settings.backoff
         attempts = 0
         while True:
             loss, lasted = await self._session()
             attempts = 0 if loss.started else attempts + 1
             if lasted > self._settings.backoff_limit:
-                delay = self._settings.backoff
+                self._delay = self._settings.backoff
+            delay = self._delay
             self._handler.session_lost(replace(loss, attempts=attempts, retry_in=delay))
             await wait_with_progress(asyncio.sleep(delay), self._count, delay)
-            delay = min(2 * delay, self._settings.backoff_limit)
+            self._delay = min(2 * delay, self._settings.backoff_limit)
 
     async def _session(self) -> tuple[Loss, float]:
         """One connection: how it ended, and for how long a session was up."""

@@ -38,6 +38,12 @@ def test_tables_load_no_client(module: str) -> None:
     assert {"asyncio", "gatewayd.rtde.client", "gatewayd.rtde.api.robot"}.isdisjoint(modules)
 
 
+def test_a_module_is_imported_when_it_is_named() -> None:
+    modules = loaded("from gatewayd import rtde", "rtde.sync.connect")
+    assert "gatewayd.rtde.sync" in modules
+    assert modules.isdisjoint(FOREIGN)
+
+
 def test_every_public_name_is_there_and_no_other() -> None:
     assert set(rtde.__all__) <= set(dir(rtde))
     assert all(getattr(rtde, name).__name__ == name for name in rtde.__all__ if name != "RobotEvent")

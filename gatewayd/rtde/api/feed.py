@@ -77,6 +77,8 @@ class RobotFeed(ConnectionObserver):
         """What was sent in this session, by field."""
         self.streams: list[BoundedStream[Sample]] = []
         self.main = self.stream(buffer)
+        self.started: Callable[[], None] = lambda: None
+        """Called when a session has come about."""
         self._reconnect = reconnect
         self._attempts = Attempts(ONCE)
         self._layout: SampleLayout | None = None
@@ -97,17 +99,23 @@ class RobotFeed(ConnectionObserver):
         stream: BoundedStream[Sample] = BoundedStream(limit, self._overflowed)
         if limit:
             self.streams.append(stream)
+            stream.closing = lambda: self.streams.remove(stream)
         else:
             stream.end(ValueError("buffer=0 keeps no samples: use latest or newer, or a stream of your own"))
         return stream
 
     def begin(self, retry: Retry) -> None:
         """Attempts at a session begin, within these limits."""
-        self._attempts = Attempts(retry)
+        self.limit(retry)
+        self._ever = False
         self.failure = None
         self.state = ConnectionState.CONNECTING
         for stream in self.streams:
             stream.reopen()
+
+    def limit(self, retry: Retry) -> None:
+        """The next session is to come about within these limits."""
+        self._attempts = Attempts(retry)
 
     def unavailable(self, session: Session) -> tuple[Unavailable, ...]:
         """The wanted fields that the controller does not give."""
@@ -153,6 +161,7 @@ class RobotFeed(ConnectionObserver):
         self.written.clear()
         self._ever = True
         self._attempts = Attempts(self._reconnect)
+        self.started()
         self._set_up(session)
         self.state = ConnectionState.RUNNING if self.running else ConnectionState.PAUSED
         if self.running:
@@ -178,6 +187,8 @@ class RobotFeed(ConnectionObserver):
         """See ClientHandler."""
         self.session = session
         self._report_missing(session)
+        if self.state is ConnectionState.RUNNING and not self.running:
+            self.paused()
         self._notify()
 
     def changed(self, session: Session) -> None:

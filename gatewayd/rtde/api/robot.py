@@ -12,7 +12,7 @@ from typing import Self
 from gatewayd.report.format import counted
 from gatewayd.rtde.api.errors import ConnectionLostError, FieldsRefusedError, RtdeError
 from gatewayd.rtde.api.events import RobotEvent
-from gatewayd.rtde.api.feed import IN_SESSION, ConnectionState, RobotFeed
+from gatewayd.rtde.api.feed import ConnectionState, RobotFeed
 from gatewayd.rtde.api.properties import Properties, ask_properties
 from gatewayd.rtde.api.retry import ONCE, Retry
 from gatewayd.rtde.api.sample import Sample
@@ -20,15 +20,10 @@ from gatewayd.rtde.api.stream import BoundedStream
 from gatewayd.rtde.api.verification import SHOWN_BY
 from gatewayd.rtde.api.wanted import Fields, Wanted, wanted
 from gatewayd.rtde.api.writing import InputWriter
-from gatewayd.rtde.claims import InputRecipe
 from gatewayd.rtde.client import RtdeClient
-from gatewayd.rtde.fields import Series
-from gatewayd.rtde.loss import Loss
-from gatewayd.rtde.messages import IN_USE, ControllerVersion, TextLevel, TextMessage
-from gatewayd.rtde.pace import Statistics
+from gatewayd.rtde.messages import IN_USE, TextLevel, TextMessage
 from gatewayd.rtde.properties import KNOWN_PROPERTIES
-from gatewayd.rtde.recipe import Recipe
-from gatewayd.rtde.session import ClientSettings, Session, Unavailable
+from gatewayd.rtde.session import ClientSettings
 from gatewayd.rtde.types import DEFAULT_PORT
 
 BOOTED = 40.0
@@ -101,10 +96,10 @@ def connect(
         settings,
         feed,
         retry,
+        reconnect or retry,
         strict=strict,
         claim_timeout=claim_timeout,
         boot_wait=boot_wait,
-        later=reconnect or retry,
     )
 
 
@@ -116,19 +111,15 @@ class Robot(InputWriter):
         settings: ClientSettings,
         feed: RobotFeed,
         retry: Retry,
+        later: Retry,
         *,
         strict: bool,
         claim_timeout: float,
         boot_wait: bool,
-        later: Retry,
     ) -> None:
-        self._settings = _wishing(settings, feed.wanted)
-        super().__init__(
-            feed,
-            RtdeClient(
-                replace(self._settings, backoff=later.delay, backoff_limit=later.max_delay), feed, feed
-            ),
-        )
+        wishes = _wishing(settings, feed.wanted)
+        super().__init__(feed, RtdeClient(wishes, feed, feed))
+        feed.started = lambda: self._client.back_off(later.delay, later.max_delay)
         self._retry = retry
         self._strict = strict
         self._claim_timeout = claim_timeout
@@ -171,8 +162,7 @@ class Robot(InputWriter):
         task, self._task = self._task, None
         if task is not None:
             task.cancel()
-            with suppress(asyncio.CancelledError, Exception):
-                await task
+            await asyncio.wait((task,))
         if self._feed.state is not ConnectionState.CLOSED:
             self._feed.give_up(ConnectionLostError("the robot was closed"), ConnectionState.CLOSED)
 
@@ -184,6 +174,7 @@ class Robot(InputWriter):
         self._refuse_closed()
         sessions = self.statistics.sessions
         if self._task is not None and not self._task.done():
+            self._feed.limit(self._retry)
             self._client.reconnect("a new connection was asked for")
         else:
             self._begin()
@@ -203,11 +194,6 @@ class Robot(InputWriter):
     def __aiter__(self) -> AsyncIterator[Sample]:
         return self._feed.main
 
-    @property
-    def latest(self) -> Sample | None:
-        """The newest sample of the present session; None while there is none."""
-        return self._feed.latest
-
     async def newer(self, timeout: float | None = None) -> Sample:  # noqa: ASYNC109  a public API in seconds
         """The newest sample that `newer` has not returned yet; older ones are passed over.
 
@@ -224,7 +210,7 @@ class Robot(InputWriter):
     _seen: Sample | None = None
 
     def stream(self, buffer: int = 5000) -> BoundedStream[Sample]:
-        """Another iterator over every package from now on, with a buffer of its own; `BoundedStream.overflowed`."""
+        """Another iterator over every package from now on, with a buffer of its own; close it when it is done with."""
         self._refuse_closed()
         if buffer < 1:
             message = f"a buffer of {buffer} samples keeps none"
@@ -240,8 +226,10 @@ class Robot(InputWriter):
 
     async def pause(self) -> None:
         """Have the output paused, in this session and in those to come; returns when it is."""
-        self._feed.running = False
+        feed = self._feed
+        feed.running = False
         await self._client.pause()
+        await feed.until(lambda: True if feed.state is not ConnectionState.RUNNING else None, None)
 
     async def resume(self) -> None:
         """Have it sent again."""
@@ -310,124 +298,11 @@ class Robot(InputWriter):
         self._session()
         return await ask_properties(self._client, tuple(dict.fromkeys(names)), timeout)
 
-    # what is agreed, and how it goes
-
-    @property
-    def host(self) -> str:
-        """As given."""
-        return self._settings.host
-
-    @property
-    def port(self) -> int:
-        """As given."""
-        return self._settings.port
-
-    @property
-    def address(self) -> str:
-        """Host and port for reading."""
-        return self._settings.address
-
-    @property
-    def own_address(self) -> tuple[str, int] | None:
-        """Our end of the connection, address and port; None without one."""
-        return self._client.own_address
-
-    @property
-    def peer_address(self) -> tuple[str, int] | None:
-        """The controller's end; None without a connection."""
-        return self._client.peer_address
-
-    @property
-    def state(self) -> ConnectionState:
-        """How far the connection is."""
-        return self._feed.state
-
-    @property
-    def connected(self) -> bool:
-        """Whether there is a session, running or paused."""
-        return self._feed.state in IN_SESSION
-
-    @property
-    def session(self) -> Session | None:
-        """All that is agreed; None without a session."""
-        return self._feed.session
-
-    @property
-    def version(self) -> ControllerVersion:
-        """The controller's software. This and what follows: ConnectionLostError without a session."""
-        return self._session().controller
-
-    @property
-    def series(self) -> Series | None:
-        """CB3, e-Series or PolyScope X, by the software; None for one that is not known."""
-        return self._session().series
-
-    @property
-    def protocol(self) -> int:
-        """RTDE protocol version spoken."""
-        return self._session().protocol
-
-    @property
-    def max_frequency(self) -> float:
-        """Packages that the controller can send per second."""
-        return self._session().max_frequency
-
-    @property
-    def frequency(self) -> float:
-        """Packages per second, as the controller divides its own rate."""
-        return 1 / self._session().period
-
-    @property
-    def measured_frequency(self) -> float:
-        """Packages per second, measured in the last full second; 0 before."""
-        return self.statistics.frequency
-
-    @property
-    def outputs(self) -> Recipe:
-        """The wanted outputs that the controller has, with types and slots: the layout of `Sample.values`."""
-        self._session()
-        assert self._feed.layout is not None
-        return self._feed.layout.outputs
-
-    @property
-    def outputs_id(self) -> int | None:
-        """Recipe id of the outputs; None in protocol version 1."""
-        return self._session().outputs_id
-
-    @property
-    def inputs(self) -> Mapping[str, InputRecipe]:
-        """The accepted input recipes by name, with ids, fields and types; a refused field is in none."""
-        return self._session().inputs
-
-    @property
-    def unavailable(self) -> tuple[Unavailable, ...]:
-        """The wanted fields that the controller does not give, with its word and who may be behind it."""
-        return self._feed.unavailable(self._session())
-
-    @property
-    def statistics(self) -> Statistics:
-        """Counters over all sessions: packages, skipped, late, pauses, writes."""
-        return self._client.statistics
-
-    @property
-    def overflowed(self) -> int:
-        """Samples that `async for` over this robot has lost, as it was too slow."""
-        return self._feed.main.overflowed
-
-    @property
-    def last_text(self) -> TextMessage | None:
-        """The last text of the controller, also of an earlier session."""
-        return self._feed.last_text
-
-    @property
-    def last_loss(self) -> Loss | None:
-        """Why the last session, or attempt at one, ended."""
-        return self._feed.last_loss
-
     # within
 
     def _begin(self) -> None:
         self._feed.begin(self._retry)
+        self._client.back_off(self._retry.delay, self._retry.max_delay)
         self._task = asyncio.create_task(self._client.run(), name=f"robot {self.address}")
         self._task.add_done_callback(self._ended)
 

@@ -20,6 +20,8 @@ class BoundedStream(Generic[_Item]):
     def __init__(self, limit: int, overflow: Callable[[int, int], None] = lambda _lost, _total: None) -> None:
         self.overflowed = 0
         """Items lost so far."""
+        self.closing: Callable[[], None] = lambda: None
+        """Called by `close`."""
         self._limit = limit
         self._overflow = overflow
         self._items: deque[_Item] = deque()
@@ -77,6 +79,12 @@ class BoundedStream(Generic[_Item]):
         self._ended, self._error = True, error
         if self._waiter is not None:
             self._wake()
+
+    def close(self) -> None:
+        """Take nothing more in; what is there can still be read. May be called twice."""
+        closing, self.closing = self.closing, lambda: None
+        closing()
+        self.end()
 
     def reopen(self) -> None:
         """Items come again."""

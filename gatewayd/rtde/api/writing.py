@@ -7,17 +7,16 @@ from collections.abc import Iterable, Mapping
 
 from gatewayd.rtde.api.completion import Elements, complete, elements
 from gatewayd.rtde.api.errors import ConnectionLostError, NotVerifiedError, WriteRefusedError
-from gatewayd.rtde.api.feed import ConnectionState, RobotFeed
+from gatewayd.rtde.api.feed import ConnectionState
+from gatewayd.rtde.api.information import RobotInformation
 from gatewayd.rtde.api.sample import Value
 from gatewayd.rtde.api.verification import Expectation, expectations, failed, shown_by
 from gatewayd.rtde.api.wanted import likely_input
 from gatewayd.rtde.catalogue import bit_word
 from gatewayd.rtde.claims import InputRecipe
-from gatewayd.rtde.client import RtdeClient
 from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.rtde.fields import BITS_PER_WORD
 from gatewayd.rtde.recipe import Scalar
-from gatewayd.rtde.session import Session
 
 Values = Mapping[str, Value | Iterable[Scalar]]
 """Values by field."""
@@ -31,12 +30,8 @@ _THROUGH_MASK = frozenset(
 )
 
 
-class InputWriter:
+class InputWriter(RobotInformation):
     """What a robot can be written. Only within a session: nothing waits for a connection, nothing is repeated."""
-
-    def __init__(self, feed: RobotFeed, client: RtdeClient) -> None:
-        self._feed = feed
-        self._client = client
 
     async def write(
         self,
@@ -231,14 +226,6 @@ class InputWriter:
         await self.write(self._recipe_with(fields), fields, verify=verify, timeout=timeout)
 
     # within
-
-    def _session(self) -> Session:
-        session = self._feed.session
-        if session is None:
-            reason = self._feed.last_loss
-            message = "not connected" + (f": {reason.text}" if reason is not None else "")
-            raise ConnectionLostError(message, reason)
-        return session
 
     def _held(self, recipe: str) -> InputRecipe:
         session = self._session()
