@@ -19,7 +19,10 @@ from tests.sources import MODULES, ROOT, nodes, tree
 
 LINK = {
     "core",
+    "doctor.machine",
+    "doctor.way",
     "links.contract",
+    "links.examination",
     "links.exports",
     "links.language",
     "links.registry",
@@ -52,12 +55,14 @@ LAYERS: dict[str, set[str]] = {
     },
     "links": set(),
     "links.contract": {"core", "mapping.plan"},
+    "links.examination": {"core.definition", "mapping.plan"},
     "links.language": {"core.definition", "links.contract", "mapping"},
     "links.exports": {"mapping.plan"},
     "links.tables": {"mapping.expanded", "mapping.plan", "report.layout"},
     "links.registry": {
         "core.status_layout",
         "links.contract",
+        "links.examination",
         "links.exports",
         "links.language",
         "links.tables",
@@ -85,6 +90,19 @@ LAYERS: dict[str, set[str]] = {
     },
     "control.client": {"control.paths"},
     "control.paths": set(),
+    "doctor": {
+        "control.client",
+        "control.paths",
+        "doctor",
+        "links.examination",
+        "links.registry",
+        "mapping.compiled",
+        "mapping.diagnostics",
+        "mapping.plan",
+        "report",
+    },
+    "doctor.machine": {"doctor.machine", "loop"},
+    "doctor.way": {"doctor.machine", "links.examination"},
     "service": {
         "control",
         "core",
@@ -149,6 +167,7 @@ LAYERS: dict[str, set[str]] = {
         "control",
         "core",
         "demo",
+        "doctor",
         "links.contract",
         "links.exports",
         "links.language",
@@ -188,7 +207,7 @@ LIBRARIES: dict[str, set[str]] = {
 }
 """Third-party package -> the only modules or packages that may know its types."""
 
-PURE = ("canopen", "control", "core", "links", "mapping", "modbus", "report", "rtde", "web")
+PURE = ("canopen", "control", "core", "doctor", "links", "mapping", "modbus", "report", "rtde", "web")
 """Packages without socket, event loop and clock: time is a parameter."""
 
 IMPURE = {
@@ -199,14 +218,20 @@ IMPURE = {
     "control.client": "has the socket",
     "control.endpoint": "has the socket",
     "control.server": "speaks HTTP",
+    "doctor.machine.addresses": "asks the name service",
+    "doctor.machine.ports": "has sockets",
+    "doctor.machine.routes": "asks the kernel",
+    "links.canopen_node.doctor": "hears the bus",
     "links.canopen_node.runtime": "a link at work",
     "links.canopen_node.store": "has the file, and a task that waits for it",
+    "links.modbus_server.doctor": "waits for a thread",
     "links.modbus_server.connection": "a protocol of asyncio",
     "links.modbus_server.listener": "has the sockets",
     "links.modbus_server.listeners": "opens listeners",
     "links.modbus_server.polling": "has the sockets",
     "links.modbus_server.runtime": "a link at work",
     "links.modbus_server.sockets": "has the sockets",
+    "links.robot.doctor": "asks the name service and the robot",
     "links.robot.runtime": "a link at work",
     "rtde.api.feed": "waits for what happens",
     "rtde.api.properties": "waits for an answer",

@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
-from gatewayd.cli.files import STDIN, format_option, name_of, read_file, reason_of
+from gatewayd.cli.files import format_option, mapping_files, read_named
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from gatewayd.mapping.compiled import Unreadable
     from gatewayd.report.findings import CheckOutcome
 
@@ -111,11 +109,9 @@ def _check(files: tuple[str, ...], *, separately: bool) -> CheckOutcome:
 
     readable: list[tuple[str, bytes]] = []
     unreadable: list[Unreadable] = []
-    # A file named twice is one cell, not two that clash.
-    for file in dict.fromkeys(_named(files)):
-        content = _read(file)
+    for name, content in map(read_named, mapping_files(files)):
         if isinstance(content, bytes):
-            readable.append((name_of(file), content))
+            readable.append((name, content))
         else:
             unreadable.append(content)
     loaded = tuple(load(data, name) for name, data in readable) if separately else load_together(readable)
@@ -123,32 +119,6 @@ def _check(files: tuple[str, ...], *, separately: bool) -> CheckOutcome:
     sound = [mapping for mapping in loaded if mapping.plan is not None]
     said = tuple((mapping.name, remark) for mapping in sound for remark in remarks(mapping.cell))
     return CheckOutcome(tuple(name for name, _ in readable), findings, tuple(unreadable), said)
-
-
-def _named(files: tuple[str, ...]) -> Iterator[str]:
-    """The files meant: a directory stands for its mapping files, as in `gatewayd run`; an empty one for itself."""
-    from pathlib import Path
-
-    from gatewayd.mapping.files import files_of
-
-    for file in files:
-        try:
-            inside = files_of(Path(file)) if file != STDIN else []
-        except OSError:
-            inside = []
-        yield from map(str, inside) if inside else (file,)
-
-
-def _read(file: str) -> bytes | Unreadable:
-    from gatewayd.mapping.compiled import Unreadable
-    from gatewayd.mapping.files import PATTERNS
-
-    try:
-        return read_file(file)
-    except IsADirectoryError:
-        return Unreadable(name_of(file), f"no mapping file ({PATTERNS}) in this directory")
-    except (OSError, ValueError) as error:
-        return Unreadable(name_of(file), reason_of(error))
 
 
 def _written(outcome: CheckOutcome, form: str) -> str:

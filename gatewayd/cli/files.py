@@ -9,8 +9,9 @@ import click
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
+    from gatewayd.mapping.compiled import Unreadable
     from gatewayd.mapping.loader import Loaded
     from gatewayd.mapping.plan import Plan
 
@@ -45,6 +46,39 @@ def read_file(file: str) -> bytes:
 def reason_of(error: OSError | ValueError) -> str:
     """Why a file cannot be read or written, in the operating system's words."""
     return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+
+
+def mapping_files(files: Iterable[str]) -> list[str]:
+    """The files meant, each once, so that one named twice is one cell and not two that clash.
+
+    A directory stands for its mapping files, as in `gatewayd run`; an empty one for itself.
+    """
+    from pathlib import Path
+
+    from gatewayd.mapping.files import files_of
+
+    named: list[str] = []
+    for file in files:
+        try:
+            inside = files_of(Path(file)) if file != STDIN else []
+        except OSError:
+            inside = []
+        named += map(str, inside) if inside else (file,)
+    return list(dict.fromkeys(named))
+
+
+def read_named(file: str) -> tuple[str, bytes | Unreadable]:
+    """What the file is called in messages, and its text or why it cannot be read."""
+    from gatewayd.mapping.compiled import Unreadable
+    from gatewayd.mapping.files import PATTERNS
+
+    name = name_of(file)
+    try:
+        return name, read_file(file)
+    except IsADirectoryError:
+        return name, Unreadable(name, f"no mapping file ({PATTERNS}) in this directory")
+    except (OSError, ValueError) as error:
+        return name, Unreadable(name, reason_of(error))
 
 
 def load_file(file: str) -> Loaded | None:

@@ -113,6 +113,10 @@ class LinkKind:
     metrics: ClassVar[tuple[LinkMetric, ...]] = ()
     traffic: ClassVar[str] = ""
     """Module whose `DECODER` makes what puts its links' traffic into words (`links.traffic`); empty: there is none."""
+    doctor: ClassVar[str] = ""
+    """Module whose `EXAMINATION` looks at what its links need, where they are to run (`links.examination`); empty:
+    nothing is looked at.
+    """
     usual: ClassVar[bool] = False
     """Nearly every cell has one: its runtime is imported while the mapping files are read."""
 

@@ -11,6 +11,7 @@ from gatewayd.core.status_layout import FIELDS, StatusField
 from gatewayd.links.contract import LinkKind, LinkRuntime, TrafficDecoder
 
 if TYPE_CHECKING:
+    from gatewayd.links.examination import Examination
     from gatewayd.links.exports import Export
     from gatewayd.links.language import DefiningLanguage, LinkLanguage
     from gatewayd.links.tables import LinkTables
@@ -87,6 +88,14 @@ def decoder_of(key: str) -> TrafficDecoder:
     module = kind_of(key).traffic
     found = import_module(module).DECODER() if module else TrafficDecoder()
     assert isinstance(found, TrafficDecoder)
+    return found
+
+
+def examination_of(key: str) -> Examination | None:
+    """What looks at what links with this key need; None: nothing does."""
+    # Commands that look at nothing import this module, too.
+    module = kind_of(key).doctor
+    found: Examination | None = import_module(module).EXAMINATION if module else None
     return found
 
 

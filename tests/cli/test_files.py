@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.cli.files import load_file, name_of, reason_of
+from gatewayd.cli.files import load_file, mapping_files, name_of, read_named, reason_of
+from gatewayd.mapping.compiled import Unreadable
 
 
 def test_standard_input_has_a_name() -> None:
@@ -28,3 +29,21 @@ def test_a_file_with_errors_is_loaded_and_they_are_printed(
     assert loaded is not None
     assert loaded.plan is None
     assert "GW107" in capsys.readouterr().err
+
+
+def test_a_directory_stands_for_its_mapping_files_and_each_counts_once(tmp_path: Path) -> None:
+    for name in ("b.yml", "a.yaml", ".hidden.yaml", "notes.txt"):
+        (tmp_path / name).touch()
+    first, second = str(tmp_path / "a.yaml"), str(tmp_path / "b.yml")
+    assert mapping_files([second, str(tmp_path), "-", "-"]) == [second, first, "-"]
+
+
+def test_what_cannot_be_read_has_its_reason(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_bytes(b"cell: a")
+    (tmp_path / "empty").mkdir()
+    assert read_named(str(tmp_path / "a.yaml")) == (str(tmp_path / "a.yaml"), b"cell: a")
+    for missing, reason in (("no.yaml", "No such file"), ("empty", "no mapping file (*.yaml, *.yml)")):
+        name, content = read_named(str(tmp_path / missing))
+        assert isinstance(content, Unreadable)
+        assert content.name == name
+        assert content.reason.startswith(reason)

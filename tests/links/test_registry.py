@@ -8,8 +8,9 @@ from inspect import getmembers, isclass
 import pytest
 
 from gatewayd.core.status_layout import FIELDS, HEADER_WORDS
-from gatewayd.links.contract import Link, Medium, SharedPart, TrafficDecoder
-from gatewayd.links.registry import LINK_KINDS, decoder_of, kind_of, kinds, status_fields
+from gatewayd.links.contract import Link, LinkKind, Medium, SharedPart, TrafficDecoder
+from gatewayd.links.examination import Examination
+from gatewayd.links.registry import LINK_KINDS, decoder_of, examination_of, kind_of, kinds, status_fields
 from gatewayd.mapping.plan import LinkPlan
 
 
@@ -64,3 +65,9 @@ def test_a_kind_need_not_offer_a_tap() -> None:
     SharedPart().trace(None)
     assert TrafficDecoder().words(b"\1\2", "", outgoing=True) == "length 2: 01 02"
     assert TrafficDecoder().words(bytes(20), "", outgoing=True).endswith("00 ...")
+
+
+def test_every_kind_says_what_is_to_be_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert all(isinstance(examination_of(kind.key), Examination) for kind in kinds())
+    monkeypatch.setattr(type(kind_of("modbus")), "doctor", LinkKind.doctor)
+    assert examination_of("modbus") is None

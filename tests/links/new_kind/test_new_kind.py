@@ -114,6 +114,16 @@ def test_show_has_its_places(tree: Path, tmp_path: Path) -> None:
     assert "speed" in run(tree, "show", file)
 
 
+def test_doctor_looks_at_what_it_needs(tree: Path, tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as foreign:
+        foreign.bind((HOST, free_port()))
+        file = mapping(tmp_path / "press.yaml", robot=free_port(), listen=foreign.getsockname()[1])
+        document = json.loads(run(tree, "doctor", "--json", "--socket", tmp_path / "none", file, code=1))
+    (socket_check,) = (check for check in document["checks"] if check["link"] == "lines")
+    assert (socket_check["check"], socket_check["outcome"]) == ("socket", "problem")
+    assert [advice["link"] for advice in document["advice"]][-2:] == ["lines", "gateway"]
+
+
 def test_diff_tells_its_settings_and_places_by_name(tree: Path, tmp_path: Path) -> None:
     old = mapping(tmp_path / "old.yaml")
     new = mapping(tmp_path / "new.yaml", VARIABLES.replace("lines: speed", "lines: tempo"), to=9003)

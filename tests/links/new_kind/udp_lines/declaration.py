@@ -19,6 +19,7 @@ class UdpLines(LinkKind):
 
     key = LinesPlan.kind
     title = "JSON lines over UDP"
+    doctor = f"{__package__}.doctor"
     fields = {"listen": "host:port of the socket", "to": "who gets the lines", "sent": "lines sent"}  # noqa: RUF012
     place = "name that the lines have for it, or null"
     has_one_place = True

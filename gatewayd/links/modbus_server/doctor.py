@@ -1,0 +1,69 @@
+"""What is looked at of a Modbus listener: address, port and who has it, privilege, the way to its clients."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncIterator, Iterator
+from functools import partial
+
+from gatewayd.core.definition import CellDefinition
+from gatewayd.doctor.machine.ports import bind_failure, holder
+from gatewayd.doctor.machine.privileges import NET_BIND_SERVICE, first_unprivileged_port, has_capability
+from gatewayd.doctor.way import way_to
+from gatewayd.links.examination import Examination, Observation, Surroundings
+from gatewayd.links.modbus_server import diagnosis
+from gatewayd.links.modbus_server.declaration import KIND
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.loop.threads import in_daemon_thread
+from gatewayd.mapping.plan import LinkPlan
+from gatewayd.report.format import address
+
+_PATIENCE = 5.0
+"""Seconds for a name server, where the listener is named."""
+
+
+class ModbusExamination(Examination):
+    """See the module."""
+
+    async def examine(
+        self, plan: LinkPlan, cell: CellDefinition, around: Surroundings
+    ) -> AsyncIterator[Observation]:
+        """See Examination."""
+        assert isinstance(plan, ModbusPlan)
+        where = address(plan.host, plan.port)
+        served = [
+            link
+            for known in around.running
+            for link in known.links(KIND.title)
+            if link.get("listen") == where
+        ]
+        if served:
+            yield diagnosis.served(where, served)
+        else:
+            attempt = partial(bind_failure, plan.host, plan.port)
+            try:
+                async with asyncio.timeout(_PATIENCE):
+                    failure = await in_daemon_thread(attempt, f"bind {where}")
+            except TimeoutError as error:
+                failure = error
+            facts = diagnosis.PortFacts(
+                first_unprivileged_port(), has_capability(NET_BIND_SERVICE), holder(plan.port), os.geteuid()
+            )
+            for found in diagnosis.listener(plan.host, plan.port, failure, facts):
+                yield found
+        for found in _clients(plan, cell):
+            yield found
+
+
+def _clients(plan: ModbusPlan, cell: CellDefinition) -> Iterator[Observation]:
+    """The way to each writer that is one machine."""
+    for network, writer in plan.writers:
+        if network.num_addresses == 1 and not network.is_loopback:
+            name = cell.writers[writer].name
+            for found in way_to(str(network.network_address), name):
+                yield diagnosis.of_client(found, name, str(network.network_address))
+
+
+EXAMINATION = ModbusExamination()
+"""Looks at what this kind of link needs."""
