@@ -8,9 +8,12 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from gatewayd.rtde.recording import open_recording
 
 if TYPE_CHECKING:
     from tests.simulator.conftest import Process
@@ -108,3 +111,31 @@ receive.disconnect()
 def test_it_works_with_a_cb3(process: Callable[..., Process]) -> None:
     first, second, *_ = ur_rtde(process, MOVES, "--series", "cb3")
     assert second[0] > first[0]
+
+
+def test_its_recording_is_read_with_the_fields_of_the_controller(
+    process: Callable[..., Process], tmp_path: Path
+) -> None:
+    """Text with commas, made by a recorder that knows nothing of ours."""
+    script = f"""
+receive.startFileRecording({str(tmp_path / "theirs.csv")!r}, [])
+begin = receive.getTimestamp()
+until(lambda: receive.getTimestamp() > begin + 0.5)
+receive.stopFileRecording()
+result = [begin, receive.getTimestamp()]
+receive.disconnect()
+"""
+    begin, end = ur_rtde(process, script)
+    with open_recording(tmp_path / "theirs.csv") as recording:
+        kinds = recording.recipe.kinds
+        rows = list(recording)
+    assert {name: kinds[name].word for name in ("timestamp", "actual_q", "robot_mode", "runtime_state")} == {
+        "timestamp": "DOUBLE",
+        "actual_q": "VECTOR6D",
+        "robot_mode": "INT32",
+        "runtime_state": "UINT32",
+    }
+    times = [row[recording.recipe.slots["timestamp"].start] for row in rows]
+    assert times == sorted(times)
+    assert begin - 0.1 <= times[0] <= times[-1] <= end + 0.1
+    assert {row[recording.recipe.slots["robot_mode"].start] for row in rows} == {7}

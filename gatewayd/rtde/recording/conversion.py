@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.recording.errors import RecordingError, RecordingExistsError
-from gatewayd.rtde.recording.gaps import GapWriter, read_gaps
+from gatewayd.rtde.recording.gaps import SUFFIX, GapWriter, read_gaps
 from gatewayd.rtde.recording.parquet import write_parquet
 from gatewayd.rtde.recording.reading import RecordingReader, open_recording
 from gatewayd.rtde.recording.writing import check_delimiter, create_recording
@@ -65,8 +65,9 @@ def convert(
     MissingExtraError, and ValueError for a delimiter.
     """
     check_delimiter(delimiters[1])
-    if not overwrite and os.path.lexists(target):
-        raise RecordingExistsError(str(target))
+    for made in (str(target), f"{target}{SUFFIX}"):
+        if not overwrite and os.path.lexists(made):
+            raise RecordingExistsError(made)
     if Path(target).exists() and Path(target).samefile(source):
         raise RecordingError(f"{target}: is the recording itself; choose another name")
     gaps = read_gaps(source)

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self
 
 from gatewayd.rtde.recipe import Recipe, Scalar
-from gatewayd.rtde.recording.errors import RecordingError
+from gatewayd.rtde.recording.errors import RecordingError, RecordingExistsError
 from gatewayd.rtde.recording.row_file import RowFile
 
 SUFFIX = ".gaps.jsonl"
@@ -94,7 +95,10 @@ class GapWriter:
     """Writes the file beside a recording, once there is a first gap. As a context manager it is closed at the end."""
 
     def __init__(self, recording: str | Path, *, overwrite: bool = False) -> None:
-        """Prepare it; with `overwrite` the file of an earlier recording goes. RecordingError where it cannot."""
+        """Prepare it; with `overwrite` the file of an earlier recording goes.
+
+        Raises RecordingExistsError where one stays, RecordingError where it cannot be removed.
+        """
         self._path = f"{recording}{SUFFIX}"
         self._file: RowFile | None = None
         self.count = 0
@@ -106,9 +110,11 @@ class GapWriter:
                 Path(self._path).unlink(missing_ok=True)
             except (OSError, ValueError) as error:
                 raise RecordingError(f"{self._path}: cannot be removed: {error}") from error
+        elif os.path.lexists(self._path):
+            raise RecordingExistsError(self._path)
 
     def write(self, gap: RecordedGap) -> None:
-        """Add a gap. Raises RecordingExistsError for the file of another recording, RecordingError for a full disk."""
+        """Add a gap. Raises RecordingError for a full disk."""
         if self._file is None:
             self._file = RowFile(self._path)
         shown = {name: found for name, found in asdict(gap).items() if found is not None}

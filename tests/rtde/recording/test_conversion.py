@@ -71,6 +71,14 @@ def test_a_file_that_is_there_is_overwritten_only_on_request(tmp_path: Path) -> 
     assert rows(target) == rows(source)
 
 
+def test_the_gaps_of_another_recording_are_in_the_way_from_the_begin(tmp_path: Path) -> None:
+    source = recorded(tmp_path / "x.csv")
+    (tmp_path / "y.csv.gaps.jsonl").write_text("precious")
+    with pytest.raises(RecordingExistsError, match=r"y\.csv\.gaps\.jsonl"):
+        convert(source, tmp_path / "y.csv", RecordingFormat.CSV)
+    assert sorted(path.name for path in tmp_path.glob("y*")) == ["y.csv.gaps.jsonl"]
+
+
 def test_a_file_that_comes_in_the_meantime_stays(tmp_path: Path) -> None:
     source, target = recorded(tmp_path / "x.csv", 1000), tmp_path / "y.csv"
 

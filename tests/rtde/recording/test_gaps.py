@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 from gatewayd.rtde.fields import OUTPUTS
 from gatewayd.rtde.recipe import Recipe
-from gatewayd.rtde.recording import GapWatch, GapWriter, RecordedGap, RecordingError, read_gaps
+from gatewayd.rtde.recording import (
+    GapWatch,
+    GapWriter,
+    RecordedGap,
+    RecordingError,
+    RecordingExistsError,
+    read_gaps,
+)
 
 WITH_TIME = Recipe(["robot_mode", "timestamp"], [OUTPUTS[name].type for name in ("robot_mode", "timestamp")])
 WITHOUT = Recipe(["robot_mode"], [OUTPUTS["robot_mode"].type])
@@ -87,8 +94,8 @@ def test_the_gaps_of_an_overwritten_recording_go(tmp_path: Path) -> None:
     path = tmp_path / "robot_data.csv"
     with GapWriter(path) as writer:
         writer.write(RecordedGap(1, "skipped"))
-    with GapWriter(path) as writer, pytest.raises(RecordingError, match="is there already"):
-        writer.write(RecordedGap(2, "skipped"))
+    with pytest.raises(RecordingExistsError, match=r"robot_data\.csv\.gaps\.jsonl: is there already"):
+        GapWriter(path)
     GapWriter(path, overwrite=True).close()
     assert read_gaps(path) == ()
 
