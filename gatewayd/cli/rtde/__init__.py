@@ -7,6 +7,7 @@ import click
 from gatewayd.cli.lazy import LazyGroup
 
 COMMANDS: dict[str, str] = {
+    "record": "Record every package of a robot in a file.",
     "fields": "Print which fields a controller has, and of what type.",
     "convert": "Write a finished recording in another format.",
     "plot": "Draw a recording: PNG, SVG or PDF.",

@@ -24,7 +24,7 @@ class StreamClock:
     """The controller's time, going on where it begins anew: `period` seconds after the package before."""
 
     def __init__(self, period: float) -> None:
-        self._period = period
+        self.period = period
         self._last: float | None = None
         self.now = 0.0
         """Seconds since the first package."""
@@ -33,7 +33,7 @@ class StreamClock:
         """Take in the timestamp of a package, None if it has none; `now` of it."""
         last, self._last = self._last, timestamp
         if timestamp is None or not (timestamp if last is None else last) <= timestamp < math.inf:
-            self.now += self._period
+            self.now += self.period
         elif last is not None:
             self.now += timestamp - last
         return self.now
