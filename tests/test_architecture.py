@@ -253,6 +253,7 @@ IMPURE = {
 """Module in a pure package -> why it is none."""
 
 OTHER_CLOCK = {
+    "cli.rtde.progress_lines": "paces lines of a terminal",
     "cli.watch": "paints a terminal; times of the gateway come as ages",
     "loop.clock": "is made of it",
     "service.compilation": "waits for a child, which is suspended as well",
@@ -277,6 +278,10 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "cli.completion": "tests/cli/test_main.py",
     "cli.importing": "a table; tests/cli/test_main.py",
     "cli.rtde": "a table; tests/cli/test_main.py",
+    "cli.rtde.progress_lines": "tests/cli/rtde/test_record.py",
+    "cli.rtde.recording_run": "tests/cli/rtde/test_record.py ends it in every way",
+    "cli.rtde.robot_source": "tests/cli/rtde/test_record.py, with a simulator",
+    "cli.rtde.sources": "a protocol; tests/cli/rtde/test_record.py",
     "canopen.product": "two numbers; tests/canopen/test_identity.py",
     "core.requester": "a record; tests/core/test_cell.py pins what its parts mean",
     "links.canopen_node.compile": "tests/mapping/test_compile.py compiles it",

@@ -65,7 +65,7 @@ class GatewaySource:
             return Arrivals()
         try:
             return self._arrivals(row)
-        except (KeyError, TypeError, ValueError, ProtocolError) as error:
+        except (LookupError, TypeError, ArithmeticError, ValueError, ProtocolError) as error:
             raise SourceRefusedError(f"the gateway sent what is no package: {error}") from error
 
     async def close(self) -> None:

@@ -72,7 +72,9 @@ class Recorder:
         self._order = order
         self._pick = _picker(recipe, columns)
         self._trigger = order.trigger(recipe)
-        self._windows: Windows[tuple[Values, float]] = Windows(order.before, order.after)
+        # Half a period more: packages are a whole number of periods apart, and their times are rounded.
+        spare = layout.period / 2
+        self._windows: Windows[tuple[Values, float]] = Windows(order.before + spare, order.after + spare)
         self._clock = StreamClock(layout.period)
         slot = recipe.slots.get(TIMESTAMP)
         self._timestamp = slot.start if slot is not None else None

@@ -1,0 +1,125 @@
+"""The recorder alone: columns, limits, gaps, and the order of what it gets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from gatewayd.cli.rtde.conditions import parse_condition
+from gatewayd.cli.rtde.recorder import LEFT_OUT, Recorder, RecordingOrder, SourceLayout
+from gatewayd.cli.rtde.triggers import Conditions
+from gatewayd.rtde.recipe import Recipe
+from gatewayd.rtde.recording import RecordingError, open_recording, read_gaps
+from gatewayd.rtde.types import DataType
+
+RECIPE = Recipe(["timestamp", "q", "io"], [DataType.DOUBLE, DataType.VECTOR3D, DataType.INT32])
+LAYOUT = SourceLayout(RECIPE, 0.5)
+Package = tuple[tuple[float, ...], float]
+
+
+def package(number: int, io: int = 0) -> Package:
+    return (100 + number / 2, number, number + 0.25, -number, io), 1e9 + number
+
+
+def stamps(path: Path) -> list[float]:
+    with open_recording(path) as found:
+        return [(row[0] - 100) * 2 for row in found]
+
+
+def recorded(order: RecordingOrder, *bursts: list[Package]) -> Recorder:
+    with Recorder(order, LAYOUT) as recorder:
+        for number, burst in enumerate(bursts):
+            if not recorder.over:
+                recorder.take(burst, float(number))
+    return recorder
+
+
+def test_columns_in_the_order_that_was_asked_for(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    recorded(RecordingOrder(path=str(path), fields=("io", "q"), host_time=True), [package(3, 7)])
+    assert path.read_text() == "io q_0 q_1 q_2 host_time\n7 3.0 3.25 -3.0 1000000003.0\n"
+    one = tmp_path / "b.csv"
+    recorded(RecordingOrder(path=str(one), fields=("io",)), [package(3, 7)])
+    assert one.read_text() == "io\n7\n"
+    with pytest.raises(
+        RecordingError, match="not among the fields that come: off; there are timestamp, q, io"
+    ):
+        recorded(RecordingOrder(path=str(tmp_path / "c.csv"), fields=("off",)), [])
+    assert not (tmp_path / "c.csv").exists()
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    st.lists(st.integers(1, 9), max_size=8), st.none() | st.integers(1, 30), st.none() | st.integers(1, 30)
+)
+def test_limits_hold_to_the_package_however_they_come(
+    tmp_path: Path, bursts: list[int], samples: int | None, periods: int | None
+) -> None:
+    path, first, given_bursts = tmp_path / "a.csv", 0, list[list[Package]]()
+    for size in bursts:
+        given_bursts.append([package(number) for number in range(first, first + size)])
+        first += size
+    duration = None if periods is None else periods / 2
+    order = RecordingOrder(path=str(path), samples=samples, duration=duration, overwrite=True)
+    recorder = recorded(order, *given_bursts)
+    most = min(limit for limit in (samples, periods, first) if limit is not None)
+    assert stamps(path) == list(range(most))
+    assert recorder.tally().packages == most
+    assert recorder.over is (most < first or most == samples)
+
+
+def test_gaps_are_counted_and_kept_beside(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    with Recorder(RecordingOrder(path=str(path)), LAYOUT) as recorder:
+        recorder.take([package(0), package(1), package(4)], 0.0)
+        recorder.lost("pulled")
+        recorder.take([package(9)], 1.0)
+        tally = recorder.tally()
+    assert [(gap.package, gap.reason, gap.missing) for gap in read_gaps(path)] == [
+        (2, "skipped", 2),
+        (3, "pulled", 4),
+    ]
+    assert (tally.packages, tally.skipped, tally.gaps, tally.left_out) == (4, 6, 2, 0)
+    assert tally.seconds == 4.5
+
+
+def test_what_a_condition_leaves_out_is_no_loss(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    order = RecordingOrder(
+        path=str(path),
+        trigger=Conditions(parse_condition("io == 1"), None, None, once=False).trigger,
+        before=1.0,
+    )
+    recorder = recorded(order, [package(number, number in {5, 6, 15}) for number in range(20)])
+    assert stamps(path) == [3, 4, 5, 6, 13, 14, 15]
+    assert [(gap.package, gap.reason, gap.missing) for gap in read_gaps(path)] == [(4, LEFT_OUT, 6)]
+    tally = recorder.tally()
+    assert (tally.skipped, tally.gaps, tally.left_out) == (0, 0, 6)
+    assert recorder.waiting
+
+
+def test_the_time_ends_though_nothing_comes_or_the_clock_stands_still(tmp_path: Path) -> None:
+    order = RecordingOrder(path=str(tmp_path / "a.csv"), duration=3.0)
+    with Recorder(order, LAYOUT) as recorder:
+        recorder.look(1000.0)
+        assert not recorder.over, "it has not begun"
+        recorder.take([package(0), package(0)], 1000.0)
+        recorder.look(1003.5)
+        assert not recorder.over
+        recorder.look(1004.5)
+        assert recorder.over
+
+
+def test_without_a_timestamp_everything_is_recorded(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    with Recorder(
+        RecordingOrder(path=str(path)), SourceLayout(Recipe(["x"], [DataType.INT32]), 0.5)
+    ) as recorder:
+        recorder.take([((number,), 0.0) for number in range(3)], 0.0)
+        recorder.lost("pulled")
+        recorder.take([((3,), 0.0)], 0.0)
+    assert path.read_text() == "x\n0\n1\n2\n3\n"
+    assert [(gap.package, gap.reason) for gap in read_gaps(path)] == [(3, "pulled")]
