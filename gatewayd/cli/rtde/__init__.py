@@ -9,6 +9,7 @@ from gatewayd.cli.lazy import LazyGroup
 COMMANDS: dict[str, str] = {
     "record": "Record every package of a robot in a file.",
     "fields": "Print which fields a controller has, and of what type.",
+    "info": "Print what a controller is, and how it speaks RTDE.",
     "convert": "Write a finished recording in another format.",
     "plot": "Draw a recording: PNG, SVG or PDF.",
 }
