@@ -292,6 +292,11 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "links.exports": "the contract; tests/cli/test_export.py",
     "links.language": "a protocol; tests/links/test_registry.py",
     "links.modbus_server.declaration": "tests/links/test_registry.py",
+    "links.modbus_server.exports": "tests/cli/test_export.py",
+    "links.modbus_server.plc.header": "texts; tests/links/modbus_server/plc/test_targets.py",
+    "links.modbus_server.plc.keywords": "lists; tests/links/modbus_server/plc/test_names.py",
+    "links.modbus_server.plc.model": "records; tests/links/modbus_server/plc/test_build.py",
+    "links.modbus_server.plc.registry": "a table; tests/links/modbus_server/plc/test_targets.py",
     "links.modbus_server.plan": "records; tests/mapping/test_compile.py pins their content",
     "links.modbus_server.tables": "tests/cli/test_show.py, tests/report/test_table.py",
     "links.robot.plan": "records; tests/mapping/test_compile.py pins their content",
@@ -312,6 +317,8 @@ WITHOUT_TEST_FILE: dict[str, str] = {
 
 TESTED_TOGETHER = {
     "links.canopen_node.rules": "tests/mapping/test_rules.py",
+    "links.modbus_server.plc.st": "tests/links/modbus_server/plc/test_structured_text.py",
+    "links.modbus_server.plc.targets": "tests/links/modbus_server/plc/test_targets.py",
     "links.modbus_server.rules": "tests/mapping/test_rules.py",
     "links.robot.rules": "tests/mapping/test_rules.py",
     "mapping.rules": "tests/mapping/test_rules.py",

@@ -10,9 +10,9 @@ from gatewayd.cli.files import load_plan, reason_of
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
-    from gatewayd.links.exports import Export, ExportOption
+    from gatewayd.links.exports import Export, ExportedFile, ExportOption, ExportSet
 
 BROKEN, UNREADABLE = 1, 2
 """Exit codes."""
@@ -42,7 +42,11 @@ class ExportGroup(click.Group):
         from gatewayd.links.registry import exports
 
         export = exports().get(cmd_name)
-        return _command(export) if export is not None else None
+        if export is None:
+            return None
+        from gatewayd.links.exports import Export
+
+        return _command(export) if isinstance(export, Export) else _command_of_set(export)
 
 
 @click.group(
@@ -53,11 +57,12 @@ Examples:
   gatewayd export eds my-cell.yaml -o my-cell.eds      for the CANopen master's configurator
   gatewayd export dcf my-cell.yaml -o my-cell.dcf      the same with node-ID, bit-rate and values
   gatewayd export urscript my-cell.yaml                functions for the robot program
+  gatewayd export plc my-cell.yaml --for iec-st -o plc/   data types and code for a PLC
   gatewayd show --format csv my-cell.yaml              the register list, for a spreadsheet
 """,
 )
 def command() -> None:
-    """Write files for other tools from a mapping FILE: the CANopen data sheet, functions for the robot program."""
+    """Write files for other tools from a mapping FILE: the CANopen data sheet, robot program functions, PLC programs."""
 
 
 def _command(export: Export) -> click.Command:
@@ -87,6 +92,35 @@ def _command(export: Export) -> click.Command:
     )
 
 
+def _command_of_set(export: ExportSet) -> click.Command:
+    from inspect import cleandoc
+
+    def run(file: str, output: str, force: bool, **options: object) -> None:
+        _write_set(click.get_current_context(), export, file, output, options, force=force)
+
+    examples = "\n".join(f"  {example}" for example in export.examples)
+    return click.Command(
+        export.name,
+        callback=run,
+        params=[
+            click.Argument(["file"], type=click.Path(allow_dash=True)),
+            *map(_option, export.options),
+            click.Option(
+                ["-o", "--output"],
+                metavar="FOLDER",
+                type=click.Path(file_okay=False),
+                default=".",
+                show_default=True,
+                help="Where to write the files; it is made where there is none.",
+            ),
+            click.Option(["--force"], is_flag=True, help="Overwrite generated files that somebody changed."),
+        ],
+        help=cleandoc(export.help),
+        short_help=export.summary,
+        epilog=f"\b\nExamples:\n{examples}\n\n{_EXIT_CODES}",
+    )
+
+
 def _option(option: ExportOption) -> click.Option:
     return click.Option(
         [option.flag, option.name],
@@ -99,6 +133,51 @@ def _option(option: ExportOption) -> click.Option:
         multiple=option.multiple,
         is_flag=not option.metavar,
     )
+
+
+def _write_set(
+    context: click.Context,
+    export: ExportSet,
+    file: str,
+    output: str,
+    options: Mapping[str, object],
+    *,
+    force: bool,
+) -> None:
+    from pathlib import Path
+
+    from gatewayd.cli.generated import planned, write
+
+    made = _set(context, export, file, options)
+    try:
+        files = planned(Path(output), made, force=force)
+        changed = [each for each in files if each.state == "changed by hand"]
+        if not changed:
+            write(files)
+    except OSError as error:
+        where = click.format_filename(error.filename or output)
+        click.echo(printable(f"{where}: cannot be written: {reason_of(error)}"), err=True)
+        context.exit(UNREADABLE)
+    for each in changed:
+        text = f"{each.path}: changed by hand, so nothing was written: move the change elsewhere, or --force"
+        click.echo(printable(text), err=True)
+    if changed:
+        context.exit(BROKEN)
+    for each in files:
+        click.echo(printable(f"{each.path}: {each.state}"))
+
+
+def _set(
+    context: click.Context, export: ExportSet, file: str, options: Mapping[str, object]
+) -> Sequence[ExportedFile]:
+    from gatewayd.links.exports import ExportError
+
+    try:
+        return export.make(load_plan(context, file)[1], **options)
+    except ExportError as error:
+        for line in str(error).splitlines():
+            click.echo(printable(line), err=True)
+        context.exit(BROKEN)
 
 
 def _made(context: click.Context, export: Export, file: str, options: Mapping[str, object]) -> str:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 
 class ExportError(Exception):
@@ -45,3 +48,51 @@ class Export:
     make: Callable[..., str]
     """The text, of a plan and of the options by name. Raises ExportError."""
     options: tuple[ExportOption, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedFile:
+    """One of several files. Its text has `CHECKSUM` in a comment, where there is a place for comments."""
+
+    name: str
+    text: str
+    encoding: str = "utf-8"
+    line_end: str = "\n"
+    once: bool = False
+    """It is a beginning to be worked on: it is written where there is none, and is nobody's but the user's then."""
+
+    def content(self) -> bytes:
+        """What stands in the file."""
+        text = self.text.replace(CHECKSUM, f"{_MARK}{_checksum(self.text)}")
+        return text.replace("\n", self.line_end).encode(self.encoding)
+
+
+@dataclass(frozen=True, slots=True)
+class ExportSet:
+    """Several files for another tool, made from a plan and from what its options say."""
+
+    name: str
+    summary: str
+    help: str
+    examples: tuple[str, ...]
+    options: tuple[ExportOption, ...]
+    make: Callable[..., Sequence[ExportedFile]]
+    """The files, of a plan and of the options by name. Raises ExportError."""
+
+
+_MARK: Final = "gatewayd-checksum: "
+CHECKSUM: Final = f"{_MARK}{'0' * 16}"
+"""Stands in a text where its checksum belongs."""
+_MARKED: Final = re.compile(rf"{_MARK}([0-9a-f]{{16}})")
+
+
+def is_as_generated(content: bytes) -> bool:
+    """Whether a file is one of ours that nobody has changed; line ends and a byte order mark do not count."""
+    text = content.decode("utf-8", errors="replace").removeprefix("\ufeff").replace("\r\n", "\n")
+    found = _MARKED.search(text)
+    return found is not None and found[1] == _checksum(text)
+
+
+def _checksum(text: str) -> str:
+    """Of the text without its own checksum."""
+    return hashlib.sha256(_MARKED.sub(CHECKSUM, text, count=1).encode()).hexdigest()[:16]

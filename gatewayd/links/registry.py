@@ -12,7 +12,7 @@ from gatewayd.links.contract import LinkKind, LinkRuntime, TrafficDecoder
 
 if TYPE_CHECKING:
     from gatewayd.links.examination import Examination
-    from gatewayd.links.exports import Export
+    from gatewayd.links.exports import Export, ExportSet
     from gatewayd.links.language import DefiningLanguage, LinkLanguage
     from gatewayd.links.tables import LinkTables
 
@@ -77,7 +77,7 @@ def tables() -> tuple[LinkTables, ...]:
 
 
 @cache
-def exports() -> Mapping[str, Export]:
+def exports() -> Mapping[str, Export | ExportSet]:
     """What all kinds write for other tools, by name."""
     modules = [import_module(language.exports) for language in languages() if language.exports]
     return {export.name: export for module in modules for export in module.EXPORTS}

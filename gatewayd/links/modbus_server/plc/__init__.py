@@ -1,0 +1,1 @@
+"""What a PLC program needs of a Modbus unit: tags, code for its registers, the status block, the poll plan."""

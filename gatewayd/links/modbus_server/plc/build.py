@@ -1,0 +1,129 @@
+"""From a compiled mapping to the model of one PLC's program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import PurePath
+from typing import Final
+
+from gatewayd.core.definition import CellDefinition, Direction
+from gatewayd.links.exports import ExportError
+from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.modbus_server.plc.model import PlcModel, Tag
+from gatewayd.links.modbus_server.plc.polling import numbered, read_polls, status_polls, write_polls
+from gatewayd.links.modbus_server.plc.tags import members, owners, places, tag_of
+from gatewayd.mapping.plan import Plan
+from gatewayd.modbus.areas import Area
+from gatewayd.report.wording import alternatives, did_you_mean, one_and_more
+
+NOBODY: Final = "none"
+"""The writer of a program that only reads."""
+_PERIOD: Final = 0.1
+_ANYWHERE: Final = frozenset({"0.0.0.0", "::"})
+
+
+@dataclass(frozen=True, slots=True)
+class PlcWishes:
+    """What a mapping cannot say of the program."""
+
+    writer: str | None = None
+    """Which writer of the mapping the PLC is; `NOBODY`: it only reads; None: the only one there is."""
+    prefix: str = "GW"
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Variable or family of the mapping -> what it is called in the PLC."""
+    host: str | None = None
+    """How the PLC reaches the gateway; None: as the mapping says where it listens."""
+
+
+def model_of(plan: Plan, wishes: PlcWishes) -> PlcModel:
+    """The model. Raises ExportError for a cell without Modbus, and where no program could do what the mapping says."""
+    modbus = _modbus_of(plan)
+    cell = plan.cell
+    writer = _writer_of(cell, modbus, wishes.writer)
+    chosen = places(modbus.placements, cell)
+    tags = _renamed([tag_of(place, cell) for place in chosen.values()], wishes.names)
+    outputs = [tag for tag in tags if cell.variables[tag.number - 1].direction is Direction.OUTPUT]
+    inputs = [tag for tag in tags if writer is not None and writer + 1 in tag.owners]
+    others = {
+        place.address: cell.variables[index].name
+        for index, place in chosen.items()
+        if place.area is Area.HOLDING and cell.variables[index].direction is Direction.INPUT
+        if writer not in owners(cell.variables[index], cell)
+    }
+    polls = [*status_polls(len(cell.variables)), *read_polls(outputs, modbus)]
+    if writer is not None:
+        polls += write_polls(inputs, cell, writer, others)
+    return PlcModel(
+        cell=cell.name,
+        source=PurePath(plan.source).name,
+        fingerprint=cell.fingerprint,
+        prefix=wishes.prefix,
+        host=wishes.host or ("192.168.1.2" if modbus.host in _ANYWHERE else modbus.host),
+        port=modbus.port,
+        unit=modbus.unit,
+        writer="" if writer is None else cell.writers[writer].name,
+        writer_number=0 if writer is None else writer + 1,
+        writers=tuple(known.name for known in cell.writers),
+        timeout=None if writer is None else cell.writers[writer].timeout,
+        inputs=members(inputs),
+        outputs=members(outputs),
+        variables=tuple(variable.name for variable in cell.variables),
+        polls=numbered(polls),
+        left_out=tuple(_left_out(cell, chosen, inputs)),
+        period=_PERIOD,
+    )
+
+
+def _modbus_of(plan: Plan) -> ModbusPlan:
+    found = list(plan.of(ModbusPlan).values())
+    if not found:
+        raise ExportError(
+            f"{plan.source}: the cell has no Modbus server: add `modbus: {{listen: 0.0.0.0:502}}`; "
+            "for a CANopen master there is `gatewayd export eds`"
+        )
+    return found[0]
+
+
+def _writer_of(cell: CellDefinition, modbus: ModbusPlan, name: str | None) -> int | None:
+    known = sorted({writer for _network, writer in modbus.writers})
+    names = [cell.writers[writer].name for writer in known]
+    if name == NOBODY or not (known or name):
+        return None
+    if name is None and len(known) == 1:
+        return known[0]
+    if name in names:
+        return known[names.index(name)]
+    choice = alternatives([*names, NOBODY])
+    if name is None:
+        raise ExportError(
+            f"the mapping has several writers on Modbus: say which the PLC is, with --writer: {choice}"
+        )
+    raise ExportError(f"`{name}` is no writer on Modbus: --writer is one of {choice}")
+
+
+def _renamed(tags: Sequence[Tag], names: Mapping[str, str]) -> list[Tag]:
+    known = {tag.member for tag in tags}
+    for name in names:
+        if name not in known:
+            raise ExportError(
+                f"--name {name}={names[name]}: {did_you_mean(name, known, f'there is no `{name}`')}"
+            )
+    return [replace(tag, member=names.get(tag.member, tag.member)) for tag in tags]
+
+
+def _left_out(cell: CellDefinition, chosen: Mapping[int, object], inputs: Sequence[Tag]) -> list[str]:
+    """Inputs of other writers, and variables without a place on Modbus."""
+    written = {tag.number for tag in inputs}
+    foreign = [
+        variable.name
+        for index, variable in enumerate(cell.variables)
+        if index in chosen and variable.direction is Direction.INPUT and variable.number not in written
+    ]
+    absent = [variable.name for index, variable in enumerate(cell.variables) if index not in chosen]
+    found = []
+    if foreign:
+        found.append(f"{one_and_more(foreign)}: not written by this PLC")
+    if absent:
+        found.append(f"{one_and_more(absent)}: no place on Modbus")
+    return found

@@ -1,0 +1,147 @@
+"""From registers to values: one statement for each variable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gatewayd.links.modbus_server.plc.model import Encoding, PlcModel, Poll, Tag, initial
+from gatewayd.links.modbus_server.plc.st.dialect import REALS, Dialect, elementary, literal, own, real, word
+from gatewayd.links.modbus_server.plc.st.program import (
+    PlcVariable,
+    ProgramUnit,
+    VariableSection,
+    indented,
+    used,
+)
+from gatewayd.links.modbus_server.plc.tags import WIRE_TYPES
+from gatewayd.modbus.codec import TYPES
+
+_SWAPPED = frozenset({"BADC", "DCBA"})
+_REVERSED = frozenset({"CDAB", "DCBA"})
+_INFINITE = {"REAL": "DWORD#16#7F800000", "LREAL": "LWORD#16#7FF0000000000000"}
+"""The exponent of what is no finite number."""
+
+_UNREADABLE = PlcVariable(
+    "unreadable", elementary("BOOL"), "a real is NaN or infinite: its value stayed as it was"
+)
+
+
+def unpack(model: PlcModel, dialect: Dialect) -> ProgramUnit:
+    """The block that brings the values of the robot into the structure of outputs."""
+    prefix = model.prefix
+    decoded = [
+        line for poll in model.reads for tag in poll.tags for line in statement(tag, poll, model, dialect)
+    ]
+    lost = [line for member in model.outputs for tag in member.tags for line in _fallback(tag)]
+    if dialect.primitives.only_finite:
+        decoded.insert(0, "unreadable := FALSE;")
+    body = ["IF trusted THEN", *indented(decoded)]
+    if lost:
+        body += ["ELSE", *indented(lost)]
+    return ProgramUnit(
+        "FUNCTION_BLOCK",
+        f"{prefix}_Unpack",
+        (
+            VariableSection(
+                "VAR_INPUT",
+                (
+                    PlcVariable(
+                        "trusted",
+                        elementary("BOOL"),
+                        "from the status: otherwise each value is what on_stale says",
+                    ),
+                ),
+            ),
+            VariableSection("VAR_OUTPUT", (_UNREADABLE,) if dialect.primitives.only_finite else ()),
+            VariableSection(
+                "VAR_IN_OUT",
+                (
+                    PlcVariable("image", own(f"{prefix}_Image")),
+                    PlcVariable("outputs", own(f"{prefix}_Outputs")),
+                ),
+            ),
+            VariableSection(
+                "VAR",
+                used(
+                    body, PlcVariable("double", elementary("DWORD")), PlcVariable("quad", elementary("LWORD"))
+                ),
+            ),
+        ),
+        (*body, "END_IF;"),
+        comment="registers to values of the robot",
+    )
+
+
+def statement(tag: Tag, poll: Poll, model: PlcModel, dialect: Dialect) -> Iterator[str]:
+    """What brings one value from the image."""
+    target, index = f"outputs.{tag.path}", tag.address - poll.address
+    place = f"image.{poll.name}[{index}]"
+    if tag.encoding is None:
+        packed = f"({place} AND {word(1 << (tag.bit or 0))}) <> {word(0)}"
+        yield f"{target} := {place if poll.area.of_bits else packed};"
+        return
+    wire = WIRE_TYPES[tag.encoding.type]
+    if TYPES[tag.encoding.type].words == 1:
+        yield f"{target} := {_value(_single(place, tag, tag.encoding, model, dialect), tag)};"
+        return
+    bits, kind = ("double", "DWORD") if TYPES[tag.encoding.type].words == 2 else ("quad", "LWORD")
+    yield f"{bits} := {_joined(poll, index, tag.encoding, model, dialect)};"
+    if wire not in REALS:
+        yield f"{target} := {_value(f'{kind}_TO_{wire}({bits})', tag)};"
+        return
+    assigned = f"{target} := {_value(dialect.call(model, f'To{wire.capitalize()}', bits=bits), tag)};"
+    if not dialect.primitives.only_finite:
+        yield assigned
+        return
+    yield f"IF ({bits} AND {_INFINITE[wire]}) <> {_INFINITE[wire]} THEN"
+    yield f"  {assigned}"
+    yield "ELSE"
+    yield "  unreadable := TRUE;"
+    yield "END_IF;"
+
+
+def _single(place: str, tag: Tag, encoding: Encoding, model: PlcModel, dialect: Dialect) -> str:
+    """The raw number of one register or of a byte of it."""
+    number = TYPES[encoding.type]
+    if number.is_byte:
+        byte = dialect.shift("SHR", place, "8") if tag.bit else f"{place} AND {word(0xFF)}"
+        return f"BYTE_TO_{WIRE_TYPES[encoding.type]}(WORD_TO_BYTE({byte}))"
+    is_turned = encoding.order in _SWAPPED and encoding.type != "bool"
+    turned = dialect.call(model, "Swap", value=place) if is_turned else place
+    if encoding.type == "bool":
+        return f"WORD_TO_UINT({turned})"
+    return f"WORD_TO_{WIRE_TYPES[encoding.type]}({turned})"
+
+
+def _joined(poll: Poll, index: int, encoding: Encoding, model: PlcModel, dialect: Dialect) -> str:
+    count = TYPES[encoding.type].words
+    words = [f"image.{poll.name}[{index + offset}]" for offset in range(count)]
+    if encoding.order in _SWAPPED:
+        words = [dialect.call(model, "Swap", value=each) for each in words]
+    if encoding.order in _REVERSED:
+        words.reverse()
+    names = ("high", "low") if count == 2 else ("a", "b", "c", "d")
+    return dialect.call(model, "Double" if count == 2 else "Quad", **dict(zip(names, words, strict=True)))
+
+
+def _value(raw: str, tag: Tag) -> str:
+    """The raw number with scale and offset, as the type of the value."""
+    encoding = tag.encoding
+    assert encoding is not None
+    wire = WIRE_TYPES[encoding.type]
+    if tag.type == "BOOL":
+        return f"{raw} <> {real(0, wire) if wire in REALS else 0}"
+    if not tag.arithmetic:
+        return raw
+    number = raw if wire == tag.arithmetic else f"{wire}_TO_{tag.arithmetic}({raw})"
+    scaled = number if encoding.scale == 1 else f"{number} * {real(encoding.scale, tag.arithmetic)}"
+    if encoding.offset:
+        scaled = f"{scaled} + {real(encoding.offset, tag.arithmetic)}"
+    return scaled
+
+
+def _fallback(tag: Tag) -> Iterator[str]:
+    """What the value is when gateway or connection are lost: the same that the gateway shows when the robot is."""
+    value = initial(tag)
+    if value is not None:
+        yield f"outputs.{tag.path} := {literal(value, tag.type)};"
