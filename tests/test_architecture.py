@@ -57,7 +57,7 @@ LAYERS: dict[str, set[str]] = {
     "links.contract": {"core", "mapping.plan"},
     "links.examination": {"core.definition", "mapping.plan"},
     "links.language": {"core.definition", "links.contract", "mapping"},
-    "links.exports": {"mapping.plan"},
+    "links.exports": set(),
     "links.tables": {"mapping.expanded", "mapping.plan", "report.layout"},
     "links.registry": {
         "core.status_layout",

@@ -62,7 +62,7 @@ Examples:
 """,
 )
 def command() -> None:
-    """Write files for other tools from a mapping FILE: the CANopen data sheet, robot program functions, PLC programs."""
+    """Write files for other tools from a mapping FILE: the CANopen data sheet, robot and PLC programs."""
 
 
 def _command(export: Export) -> click.Command:
