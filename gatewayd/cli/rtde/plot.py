@@ -127,8 +127,8 @@ def _panels(recipe: Recipe, fields: Sequence[str]) -> tuple[Panel, ...]:
 def _read(
     recording: RecordingReader, file: str, panels: Sequence[Panel], progress: Progress, *, running: bool
 ) -> Plotted:
-    from gatewayd.cli.rtde.plotted import plotted, program_runs
-    from gatewayd.rtde.recording import read_gaps
+    from gatewayd.cli.rtde.plotted import plotted
+    from gatewayd.rtde.recording import program_runs, read_gaps
 
     runs = program_runs(recording.recipe) if running else None
     if running and runs is None:

@@ -14,11 +14,6 @@ Row = tuple[tuple[Scalar, ...], float | None]
 """Flat values, and the host time of a recording that has it."""
 Runs = Callable[[Sequence[Scalar]], bool]
 
-_PLAYING = 2
-"""`runtime_state` of a program that runs, as the official reader's filter takes it."""
-_PROGRAM_RUNNING = 1 << 1
-"""Bit of `robot_status_bits`."""
-
 
 @dataclass(slots=True)
 class Plotted:
@@ -41,17 +36,6 @@ class Plotted:
         for place, values in self.values.items():
             values.append(row[place])
         self.packages += 1
-
-
-def program_runs(recipe: Recipe) -> Runs | None:
-    """Whether the robot program runs in a package; None: the recording does not have what tells it."""
-    if "runtime_state" in recipe.slots:
-        state = recipe.slots["runtime_state"].start
-        return lambda row: row[state] == _PLAYING
-    if "robot_status_bits" in recipe.slots:
-        bits = recipe.slots["robot_status_bits"].start
-        return lambda row: bool(int(row[bits]) & _PROGRAM_RUNNING)
-    return None
 
 
 def time_label(recipe: Recipe, *, host_time: bool) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import click
 
+from gatewayd.cli.files import reason_of
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
 
@@ -59,6 +60,9 @@ def reported(context: click.Context, *, remedy: str = "") -> Iterator[None]:
         text = f"{error}{f', or {remedy}' if exists and remedy else ''}"
         click.echo(printable(text), err=True)
         context.exit(WRONG if exists or isinstance(error, MissingExtraError) else FAILED)
+    except OSError as error:
+        click.echo(printable(f"a recording cannot be read: {reason_of(error)}"), err=True)
+        context.exit(FAILED)
 
 
 class Progress:

@@ -14,6 +14,7 @@ from gatewayd.rtde.recording.errors import MissingExtraError, RecordingError, Re
 from gatewayd.rtde.recording.gaps import GapWatch, GapWriter, RecordedGap, read_gaps
 from gatewayd.rtde.recording.layout import HOST_TIME, columns
 from gatewayd.rtde.recording.reading import RecordingReader, open_recording
+from gatewayd.rtde.recording.running import program_runs
 from gatewayd.rtde.recording.writing import RecordingWriter, create_recording
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "convert",
     "create_recording",
     "open_recording",
+    "program_runs",
     "read_arrays",
     "read_gaps",
 ]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gatewayd.rtde.recipe import Scalar
-from gatewayd.rtde.recording.errors import RecordingError, RecordingExistsError
+from gatewayd.rtde.recording.errors import RecordingError, RecordingExistsError, RecordingWriteError
 from gatewayd.rtde.recording.gaps import SUFFIX, GapWriter, read_gaps
 from gatewayd.rtde.recording.parquet import write_parquet
 from gatewayd.rtde.recording.reading import RecordingReader, open_recording
@@ -76,9 +76,10 @@ def convert(
         try:
             count = _write(recording, unfinished, form, delimiters[1], progress)
             _finish(unfinished, Path(target), overwrite=overwrite)
-        except BaseException:
+        except RecordingWriteError as error:
+            raise RecordingError(f"{target}: cannot be written: {error.reason}") from error
+        finally:
             unfinished.unlink(missing_ok=True)
-            raise
         torn = recording.torn
     with GapWriter(target, overwrite=overwrite) as writer:
         for gap in gaps:
@@ -128,7 +129,6 @@ def _finish(unfinished: Path, target: Path, *, overwrite: bool) -> None:
             unfinished.replace(target)
         else:
             target.hardlink_to(unfinished)
-            unfinished.unlink()
     except FileExistsError:
         raise RecordingExistsError(str(target)) from None
     except OSError as error:

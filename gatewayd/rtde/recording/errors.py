@@ -15,6 +15,15 @@ class RecordingExistsError(RecordingError):
         self.path = path
 
 
+class RecordingWriteError(RecordingError):
+    """The system does not take what is to be written: a full disk, a quota, a missing right."""
+
+    def __init__(self, path: str, error: OSError | ValueError, outcome: str) -> None:
+        self.reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        """Why, in the system's words."""
+        super().__init__(f"{path}: {outcome.format(reason=self.reason)}")
+
+
 class MissingExtraError(RecordingError):
     """A package is needed that only an extra of gatewayd brings."""
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import RawIOBase
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 from gatewayd.rtde.fields import INPUTS, OUTPUTS
-from gatewayd.rtde.recording.errors import MissingExtraError, RecordingError
+from gatewayd.rtde.recording.errors import MissingExtraError, RecordingError, RecordingWriteError
 from gatewayd.rtde.recording.layout import HOST_TIME, column_types, columns, fields_of
 from gatewayd.rtde.types import DataType
 
@@ -58,19 +59,44 @@ def write_parquet(
     )
     flat = ((*values, time) for values, time in rows) if host_time else (values for values, _time in rows)
     failures: list[BaseException] = []
-    batches = _batches(core, schema, kinds, flat, failures)
     try:
         with Path(path).open("wb") as file:
             io.write_parquet(
-                core.RecordBatchReader.from_batches(schema, batches),
-                file,
+                core.RecordBatchReader.from_batches(schema, _batches(core, schema, kinds, flat, failures)),
+                _Output(file, failures),
                 compression=_COMPRESSION,
                 max_row_group_size=_GROUP,
             )
+    except OSError as error:
+        raise RecordingWriteError(str(path), error, "cannot be written: {reason}") from error
     except Exception as error:
-        if failures:
-            raise failures[0] from None
-        raise RecordingError(f"{path}: cannot be written: {error}") from error
+        if not failures:
+            raise RecordingError(f"{path}: cannot be written: {error}") from error
+    if failures:
+        failure = failures[0]
+        if isinstance(failure, OSError):
+            raise RecordingWriteError(str(path), failure, "cannot be written: {reason}")
+        raise failure
+
+
+class _Output(RawIOBase):
+    """A file that takes everything: what the system refuses is kept as a failure, because the library would panic."""
+
+    def __init__(self, file: BinaryIO, failures: list[BaseException]) -> None:
+        self._file = file
+        self._failures = failures
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: Any) -> int:
+        if not self._failures:
+            try:
+                self._file.write(data)
+                self._file.flush()
+            except OSError as error:
+                self._failures.append(error)
+        return len(data)
 
 
 def _batches(
@@ -80,9 +106,9 @@ def _batches(
     rows: Iterator[tuple[Any, ...]],
     failures: list[BaseException],
 ) -> Iterator[Any]:
-    """The rows as columns. What goes wrong is kept, because the library would make a text of it."""
+    """The rows as columns, until something fails: that is kept, because the library would make a text of it."""
     try:
-        while block := list(islice(rows, _TOGETHER)):
+        while not failures and (block := list(islice(rows, _TOGETHER))):
             found = zip(kinds, zip(*block, strict=True), strict=True)
             yield core.RecordBatch.from_arrays(
                 [_column(core, kind, values) for kind, values in found], schema=schema

@@ -9,7 +9,7 @@ from itertools import accumulate
 from pathlib import Path
 
 from gatewayd.report.format import counted
-from gatewayd.rtde.recording.errors import RecordingError, RecordingExistsError
+from gatewayd.rtde.recording.errors import RecordingError, RecordingExistsError, RecordingWriteError
 
 
 class RowFile:
@@ -41,12 +41,12 @@ class RowFile:
         except FileExistsError:
             raise RecordingExistsError(self.path) from None
         except (OSError, ValueError) as error:
-            raise RecordingError(f"{self.path}: cannot be written: {_reason(error)}") from error
+            raise RecordingWriteError(self.path, error, "cannot be written: {reason}") from error
         try:
             self._write(head)
         except OSError as error:
             os.close(self._file)
-            raise RecordingError(f"{self.path}: cannot be written: {_reason(error)}") from error
+            raise RecordingWriteError(self.path, error, "cannot be written: {reason}") from error
         self.size = len(head)
 
     def append(self, row: bytes) -> None:
@@ -97,8 +97,8 @@ class RowFile:
         self._waiting = []
         with suppress(OSError):
             os.ftruncate(self._file, self.size)
-        text = f"{self.path}: {_reason(error)}; the file has {counted(self.rows, 'row')}, all of them whole"
-        self._failure = RecordingError(text)
+        outcome = f"{{reason}}; the file has {counted(self.rows, 'row')}, all of them whole"
+        self._failure = RecordingWriteError(self.path, error, outcome)
         return self._failure
 
     def _sync(self) -> None:
@@ -106,8 +106,4 @@ class RowFile:
             os.fsync(self._file)
         except OSError as error:
             if error.errno != errno.EINVAL:  # what a device answers that keeps nothing
-                raise RecordingError(f"{self.path}: may lack its end: {_reason(error)}") from error
-
-
-def _reason(error: OSError | ValueError) -> str:
-    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+                raise RecordingWriteError(self.path, error, "may lack its end: {reason}") from error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -97,6 +99,47 @@ def test_without_the_package_for_parquet(
     done = convert(source, tmp_path / "x.parquet")
     assert done.exit_code == 2
     assert "pip install 'gatewayd[parquet]'" in done.stderr
+
+
+CONVERT = """
+import resource, sys
+from gatewayd.__main__ import main
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv.pop()),) * 2)
+main()
+"""
+
+
+@pytest.mark.parametrize("name", ["x.parquet", "x.bin", "x.txt"])
+def test_a_disk_that_is_full_leaves_nothing(source: Path, tmp_path: Path, name: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", CONVERT, "rtde", "convert", source, tmp_path / name, "1000"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "File too large" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == [source.name]
+
+
+@pytest.mark.parametrize("name", ["x.parquet", "x.bin"])
+def test_ctrl_c_leaves_nothing(source: Path, tmp_path: Path, name: str) -> None:
+    with source.open("a") as file:
+        file.writelines(f"{number / 500} 7\n" for number in range(1_000_000))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "gatewayd", "rtde", "convert", source, tmp_path / name],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    while not list(tmp_path.glob("*.part")):
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    printed, error = process.communicate(timeout=60)
+    assert (process.returncode, printed, error) == (130, "", "\n")
+    assert [path.name for path in tmp_path.iterdir()] == [source.name]
 
 
 def test_no_recording(tmp_path: Path) -> None:

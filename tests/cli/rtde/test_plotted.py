@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-import pytest
-
-from gatewayd.cli.rtde.plotted import Row, plotted, program_runs, time_label
+from gatewayd.cli.rtde.plotted import Row, plotted, time_label
 from gatewayd.rtde.fields import OUTPUTS
 from gatewayd.rtde.recipe import Recipe
+from gatewayd.rtde.recording import program_runs
 
 
 def recipe(*names: str) -> Recipe:
@@ -45,17 +44,6 @@ def test_only_while_the_program_runs() -> None:
     drawn = plotted(found, RECIPE, [2], runs=program_runs(RECIPE))
     assert shown(drawn.values[2].tolist()) == [1.0, 2.0, None, 4.0]
     assert (drawn.time.tolist(), drawn.packages) == ([0.0, 1.0, 1.0, 3.0], 3)
-
-
-@pytest.mark.parametrize("bits, runs", [(0, False), (1, False), (2, True), (3, True)])
-def test_the_robots_status_tells_it_too(bits: int, runs: bool) -> None:
-    test = program_runs(recipe("robot_status_bits"))
-    assert test is not None
-    assert test((bits,)) is runs
-
-
-def test_without_either_it_is_not_known() -> None:
-    assert program_runs(recipe("timestamp")) is None
 
 
 def test_without_a_timestamp_the_host_time_or_the_number_of_the_package_counts() -> None:

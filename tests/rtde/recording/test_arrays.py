@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gatewayd.rtde.recording import MissingExtraError, create_recording, read_arrays
+from gatewayd.rtde.recording import MissingExtraError, RecordingError, create_recording, read_arrays
 from tests.rtde.recording.samples import HEADER, LINES, PACKAGES, RECIPE
 
 
@@ -48,6 +48,15 @@ def test_they_are_what_numpy_reads_itself(tmp_path: Path) -> None:
     found = read_arrays(path)
     columns = np.column_stack([found[name] for name in RECIPE.names])
     assert np.array_equal(columns, table)
+
+
+def test_only_while_a_program_ran(tmp_path: Path) -> None:
+    path = tmp_path / "x"
+    path.write_text("".join(f"{line}\n" for line in (HEADER, *LINES)))
+    assert read_arrays(path, running=True)["timestamp"].tolist() == [1234.002]
+    path.write_text("timestamp\n0.5\n")
+    with pytest.raises(RecordingError, match="has neither runtime_state nor robot_status_bits"):
+        read_arrays(path, running=True)
 
 
 def test_a_recording_without_packages(tmp_path: Path) -> None:
