@@ -37,9 +37,11 @@ from gatewayd.rtde.strange import Oddity, StrangePackage, odd_data
 _FIRST_CLAIM_RETRY = 0.1
 _MEASURE_EVERY = 1.0
 _PERIODS_OF_PATIENCE = 5
+_READ = 65536
+"""Bytes of the buffer that every read goes into: a fresh one for each would cost more than its package."""
 
 
-class Connection(asyncio.Protocol):
+class Connection(asyncio.BufferedProtocol):
     """Sockets to negotiation and back. `done` becomes the loss, or the exception of a handler."""
 
     def __init__(
@@ -76,6 +78,7 @@ class Connection(asyncio.Protocol):
         self._probed_at = 0.0
         self._asked_at: float | None = None
         self._round_trip = 0.0
+        self._received = memoryview(bytearray(_READ))
         self._delivery: OutputDelivery | None = None
         self._change: Wishes | None = None
         self._questions = PropertyQuestions()
@@ -169,19 +172,24 @@ class Connection(asyncio.Protocol):
     # what asyncio calls
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """See asyncio.Protocol."""
+        """See asyncio.BufferedProtocol."""
         self.sender.open(cast("asyncio.Transport", transport))
         self._observer.connected(self.sender.own, self.sender.peer)
         self._request(self._negotiation.begin())
         self._watch()
 
-    def data_received(self, data: bytes) -> None:
-        """See asyncio.Protocol."""
+    def get_buffer(self, sizehint: int) -> memoryview:
+        """See asyncio.BufferedProtocol."""
+        return self._received
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """See asyncio.BufferedProtocol."""
+        data = bytes(self._received[:nbytes])
         self.sender.received(data)
         self._guarded(lambda: self._receive(data))
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """See asyncio.Protocol."""
+        """See asyncio.BufferedProtocol."""
         self._lost.set_result(None)
         self._conclude(connection_failure(exc if isinstance(exc, OSError) else None, self._settings.address))
 

@@ -194,6 +194,11 @@ class Robot(InputWriter):
     def __aiter__(self) -> AsyncIterator[Sample]:
         return self._feed.main
 
+    @property
+    def samples(self) -> BoundedStream[Sample]:
+        """The iterator that `async for sample in robot` uses, from the first package on."""
+        return self._feed.main
+
     async def newer(self, timeout: float | None = None) -> Sample:  # noqa: ASYNC109  a public API in seconds
         """The newest sample that `newer` has not returned yet; older ones are passed over.
 
