@@ -6,7 +6,7 @@ import errno
 import logging
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,16 +14,25 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from gatewayd.rtde.fields import Field, Series, SoftwareVersion
-    from gatewayd.simulator.controller import Controller
+    from gatewayd.simulator.fleet import RobotHost, Robots
     from gatewayd.simulator.program import ProgramRule
+    from gatewayd.simulator.settings import RobotSettings
 
 CANNOT_SERVE = 1
 SAFETY_TEXT = "SafetySetup has not been confirmed yet, therefore no data will be send yet"
+_MODELS = ("ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30")
 _PROBABILITY = click.FloatRange(0, 1)
 
 
-class _ProgramMistakeError(click.ClickException):
+_ABOUT_THE_PROCESS = frozenset(
+    {"host", "ports", "connections", "control", "quiet", "speed", "stepped", "scenario"}
+)
+"""Options beside --scenario: the others describe a robot, as the file does."""
+_NOT_REPLAYED = frozenset({"programs", "program_files", "model", "uptime", "boot_restart"})
+"""Options that mean nothing where a recording is the robot."""
+
+
+class _MistakeInFileError(click.ClickException):
     """One line without the usage: it names the place itself."""
 
     exit_code = 2
@@ -72,7 +81,10 @@ Commands on standard input (--control stdin), each answered with `ok`, `ok RESUL
   drop-clients                       drop-at STEP[:NUMBER]|off
   text MESSAGE                       raw HEX
   clients                            restart
-  quit (as does the end of input)
+  step [CYCLES] (--stepped)          quit (as does the end of input)
+
+Several robots have names, those of the scenario or robot1, robot2, ...; a command then begins with one:
+`left: power on`.
 
 \b
 Examples:
@@ -80,21 +92,50 @@ Examples:
   gatewayd simulate --program 'output_int_register_0 = input_int_register_0 * 2 + 1'
   gatewayd simulate --program 'output_bit_register_0 = input_bit_register_0 for 300ms' --control stdin
   gatewayd simulate --series cb3 --protocol-v1 --hold input_int_register_3
+  gatewayd simulate --scenario cell.toml
+  gatewayd simulate --port 30004 --port 30014 --control stdin
+  gatewayd simulate --replay robot_data.csv --loop
 
 \b
 Exit codes:
   0    stopped by SIGTERM, SIGINT or `quit`
-  1    it cannot listen on the address
-  2    wrong usage, or a mistake in the robot program
+  1    it cannot listen on the address, or the recording cannot be read
+  2    wrong usage, or a mistake in the robot program or in the scenario
 """,
 )
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
 @click.option(
     "--port",
+    "ports",
     type=click.IntRange(0, 65535),
-    default=30004,
+    multiple=True,
+    help="TCP port; 0 takes a free one and prints it. Repeatable: a robot on each. Default: 30004, or those of the "
+    "scenario.",
+)
+@click.option(
+    "--scenario",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Robots and what happens to them when (TOML); other options that describe a robot stand in the file.",
+)
+@click.option(
+    "--replay",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="A recording as the robot, from the first client on, then the end. Outputs are those recorded and --field.",
+)
+@click.option("--loop", is_flag=True, help="With --replay: again and again; timestamps go on.")
+@click.option(
+    "--speed",
+    type=click.FloatRange(0.01, 100),
+    default=1.0,
     show_default=True,
-    help="TCP port; 0 takes a free one and prints it.",
+    metavar="FACTOR",
+    help="Seconds of the controller for each of the clock.",
+)
+@click.option("--stepped", is_flag=True, help="Time passes by the command `step` alone; needs --control.")
+@click.option(
+    "--model", type=click.Choice(_MODELS), default="ur5e", show_default=True, help="Size of the arm."
 )
 @click.option(
     "--series",
@@ -232,44 +273,136 @@ Exit codes:
 @click.option("--silence", is_flag=True, help="Fault: no data packages.")
 @click.option("--control", type=click.Choice(["stdin"]), help="Take commands (below) from standard input.")
 @click.option("-q", "--quiet", is_flag=True, help="Log warnings only.")
-def command(
-    host: str, port: int, control: str | None, connections: int, *, quiet: bool, **options: Any
-) -> int:
+@click.pass_context
+def command(ctx: click.Context, /, control: str | None, *, quiet: bool, **options: Any) -> int:
     """Simulate a Universal Robots controller: its RTDE interface with moving values, claims and a robot program.
 
     It serves several RTDE clients at a time, as a real controller does, and prints one line when it listens. Faults
-    are chosen by options; some can also be switched while it runs (--control).
+    are chosen by options; some can also be switched while it runs (--control). A scenario (--scenario) plays them by
+    itself, for one robot or several; a recording (--replay) takes the robot's place.
     """
-    import asyncio
-
     from gatewayd.logs.records import configure
-    from gatewayd.service.standard_streams import OutputError
-    from gatewayd.simulator.process import serve
-    from gatewayd.simulator.server import SimulatedController
 
     level = logging.WARNING if quiet else logging.INFO
     configure(level=level)
-    controller = _controller(**options)
-    simulator = SimulatedController(controller, host=host, port=port, connections=connections)
+    if options["stepped"] and control is None:
+        raise click.UsageError("--stepped needs --control stdin: `step` lets time pass")
     try:
-        asyncio.run(serve(simulator, control=control is not None))
+        robots = _robots(ctx, **options)
+    except _UnreadableError as error:
+        click.echo(f"gatewayd: {error}", err=True)
+        return CANNOT_SERVE
+    return _run(robots, control=control is not None)
+
+
+class _UnreadableError(Exception):
+    """A recording that cannot be replayed."""
+
+
+def _run(robots: Robots, *, control: bool) -> int:
+    import asyncio
+
+    from gatewayd.service.standard_streams import OutputError
+    from gatewayd.simulator.process import serve
+    from gatewayd.simulator.replay import Replay
+
+    try:
+        asyncio.run(serve(robots, control=control))
     except (BrokenPipeError, OutputError):
         # Of stdout: no fault of the address.
         raise
     except OSError as error:
-        # asyncio's own text says "error while attempting to bind" and repeats the address.
-        reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
-        if error.errno == errno.EADDRINUSE:
-            reason += "; stop the simulator that runs there, or let --port 0 take a free one"
-        click.echo(f"gatewayd: cannot listen on {host}:{port}: {reason}", err=True)
+        click.echo(f"gatewayd: cannot listen on {_refused(robots)}: {_reason(error)}", err=True)
         return CANNOT_SERVE
-    return 0
+    followers = [robot.follower for robot in robots.values()]
+    return CANNOT_SERVE if any(isinstance(one, Replay) and one.problem for one in followers) else 0
 
 
-def _controller(
+def _refused(robots: Robots) -> str:
+    """The address that could not be had."""
+    return next(f"{robot.host}:{robot.port}" for robot in robots.values() if not robot.started)
+
+
+def _reason(error: OSError) -> str:
+    # asyncio's own text says "error while attempting to bind" and repeats the address.
+    reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+    if error.errno == errno.EADDRINUSE:
+        reason += "; stop the simulator that runs there, or let --port 0 take a free one"
+    return reason
+
+
+def _robots(
+    ctx: click.Context,
+    *,
+    host: str,
+    ports: tuple[int, ...],
+    connections: int,
+    speed: float,
+    stepped: bool,
+    scenario: Path | None,
+    replay: Path | None,
+    loop: bool,
+    **options: Any,
+) -> Robots:
+    """The robots that the options ask for."""
+    from gatewayd.simulator.fleet import RobotHost, plain_robots
+    from gatewayd.simulator.program import ProgramError
+
+    at = RobotHost(host, ports, connections, speed, stepped)
+    if scenario is not None:
+        _refuse_beside(ctx, "--scenario", lambda name: name not in _ABOUT_THE_PROCESS, "write it in the file")
+        return _of_scenario(scenario, at)
+    if loop and replay is None:
+        raise click.UsageError("--loop needs --replay FILE")
+    settings = _settings(**options)
+    try:
+        if replay is None:
+            return plain_robots(settings, at)
+        _refuse_beside(ctx, "--replay", lambda name: name in _NOT_REPLAYED, "the recording is the robot")
+        return _of_recording(replay, settings, at, loop=loop)
+    except ProgramError as error:
+        raise _MistakeInFileError(str(error)) from error
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="--hold, --field") from error
+
+
+def _refuse_beside(ctx: click.Context, option: str, refused: Callable[[str], bool], remedy: str) -> None:
+    for parameter in ctx.command.params:
+        name = parameter.name or ""
+        given = ctx.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+        if given and refused(name):
+            raise click.UsageError(f"{parameter.opts[0]} has no meaning beside {option}: {remedy}")
+
+
+def _of_scenario(path: Path, at: RobotHost) -> Robots:
+    from gatewayd.simulator.fleet import scenario_robots
+    from gatewayd.simulator.scenario import ScenarioError, read_scenario
+
+    try:
+        return scenario_robots(read_scenario(path), at)
+    except OSError as error:
+        raise click.BadParameter(f"{path}: {error.strerror}", param_hint="--scenario") from error
+    except ScenarioError as error:
+        raise _MistakeInFileError(str(error)) from error
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="--port") from error
+
+
+def _of_recording(path: Path, settings: RobotSettings, at: RobotHost, *, loop: bool) -> Robots:
+    from gatewayd.rtde.recording import RecordingError
+    from gatewayd.simulator.fleet import replayed_robots
+
+    try:
+        return replayed_robots(path, settings, at, repeat=loop)
+    except RecordingError as error:
+        raise _UnreadableError(str(error)) from error
+
+
+def _settings(
     *,
     series: str | None,
     version: str | None,
+    model: str,
     frequency: float | None,
     uptime: float | None,
     programs: tuple[str, ...],
@@ -283,44 +416,34 @@ def _controller(
     linger: int,
     overflow_close: float,
     **switches: Any,
-) -> Controller:
-    from gatewayd.simulator.controller import Controller
-    from gatewayd.simulator.faults import DropAt, Faults, LongLists
+) -> RobotSettings:
+    from gatewayd.simulator.faults import DropAt, LongLists
     from gatewayd.simulator.program import ProgramError
+    from gatewayd.simulator.settings import RobotSettings, read_field, read_generation, read_inputs
 
     with _blamed("--drop-at"):
         step = DropAt.parse(drop_at) if drop_at is not None else None
     with _blamed("--field"):
-        own = [_field(text) for text in fields]
+        own = tuple(read_field(text) for text in fields)
     with _blamed("--unreadable"):
-        inputs = _inputs(unreadable)
+        inputs = read_inputs(_fields(unreadable))
     with _blamed("--version"):
-        generation, software = _generation(series, version)
-    faults = Faults(
-        hold=_fields(hold),
-        unreadable=inputs,
-        long_lists=LongLists(strict_lists or "take"),
-        drop_at=step,
-        drop_times=drop_times or math.inf,
-        linger=linger / 1000,
-        overflow_close=None if overflow_close == math.inf else overflow_close,
-        **switches,
-    )
+        generation, software = read_generation(series, version)
     try:
-        rules = _rules(programs, program_files)
-        return Controller(
-            generation,
-            software,
-            frequency=frequency,
-            uptime=uptime,
-            program=rules,
-            faults=faults,
-            fields=own,
-        )
+        program = tuple(_rules(programs, program_files))
     except ProgramError as error:
-        raise _ProgramMistakeError(str(error)) from error
-    except ValueError as error:
-        raise click.BadParameter(str(error), param_hint="--hold, --field") from error
+        raise _MistakeInFileError(str(error)) from error
+    faults = {
+        "hold": _fields(hold),
+        "unreadable": inputs,
+        "long_lists": LongLists(strict_lists or "take"),
+        "drop_at": step,
+        "drop_times": drop_times or math.inf,
+        "linger": linger / 1000,
+        "overflow_close": None if overflow_close == math.inf else overflow_close,
+        **switches,
+    }
+    return RobotSettings(generation, software, model, frequency, uptime, program, own, faults)
 
 
 @contextmanager
@@ -332,49 +455,8 @@ def _blamed(option: str) -> Iterator[None]:
         raise click.BadParameter(str(error), param_hint=option) from error
 
 
-def _field(text: str) -> Field:
-    """Read "dexterity:DOUBLE"."""
-    from gatewayd.rtde.fields import Field
-    from gatewayd.rtde.types import DataType
-
-    name, _, word = text.partition(":")
-    try:
-        return Field(name, DataType.from_word(word), "of this simulator")
-    except KeyError:
-        types = ", ".join(kind.word for kind in DataType)
-        msg = f"{text!r} is not NAME:TYPE, where TYPE is one of {types}"
-        raise ValueError(msg) from None
-
-
 def _fields(text: str | None) -> tuple[str, ...]:
     return tuple(name.strip() for name in (text or "").split(",") if name.strip())
-
-
-def _inputs(text: str | None) -> frozenset[str]:
-    from gatewayd.rtde.fields import INPUTS
-
-    fields = frozenset(_fields(text))
-    unknown = sorted(fields - INPUTS.keys())
-    if unknown:
-        message = f"no such input: {', '.join(unknown)}"
-        raise ValueError(message)
-    return fields
-
-
-def _generation(series: str | None, version: str | None) -> tuple[Series, SoftwareVersion | None]:
-    from gatewayd.rtde.fields import Series, SoftwareVersion
-
-    if version is None:
-        return Series.from_word(series or "e"), None
-    software = SoftwareVersion.parse(version)
-    own = Series.from_major(software.major)
-    if own is None:
-        message = f"{version}: software versions begin with 3 (cb3), 5 (e) or 10 (x)"
-        raise ValueError(message)
-    if series is not None and own.word != series:
-        message = f"{version} is software of series {own.word}, not of {series}"
-        raise ValueError(message)
-    return own, software
 
 
 def _rules(programs: tuple[str, ...], files: tuple[Path, ...]) -> list[ProgramRule]:

@@ -20,10 +20,12 @@
     raw HEX                      these bytes, whatever they are, to every client: `raw 000352`
     restart                      boot again: connections, registers and timestamp from the beginning
     clients                      ok COUNT
+    step [CYCLES]                let control cycles pass where time is stepped (--stepped); ok CYCLE
     quit                         stop the simulator
 
 An answer is `ok`, `ok RESULT` or `error REASON`. Bits are `true` and `false`, as are their values in `set`; a mode or
-state may be written as its name: `set robot_mode POWER_OFF`.
+state may be written as its name: `set robot_mode POWER_OFF`. Where there are several robots, a line begins with the
+name of one: `left: power on`.
 """
 
 from __future__ import annotations
@@ -37,11 +39,16 @@ from gatewayd.rtde.catalogue import suggest
 from gatewayd.rtde.enums import STATES
 from gatewayd.rtde.types import INTEGER_RANGES
 from gatewayd.simulator.faults import DropAt
-from gatewayd.simulator.modes import POWER_COMMANDS, PROGRAM, SAFETY, RobotModes
+from gatewayd.simulator.modes import POWER_COMMANDS, PROGRAM, SAFETY
 from gatewayd.simulator.server import SimulatedController
 from gatewayd.simulator.store import Scalar
 
-_Command = Callable[[str], str | Awaitable[None] | None]
+Action = Callable[[], str | Awaitable[str | None] | None]
+"""What a command does, once it has been read."""
+
+MAX_STEPS = 1_000_000
+"""Cycles of one `step`."""
+
 _WORDS = {"true": True, "false": False, "on": True, "off": False}
 
 
@@ -53,87 +60,177 @@ class Control:
         """Whether `quit` was asked for."""
         self._simulator = simulator
         self._controller = simulator.controller
-        self._commands: Mapping[str, _Command] = {
+        self._commands: Mapping[str, Callable[[str], Action]] = {
             "get": self._get,
             "set": self._set,
             "overwrite": self._overwrite,
             "hold": self._hold,
-            "free": lambda rest: self._controller.free(_fields(rest)),
-            "power": lambda rest: self._modes.switch_power(_choice(rest, POWER_COMMANDS)),
-            "program": lambda rest: self._modes.run_program(_choice(rest, PROGRAM)),
-            "safety": lambda rest: self._modes.set_safety(_choice(rest, SAFETY)),
+            "free": self._free,
+            "power": self._power,
+            "program": self._program,
+            "safety": self._safety,
             "freeze": partial(self._switch, "freeze"),
             "creep": partial(self._switch, "creep"),
             "silence": partial(self._switch, "silence"),
-            "pause": lambda rest: simulator.pause(_seconds(rest)),
+            "pause": self._pause,
             "delay": self._delay,
             "drop-at": self._drop_at,
-            "drop-clients": lambda _: str(simulator.drop_clients()),
-            "text": simulator.say,
-            "raw": lambda rest: simulator.raw(bytes.fromhex(rest)),
-            "restart": lambda _: simulator.restart(),
-            "clients": lambda _: str(simulator.clients),
-            "quit": self._quit,
+            "drop-clients": lambda _: lambda: str(simulator.drop_clients()),
+            "text": lambda text: lambda: simulator.say(text),
+            "raw": self._raw,
+            "restart": lambda _: simulator.restart,
+            "clients": lambda _: lambda: str(simulator.clients),
+            "step": self._step,
+            "quit": lambda _: self._quit,
         }
-
-    @property
-    def _modes(self) -> RobotModes:
-        return self._controller.modes
 
     async def execute(self, line: str) -> str:
         """Run one command line and return its answer, without a line end. Never raises for what the line says."""
+        try:
+            result = self.prepare(line)()
+            if isinstance(result, Awaitable):
+                result = await result
+        except (ValueError, OSError) as error:
+            return f"error {error}"
+        return "ok" if result is None else f"ok {result}"
+
+    def prepare(self, line: str) -> Action:
+        """Read a command line without doing anything; ValueError says what is wrong with it.
+
+        What it does may still raise a ValueError: for a mode in which the robot does not take the command, say.
+        """
         name, _, rest = line.strip().partition(" ")
         command = self._commands.get(name)
         if command is None:
-            return f"error unknown command {name!r}; there are: {', '.join(self._commands)}"
-        try:
-            result = command(rest.strip())
-            if isinstance(result, Awaitable):
-                await result
-                result = None
-        except (ValueError, OSError) as error:
-            return f"error {error}"
-        except KeyError as error:
-            return f"error {_unknown(str(error.args[0]))}"
-        return "ok" if result is None else f"ok {result}"
+            message = f"unknown command {name!r}; there are: {', '.join(self._commands)}"
+            raise ValueError(message)
+        return command(rest.strip())
 
-    def _get(self, rest: str) -> str:
-        values = self._controller.get(rest)
-        return ",".join(str(value).lower() if isinstance(value, bool) else str(value) for value in values)
+    def _get(self, rest: str) -> Action:
+        self._known(rest)
+        return lambda: _shown(self._controller.get(rest))
 
-    def _hold(self, rest: str) -> None:
+    def _set(self, rest: str) -> Action:
+        field, _, text = rest.partition(" ")
+        values = self._values(field, text)
+        return lambda: self._controller.set(field, values)
+
+    def _overwrite(self, rest: str) -> Action:
+        field, _, text = rest.partition(" ")
+        self._known(field)
+        values = None if text.strip() == "off" else self._values(field, text)
+        return lambda: self._controller.overwrite(field, values)
+
+    def _hold(self, rest: str) -> Action:
         names, _, holder = rest.partition(" by ")
-        self._controller.hold(_fields(names), *filter(None, [holder.strip()]))
+        fields, by = self._inputs(names), list(filter(None, [holder.strip()]))
+        return lambda: self._controller.hold(fields, *by)
 
-    def _set(self, rest: str) -> None:
-        field, _, text = rest.partition(" ")
-        self._controller.set(field, self._values(field, text))
+    def _free(self, rest: str) -> Action:
+        fields = self._inputs(rest)
+        return lambda: self._controller.free(fields)
 
-    def _overwrite(self, rest: str) -> None:
-        field, _, text = rest.partition(" ")
-        self._controller.overwrite(field, None if text.strip() == "off" else self._values(field, text))
+    def _power(self, rest: str) -> Action:
+        word = _choice(rest, POWER_COMMANDS)
+        return lambda: self._controller.modes.switch_power(word)
 
-    def _switch(self, fault: str, text: str) -> None:
+    def _program(self, rest: str) -> Action:
+        word = _choice(rest, PROGRAM)
+        return lambda: self._controller.modes.run_program(word)
+
+    def _safety(self, rest: str) -> Action:
+        word = _choice(rest, SAFETY)
+        return lambda: self._controller.modes.set_safety(word)
+
+    def _switch(self, fault: str, text: str) -> Action:
         if text not in ("on", "off"):
             message = f"on or off, not {text!r}"
             raise ValueError(message)
-        setattr(self._simulator.faults, fault, text == "on")
+        return lambda: setattr(self._simulator.faults, fault, text == "on")
 
-    def _delay(self, rest: str) -> None:
-        self._simulator.faults.delay = _seconds(rest)
+    def _pause(self, rest: str) -> Action:
+        seconds = _seconds(rest)
+        return lambda: self._simulator.pause(seconds)
 
-    def _drop_at(self, rest: str) -> None:
-        faults = self._simulator.faults
-        faults.drop_at = None if rest == "off" else DropAt.parse(rest)
-        faults.drop_times = 1
+    def _delay(self, rest: str) -> Action:
+        seconds = _seconds(rest)
+        return lambda: setattr(self._simulator.faults, "delay", seconds)
 
-    def _quit(self, _rest: str) -> None:
+    def _drop_at(self, rest: str) -> Action:
+        step = None if rest == "off" else DropAt.parse(rest)
+
+        def act() -> None:
+            self._simulator.faults.drop_at = step
+            self._simulator.faults.drop_times = 1
+
+        return act
+
+    def _raw(self, rest: str) -> Action:
+        data = bytes.fromhex(rest)
+        return lambda: self._simulator.raw(data)
+
+    def _step(self, rest: str) -> Action:
+        cycles = int(rest or "1")
+        if not 0 < cycles <= MAX_STEPS:
+            message = f"{cycles} is not within 1..{MAX_STEPS}"
+            raise ValueError(message)
+
+        async def act() -> str:
+            await self._simulator.step(cycles)
+            return str(self._controller.cycle)
+
+        return act
+
+    def _quit(self) -> None:
         self.quit = True
 
+    def _known(self, field: str) -> None:
+        if field not in self._controller.store:
+            near = suggest(field)
+            hint = f"; did you mean {' or '.join(near)}?" if near else ""
+            message = f"no field {field!r}{hint}"
+            raise ValueError(message)
+
+    def _inputs(self, text: str) -> list[str]:
+        fields = _fields(text)
+        unknown = [name for name in fields if self._controller.input_type(name) is None]
+        if unknown:
+            message = f"no such input: {', '.join(unknown)}"
+            raise ValueError(message)
+        return fields
+
     def _values(self, field: str, text: str) -> list[Scalar]:
-        code = self._controller.store.type(field).code
-        names = STATES.get(field)
-        return [_value(item.strip(), code, names) for item in text.split(",")]
+        self._known(field)
+        kind, names = self._controller.store.type(field), STATES.get(field)
+        values = [_value(item.strip(), kind.code, names) for item in text.split(",")]
+        self._controller.check(field, values)
+        return values
+
+
+class RobotControls:
+    """The commands of several simulators: `NAME: COMMAND`. A single one needs no name."""
+
+    def __init__(self, simulators: Mapping[str, SimulatedController]) -> None:
+        self._controls = {name: Control(simulator) for name, simulator in simulators.items()}
+
+    @property
+    def quit(self) -> bool:
+        """Whether one of them was told to quit."""
+        return any(control.quit for control in self._controls.values())
+
+    async def execute(self, line: str) -> str:
+        """Run one command line; see `Control.execute`."""
+        first, *others = self._controls.values()
+        name, colon, rest = line.strip().partition(":")
+        if colon and name in self._controls:
+            return await self._controls[name].execute(rest)
+        if not others or line.strip() == "quit":
+            return await first.execute(line)
+        return f"error which robot? Begin with {' or '.join(f'{name}:' for name in self._controls)}"
+
+
+def _shown(values: Iterable[Scalar]) -> str:
+    return ",".join(str(value).lower() if isinstance(value, bool) else str(value) for value in values)
 
 
 def _fields(text: str) -> list[str]:
@@ -176,8 +273,3 @@ def _value(text: str, code: str, names: type[IntEnum] | None) -> Scalar:
         message = f"{value} is not within {low}..{high}"
         raise ValueError(message)
     return value
-
-
-def _unknown(field: str) -> str:
-    near = suggest(field)
-    return f"no field {field!r}" + (f"; did you mean {' or '.join(near)}?" if near else "")

@@ -7,7 +7,7 @@ what was written and from the switches in `faults`.
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Collection, Hashable, Iterable, Sequence
 
 from gatewayd.rtde.enums import ProgramState
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field, Series, SoftwareVersion
@@ -46,7 +46,8 @@ class Controller:
 
     `frequency` is the rate of its control cycle in Hz (default: that of the series), `uptime` its first timestamp in
     seconds. `model` is the size of the arm, one of `MODELS`. `fields` are outputs that the catalogue does not have, or
-    has with another type; they rest at zero. Raises ProgramError if `program` names what the controller does not have,
+    has with another type; they rest at zero. `replayed`: the outputs are those of a recording and `fields`, and nothing
+    moves or runs by itself. Raises ProgramError if `program` names what the controller does not have,
     ValueError for inputs to be held that do not exist, for an unknown model, and for fields that are inputs or tell
     the time.
     """
@@ -62,6 +63,7 @@ class Controller:
         faults: Faults | None = None,
         fields: Iterable[Field] = (),
         model: str = "ur5e",
+        replayed: Collection[str] | None = None,
     ) -> None:
         self.series = series
         self.version = version or DEFAULT_VERSIONS[series]
@@ -74,12 +76,17 @@ class Controller:
         """Cycles run. Unlike the step counter it goes on while the controller is frozen."""
         self.claims = ControllerClaims()
         own = {field.name: field for field in fields}
+        self._own = own.keys()
         taken = own.keys() & (INPUTS.keys() | CYCLE_FIELDS)
         if taken:
             message = f"{min(taken)} cannot be another field"
             raise ValueError(message)
         self._outputs = {**OUTPUTS, **own}
-        signals = {name: signal for name, signal in SIGNALS.items() if name not in own}
+        self._replayed = replayed
+        self.quiet = False
+        """Whether there is nothing to send in this cycle."""
+        still = own.keys() | set(replayed or ())
+        signals = {name: signal for name, signal in SIGNALS.items() if name not in still}
         initial = {name: value for name, value in INITIAL.items() if name not in own}
         types = {name: field.type for name, field in {**INPUTS, **self._outputs}.items()}
         self.store = FieldStore(types, signals, initial)
@@ -107,7 +114,9 @@ class Controller:
 
     def output_type(self, name: str) -> DataType | None:
         """The type of an output, None if this series and version does not have it, or by a fault."""
-        return None if name in self.faults.unreadable else self._type(self._outputs.get(name))
+        if name in self.faults.unreadable or not self._shows(name):
+            return None
+        return self._type(self._outputs.get(name))
 
     def input_type(self, name: str) -> DataType | None:
         """The type of an input, None if this series and version does not have it."""
@@ -135,13 +144,14 @@ class Controller:
     def advance(self, cycles: int = 1) -> None:
         """Run one control cycle, `cycles` after the last: more than 1 where some could not be run in time."""
         self.cycle += cycles
-        for field, values in self._overwritten.items():
-            if self.get(field) != values:
-                self.store.write(field, values)
+        self.enforce()
         if self.faults.creep:
             moment = self.store.moment
             self.store.moment = moment._replace(time=moment.time + _CREEP)
         if self.faults.freeze or self.faults.creep:
+            return
+        if self._replayed is not None:
+            self._boot(self.step + cycles)
             return
         self.modes.advance(cycles)
         before = self.store.moment
@@ -154,6 +164,12 @@ class Controller:
         self._set_step(step, step / self.rate, path, fraction, change)
         if int(self.store.cells[self._state]) == ProgramState.RUNNING:
             self._interpreter.run(cycles)
+
+    def enforce(self) -> None:
+        """Write what is overwritten in every cycle."""
+        for field, values in self._overwritten.items():
+            if self.get(field) != values:
+                self.store.write(field, values)
 
     def restart(self) -> None:
         """Boot again: timestamp and registers from the beginning, no claims but internal ones, nothing overwritten."""
@@ -199,14 +215,19 @@ class Controller:
         Joint angles take the arm along: it stands at `actual_q` or `target_q`, and its pose follows. KeyError if there
         is no such field, ValueError for the wrong number of values or the cycle counter.
         """
-        if field in CYCLE_FIELDS:
-            message = f"{field} follows the controller's cycles; use freeze to stop it"
-            raise ValueError(message)
-        if field in _POSTURES and len(values) == self.store.type(field).count:
+        self.check(field, values)
+        if field in _POSTURES:
             self._posture = tuple(float(value) if math.isfinite(value) else 0.0 for value in values)
             self._set_step(*self.store.moment[:4])
             return
         self.store.pin(field, values)
+
+    def check(self, field: str, values: Sequence[Scalar]) -> None:
+        """Raise what `set` would raise, and set nothing."""
+        if field in CYCLE_FIELDS:
+            message = f"{field} follows the controller's cycles; use freeze to stop it"
+            raise ValueError(message)
+        self.store.check(field, values)
 
     def overwrite(self, field: str, values: Sequence[Scalar] | None) -> None:
         """Write a field as `set` does, and in every cycle again, whatever clients send; None: no more.
@@ -221,6 +242,13 @@ class Controller:
 
     def _type(self, field: Field | None) -> DataType | None:
         return field.type if field is not None and field.available(self.series, self.version) else None
+
+    def _shows(self, name: str) -> bool:
+        """Whether a controller that is replayed has this output: recorded, declared, an input's, or the time."""
+        replayed = self._replayed
+        return (
+            replayed is None or name in replayed or name in self._own or name in INPUTS or name == "timestamp"
+        )
 
     def _load(self) -> Interpreter:
         self._speed = self.store.place("target_speed_fraction").start

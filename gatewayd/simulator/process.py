@@ -8,27 +8,33 @@ import os
 import signal
 import stat
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 
 from gatewayd.report.format import address
-from gatewayd.simulator.control import Control
+from gatewayd.simulator.control import RobotControls
 from gatewayd.simulator.server import SimulatedController
 
 _LONGEST_LINE = 65536
 
 
-async def serve(simulator: SimulatedController, *, control: bool) -> None:
+async def serve(simulators: Mapping[str, SimulatedController], *, control: bool) -> None:
     """Run until SIGTERM, SIGINT, SIGHUP or, with `control`, `quit` or the end of standard input.
 
-    Prints `listening on HOST:PORT` once connections are accepted. OSError if the address cannot be had.
+    Prints `listening on HOST:PORT` once connections are accepted, for each of several robots `NAME: listening on
+    HOST:PORT`. Ends as well when what drives the robots has come to its end. OSError if an address cannot be had.
     """
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         loop.add_signal_handler(number, stop.set)
-    async with simulator:
-        reader = asyncio.create_task(_commands(Control(simulator), stop)) if control else None
-        _say(f"listening on {address(simulator.host, simulator.port)}", stop)
+    async with contextlib.AsyncExitStack() as stack:
+        for simulator in simulators.values():
+            simulator.ended = stop.set
+            await stack.enter_async_context(simulator)
+        reader = asyncio.create_task(_commands(RobotControls(simulators), stop)) if control else None
+        for name, simulator in simulators.items():
+            prefix = f"{name}: " if len(simulators) > 1 else ""
+            _say(f"{prefix}listening on {address(simulator.host, simulator.port)}", stop)
         await stop.wait()
         if reader is not None:
             reader.cancel()
@@ -36,7 +42,7 @@ async def serve(simulator: SimulatedController, *, control: bool) -> None:
                 await reader
 
 
-async def _commands(control: Control, stop: asyncio.Event) -> None:
+async def _commands(control: RobotControls, stop: asyncio.Event) -> None:
     """Answer each line of standard input with one line."""
     readline = await _standard_input()
     while not control.quit:

@@ -1,7 +1,8 @@
 """The simulated controller on a TCP port: sockets, the clock that drives its cycles, and nothing else.
 
-The cycle counter follows the clock. A cycle that comes late is made up for by shortened ones, never by a burst; what is
-more than `MAKE_UP` cycles late is skipped, packages and all.
+The cycle counter follows the clock, at its speed or another. A cycle that comes late is made up for by shortened ones,
+never by a burst; what is more than `MAKE_UP` cycles late is skipped, packages and all. A stepped controller has no
+clock: whoever tests with it says when a cycle passes.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ import asyncio
 import contextlib
 import logging
 import socket
+from collections.abc import Callable
 from types import TracebackType
-from typing import Self, cast
+from typing import Protocol, Self, cast
 
 from gatewayd.rtde.codec import ProtocolError
 from gatewayd.simulator.controller import Controller
@@ -27,6 +29,7 @@ MAX_CONNECTIONS = 16
 
 _SHORTEST_CYCLE = 0.75  # of a period, before the timer's error
 _TIMER_ERROR = 0.0005  # epoll rounds up to 1 ms: aiming this much early spreads the error evenly
+_SHORTEST_TICK = 0.001  # seconds: shorter cycles, of a raised speed, are run several at a time
 _IDLE = 0.01  # seconds between cycles while nobody is connected
 _SEND_BUFFER = 65536
 _MOST_UNSENT = 1 << 18  # replies that a client has not fetched
@@ -34,10 +37,24 @@ _DOWN = 0.2  # seconds a restart takes
 _log = logging.getLogger(__name__)
 
 
+class CycleFollower(Protocol):
+    """What happens to a robot by itself, in step with its cycles."""
+
+    def begin(self) -> None:
+        """The controller has been started, or has booted again."""
+
+    def follow(self, cycle: int) -> None:
+        """The controller has run its cycle number `cycle`."""
+
+    async def settle(self) -> None:
+        """Returns when all that has begun is done."""
+
+
 class SimulatedController:
     """Serves one `Controller`; an asynchronous context manager, or `start` and `stop`.
 
-    `port` 0 takes a free one, which is kept over `stop` and `start`. OSError if the address cannot be had.
+    `port` 0 takes a free one, which is kept over `stop` and `start`. OSError if the address cannot be had. `speed` is
+    the share of the clock's speed at which its time passes; `stepped`: it passes only by `step`.
     """
 
     def __init__(
@@ -47,11 +64,21 @@ class SimulatedController:
         host: str = "127.0.0.1",
         port: int = 0,
         connections: int = MAX_CONNECTIONS,
+        speed: float = 1.0,
+        stepped: bool = False,
     ) -> None:
         self.controller = controller or Controller()
         self.host = host
         self.port = port
         """The TCP port; once started the real one."""
+        self.speed = speed
+        """Seconds of the controller for each of the clock."""
+        self.stepped = stepped
+        """Whether time passes by `step` alone."""
+        self.follower: CycleFollower | None = None
+        """What happens by itself; to be set before the start."""
+        self.ended: Callable[[], None] | None = None
+        """Called when there is nothing left to show: at the end of a recording."""
         self.refused = 0
         """Connections turned away because there were too many."""
         self.malformed = 0
@@ -63,7 +90,7 @@ class SimulatedController:
         self._number = 0
         self._server: asyncio.Server | None = None
         self._ticking: asyncio.TimerHandle | None = None
-        self._booting: asyncio.TimerHandle | None = None
+        self._boot_at: int | None = None
         self._restarting: asyncio.Task[None] | None = None
         self._next = 0.0
         self._paused_until = 0.0
@@ -78,9 +105,19 @@ class SimulatedController:
         await self.stop()
 
     @property
+    def started(self) -> bool:
+        """Whether it has listened."""
+        return self._server is not None
+
+    @property
     def clients(self) -> int:
         """Clients connected now."""
         return len(self._connections)
+
+    @property
+    def streaming(self) -> bool:
+        """Whether a client has started its output recipe."""
+        return any(connection.streaming for connection in self._connections.values())
 
     @property
     def faults(self) -> Faults:
@@ -92,15 +129,17 @@ class SimulatedController:
         await self._listen()
         loop = asyncio.get_running_loop()
         if self.faults.boot_restart is not None:
-            self._booting = loop.call_later(self.faults.boot_restart, self._boot)
+            self._boot_at = self.controller.cycle + round(self.faults.boot_restart * self.controller.rate)
+        if self.follower is not None:
+            self.follower.begin()
         self._next = loop.time()
-        self._tick()
+        if not self.stepped:
+            self._tick()
 
     async def stop(self) -> None:
         """Close everything. The variables keep their values for the next `start`."""
-        for handle in (self._ticking, self._booting):
-            if handle is not None:
-                handle.cancel()
+        if self._ticking is not None:
+            self._ticking.cancel()
         if self._restarting is not None:
             self._restarting.cancel()
             with contextlib.suppress(asyncio.CancelledError):
@@ -113,7 +152,26 @@ class SimulatedController:
         await self._close()
         await asyncio.sleep(_DOWN)
         self.controller.restart()
+        if self.follower is not None:
+            self.follower.begin()
         await self._listen()
+
+    async def step(self, cycles: int = 1) -> None:
+        """Let that many control cycles pass, one by one; RuntimeError unless it is stepped.
+
+        Each begins when every client has room for its package, so that none is skipped: a client that does not read
+        is waited for as long as `overflow_close` says, and then closed.
+        """
+        if not self.stepped:
+            message = "time follows the clock here; a stepped simulator has steps (--stepped, stepped=True)"
+            raise RuntimeError(message)
+        for _ in range(cycles):
+            for connection in list(self._connections.values()):
+                await connection.drained()
+            self._run(1)
+            if self.follower is not None:
+                await self.follower.settle()
+            await asyncio.sleep(0)  # lets what clients have sent come in
 
     def pause(self, seconds: float) -> None:
         """Stand still for a while, as a halted virtual machine does: nothing is sent, read or counted.
@@ -174,9 +232,6 @@ class SimulatedController:
             connection.abort("controller stops")
         await asyncio.sleep(0)  # lets the transports report the loss, which releases the claims
 
-    def _boot(self) -> None:
-        self._restarting = asyncio.get_running_loop().create_task(self.restart())
-
     def _accept(self) -> asyncio.Protocol:
         self._number += 1
         return _Connection(self, self._number)
@@ -198,22 +253,37 @@ class SimulatedController:
     def _tick(self) -> None:
         loop = asyncio.get_running_loop()
         now = loop.time()
-        period = 1 / self.controller.rate
+        period = 1 / (self.controller.rate * self.speed)
+        batch = max(1, int(_SHORTEST_TICK / period))
         late = now - self._next
-        cycles = 1
-        if late > (MAKE_UP * period if self._connections else period):
-            cycles += int(late / period)
+        skipped = 0
+        if late > (MAKE_UP if self._connections else 1) * batch * period:
+            skipped = int(late / period)
         if not self.paused:
-            self.controller.advance(cycles)
-            for connection in list(self._connections.values()):
-                connection.cycle(now)
-        self._next += cycles * period
-        pause = _SHORTEST_CYCLE * period if self._connections else _IDLE
+            self._run(1 + skipped)
+            for _ in range(batch - 1):
+                self._run(1)
+        self._next += (batch + skipped) * period
+        pause = _SHORTEST_CYCLE * batch * period if self._connections else _IDLE
         self._schedule(max(self._next, now + pause))
+
+    def _run(self, cycles: int) -> None:
+        """One control cycle, `cycles` after the last, and its packages."""
+        controller, now = self.controller, asyncio.get_running_loop().time()
+        controller.advance(cycles)
+        if self.follower is not None:
+            self.follower.follow(controller.cycle)
+        for connection in list(self._connections.values()):
+            connection.cycle(now)
+        if self._boot_at is not None and controller.cycle >= self._boot_at:
+            self._boot_at = None
+            self._restarting = asyncio.get_running_loop().create_task(self.restart())
 
     def _schedule(self, when: float) -> None:
         if self._ticking is not None:
             self._ticking.cancel()
+        if self.stepped:
+            return
         self._ticking = asyncio.get_running_loop().call_at(when - _TIMER_ERROR, self._tick)
 
 
@@ -225,6 +295,8 @@ class _Connection(asyncio.Protocol):
         self._number = number
         self._mangler = Mangler(server.faults, number)
         self._blocked_since: float | None = None
+        self._room = asyncio.Event()
+        self._room.set()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.Transport", transport)
@@ -240,6 +312,8 @@ class _Connection(asyncio.Protocol):
         # A small send buffer makes it show soon that a client does not read.
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if self._server.stepped:
+            self._transport.set_write_buffer_limits(0)
         self._write(self._session.greeting())
         self.read(on=not self._server.paused)
         _log.info("%s connected", self._session)
@@ -258,8 +332,15 @@ class _Connection(asyncio.Protocol):
             return
         self._write(replies)
 
+    def pause_writing(self) -> None:
+        self._room.clear()
+
+    def resume_writing(self) -> None:
+        self._room.set()
+
     def connection_lost(self, exc: Exception | None) -> None:
         self._server.leave(self._number)
+        self._room.set()
         self._line.close()
         linger = self._server.faults.linger
         if linger:
@@ -267,6 +348,20 @@ class _Connection(asyncio.Protocol):
         else:
             self._session.close()
         _log.info("%s gone", self._session)
+
+    @property
+    def streaming(self) -> bool:
+        """Whether the client has started its output recipe."""
+        return self._session.streaming
+
+    async def drained(self) -> None:
+        """Returns when everything has left for the client, or when it has been closed for not reading."""
+        limit = self._server.faults.overflow_close
+        try:
+            async with asyncio.timeout(limit):
+                await self._room.wait()
+        except TimeoutError:
+            self._overflow(f"has not read for {limit:g} s")
 
     def abort(self, reason: str) -> None:
         """Cut the connection at once."""
@@ -313,13 +408,15 @@ class _Connection(asyncio.Protocol):
         if self._blocked_since is None:
             self._blocked_since = now
         elif limit is not None and now - self._blocked_since > limit:
-            self._server.overflowed += 1
-            self.abort(f"has not read for {limit:g} s")
+            self._overflow(f"has not read for {limit:g} s")
 
     def _write(self, data: bytes) -> None:
         if not data or self._transport.is_closing():
             return
         self._line.write(self._mangler.flush() + data)
         if self._transport.get_write_buffer_size() > _MOST_UNSENT:
-            self._server.overflowed += 1
-            self.abort("does not fetch its answers")
+            self._overflow("does not fetch its answers")
+
+    def _overflow(self, reason: str) -> None:
+        self._server.overflowed += 1
+        self.abort(reason)

@@ -77,6 +77,11 @@ class SimulatorSession:
     def __str__(self) -> str:
         return self._name
 
+    @property
+    def streaming(self) -> bool:
+        """Whether the client has started its output recipe."""
+        return self._started and self._view is not None
+
     def greeting(self) -> bytes:
         """What is sent before anything was asked."""
         text = self._controller.faults.text_on_connect
@@ -103,7 +108,7 @@ class SimulatorSession:
     def package(self) -> bytes:
         """The data package of this cycle; empty if none is due. Raises DroppedError for a fault."""
         controller = self._controller
-        if not self._started or self._view is None or controller.faults.silence:
+        if not self.streaming or self._view is None or controller.faults.silence or controller.quiet:
             return b""
         if controller.cycle % self._period:
             return b""

@@ -91,12 +91,17 @@ class FieldStore:
 
     def write(self, name: str, values: Sequence[Scalar]) -> None:
         """Set a field; ValueError unless there is one element for each of its type."""
+        self.check(name, values)
+        kind = self._types[name]
+        self.cells[self._places[name]] = [fitting(value, kind.code) for value in values]
+        self.edition += 1
+
+    def check(self, name: str, values: Sequence[Scalar]) -> None:
+        """ValueError unless there is one element for each of the field's type; KeyError if there is no such field."""
         kind = self._types[name]
         if len(values) != kind.count:
             message = f"{name} takes {counted(kind.count, 'value')}, not {len(values)}"
             raise ValueError(message)
-        self.cells[self._places[name]] = [fitting(value, kind.code) for value in values]
-        self.edition += 1
 
     def read(self, name: str) -> tuple[Scalar, ...]:
         """The elements of a field now."""

@@ -9,10 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from gatewayd.cli.simulate import _MODELS
+from gatewayd.simulator.kinematics import MODELS
+
 
 def run(*options: str) -> subprocess.CompletedProcess[str]:
     """A run that must end by itself."""
-    command = [sys.executable, "-m", "gatewayd", "simulate", "--port", "0", *options]
+    port = () if "--port" in options else ("--port", "0")
+    command = [sys.executable, "-m", "gatewayd", "simulate", *port, *options]
     return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
 
 
@@ -39,6 +43,17 @@ def test_a_mistake_in_a_program_file_names_its_place(tmp_path: Path) -> None:
     "options,message",
     [
         (("--hold", "foo"), "no such input: foo"),
+        (("--stepped",), "--stepped needs --control stdin"),
+        (("--loop",), "--loop needs --replay FILE"),
+        (("--scenario", "/nowhere"), "/nowhere: No such file or directory"),
+        (
+            ("--scenario", "x.toml", "--series", "e"),
+            "--series has no meaning beside --scenario: write it in the",
+        ),
+        (
+            ("--replay", "x.csv", "--program", "demo"),
+            "--program has no meaning beside --replay: the recording is",
+        ),
         (("--unreadable", "input_int_register_0,foo"), "no such input: foo"),
         (
             ("--field", "dexterity:REAL"),
@@ -59,6 +74,24 @@ def test_wrong_options_are_refused(options: tuple[str, ...], message: str) -> No
     result = run(*options)
     assert result.returncode == 2
     assert message in " ".join(result.stderr.split())
+
+
+def test_a_mistake_in_a_scenario_names_its_place(tmp_path: Path) -> None:
+    file = tmp_path / "cell.toml"
+    file.write_text('[robots.left]\nseries = "e"\ntimeline = """\n1 power off\n2 power up\n"""\n')
+    result = run("--scenario", str(file))
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr == f"Error: {file}:5: `power up`: 'up' is not one of on, off, release\n"
+
+
+def test_a_recording_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    result = run("--replay", str(tmp_path / "none.csv"))
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr == f"gatewayd: {tmp_path}/none.csv: cannot be read: No such file or directory\n"
+
+
+def test_models_are_those_that_the_kinematics_know() -> None:
+    assert _MODELS == MODELS
 
 
 def test_the_help_explains_rules_and_commands() -> None:

@@ -8,7 +8,7 @@ import math
 import socket
 import struct
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import pytest
 
@@ -300,3 +300,54 @@ async def test_what_is_overwritten_shows_in_the_read_back(
         simulator.controller.overwrite(INT(0), None)
         one.send(DataPackage(1, struct.pack(">i", 6)))
         await one.until(lambda values: values == (6,))
+
+
+async def test_a_stepped_controller_sends_one_package_for_each_step(client: type[Client]) -> None:
+    async with SimulatedController(stepped=True) as stepped, client(stepped.port) as one:
+        await one.stream("timestamp")
+        for cycle in range(1, 6):
+            await stepped.step()
+            assert await one.package() == pytest.approx((100 + cycle / 500,))
+        await stepped.step(3)
+        assert [(await one.package())[0] for _ in range(3)] == pytest.approx([100.012, 100.014, 100.016])
+
+
+async def test_steps_lose_nothing_however_many_there_are(client: type[Client]) -> None:
+    """Far more packages than the socket holds: the steps wait for a client that reads."""
+    names = [f"output_double_register_{number}" for number in range(48)]
+    async with SimulatedController(stepped=True) as stepped, client(stepped.port) as one:
+        await one.stream("timestamp", *names)
+        steps = asyncio.create_task(stepped.step(3000))
+        stamps = [(await one.package())[0] for _ in range(3000)]
+        await steps
+    assert stamps == pytest.approx([100 + cycle / 500 for cycle in range(1, 3001)])
+
+
+async def test_steps_do_not_wait_for_ever_for_a_client_that_does_not_read(client: type[Client]) -> None:
+    names = [f"output_double_register_{number}" for number in range(48)]
+    faults = Faults(overflow_close=0.05)
+    stepped = SimulatedController(Controller(faults=faults), stepped=True)
+    async with stepped, client(stepped.port) as one:
+        await one.stream("timestamp", *names)
+        cast("asyncio.Transport", one.writer.transport).pause_reading()
+        while not stepped.overflowed:
+            await stepped.step(1000)
+        assert stepped.clients == 0
+
+
+async def test_only_a_stepped_controller_has_steps(simulator: SimulatedController) -> None:
+    with pytest.raises(RuntimeError, match="--stepped, stepped=True"):
+        await simulator.step()
+
+
+@pytest.mark.parametrize("speed", [0.1, 20.0])
+async def test_another_speed_leaves_each_cycle_as_it_is(client: type[Client], speed: float) -> None:
+    async with SimulatedController(speed=speed) as served, client(served.port) as one:
+        await one.stream("timestamp")
+        began = asyncio.get_running_loop().time()
+        stamps = [(await one.package())[0] for _ in range(200 if speed > 1 else 20)]
+        passed = asyncio.get_running_loop().time() - began
+    steps = [round((b - a) * 500) for a, b in pairwise(stamps)]
+    assert min(steps) == 1
+    # No bound for a busy machine: it only makes the controller skip, and its time never outruns its speed.
+    assert (stamps[-1] - stamps[0]) < (passed + 0.5) * speed + 0.1
