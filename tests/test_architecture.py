@@ -281,6 +281,7 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "cli.rtde.progress_lines": "tests/cli/rtde/test_record.py",
     "cli.rtde.recording_run": "tests/cli/rtde/test_record.py ends it in every way",
     "cli.rtde.robot_source": "tests/cli/rtde/test_record.py, with a simulator",
+    "cli.rtde.robots": "tests/cli/rtde/test_get.py and test_set.py",
     "cli.rtde.sources": "a protocol; tests/cli/rtde/test_record.py",
     "canopen.product": "two numbers; tests/canopen/test_identity.py",
     "core.requester": "a record; tests/core/test_cell.py pins what its parts mean",

@@ -86,7 +86,7 @@ def command(
     view = View(filter=text)
     first = _look(client, cell)
     # Ctrl-C is a way to end it, not to break it off; whatever else ends it leaves the terminal as it was.
-    with suppress(KeyboardInterrupt), _ending_on_signals():
+    with suppress(KeyboardInterrupt), ending_on_signals():
         if once or not console.is_terminal or console.is_dumb_terminal or not sys.stdin.isatty():
             _lines(client, cell, first, view, interval=0.0 if once else interval)
         else:
@@ -130,7 +130,7 @@ def _live(console: Console, look: Callable[[], Glimpse], first: Glimpse, view: V
 
     glimpse, before = first, None
     due = time.monotonic() + interval
-    with _raw(sys.stdin.fileno()), Live(console=console, screen=True, auto_refresh=False) as picture:
+    with raw(sys.stdin.fileno()), Live(console=console, screen=True, auto_refresh=False) as picture:
         while not view.over:
             width, height = console.size
             view = settled(view, glimpse, width, height)
@@ -161,7 +161,7 @@ def keys(descriptor: int, patience: float) -> Iterator[str]:
 
 
 @contextmanager
-def _raw(descriptor: int) -> Iterator[None]:
+def raw(descriptor: int) -> Iterator[None]:
     """Give every key at once and without echo; as before at the end."""
     import termios
     import tty
@@ -175,7 +175,7 @@ def _raw(descriptor: int) -> Iterator[None]:
 
 
 @contextmanager
-def _ending_on_signals() -> Iterator[None]:
+def ending_on_signals() -> Iterator[None]:
     """SIGTERM and SIGHUP end what is inside as Ctrl-C does."""
 
     def interrupt(_number: int, _frame: object) -> None:

@@ -8,6 +8,10 @@ from gatewayd.cli.lazy import LazyGroup
 
 COMMANDS: dict[str, str] = {
     "record": "Record every package of a robot in a file.",
+    "watch": "Watch fields of a robot live.",
+    "get": "Print what fields of a robot hold now.",
+    "set": "Write inputs of a robot, verified by reading back.",
+    "message": "Put a line into a controller's log.",
     "fields": "Print which fields a controller has, and of what type.",
     "info": "Print what a controller is, and how it speaks RTDE.",
     "convert": "Write a finished recording in another format.",

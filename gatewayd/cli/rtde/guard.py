@@ -1,0 +1,69 @@
+"""What keeps a command from writing to a robot: a gateway that serves it, a program that runs."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Mapping
+from pathlib import Path
+
+from gatewayd.rtde.enums import MEANINGS, ProgramState
+
+_QUIET = frozenset({ProgramState.STOPPED, ProgramState.PAUSED})
+"""States in which no program moves the robot or reads what it is given."""
+_PATIENCE = 1.0
+
+
+def gateway_in_the_way(host: str, port: int, named: Path | None = None) -> str:
+    """Why a gateway on this machine forbids to write to the robot, in words; empty if none does.
+
+    One that is there and gives no answer forbids it too: what it serves is not known.
+    """
+    from gatewayd.doctor.running import ask, sockets
+
+    found = ask(sockets(named, os.environ))
+    wanted = _addresses(host, port)
+    for cell in found.cells:
+        address = str(cell.status["robot"]["address"])
+        their_host, _, their_port = address.rpartition(":")
+        if _addresses(their_host.strip("[]"), int(their_port or 0)) & wanted:
+            return (
+                f"the gateway at {cell.socket} serves this robot as cell {cell.status['name']}: "
+                "write by it, with gatewayd force"
+            )
+    for place, reason in found.silent:
+        if not _is_dead(place):
+            return f"a gateway may serve this robot, and does not say so: {reason}"
+    return ""
+
+
+def program_in_the_way(state: int | None) -> str:
+    """Why the program's state (`runtime_state`; None: not known) forbids to write, in words; empty if it does not."""
+    if state in _QUIET:
+        return ""
+    if state is None:
+        return "the controller does not say whether a program runs"
+    words: Mapping[int, str] = MEANINGS["runtime_state"]
+    return f"the program is {words.get(state, f'in state {state}')}"
+
+
+def _addresses(host: str, port: int) -> set[tuple[str, int]]:
+    """Where a name leads to; the name itself where it leads nowhere."""
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError):
+        return {(host, port)}
+    return {(str(address[0]), port) for *_, address in found}
+
+
+def _is_dead(place: str) -> bool:
+    """Whether nobody listens at a socket any more."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.settimeout(_PATIENCE)
+        try:
+            probe.connect(place)
+        except (ConnectionRefusedError, FileNotFoundError):
+            return True
+        except OSError:
+            return False
+    return False
