@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
+from itertools import product
 
 from gatewayd.cli.rtde.panels import Panel
 from gatewayd.cli.rtde.plotted import Plotted
@@ -17,8 +18,13 @@ _FEW = 4
 _LINE = 0.9
 
 
-def draw(form: str, panels: Sequence[Panel], drawn: Plotted, *, title: str, time_label: str) -> bytes:
-    """The picture, of the form `png`, `svg` or `pdf`. Raises MissingExtraError without matplotlib."""
+def draw(
+    form: str, panels: Sequence[Panel], drawn: Mapping[str, Plotted], *, title: str, time_label: str
+) -> bytes:
+    """The picture, of the form `png`, `svg` or `pdf`. Raises MissingExtraError without matplotlib.
+
+    `drawn` has the recordings by what they are called; of several, each has its curve in the panels.
+    """
     try:
         from matplotlib import rc_context
         from matplotlib.figure import Figure
@@ -35,18 +41,18 @@ def draw(form: str, panels: Sequence[Panel], drawn: Plotted, *, title: str, time
         # Down the columns, so that the six joints of a vector stand below each other.
         axes = [grid[place % down][place // down] for place in range(down * across)]
         for panel, area in zip(panels, axes, strict=False):
-            for curve in panel.curves:
-                style = "steps-post" if curve.stepped else "default"
-                area.plot(
-                    drawn.time,
-                    drawn.values[curve.column],
-                    label=curve.label,
-                    linewidth=_LINE,
-                    drawstyle=style,
-                )
+            for (name, found), curve in product(drawn.items(), panel.curves):
+                if curve.column in found.values:
+                    area.plot(
+                        found.time,
+                        found.values[curve.column],
+                        label=curve.field if len(drawn) == 1 else f"{name}: {curve.field}",
+                        linewidth=_LINE,
+                        drawstyle="steps-post" if curve.stepped else "default",
+                    )
             area.set_ylabel(panel.label, fontsize="small")
             area.grid(alpha=0.3)
-            if len(panel.curves) > 1:
+            if len(drawn) * len(panel.curves) > 1:
                 area.legend(fontsize="x-small", loc="upper right")
         for area in axes[len(panels) :]:
             area.set_visible(False)

@@ -37,9 +37,8 @@ _UNITS = {
 class Curve:
     """One column of the recording in a panel."""
 
-    label: str
-    column: int
-    """Its place among the flat values."""
+    field: str
+    column: str
     stepped: bool
     """Of an integer or a bit, which has nothing between two values."""
 
@@ -57,6 +56,12 @@ class Panel:
     def label(self) -> str:
         """What stands at its upright axis: `q, base in rad`."""
         return f"{self.title} in {self.unit}" if self.unit else self.title
+
+
+def together(recipes: Iterable[Recipe]) -> Recipe:
+    """The fields of several recordings, each once."""
+    found = {name: kind for recipe in recipes for name, kind in recipe.kinds.items()}
+    return Recipe(list(found), list(found.values()))
 
 
 def chosen(recipe: Recipe, wanted: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -86,12 +91,12 @@ def panels(recipe: Recipe, drawn: Iterable[str]) -> tuple[Panel, ...]:
     found: dict[str, dict[int, list[Curve]]] = {}
     for field, slot in recipe.slots.items():
         stepped = recipe.kinds[field].element is not DataType.DOUBLE
-        for element, column in enumerate(range(slot.start, slot.stop)):
-            if names[column] in wanted:
+        for element, column in enumerate(names[slot]):
+            if column in wanted:
                 curves = found.setdefault(_quantity(field), {}).setdefault(element, [])
                 curves.append(Curve(field, column, stepped))
     return tuple(
-        Panel(_title(curves, element, recipe), _unit(curves[0].label, element), tuple(curves))
+        Panel(_title(curves, element, recipe), _unit(curves[0].field, element), tuple(curves))
         for elements in found.values()
         for element, curves in sorted(elements.items())
     )
@@ -102,7 +107,7 @@ def _quantity(field: str) -> str:
 
 
 def _title(curves: Sequence[Curve], element: int, recipe: Recipe) -> str:
-    fields = [curve.label for curve in curves]
+    fields = [curve.field for curve in curves]
     name = fields[0] if len(fields) == 1 else _quantity(fields[0])
     count = max(recipe.kinds[field].count for field in fields)
     if count == 1:

@@ -33,6 +33,7 @@ Examples:
   gatewayd rtde plot robot_data.csv -f actual_q -f target_q     both in one panel for each joint
   gatewayd rtde plot robot_data.csv -f 'actual_q[1]' -f actual_TCP_force
   gatewayd rtde plot robot_data.csv -f '*_current' --running -o current.svg
+  gatewayd rtde plot monday.csv friday.csv -f actual_TCP_force -o forces.png
 
 \b
 Exit codes:
@@ -41,14 +42,14 @@ Exit codes:
   2  wrong usage, OUT exists, or matplotlib is not installed
 """,
 )
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, readable=True))
+@click.argument("files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, readable=True))
 @click.option(
     "-o",
     "--output",
     "out",
     metavar="OUT",
     type=click.Path(dir_okay=False),
-    help="The picture: .png, .svg or .pdf; otherwise FILE with .png.",
+    help="The picture: .png, .svg or .pdf; of one FILE otherwise its name with .png.",
 )
 @click.option(
     "-f",
@@ -61,7 +62,7 @@ Exit codes:
 @click.option(
     "--running", is_flag=True, help="Only while the program runs, by runtime_state or robot_status_bits."
 )
-@click.option("--title", metavar="TEXT", help="What stands above; otherwise the name of FILE.")
+@click.option("--title", metavar="TEXT", help="What stands above; otherwise the names of the files.")
 @delimiter_option(
     "--delimiter", "What separates the columns of FILE, where it cannot be told from its first line."
 )
@@ -69,7 +70,7 @@ Exit codes:
 @click.pass_context
 def command(
     context: click.Context,
-    file: str,
+    files: tuple[str, ...],
     *,
     out: str | None,
     fields: tuple[str, ...],
@@ -78,41 +79,65 @@ def command(
     delimiter: str | None,
     force: bool,
 ) -> None:
-    """Draw the recording FILE: each joint or element of a vector in a panel of its own, over the time in seconds.
+    """Draw the recordings FILES: each joint or element of a vector in a panel of its own, over the time in seconds.
 
-    Actual and target values of one quantity share a panel. Curves are interrupted where packages are missing.
+    Actual and target values of one quantity share a panel, and so do several recordings, each from its own first
+    package on. Curves are interrupted where packages are missing.
     """
     from gatewayd.cli.rtde.drawing import draw
     from gatewayd.cli.rtde.plotted import time_label
-    from gatewayd.rtde.recording import open_recording
 
-    target = Path(out) if out is not None else Path(file).with_suffix(".png")
+    target, form = _target(files, out, force=force)
+    with reported(context):
+        heads = [_head(file, delimiter) for file in files]
+        panels = _panels([recipe for recipe, _host_time in heads], fields)
+        drawn = {
+            name: _read(file, delimiter, panels, running=running)
+            for name, file in zip(_names(files), files, strict=True)
+        }
+        packages = sum(found.packages for found in drawn.values())
+        if not packages:
+            nothing = "no package while a program ran" if running else "no package"
+            click.echo(printable(f"{', '.join(files)}: {nothing}: nothing was drawn"), err=True)
+            context.exit(FAILED)
+        above = title if title is not None else ", ".join(drawn)
+        label = " or ".join(sorted({time_label(recipe, host_time=host_time) for recipe, host_time in heads}))
+        picture = draw(form, panels, drawn, title=above, time_label=label)
+    _save(context, target, picture)
+    click.echo(printable(f"{target}: {counted(len(panels), 'panel')}, {counted(packages, 'package')}"))
+
+
+def _target(files: Sequence[str], out: str | None, *, force: bool) -> tuple[Path, str]:
+    """Where the picture is to lie, and its form."""
+    if out is None and len(files) > 1:
+        raise click.UsageError("name the picture of several recordings with -o")
+    target = Path(out) if out is not None else Path(files[0]).with_suffix(".png")
     form = _FORMS.get(target.suffix.lower())
     if form is None:
         raise click.UsageError(f"{target.name!r} is no picture that can be drawn: name it .png, .svg or .pdf")
     if target.exists() and not force:
         raise click.UsageError(f"{click.format_filename(target)} exists; overwrite it with --force")
-    with Progress() as progress, reported(context), open_recording(file, delimiter=delimiter) as recording:
-        panels = _panels(recording.recipe, fields)
-        drawn = _read(recording, file, panels, progress, running=running)
-        label = time_label(recording.recipe, host_time=recording.host_time)
-        torn = recording.torn
-    if torn:
-        click.echo(printable(torn), err=True)
-    if not drawn.packages:
-        nothing = "no package while a program ran" if running else "no package"
-        click.echo(printable(f"{file}: has {nothing}: nothing was drawn"), err=True)
-        context.exit(FAILED)
-    above = title if title is not None else Path(file).name
-    with reported(context):
-        picture = draw(form, panels, drawn, title=above, time_label=label)
-    _save(context, target, picture)
-    click.echo(printable(f"{target}: {counted(len(panels), 'panel')}, {counted(drawn.packages, 'package')}"))
+    return target, form
 
 
-def _panels(recipe: Recipe, fields: Sequence[str]) -> tuple[Panel, ...]:
-    from gatewayd.cli.rtde.panels import chosen, panels
+def _names(files: Sequence[str]) -> Sequence[str]:
+    """What the recordings are called: their names, or with their folders where names are there twice."""
+    names = [Path(file).name for file in files]
+    return names if len(set(names)) == len(names) else files
 
+
+def _head(file: str, delimiter: str | None) -> tuple[Recipe, bool]:
+    """The fields of a recording, and whether it has host time."""
+    from gatewayd.rtde.recording import open_recording
+
+    with open_recording(file, delimiter=delimiter) as recording:
+        return recording.recipe, recording.host_time
+
+
+def _panels(recipes: Sequence[Recipe], fields: Sequence[str]) -> tuple[Panel, ...]:
+    from gatewayd.cli.rtde.panels import chosen, panels, together
+
+    recipe = together(recipes)
     names, unknown = chosen(recipe, fields)
     there = listed(recipe.names, _SHOWN)
     if unknown:
@@ -124,18 +149,20 @@ def _panels(recipe: Recipe, fields: Sequence[str]) -> tuple[Panel, ...]:
     return found
 
 
-def _read(
-    recording: RecordingReader, file: str, panels: Sequence[Panel], progress: Progress, *, running: bool
-) -> Plotted:
+def _read(file: str, delimiter: str | None, panels: Sequence[Panel], *, running: bool) -> Plotted:
     from gatewayd.cli.rtde.plotted import plotted
-    from gatewayd.rtde.recording import program_runs, read_gaps
+    from gatewayd.rtde.recording import open_recording, program_runs, read_gaps
 
-    runs = program_runs(recording.recipe) if running else None
-    if running and runs is None:
-        raise click.UsageError("--running needs runtime_state or robot_status_bits in the recording")
-    drawn = {curve.column for panel in panels for curve in panel.curves}
+    wanted = {curve.column for panel in panels for curve in panel.curves}
     gaps = {gap.package for gap in read_gaps(file)}
-    return plotted(_watched(recording, progress), recording.recipe, sorted(drawn), gaps=gaps, runs=runs)
+    with Progress() as progress, open_recording(file, delimiter=delimiter) as recording:
+        runs = program_runs(recording.recipe) if running else None
+        if running and runs is None:
+            raise click.UsageError(f"--running needs runtime_state or robot_status_bits, which {file} lacks")
+        found = plotted(_watched(recording, progress), recording.recipe, wanted, gaps=gaps, runs=runs)
+    if recording.torn:
+        click.echo(printable(recording.torn), err=True)
+    return found
 
 
 def _watched(recording: RecordingReader, progress: Progress) -> Iterator[Row]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from gatewayd.cli.rtde.panels import TIMESTAMP
 from gatewayd.rtde.recipe import Recipe, Scalar
+from gatewayd.rtde.recording import columns
 
 Row = tuple[tuple[Scalar, ...], float | None]
 """Flat values, and the host time of a recording that has it."""
@@ -21,20 +22,20 @@ class Plotted:
 
     time: array[float] = field(default_factory=lambda: array("d"))
     """Seconds since the first package, or numbers of packages where the recording has no time."""
-    values: dict[int, array[float]] = field(default_factory=dict)
+    values: dict[str, array[float]] = field(default_factory=dict)
     """Column -> values, as many as `time` has."""
     packages: int = 0
     """Packages that are drawn."""
 
-    def add(self, moment: float, row: Sequence[Scalar], *, apart: bool) -> None:
-        """Take in a package; `apart`: its curve is not joined to the package before."""
+    def add(self, moment: float, row: Iterable[Scalar], *, apart: bool) -> None:
+        """Take in a package, the value of each column; `apart`: its curve is not joined to the package before."""
         if self.time and (apart or moment < self.time[-1]):
             self.time.append(self.time[-1])
             for values in self.values.values():
                 values.append(math.nan)
         self.time.append(moment)
-        for place, values in self.values.items():
-            values.append(row[place])
+        for values, value in zip(self.values.values(), row, strict=True):
+            values.append(value)
         self.packages += 1
 
 
@@ -46,13 +47,17 @@ def time_label(recipe: Recipe, *, host_time: bool) -> str:
 def plotted(
     rows: Iterable[Row],
     recipe: Recipe,
-    columns: Iterable[int],
+    wanted: Collection[str],
     *,
     gaps: Collection[int] = (),
     runs: Runs | None = None,
 ) -> Plotted:
-    """The columns of the packages in which `runs` holds; `gaps` are the packages before which some are missing."""
-    found = Plotted(values={place: array("d") for place in columns})
+    """The columns of the packages in which `runs` holds; `gaps` are the packages before which some are missing.
+
+    Of the columns that are wanted a recording may have some only.
+    """
+    places = {name: place for place, name in enumerate(columns(recipe)) if name in wanted}
+    found = Plotted(values={name: array("d") for name in places})
     slot = recipe.slots.get(TIMESTAMP)
     apart = False
     begin: float | None = None
@@ -63,6 +68,6 @@ def plotted(
             continue
         moment = float(row[slot.start]) if slot is not None else number if host_time is None else host_time
         begin = moment if begin is None else begin
-        found.add(moment - begin, row, apart=apart)
+        found.add(moment - begin, [row[place] for place in places.values()], apart=apart)
         apart = False
     return found

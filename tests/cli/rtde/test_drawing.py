@@ -20,7 +20,7 @@ ROWS = [((number / 10, *(0.1 * number,) * 6, *(0.2 * number,) * 6, number), None
 
 
 def picture(form: str, *names: str) -> bytes:
-    drawn = plotted(ROWS, RECIPE, range(1, RECIPE.count))
+    drawn = {"x.csv": plotted(ROWS, RECIPE, columns(RECIPE))}
     return draw(form, panels(RECIPE, names), drawn, title="a < b", time_label="time in s")
 
 
@@ -39,6 +39,26 @@ def test_an_svg_has_its_texts_as_text_and_a_curve_for_each_column() -> None:
         assert text in texts
     groups = [element.get("id") or "" for element in root.iter("{http://www.w3.org/2000/svg}g")]
     assert sum(group.startswith("axes_") for group in groups) == 7
+
+
+def test_several_recordings_share_the_panels_of_what_they_have() -> None:
+    other = Recipe(["runtime_state"], [OUTPUTS["runtime_state"].type])
+    drawn = {
+        "a": plotted(ROWS, RECIPE, columns(RECIPE)),
+        "b": plotted([((1,), None)], other, columns(RECIPE)),
+    }
+    shown = draw(
+        "svg", panels(RECIPE, ["runtime_state", "actual_q_0"]), drawn, title="", time_label=""
+    ).decode()
+    assert [
+        text in shown
+        for text in (">a: runtime_state<", ">b: runtime_state<", ">a: actual_q<", ">b: actual_q<")
+    ] == [
+        True,
+        True,
+        True,
+        False,
+    ]
 
 
 def test_an_svg_is_the_same_each_time() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.cli.rtde.panels import chosen, panels
+from gatewayd.cli.rtde.panels import chosen, panels, together
 from gatewayd.rtde.fields import OUTPUTS
 from gatewayd.rtde.recipe import Recipe
 from gatewayd.rtde.recording import columns
@@ -60,11 +60,16 @@ def test_each_joint_and_each_axis_has_its_panel_and_its_unit() -> None:
 
 def test_target_and_actual_share_a_panel_where_both_are_drawn() -> None:
     (shoulder,) = panels(RECIPE, ["target_q_1", "actual_q_1"])
-    assert [(curve.label, columns(RECIPE)[curve.column]) for curve in shoulder.curves] == [
+    assert [(curve.field, curve.column) for curve in shoulder.curves] == [
         ("target_q", "target_q_1"),
         ("actual_q", "actual_q_1"),
     ]
     assert panels(RECIPE, ["actual_q_1"])[0].title == "actual_q, shoulder"
+
+
+def test_fields_of_several_recordings_are_there_once() -> None:
+    other = Recipe(["payload", "actual_q"], [OUTPUTS["payload"].type, OUTPUTS["actual_q"].type])
+    assert together([RECIPE, other]).names == (*NAMES, "payload")
 
 
 def test_integers_are_stepped() -> None:

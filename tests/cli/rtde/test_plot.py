@@ -64,6 +64,19 @@ def test_wrong_usage(source: Path, arguments: list[str], message: str) -> None:
     assert message in done.stderr
 
 
+def test_several_recordings_in_one_picture(source: Path, tmp_path: Path) -> None:
+    (tmp_path / "b").mkdir()
+    other = recorded(tmp_path / "b" / source.name, "runtime_state", "timestamp", "payload")
+    refused = plot(source, other, "-f", "runtime_state")
+    assert refused.exit_code == 2
+    assert "name the picture of several recordings with -o" in refused.stderr
+    out = tmp_path / "x.svg"
+    done = plot(source, other, "-f", "runtime_state", "-f", "payload", "-o", out)
+    assert (done.exit_code, done.stdout) == (0, f"{out}: 2 panels, 100 packages\n")
+    assert f">{source}: runtime_state<" in out.read_text()
+    assert f">{other}: runtime_state<" in out.read_text()
+
+
 def test_an_existing_picture_wants_force(source: Path, tmp_path: Path) -> None:
     (tmp_path / "robot_data.png").write_text("precious")
     refused = plot(source)
@@ -74,7 +87,7 @@ def test_an_existing_picture_wants_force(source: Path, tmp_path: Path) -> None:
 def test_a_filter_needs_something_to_filter_by(tmp_path: Path) -> None:
     done = plot(recorded(tmp_path / "x.csv", "timestamp", "robot_mode"), "--running")
     assert done.exit_code == 2
-    assert "--running needs runtime_state or robot_status_bits in the recording" in done.stderr
+    assert "--running needs runtime_state or robot_status_bits, which " in done.stderr
 
 
 def test_too_many_panels_are_answered_with_the_fields(tmp_path: Path) -> None:
@@ -91,7 +104,7 @@ def test_nothing_to_draw(tmp_path: Path) -> None:
     path.write_text("timestamp runtime_state\n0.0 1\n")
     done = plot(path, "--running")
     assert done.exit_code == 1
-    assert done.stderr == f"{path}: has no package while a program ran: nothing was drawn\n"
+    assert done.stderr == f"{path}: no package while a program ran: nothing was drawn\n"
     assert not (tmp_path / "x.png").exists()
 
 
