@@ -243,6 +243,7 @@ IMPURE = {
     "rtde.resolve": "has the socket",
     "rtde.sending": "has the transport",
     "rtde.sync": "has a loop in a thread",
+    "rtde.survey": "waits for a controller to notice that a client has gone",
     "rtde.visit": "runs a client",
     "web.guard": "speaks HTTP",
     "web.launch": "has the socket",

@@ -6,17 +6,21 @@ inputs are claimed, a list at a time, each for as long as its answer takes.
 
 from __future__ import annotations
 
+import asyncio
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from gatewayd.rtde.catalogue import OLD_LIST_LIMIT
 from gatewayd.rtde.loss import Loss
-from gatewayd.rtde.messages import TextMessage
+from gatewayd.rtde.messages import IN_USE, TextMessage
 from gatewayd.rtde.reading import fitting
 from gatewayd.rtde.session import TIMESTAMP, ClientSettings, Session
 from gatewayd.rtde.visit import visit
 
+RELEASE = 1.0
+"""Seconds after which inputs that are in use are asked for once more: a controller may be slow to notice that a client
+has gone, be it our own last visit."""
 _NAME = re.compile(r"[!-+\--~]+")
 """ASCII without blanks and commas."""
 _ROOM = OLD_LIST_LIMIT - len(TIMESTAMP) - 1
@@ -52,6 +56,12 @@ async def survey(settings: ClientSettings, outputs: Sequence[str], inputs: Seque
     for names in input_lists:
         if not await _ask(found, replace(settings, outputs=(), inputs=names, watchdog=None)):
             return found
+    in_use = [name for name, word in found.inputs.items() if word == IN_USE]
+    if in_use:
+        await asyncio.sleep(RELEASE)
+    for names in pieces(in_use):
+        if not await _ask(found, replace(settings, outputs=(), inputs=names, watchdog=None)):
+            break
     return found
 
 

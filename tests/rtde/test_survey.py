@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -7,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.rtde import messages
+from gatewayd.rtde import survey as surveys
 from gatewayd.rtde.catalogue import OLD_LIST_LIMIT, list_size
 from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.loss import LossReason
@@ -56,6 +58,21 @@ async def test_what_was_answered_before_a_loss_stays(controller: Controller) -> 
     assert found.inputs == {}
     assert found.loss is not None
     assert found.loss.reason is LossReason.UNANSWERED
+
+
+async def test_what_a_client_held_that_has_just_gone_is_asked_for_once_more(
+    controller: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A controller notices the end of a connection late; our own last visit must not look like somebody else."""
+    script = controller.script
+    script.in_use = {"input_int_register_0", "input_int_register_1"}
+
+    async def pass_by(_seconds: float) -> None:
+        script.in_use.remove("input_int_register_0")
+
+    monkeypatch.setattr(surveys, "asyncio", SimpleNamespace(sleep=pass_by))
+    found = await survey(settings(controller), (), ("input_int_register_0", "input_int_register_1"))
+    assert found.inputs == {"input_int_register_0": "INT32", "input_int_register_1": "IN_USE"}
 
 
 @given(st.lists(st.text("ab_", min_size=1, max_size=30)), st.integers(30, 100))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from gatewayd.core.definition import CellDefinition, Direction
@@ -17,6 +17,7 @@ from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.loss import Loss, LossReason, connect_failure
 from gatewayd.rtde.messages import IN_USE, NOT_FOUND, TextLevel, TextMessage
 from gatewayd.rtde.session import Session
+from gatewayd.rtde.types import DataType
 from gatewayd.rtde.visit import Visit
 
 PORT = "port"
@@ -173,16 +174,15 @@ def _absence(name: str, session: Session) -> tuple[str, str]:
     return since, "update the controller, or remove the field from the mapping"
 
 
-def claims(session: Session, wanted: Collection[str]) -> Iterator[Observation]:
-    """What claiming the `wanted` inputs showed."""
-    refused = {one.field: one.word for one in session.unavailable if not one.output}
-    missing = [name for name in wanted if refused.get(name) == NOT_FOUND]
+def claims(words: Mapping[str, str], session: Session) -> Iterator[Observation]:
+    """What claiming showed: the controller's word for each input, its type where it could be claimed."""
+    missing = [name for name, word in words.items() if word == NOT_FOUND]
     for name in missing:
         why = _absence(name, session)
         yield Observation("claims", Outcome.PROBLEM, f"{name}: the controller does not have it", *why)
-    software = session.controller.software
-    yield from held({name: likely_holders(name, software) for name in wanted if refused.get(name) == IN_USE})
-    free = sum(name not in refused for name in wanted)
+    in_use = [name for name, word in words.items() if word == IN_USE]
+    yield from held({name: likely_holders(name, session.controller.software) for name in in_use})
+    free = sum(word in DataType.__members__ for word in words.values())
     if free:
         yield Observation.well("claims", f"{counted(free, 'input')} can be claimed")
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import ipaddress
 import socket
 from collections.abc import AsyncIterator, Collection, Iterator, Sequence
-from dataclasses import replace
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.doctor.machine.addresses import resolved
@@ -25,8 +24,9 @@ from gatewayd.report.format import address, counted
 from gatewayd.rtde.catalogue import bit_word
 from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.rtde.fields import OUTPUTS
-from gatewayd.rtde.session import ClientSettings
-from gatewayd.rtde.visit import Visit, visit
+from gatewayd.rtde.session import ClientSettings, Session
+from gatewayd.rtde.survey import Survey, survey
+from gatewayd.rtde.visit import visit
 
 LISTEN = 1.0
 """Seconds for which packages are counted."""
@@ -78,9 +78,9 @@ async def _met(
         for found in (*diagnosis.spoken(session, plan), *diagnosis.outputs(session, plan, cell, read)):
             yield found
         yield diagnosis.rate(visited, session)
-        # By a visit of its own, which is as short as can be: what it claims is taken from all others meanwhile.
-        claiming = await visit(replace(settings, outputs=(), inputs=asked)) if asked else None
-        for found in _claims(claiming, asked, own, serving):
+        # By visits of their own, as short as can be: what they claim is taken from all others meanwhile.
+        claimed = await survey(settings, (), asked) if asked else None
+        for found in _claims(claimed, session, own, serving):
             yield found
         if not probe and len(own) < len(inputs):
             yield _not_probed(len(inputs) - len(own))
@@ -91,14 +91,15 @@ async def _met(
 
 
 def _claims(
-    claiming: Visit | None, asked: Sequence[str], own: Collection[str], serving: Sequence[RunningCell]
+    claimed: Survey | None, session: Session, own: Collection[str], serving: Sequence[RunningCell]
 ) -> Iterator[Observation]:
-    """What is known of claims: by the visit that claimed, and from the gateway on this machine."""
-    if claiming is not None:
-        text = f"{counted(len(asked), 'input')} claimed for a moment to see who holds them, and given back"
+    """What is known of claims: by claiming, and from the gateway on this machine."""
+    if claimed is not None:
+        text = f"{counted(len(claimed.inputs), 'input')} claimed for a moment to see who holds them, and given back"
         yield Observation("claims", Outcome.NOTE, text)
-        session = claiming.session
-        yield from diagnosis.claims(session, asked) if session else [diagnosis.session_missing(claiming.loss)]
+        yield from diagnosis.claims(claimed.inputs, session)
+        if claimed.loss is not None:
+            yield diagnosis.session_missing(claimed.loss)
     if own:
         yield Observation.well(
             "claims", f"{counted(len(own), 'input')} claimed by the gateway on this machine"

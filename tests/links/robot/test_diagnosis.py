@@ -163,14 +163,14 @@ def test_why_a_field_is_missing_is_what_the_guides_say(
 
 
 def test_claims_are_grouped_by_who_probably_holds_them() -> None:
-    names = tuple(f"input_int_register_{number}" for number in (0, 1, 20, 30, 31))
-    refused = [absent(name, "IN_USE", output=False) for name in names[:3]]
-    missing = absent(names[4], output=False)
-    lower, ranged, free = (
-        seen
-        for seen in diagnosis.claims(session(*refused, missing), names)
-        if "does not have" not in seen.text
-    )
+    words = {f"input_int_register_{number}": "IN_USE" for number in (0, 1, 20)}
+    words |= {
+        "input_int_register_30": "INT32",
+        "input_int_register_31": "NOT_FOUND",
+        "input_int_register_32": "?",
+    }
+    missing, lower, ranged, free = diagnosis.claims(words, session())
+    assert missing.text == "input_int_register_31: the controller does not have it"
     assert lower.text == "in use by another client: input_int_register_0, input_int_register_1"
     assert "PROFINET or EtherNet/IP adapter" in lower.cause
     assert ranged.text == "in use by another client: input_int_register_20"

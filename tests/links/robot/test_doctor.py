@@ -15,6 +15,7 @@ from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.doctor import EXAMINATION, field_of, wanted_inputs
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.mapping.plan import Plan
+from gatewayd.rtde import survey
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import Faults
 from gatewayd.simulator.server import SimulatedController
@@ -32,6 +33,7 @@ MAPPING = """\
 @pytest.fixture(autouse=True)
 def _brief(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "LISTEN", 0.1)
+    monkeypatch.setattr(survey, "RELEASE", 0.01)
 
 
 @asynccontextmanager
