@@ -309,3 +309,61 @@ def test_whatever_is_free_is_held_and_nothing_else(
         assert set(claims.refused) == everything - set(names)
         ours = set(names)
         claims.retry()
+
+
+def test_named_recipes_are_claimed_as_they_are() -> None:
+    """A field may be in several; one that cannot be had costs its recipe this field alone."""
+    named = {
+        "a": (REGISTERS[0], REGISTERS[1]),
+        "registers": (REGISTERS[1], "speed_slider_mask"),
+        REGISTERS[2]: (REGISTERS[3],),
+    }
+    controller = Controller(taken={REGISTERS[0]})
+    claims = Claims((REGISTERS[5],), recipes={key: named[key] for key in ("a", REGISTERS[2])})
+    controller.converse(claims)
+    assert held(claims) == {
+        REGISTERS_KEY: (REGISTERS[5],),
+        "a": (REGISTERS[1],),
+        REGISTERS[2]: (REGISTERS[3],),
+    }
+    controller.taken.clear()
+    claims.retry()
+    controller.converse(claims)
+    assert held(claims)["a"] == named["a"]
+    alone = Claims((), recipes={"registers": named["registers"]})
+    controller.converse(alone)
+    alone.separate([REGISTERS[1]])
+    controller.converse(alone)
+    assert held(alone) == {"registers": named["registers"]}
+
+
+def test_a_named_recipe_that_is_too_long_a_list_is_refused_and_not_split() -> None:
+    names = tuple(name for name in INPUTS if name.startswith("input_"))
+    controller = Controller(limit=OLD_LIST_LIMIT)
+    claims = Claims((), recipes={"long": names}, limited=True)
+    controller.converse(claims)
+    assert controller.asked == [names]
+    assert held(claims) == {}
+    assert set(claims.refused.values()) == {REFUSED}
+
+
+@given(
+    st.dictionaries(st.sampled_from("abc"), st.lists(st.sampled_from(REGISTERS), min_size=1, unique=True)),
+    st.dictionaries(st.sampled_from("abc"), st.lists(st.sampled_from(REGISTERS), min_size=1, unique=True)),
+    st.sets(st.sampled_from(REGISTERS)),
+)
+def test_named_recipes_change_and_what_stays_keeps_its_id(
+    first: dict[str, list[str]], second: dict[str, list[str]], taken: set[str]
+) -> None:
+    controller = Controller(taken)
+    before = {key: tuple(names) for key, names in first.items()}
+    after = {key: tuple(names) for key, names in second.items()}
+    claims = Claims((), recipes=before)
+    controller.converse(claims)
+    ids = {key: recipe.id for key, recipe in claims.recipes.items()}
+    claims.change(after)
+    controller.converse(claims)
+    free = {key: tuple(name for name in names if name not in taken) for key, names in after.items()}
+    assert held(claims) == {key: names for key, names in free.items() if names}
+    for key, recipe in claims.recipes.items():
+        assert (recipe.id == ids.get(key)) == (before.get(key) == after[key])

@@ -426,3 +426,42 @@ def test_whatever_a_controller_answers_ends_the_talk_in_order_or_goes_on(data: s
                 )()
             if negotiation.state is State.RUNNING:
                 assert negotiation.session().inputs.keys() == negotiation.claims.recipes.keys()
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_forced_protocol_version_is_asked_for_alone(version: int) -> None:
+    wishes = Wishes(("output_int_register_0",), protocol=version)
+    negotiation, steps = talk(wishes, (m.ProtocolVersionReply(True),))
+    assert [step.send for step in steps] == [m.RequestProtocolVersion(version), m.GetControllerVersion()]
+    negotiation, _ = talk(wishes, ())
+    with pytest.raises(HandshakeError, match=f"does not speak protocol version {version}, which was forced"):
+        negotiation.handle(m.ProtocolVersionReply(False))
+
+
+def test_recipes_change_while_paused_on_the_same_connection() -> None:
+    wishes = Wishes(("output_int_register_0",), recipes={"a": ("input_int_register_0",)}, running=False)
+    negotiation, steps = talk(wishes, TO_START)
+    assert steps[-1][:2] == (None, Notice.STARTED)
+    assert negotiation.state is State.PAUSED
+    new = Wishes(
+        ("actual_q",), recipes={"a": ("input_int_register_0",), "b": ("input_int_register_1",)}, running=False
+    )
+    step = negotiation.change(new)
+    assert step.send == m.SetupOutputs(
+        ("timestamp", "actual_q", "input_int_register_0", "input_int_register_1"), 500.0
+    )
+    step = negotiation.handle(m.OutputsSetup(1, ("DOUBLE", "VECTOR6D", "INT32", "INT32")))
+    assert step.send == m.SetupInputs(("input_int_register_1",))
+    step = negotiation.handle(m.InputsSetup(2, ("INT32",)))
+    assert step[:2] == (None, Notice.CHANGED)
+    session = negotiation.session()
+    assert {key: held.id for key, held in session.inputs.items()} == {"a": 1, "b": 2}
+    assert session.outputs.names[1] == "actual_q"
+    assert negotiation.resume() == m.Start()
+
+
+def test_a_change_that_leaves_no_output_fails() -> None:
+    negotiation, _ = talk(Wishes(running=False), (*TO_OUTPUTS, m.OutputsSetup(1, ("DOUBLE",))))
+    negotiation.change(Wishes(("actual_q",), running=False))
+    with pytest.raises(HandshakeError, match="none of the wanted outputs"):
+        negotiation.handle(m.OutputsSetup(0, ("NOT_FOUND", "NOT_FOUND")))

@@ -94,3 +94,29 @@ def test_a_client_cannot_leave_out_what_version_2_wants(message: messages.Execut
 def test_a_controller_cannot_leave_out_recipe_ids_in_version_2(message: messages.ControllerMessage) -> None:
     with pytest.raises(ValueError, match="recipe id"):
         payloads.encode_controller(message, 2)
+
+
+def test_properties_are_asked_for_and_told_alike_in_both_versions() -> None:
+    asked = messages.ReadProperties(("v1.software.version", "v1.control_box.type"))
+    told = messages.PropertiesReply(("UINT64", "UINT32"), bytes(range(12)))
+    for version, (controller, executable) in enumerate(
+        [
+            (payloads.FROM_CONTROLLER_V1, payloads.FROM_EXECUTABLE_V1),
+            (payloads.FROM_CONTROLLER, payloads.FROM_EXECUTABLE),
+        ],
+        1,
+    ):
+        kind, payload = payloads.encode_executable(asked, version)
+        assert payload == b"v1.software.version,v1.control_box.type"
+        assert executable[kind](payload) == asked
+        kind, payload = payloads.encode_controller(told, version)
+        assert payload == b"\0\x0dUINT64,UINT32" + bytes(range(12))
+        assert controller[kind](payload) == told
+
+
+@pytest.mark.parametrize(
+    "payload, words", [(b"", "no bytes, at least 2"), (b"\0\x05BOOL", "types of 5 bytes reach beyond")]
+)
+def test_properties_that_cannot_be_read_are_refused(payload: bytes, words: str) -> None:
+    with pytest.raises(payloads.MalformedPayloadError, match=words):
+        payloads.FROM_CONTROLLER[PackageType.READ_PROPERTIES](payload)

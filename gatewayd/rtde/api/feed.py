@@ -82,6 +82,7 @@ class RobotFeed(ConnectionObserver):
         self._reconnect = reconnect
         self._attempts = Attempts(ONCE)
         self._layout: SampleLayout | None = None
+        self._claimed = 0
         self._connected = False
         self._ever = False
         self._missing: tuple[Unavailable, ...] = ()
@@ -93,6 +94,11 @@ class RobotFeed(ConnectionObserver):
     def layout(self) -> SampleLayout | None:
         """That of the session's samples."""
         return self._layout
+
+    @property
+    def reading(self) -> Sample | None:
+        """The newest sample if it was sent after the last claim: it shows what the claimed inputs hold."""
+        return self.latest if self.samples > self._claimed else None
 
     def stream(self, limit: int) -> BoundedStream[Sample]:
         """Another buffer that gets every sample from now on."""
@@ -186,6 +192,7 @@ class RobotFeed(ConnectionObserver):
     def inputs_changed(self, session: Session) -> None:
         """See ClientHandler."""
         self.session = session
+        self._claimed = self.samples
         self._report_missing(session)
         if self.state is ConnectionState.RUNNING and not self.running:
             self.paused()

@@ -6,7 +6,9 @@ import asyncio
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from gatewayd.rtde.api.errors import RtdeError
 from gatewayd.rtde.client import RtdeClient
+from gatewayd.rtde.codec import ProtocolError
 from gatewayd.rtde.messages import PropertiesReply
 from gatewayd.rtde.properties import PropertyValue, sort_properties
 
@@ -37,18 +39,30 @@ class Properties(Mapping[str, PropertyValue]):
 
 
 async def ask_properties(client: RtdeClient, names: tuple[str, ...], seconds: float) -> Properties:
-    """Ask once, and once more without the names that have no value: one of them keeps all values back."""
+    """Ask once, and once more without the names that have no value: one of them keeps all values back.
+
+    RtdeError for an answer that cannot be read.
+    """
     reply = await _ask(client, names, seconds)
     if reply is None:
         return Properties(answered=False)
-    found, missing = sort_properties(names, reply)
+    found, missing = _sorted(names, reply)
     rest = tuple(name for name in names if name not in missing)
     if missing and rest:
         reply = await _ask(client, rest, seconds)
         if reply is not None:
-            found, more = sort_properties(rest, reply)
+            found, more = _sorted(rest, reply)
             missing |= more
     return Properties(True, found, missing)
+
+
+def _sorted(
+    names: tuple[str, ...], reply: PropertiesReply
+) -> tuple[dict[str, PropertyValue], dict[str, str]]:
+    try:
+        return sort_properties(names, reply)
+    except ProtocolError as error:
+        raise RtdeError(str(error)) from error
 
 
 async def _ask(client: RtdeClient, names: tuple[str, ...], seconds: float) -> PropertiesReply | None:

@@ -268,27 +268,27 @@ class InputWriter(RobotInformation):
         sent = self._feed.written.get(name)
         if sent is not None:
             return sent
-        session, latest = self._session(), self._feed.latest
+        session, reading = self._session(), self._feed.reading
         if name in session.unread:
             return None
         if name in session.held:
             return session.held[name]
-        if latest is None or name not in latest:
+        if reading is None or name not in reading:
             return None
-        value = latest[name]
+        value = reading[name]
         return value if isinstance(value, tuple) else (value,)
 
     async def _know(self, held: InputRecipe, given: Mapping[str, Elements], timeout: float) -> None:  # noqa: ASYNC109
         """Wait for the first package of the session where it is needed to know what registers hold."""
         feed, session = self._feed, self._session()
-        if feed.latest is not None or feed.state is not ConnectionState.RUNNING:
+        if feed.reading is not None or feed.state is not ConnectionState.RUNNING:
             return
         readable = session.outputs.kinds.keys() - session.unread
         if any(
             name not in given and name in readable and self._known(name) is None for name in held.recipe.names
         ):
             try:
-                await feed.until(lambda: feed.latest, timeout)
+                await feed.until(lambda: feed.reading, timeout)
             except TimeoutError:
                 return  # what is missing is named by the refusal
 
