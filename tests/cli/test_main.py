@@ -102,7 +102,9 @@ def test_every_command_module_is_listed() -> None:
         inner |= {path.stem: path for path in group.glob("*.py") if path.stem != "__init__"}
         found = {name for name, path in inner.items() if commands.search(path.read_text())}
         package = import_module(".".join(("gatewayd", *group.relative_to(folder.parent).parts)))
-        assert {"import" if name == "importing" else name for name in found} == set(package.COMMANDS)
+        assert {"import" if name == "importing" else name for name in found} == set(
+            getattr(package, "COMMANDS", ())
+        )
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -26,6 +26,7 @@ ELSEWHERE = {
     r"gatewayd (status|watch|locks|events|force|unforce|trace)\b.*": "tests/cli, tests/e2e",
     r"gatewayd doctor .*": "tests/cli/test_doctor.py",
     r"gatewayd rtde (fields|info) .*": "tests/cli/rtde",
+    r"gatewayd import csv .*": "tests/cli/importing/test_csv.py, with the list of the guide",
     r"gatewayd reload|systemctl reload .*": "tests/e2e/test_reload.py",
     r"gatewayd simulate .*": "test_simulator_takes_the_options_of_the_guides below, tests/cli/test_simulate.py",
     r"mbpoll -0 -p 1502 -t 4:int -B -r 101 -c 2 127\.0\.0\.1": "tests/demo/test_view.py: the demonstration's own",

@@ -7,6 +7,7 @@ import click
 from gatewayd.cli.lazy import LazyGroup
 
 COMMANDS = {
+    "csv": "Propose a mapping from a register list.",
     "rtde": "Make a mapping from a recipe of another RTDE client.",
 }
 """Name -> what the list of commands says. Module `gatewayd.cli.importing.NAME` has the click command as `command`."""

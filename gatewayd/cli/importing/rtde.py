@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from ipaddress import ip_address
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from gatewayd.cli.files import reason_of
+from gatewayd.cli.importing.defaults import cell_name, listen_address
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
 
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 
 FOUND, WRONG = 1, 2
 """Exit codes."""
-_EVERYWHERE, _HERE = "0.0.0.0:502", "127.0.0.1:502"
-_MAX_CELL = 64
 
 
 @click.command(
@@ -107,9 +104,9 @@ def command(
             "the recipe has inputs: name the PLC that may write them with --writer ADDRESS"
         )
     settings = ImportSettings(
-        cell=cell if cell is not None else _cell_name(file),
+        cell=cell if cell is not None else cell_name(file),
         host=host,
-        listen=listen if listen is not None else _listen(writer),
+        listen=listen if listen is not None else listen_address([writer] if writer is not None else []),
         writer=writer if has_inputs else None,
         frequency=frequency,
         series=series,
@@ -133,18 +130,6 @@ def _recipes(context: click.Context, file: str, keys: Sequence[str]) -> list[Dec
     except OSError as error:
         click.echo(printable(f"{file}: cannot be read: {reason_of(error)}"), err=True)
         context.exit(WRONG)
-
-
-def _cell_name(file: str) -> str:
-    """`record-configuration` for `record_configuration.xml`."""
-    return re.sub(r"[^a-z0-9]+", "-", Path(file).stem.lower()).strip("-")[:_MAX_CELL].rstrip("-") or "robot"
-
-
-def _listen(writer: str | None) -> str:
-    try:
-        return _HERE if writer is None or ip_address(writer).is_loopback else _EVERYWHERE
-    except ValueError:
-        return _EVERYWHERE  # a network, or no address, which the check says
 
 
 def _write(context: click.Context, text: str, out: str | None) -> None:

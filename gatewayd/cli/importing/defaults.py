@@ -1,0 +1,29 @@
+"""What imports make of what nobody said: the name of the cell, and where the PLC connects to."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from ipaddress import ip_network
+from pathlib import Path
+from typing import Final
+
+_EVERYWHERE, _HERE = "0.0.0.0:502", "127.0.0.1:502"
+_MAX_CELL: Final = 64
+
+
+def cell_name(file: str) -> str:
+    """`record-configuration` for `record_configuration.xml`."""
+    return re.sub(r"[^a-z0-9]+", "-", Path(file).stem.lower()).strip("-")[:_MAX_CELL].rstrip("-") or "robot"
+
+
+def listen_address(writers: Iterable[str]) -> str:
+    """Port 502, from other machines only if a writer is one; what is no address, the check of the mapping says."""
+    return _HERE if all(map(_is_here, writers)) else _EVERYWHERE
+
+
+def _is_here(address: str) -> bool:
+    try:
+        return ip_network(address, strict=False).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,1 @@
+"""Register lists that people have, as mappings: text to cells, cells to places, places to lines of a mapping. Pure."""
