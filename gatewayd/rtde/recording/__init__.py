@@ -10,7 +10,12 @@ with open_recording("robot_data.csv") as recording:
 
 from gatewayd.rtde.recording.arrays import read_arrays
 from gatewayd.rtde.recording.conversion import RecordingFormat, convert
-from gatewayd.rtde.recording.errors import MissingExtraError, RecordingError, RecordingExistsError
+from gatewayd.rtde.recording.errors import (
+    MissingExtraError,
+    RecordingError,
+    RecordingExistsError,
+    RecordingWriteError,
+)
 from gatewayd.rtde.recording.gaps import GapWatch, GapWriter, RecordedGap, read_gaps
 from gatewayd.rtde.recording.layout import HOST_TIME, columns
 from gatewayd.rtde.recording.reading import RecordingReader, open_recording
@@ -27,6 +32,7 @@ __all__ = [
     "RecordingExistsError",
     "RecordingFormat",
     "RecordingReader",
+    "RecordingWriteError",
     "RecordingWriter",
     "columns",
     "convert",

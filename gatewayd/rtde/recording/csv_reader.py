@@ -17,7 +17,9 @@ from gatewayd.rtde.recording.errors import RecordingError
 from gatewayd.rtde.recording.layout import column_types, fields_of
 from gatewayd.rtde.types import DataType
 
-_MAX_LINE = 1 << 20
+MAX_LINE = 1 << 20
+"""Bytes of a line at most; all fields that there are take some 10 kB."""
+
 _BOOLEANS = {b"0": False, b"1": True, b"False": False, b"True": True}
 
 
@@ -57,7 +59,7 @@ class CsvReader:
         self._file.seek(self._start)
         self.position = self._start
         number = 1
-        while line := self._file.readline(_MAX_LINE):
+        while line := self._file.readline(MAX_LINE):
             number += 1
             self.position += len(line)
             if not line.endswith(b"\n"):

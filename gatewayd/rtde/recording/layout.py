@@ -67,7 +67,7 @@ def _vector(names: Sequence[str], declared: Mapping[str, DataType]) -> DataType 
     """The type of the vector whose elements stand first in `names`; None: they are columns of their own."""
     base = names[0].removesuffix(_FIRST)
     known = _field_type(base)
-    if _field_type(names[0]) is not None or (known is not None and not known.is_vector):
+    if _field_type(names[0]) is not None:
         return None
     length = known.count if known is not None else _run(base, names)
     if list(names[:length]) != [f"{base}_{element}" for element in range(length)]:

@@ -9,13 +9,10 @@ from typing import BinaryIO, Protocol, Self
 
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.recording.binary_reader import BinaryReader
-from gatewayd.rtde.recording.csv_reader import CsvReader
+from gatewayd.rtde.recording.csv_reader import MAX_LINE, CsvReader
 from gatewayd.rtde.recording.errors import RecordingError
 from gatewayd.rtde.recording.parquet import MAGIC, ParquetReader
 from gatewayd.rtde.types import DataType
-
-MAX_LINE = 1 << 20
-"""Bytes of a line at most; all fields that there are take some 10 kB."""
 
 _ELEMENTS = {kind.word for kind in DataType if not kind.is_vector}
 _DELIMITER = re.compile(r'[^\w"]', re.ASCII)
