@@ -117,7 +117,7 @@ def _assign(found: Assignments, name: str, value: str) -> None:
 def _pin(found: Assignments, match: re.Match[str], value: str) -> None:
     kind, number = match[1], int(match[2])
     if number >= _PINS[kind]:
-        raise AssignmentError(f"{match[0]}: {kind} digital outputs are 0 to {_PINS[kind] - 1}")
+        raise AssignmentError(f"{match[0]}: of this kind there are 0 to {_PINS[kind] - 1}")
     found.pins.setdefault(kind, {})[number] = _truth(match[0], value)
 
 
