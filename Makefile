@@ -58,6 +58,7 @@ generated: $(VENV)/.dev ## Make what is generated anew: schema, rule catalogue, 
 	$(PY) -m gatewayd.mapping.schema > mappings/schema.json.new && mv mappings/schema.json.new mappings/schema.json
 	$(PY) -m gatewayd.mapping.rules.catalogue docs/reference
 	$(PY) -m tests.docs
+	$(PY) -m tests.rtde.api.test_sample_fields
 
 unit-checks: $(VENV)/.dev ## Let systemd judge the units: no mistake, and little that the service may do
 	$(PY) -m pytest tests/systemd/test_units.py $(ARGS)

@@ -142,6 +142,9 @@ class BlockingRobot(RobotInformation):
         self._thread: LoopThread | None = None
         self._streams: tuple[BlockingStream[Sample], BlockingStream[RobotEvent]] | None = None
 
+    def __repr__(self) -> str:
+        return f"<BlockingRobot {self.address} {self.state.value}>"
+
     # opening and closing
 
     def __enter__(self) -> Self:

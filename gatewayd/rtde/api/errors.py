@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from gatewayd.report.format import counted
+from gatewayd.rtde.catalogue import suggest
+from gatewayd.rtde.messages import NOT_FOUND
 
 if TYPE_CHECKING:
     from gatewayd.rtde.loss import Loss
@@ -38,7 +40,7 @@ class FieldsRefusedError(RtdeError):
     def __init__(self, fields: Sequence[Unavailable]) -> None:
         self.fields = tuple(fields)
         """Each with the controller's word and what it means."""
-        super().__init__("; ".join(f"{each.field}: {each.word}, {each.hint}" for each in self.fields))
+        super().__init__("; ".join(map(_refusal, self.fields)))
 
 
 class TypeDifference(NamedTuple):
@@ -83,6 +85,12 @@ class NotVerifiedError(RtdeError):
         """Expected and seen value of each field that differs."""
         shown = "; ".join(f"{name} is {now}, not {wanted}" for name, (wanted, now) in self.seen.items())
         super().__init__(f"sent, but not shown by the robot within {seconds:g} s: {shown}")
+
+
+def _refusal(field: Unavailable) -> str:
+    near = suggest(field.field) if field.word == NOT_FOUND else ()
+    meant = f"; did you mean {' or '.join(near)}?" if near and field.field not in near else ""
+    return f"{field.field}: {field.word}, {field.hint}{meant}"
 
 
 def wrong_count(name: str, given: Sequence[Scalar], count: int) -> str:

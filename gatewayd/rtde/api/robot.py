@@ -126,6 +126,9 @@ class Robot(InputWriter):
         self._boot_wait = boot_wait
         self._task: asyncio.Task[None] | None = None
 
+    def __repr__(self) -> str:
+        return f"<Robot {self.address} {self.state.value}>"
+
     # opening and closing
 
     async def __aenter__(self) -> Self:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from operator import itemgetter
 from typing import Any, TypeAlias
 
+from gatewayd.rtde.api.sample_fields import SampleFields
 from gatewayd.rtde.catalogue import suggest
 from gatewayd.rtde.recipe import Recipe, Scalar
 
@@ -33,7 +34,7 @@ class SampleLayout:
         """From the flat tuple of a package to that of the wanted fields."""
 
 
-class Sample:
+class Sample(SampleFields):
     """The values of one package. Immutable; made by the robot.
 
     Every field is an attribute: `sample.actual_q[3]`, `sample.timestamp`. Vectors are tuples. Units are those of the

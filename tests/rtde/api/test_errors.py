@@ -17,6 +17,8 @@ from gatewayd.rtde.session import Unavailable
 def test_each_names_its_fields() -> None:
     refused = FieldsRefusedError([Unavailable("actual_q", True, "NOT_FOUND", "too old")])
     assert str(refused) == "actual_q: NOT_FOUND, too old"
+    misspelt = FieldsRefusedError([Unavailable("actual_Q", True, "NOT_FOUND", "unknown")])
+    assert "did you mean actual_q" in str(misspelt)
     differ = TypesDifferError([TypeDifference("robot_mode", "BOOL", "INT32")])
     assert str(differ) == "robot_mode was declared as BOOL, the controller has INT32"
     write = WriteRefusedError("in", {"a": "was not given"})

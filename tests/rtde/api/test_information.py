@@ -35,6 +35,7 @@ async def test_what_is_of_a_session_is_not_told_without_one(name: str, connect: 
 
 async def test_the_rest_is_always_there(connect: Connect) -> None:
     robot = connect(outputs=["robot_mode"])
+    assert repr(robot) == f"<Robot 127.0.0.1:{robot.port} not opened>"
     assert (robot.host, robot.address) == ("127.0.0.1", f"127.0.0.1:{robot.port}")
     assert (robot.session, robot.latest, robot.last_text, robot.last_loss) == (None, None, None, None)
     assert (robot.own_address, robot.peer_address, robot.connected) == (None, None, False)
