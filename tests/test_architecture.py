@@ -71,6 +71,18 @@ LAYERS: dict[str, set[str]] = {
     "links.modbus_server": {*LINK, "links.modbus_server", "modbus"},
     "links.canopen_node": {*LINK, "canopen", "encoding", "links.canopen_node"},
     "report": {"core", "links.contract", "links.registry", "mapping", "report"},
+    "maptest": {
+        "core",
+        "mapping.compiled",
+        "mapping.diagnostics",
+        "mapping.document",
+        "mapping.loader",
+        "mapping.testing",
+        "maptest",
+        "report.findings",
+        "report.format",
+        "report.printable",
+    },
     "report.format": set(),
     "report.layout": set(),
     "report.printable": set(),
@@ -175,6 +187,7 @@ LAYERS: dict[str, set[str]] = {
         "logs",
         "loop",
         "mapping",
+        "maptest",
         "report",
         "rtde",
         "service",
@@ -207,7 +220,7 @@ LIBRARIES: dict[str, set[str]] = {
 }
 """Third-party package -> the only modules or packages that may know its types."""
 
-PURE = ("canopen", "control", "core", "doctor", "links", "mapping", "modbus", "report", "rtde", "web")
+PURE = ("canopen", "control", "core", "doctor", "links", "mapping", "maptest", "modbus", "report", "rtde", "web")
 """Packages without socket, event loop and clock: time is a parameter."""
 
 IMPURE = {

@@ -12,6 +12,7 @@ COMMANDS = {
     "demo": "Simulator, gateway, a PLC and a CANopen master in one terminal.",
     "check": "Find every mistake in mapping files, without a robot.",
     "doctor": "Find out why a cell does not work, and what to do.",
+    "test": "Carry out the tests of mapping files, in simulated time.",
     "diff": "Print what a new mapping file changes.",
     "show": "Print the register table of a mapping file.",
     "export": "Write the EDS, the DCF or robot program functions of a mapping.",

@@ -17,10 +17,11 @@ FAMILIES = {
     6: "fail-safe",
     7: "lossy conversion",
     8: "other links",
+    9: "tests",
 }
 """Rule families by the hundreds digit of their ids."""
 
-_ID = re.compile(r"GW[1-8]\d\d")
+_ID = re.compile(r"GW[1-9]\d\d")
 _SLUG = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 
 

@@ -13,6 +13,7 @@ from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.model import Group, VariableSpec, WriterSpec
 from gatewayd.mapping.section import Section
 from gatewayd.mapping.source import Items, MappingText, Node, Table
+from gatewayd.mapping.testing import StepSpec
 
 S_co = TypeVar("S_co", bound=Section, covariant=True)
 Other = TypeVar("Other", bound=Section)
@@ -44,6 +45,21 @@ class Part(Generic[S_co]):
 
 
 @dataclass(frozen=True, slots=True)
+class MappingTest:
+    """One test of a mapping file."""
+
+    name: str
+    position: Position
+    """Place of the name."""
+    steps: tuple[Part[StepSpec], ...]
+
+    @property
+    def seconds(self) -> float:
+        """Simulated time that its steps take."""
+        return sum((step.spec.after or 0.0) + (step.spec.repeat_for or 0.0) for step in self.steps)
+
+
+@dataclass(frozen=True, slots=True)
 class Document:
     """What could be read of a mapping file."""
 
@@ -55,6 +71,8 @@ class Document:
     writers: Mapping[str, Part[WriterSpec]] = field(default_factory=dict)
     groups: Mapping[str, Part[Group]] = field(default_factory=dict)
     variables: Mapping[str, Part[VariableSpec]] = field(default_factory=dict)
+    tests: tuple[MappingTest, ...] = ()
+    """Empty too where they were not to be read."""
 
     def part(self, section: type[Other]) -> Part[Other] | None:
         """The section of that type; None where there is none, or a broken one."""

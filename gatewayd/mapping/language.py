@@ -14,6 +14,7 @@ from gatewayd.mapping import syntax
 from gatewayd.mapping.model import Group, VariablePolicy, VariableSpec, WriterSpec
 from gatewayd.mapping.scalars import CellName, Name, refuse
 from gatewayd.mapping.section import Section
+from gatewayd.mapping.testing import StepSpec, TestName
 from gatewayd.mapping.typed import Field
 from gatewayd.report.wording import alternatives
 
@@ -76,6 +77,7 @@ FILE: Final = _with(
         "writers": dict[Name, WRITER],  # type: ignore[valid-type]
         "groups": dict[Name, Group],
         "variables": dict[Name, VARIABLE],  # type: ignore[valid-type]
+        "tests": dict[TestName, tuple[StepSpec, ...]],
     },
     gatewayd=Field(description="version of the mapping language"),
     cell=Field(description="name of the cell"),
@@ -88,5 +90,8 @@ FILE: Final = _with(
     writers=Field(default_factory=dict, description="who may write inputs"),
     groups=Field(default_factory=dict, description="variables that are owned together"),
     variables=Field(description="the variables by name"),
+    tests=Field(
+        default_factory=dict, description="what has to be so: steps of each test, for `gatewayd test`"
+    ),
 )
 """The whole file."""

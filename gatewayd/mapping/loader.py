@@ -43,12 +43,15 @@ def load(data: bytes, name: str) -> Loaded:
     return load_together([(name, data)])[0]
 
 
-def load_together(files: Sequence[tuple[str, bytes]]) -> tuple[Loaded, ...]:
-    """Load files (name, bytes) that are to run in one process: what they share is checked too. Never raises."""
+def load_together(files: Sequence[tuple[str, bytes]], *, tests: bool = True) -> tuple[Loaded, ...]:
+    """Load files (name, bytes) that are to run in one process: what they share is checked too. Never raises.
+
+    `tests`: judge the section `tests:` too. Nothing of it is in a plan.
+    """
     cells: list[ExpandedCell] = []
     findings: list[list[Diagnostic]] = []
     for name, data in files:
-        document, found = read_document(parse(data, name))
+        document, found = read_document(parse(data, name), tests=tests)
         cell = expand(document)
         cells.append(cell)
         findings.append([*found, *check_cell(cell)])

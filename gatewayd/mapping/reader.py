@@ -14,7 +14,7 @@ from gatewayd.links.language import LinkLanguage
 from gatewayd.links.registry import languages
 from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule, rule_of
-from gatewayd.mapping.document import Document, Part, Step, walk
+from gatewayd.mapping.document import Document, MappingTest, Part, Step, walk
 from gatewayd.mapping.language import FILE, VARIABLE, WRITER
 from gatewayd.mapping.model import ANY, FORMAT_VERSION, Group, VariableSpec, WriterSpec
 from gatewayd.mapping.scalars import CellName, Name
@@ -22,6 +22,7 @@ from gatewayd.mapping.section import Section
 from gatewayd.mapping.slips import lookalike
 from gatewayd.mapping.source import Items, MappingText, Node, Scalar, Table, TableEntry, shown
 from gatewayd.mapping.tables import read
+from gatewayd.mapping.testing import StepSpec, TestName
 from gatewayd.mapping.typed import Invalid, Mistake
 from gatewayd.report.wording import alternatives, number
 
@@ -29,11 +30,11 @@ S = TypeVar("S", bound=Section)
 Found = TypeVar("Found")
 
 
-def read_document(source: MappingText) -> tuple[Document, tuple[Diagnostic, ...]]:
-    """Validate the tree of a file part by part. Never raises."""
+def read_document(source: MappingText, *, tests: bool = True) -> tuple[Document, tuple[Diagnostic, ...]]:
+    """Validate the tree of a file part by part, with its `tests` or without. Never raises."""
     if source.root is None:
         return Document(source, ""), source.findings
-    reader = _Reader(source)
+    reader = _Reader(source, tests=tests)
     document = reader.read(source.root)
     # What stands in the place of an alias is refused already; that it is no number either helps nobody.
     refused = {finding.position for finding in source.findings}
@@ -57,6 +58,7 @@ _ARTICLE: Final[dict[type[Section], str]] = {
     WriterSpec: "a writer",
     Group: "a group",
     VariableSpec: "a variable",
+    StepSpec: "a step",
     **{section: words for language in languages() for section, words in language.articles.items()},
 }
 _ELSEWHERE: Final[dict[tuple[type[Section], str], str]] = {
@@ -106,8 +108,9 @@ _TEXT_HINT = "put it in quotes to make it a text"
 
 
 class _Reader:
-    def __init__(self, source: MappingText) -> None:
+    def __init__(self, source: MappingText, *, tests: bool) -> None:
         self.source = source
+        self.tests = tests
         self.findings: list[Diagnostic] = []
 
     def read(self, root: Table) -> Document:
@@ -131,6 +134,7 @@ class _Reader:
             self._sections(WRITER, root.entries.get("writers")),
             self._sections(Group, root.entries.get("groups")),
             self._sections(VARIABLE, root.entries.get("variables")),
+            self._tests(root.entries.get("tests")) if self.tests else (),
         )
 
     def _format_version(self, root: Table) -> None:
@@ -158,19 +162,49 @@ class _Reader:
 
     def _sections(self, model: type[S], entry: TableEntry | None) -> dict[str, Part[S]]:
         parts: dict[str, Part[S]] = {}
-        if entry is None or not self._has_value(entry.key.text, entry):
-            return parts
-        if not isinstance(entry.value, Table):
-            message = f"`{entry.key.text}` is not a table of `name: ...` lines"
-            hint = "write one name with its table per line"
-            self._find(syntax.WRONG_TYPE, message, entry.value.position, hint)
-            return parts
-        for name, inner in entry.value.entries.items():
+        for name, inner in self._entries(entry, "write one name with its table per line"):
             named = self._name(model, inner)
             part = self._section(model, inner)
             if named and part is not None:
                 parts[name] = part
         return parts
+
+    def _entries(self, entry: TableEntry | None, hint: str) -> list[tuple[str, TableEntry]]:
+        if entry is None or not self._has_value(entry.key.text, entry):
+            return []
+        if not isinstance(entry.value, Table):
+            message = f"`{entry.key.text}` is not a table of `name: ...` lines"
+            self._find(syntax.WRONG_TYPE, message, entry.value.position, hint)
+            return []
+        return list(entry.value.entries.items())
+
+    def _tests(self, entry: TableEntry | None) -> tuple[MappingTest, ...]:
+        found = [
+            self._test(inner) for _name, inner in self._entries(entry, "write a name and its list of steps")
+        ]
+        return tuple(test for test in found if test is not None)
+
+    def _test(self, entry: TableEntry) -> MappingTest | None:
+        """One test; None where any of its steps has a mistake."""
+        name = entry.key.text
+        if not self._has_value(name, entry):
+            return None
+        mistakes = len(self.findings)
+        self._by_rules_of(TestName, entry)
+        if not isinstance(entry.value, Items) or not entry.value.items:
+            hint = "write its steps below it, each behind a dash: `- {by: plc, write: {start: true}}`"
+            message = f"the test `{shown(name)}` is not a list of steps"
+            self._find(syntax.WRONG_TYPE, message, entry.value.position, hint)
+            return None
+        steps = [
+            self._section(
+                StepSpec, TableEntry(Scalar(f"step {number}", quoted=True, position=item.position), item)
+            )
+            for number, item in enumerate(entry.value.items, 1)
+        ]
+        if len(self.findings) > mistakes:
+            return None
+        return MappingTest(name, entry.key.position, tuple(step for step in steps if step is not None))
 
     def _link(self, language: LinkLanguage, root: Table) -> Part[Section] | None:
         part = self._section(language.section, root.entries.get(language.key))
@@ -183,8 +217,12 @@ class _Reader:
             message = f"a writer cannot be called `{ANY}`: that word stands for every writer"
             self._find(syntax.BAD_NAME, message, entry.key.position, "choose another name")
             return False
+        return self._by_rules_of(Name, entry)
+
+    def _by_rules_of(self, names: Any, entry: TableEntry) -> bool:
+        """Whether the key is such a name."""
         try:
-            read(Name, entry.key.text)
+            read(names, entry.key.text)
         except Invalid as invalid:
             context = invalid.mistakes[0].context
             self._find(syntax.BAD_NAME, context["message"], entry.key.position, context["hint"])

@@ -14,7 +14,7 @@ from functools import partial
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 from typing import Annotated, Any, Final, Literal, NoReturn, TypeAlias
 
-from gatewayd.core.definition import Fallback, FallbackKind
+from gatewayd.core.definition import Fallback, FallbackKind, Value
 from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Rule
 from gatewayd.mapping.source import RealNumber, WholeNumber
@@ -90,6 +90,21 @@ Whole = Annotated[int, BeforeValidator(_decimal)]
 """An integer in plain decimal digits."""
 Real = Annotated[float, BeforeValidator(_decimal)]
 """A number in plain decimal digits."""
+
+
+def _plain(value: object) -> object:
+    """A value of a variable: true or false, or a plain decimal number."""
+    if isinstance(value, bool):
+        return value
+    if not isinstance(value, (int, float)):
+        hint = "write true or false for a bit, and a plain decimal number such as 10 or 0.5 for any other"
+        text = scalar(value, "a value", hint)
+        refuse(syntax.WRONG_TYPE, f"`{text}` is not a value", hint)
+    return _decimal(value)
+
+
+Plain = Annotated[InstanceOf[Value], BeforeValidator(_plain, json_schema_input_type=bool | float)]
+"""True, false or a number, as it was written."""
 
 
 def _duration(value: object) -> float:

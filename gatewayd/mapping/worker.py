@@ -16,7 +16,10 @@ from gatewayd.mapping.loader import load_together, read_bytes
 
 
 def compile_files(names: Iterable[str]) -> Compiled:
-    """Read, check and compile; the files are to run in one process. Never raises, whatever is named."""
+    """Read, check and compile; the files are to run in one process. Never raises, whatever is named.
+
+    Their `tests` are not even read: a mistake in one keeps no cell from being served.
+    """
     files: list[tuple[str, bytes]] = []
     unreadable: list[Unreadable] = []
     for name in names:
@@ -24,7 +27,7 @@ def compile_files(names: Iterable[str]) -> Compiled:
             files.append((name, read_bytes(Path(name))))
         except (OSError, ValueError) as error:
             unreadable.append(Unreadable(name, getattr(error, "strerror", None) or str(error)))
-    loaded = load_together(files)
+    loaded = load_together(files, tests=False)
     return Compiled(
         tuple(CompiledFile(file.name, file.diagnostics, file.plan) for file in loaded), tuple(unreadable)
     )

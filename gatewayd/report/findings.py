@@ -40,7 +40,7 @@ def as_text(outcome: CheckOutcome, *, colour: bool = False) -> str:
     """One line `file:line:col: severity GWnnn slug: message` per finding, details indented; a summary line."""
     lines: list[str] = []
     for finding in outcome.findings:
-        lines.extend(_finding_lines(finding, colour=colour))
+        lines.extend(finding_lines(finding, colour=colour))
     lines.extend(printable(f"{item.name}: cannot be read: {item.reason}") for item in outcome.unreadable)
     if lines:
         lines.append("")
@@ -60,7 +60,7 @@ def as_json(outcome: CheckOutcome) -> str:
         "files": list(outcome.files),
         "errors": outcome.errors,
         "warnings": outcome.warnings,
-        "findings": [_as_object(finding) for finding in outcome.findings],
+        "findings": [finding_object(finding) for finding in outcome.findings],
         "unreadable": [{"file": item.name, "reason": item.reason} for item in outcome.unreadable],
         "remarks": [{"file": name, "remark": remark} for name, remark in outcome.remarks],
     }
@@ -77,7 +77,8 @@ def as_github(outcome: CheckOutcome) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def _finding_lines(finding: Diagnostic, *, colour: bool) -> list[str]:
+def finding_lines(finding: Diagnostic, *, colour: bool = False) -> list[str]:
+    """One finding as text: its line, and below it, indented, related places and the hint."""
     rule = finding.rule
     place, label = printable(str(finding.position)), f"{rule.severity.value} {rule.id}"
     if colour:
@@ -103,7 +104,8 @@ def _summary(outcome: CheckOutcome) -> str:
     return f"{', '.join(parts)}: {', '.join(found) or 'no findings'}"
 
 
-def _as_object(finding: Diagnostic) -> dict[str, object]:
+def finding_object(finding: Diagnostic) -> dict[str, object]:
+    """One finding as `as_json` has it."""
     return {
         "rule": finding.rule.id,
         "slug": finding.rule.slug,

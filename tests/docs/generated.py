@@ -82,6 +82,7 @@ _SECTIONS = {
     "RobotField": "`variables:` NAME`: robot:`",
     "PlacementSpec": "`variables:` NAME`: modbus:`",
     "CanopenPlace": "`variables:` NAME`: canopen:`",
+    "StepSpec": "`tests:` NAME`:`, each step",
 }
 _DURATION = re.compile(r"ms\|s\|min\|h")
 

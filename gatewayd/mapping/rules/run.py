@@ -11,10 +11,10 @@ from gatewayd.links.language import LinkLanguage
 from gatewayd.links.registry import languages
 from gatewayd.mapping.diagnostics import Diagnostic
 from gatewayd.mapping.expanded import ExpandedCell
-from gatewayd.mapping.rules import bounds, failsafe, ownership, sharing, supervision
+from gatewayd.mapping.rules import bounds, failsafe, ownership, sharing, supervision, testing
 from gatewayd.mapping.rules.registry import CELL_CHECKS, PLANT_CHECKS
 
-RULE_MODULES = (bounds, ownership, sharing, failsafe, supervision)
+RULE_MODULES = (bounds, ownership, sharing, failsafe, supervision, testing)
 """The modules with the rules of the language; their import enters these."""
 
 
