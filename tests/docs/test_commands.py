@@ -52,7 +52,7 @@ ELSEWHERE = {
 }
 """Command (the whole line) -> what else tests it."""
 
-RUN = re.compile(r"gatewayd (check|show|export) (?!/etc/).*")
+RUN = re.compile(r"gatewayd (check|test|show|export) (?!/etc/).*")
 """What test_commands_work runs."""
 
 
@@ -105,6 +105,24 @@ def test_files_of_the_pages_have_no_findings(files: Path) -> None:
     assert "my-cell.yaml" in names
     done = gatewayd("check --strict --separately " + " ".join(names), files)
     assert "no findings" in done.stdout, done.stdout
+
+
+def test_the_failure_of_the_guide_to_tests_is_the_real_one(files: Path) -> None:
+    page = (DOCS / "howto" / "test-a-mapping.md").read_text()
+    text = (files / "tested-cell.yaml").read_text()
+    (files / "tested-cell.yaml").write_text(text.replace("3s, expect: {speed: 0}", "3s, expect: {speed: 50}"))
+    done = gatewayd("test tested-cell.yaml", files)
+    assert done.exit_code == 1
+    for line in done.stdout.splitlines()[:2]:
+        assert line in page
+
+
+def test_the_tests_of_the_tutorial_pass(files: Path) -> None:
+    page = (DOCS / "tutorial" / "2-own-mapping.md").read_text()
+    (tests,) = re.findall(r"```yaml\n(tests:.*?)```", page, re.DOTALL)
+    with (files / "my-cell.yaml").open("a", encoding="utf-8") as file:
+        file.write(tests)
+    assert "1 passed, 0 failed" in gatewayd("test my-cell.yaml", files).stdout
 
 
 def test_mistakes_of_the_tutorial_are_found_as_it_says(files: Path) -> None:

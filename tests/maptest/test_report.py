@@ -24,11 +24,11 @@ REPORT = RunReport((FILE, BROKEN), (Unreadable("no.yaml", "No such file or direc
 
 
 def test_text_names_what_failed() -> None:
-    assert file_text(FILE, verbose=False).splitlines() == [
-        'cell.yaml:30:35: failed: "a <lost> plc": step 2: expected start true, is false (free since 0 s: '
-        "owner lost: connection closed)",
-        "    hint: a release gives the robot its `on_release`: clear",
-    ]
+    failed, hint = file_text(FILE, verbose=False).splitlines()
+    assert failed.startswith(
+        'cell.yaml:30:35: failed: "a <lost> plc": step 2: expected start true, is false ('
+    )
+    assert hint == "    hint: a release gives the robot its `on_release`: clear"
 
 
 def test_verbose_text_names_what_passed() -> None:
