@@ -220,7 +220,19 @@ LIBRARIES: dict[str, set[str]] = {
 }
 """Third-party package -> the only modules or packages that may know its types."""
 
-PURE = ("canopen", "control", "core", "doctor", "links", "mapping", "maptest", "modbus", "report", "rtde", "web")
+PURE = (
+    "canopen",
+    "control",
+    "core",
+    "doctor",
+    "links",
+    "mapping",
+    "maptest",
+    "modbus",
+    "report",
+    "rtde",
+    "web",
+)
 """Packages without socket, event loop and clock: time is a parameter."""
 
 IMPURE = {
