@@ -10,8 +10,9 @@ from dataclasses import asdict, dataclass, replace
 
 from gatewayd.report.printable import printable
 from gatewayd.report.wording import family
+from gatewayd.rtde.catalogue import likely_holders
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field, Series, SoftwareVersion
-from gatewayd.rtde.messages import NOT_FOUND
+from gatewayd.rtde.messages import IN_USE, NOT_FOUND
 
 _NUMBER = re.compile(r"[0-9]+$")
 
@@ -31,6 +32,8 @@ class FieldRow:
     since: str
     """First versions, by series: `cb3 3.12.0, e 5.5.1`; empty: from the start of all."""
     comment: str
+    holder: str = ""
+    """Of an input that is in use: who probably holds it."""
 
 
 def catalogue_rows(series: Series | None, version: SoftwareVersion | None) -> list[FieldRow]:
@@ -43,14 +46,24 @@ def catalogue_rows(series: Series | None, version: SoftwareVersion | None) -> li
     ]
 
 
-def answered_rows(outputs: Mapping[str, str], inputs: Mapping[str, str]) -> list[FieldRow]:
-    """What a controller answered, by direction and in its order."""
+def answered_rows(
+    outputs: Mapping[str, str], inputs: Mapping[str, str], software: SoftwareVersion | None = None
+) -> list[FieldRow]:
+    """What a controller with this software answered, by direction and in its order."""
     answers = {"output": outputs, "input": inputs}
     return [
-        _row(table.get(name), direction, word, name)
+        replace(
+            _row(table.get(name), direction, word, name),
+            holder=likely_holders(name, software) if word == IN_USE else "",
+        )
         for direction, table in _TABLES
         for name, word in answers[direction].items()
     ]
+
+
+def remark(row: FieldRow) -> str:
+    """What a table for people says of the row: who holds it, or else what it is."""
+    return f"in use, probably by {row.holder}" if row.holder else row.comment
 
 
 def is_there(row: FieldRow) -> bool:
@@ -80,7 +93,7 @@ def as_csv(rows: Iterable[FieldRow]) -> str:
 
 
 def as_object(row: FieldRow) -> dict[str, str]:
-    """For programs: `name`, `direction`, `type`, `catalogue`, `unit`, `since`, `comment`."""
+    """For programs: `name`, `direction`, `type`, `catalogue`, `unit`, `since`, `comment`, `holder`."""
     return {name: printable(text) for name, text in asdict(row).items()}
 
 

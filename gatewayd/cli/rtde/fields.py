@@ -142,7 +142,7 @@ def _print_answers(form: str, found: Survey, *, with_inputs: bool) -> None:
         "complete": found.loss is None,
         "claims_probed": with_inputs,
     }
-    _print(form, answered_rows(found.outputs, found.inputs), heading)
+    _print(form, answered_rows(found.outputs, found.inputs, session.controller.software), heading)
     if form == "table" and not with_inputs:
         click.echo("inputs were not asked for: only claiming shows them, which --probe-claims does")
 
@@ -162,7 +162,7 @@ def _print(form: str, rows: Sequence[FieldRow], heading: dict[str, Any]) -> None
 
 def _print_table(rows: Sequence[FieldRow], heading: dict[str, Any]) -> None:
     from gatewayd.cli.printing import echo
-    from gatewayd.cli.rtde.field_rows import folded, is_there
+    from gatewayd.cli.rtde.field_rows import folded, is_there, remark
     from gatewayd.report.format import counted
     from gatewayd.report.printable import printable
 
@@ -170,12 +170,12 @@ def _print_table(rows: Sequence[FieldRow], heading: dict[str, Any]) -> None:
         series = heading["series"] or "unknown"
         echo(f"controller {heading['controller']}, series {series}, protocol {heading['protocol']}")
     shown = folded(rows)
-    columns = ("name", "direction", "type", "unit", "since", "comment")
+    columns = ("name", "direction", "type", "unit", "since")
     widths = {column: max(len(column), *(len(getattr(row, column)) for row in shown)) for column in columns}
-    echo("  ".join(column.ljust(widths[column]) for column in columns).rstrip(), broken=False)
+    echo("  ".join([*(column.ljust(widths[column]) for column in columns), "comment"]), broken=False)
     for row in shown:
         texts = (getattr(row, column).ljust(widths[column]) for column in columns)
-        echo(printable("  ".join(texts).rstrip()), broken=False)
+        echo(printable("  ".join([*texts, remark(row)]).rstrip()), broken=False)
     there = sum(map(is_there, rows))
     left = f", {len(rows) - there} of them not there" if there < len(rows) else ""
     echo(f"{counted(len(rows), 'field')}{left}")

@@ -11,6 +11,7 @@ from gatewayd.links.examination import Observation, Outcome
 from gatewayd.report.format import address, counted
 
 ADDRESS, PORT, PRIVILEGE = "address", "port", "privilege"
+_UNSEEN = "a process of another user (`sudo ss -ltnp` names it)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,8 @@ class PortFacts:
     """The process that listens on the port; empty: nobody, or not to be seen."""
     user: int
     """Who looks, by number."""
+    listened: bool = False
+    """Whether anybody listens on the port, at whatever address."""
 
 
 def served(where: str, links: Sequence[Mapping[str, Any]]) -> Observation:
@@ -48,7 +51,12 @@ def listener(host: str, port: int, failure: OSError | None, facts: PortFacts) ->
         yield Observation.well(PORT, f"{where} is free")
     elif failure.errno == errno.EADDRINUSE:
         yield _taken(where, facts)
-    elif failure.errno not in (errno.EACCES, errno.EPERM):
+    elif failure.errno in (errno.EACCES, errno.EPERM):
+        if facts.listened:
+            who = facts.holder or _UNSEEN
+            text = f"who listens on port {port} already is {who}: whether at this address shows only with the privilege"
+            yield Observation(PORT, Outcome.NOTE, text)
+    else:
         remedy = "try it by hand: `gatewayd run` says the same"
         yield Observation(PORT, Outcome.PROBLEM, f"{where}: {_reason(failure)}", "not known", remedy)
 
@@ -86,7 +94,7 @@ def _privilege(port: int, facts: PortFacts) -> Observation:
 
 
 def _taken(where: str, facts: PortFacts) -> Observation:
-    who = facts.holder or "a process of another user (`sudo ss -ltnp` names it)"
+    who = facts.holder or _UNSEEN
     return Observation(
         PORT,
         Outcome.PROBLEM,

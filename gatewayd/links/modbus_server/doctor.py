@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Iterator
 from functools import partial
 
 from gatewayd.core.definition import CellDefinition
-from gatewayd.doctor.machine.ports import bind_failure, holder
+from gatewayd.doctor.machine.ports import bind_failure, holder, listening_inodes
 from gatewayd.doctor.machine.privileges import NET_BIND_SERVICE, first_unprivileged_port, has_capability
 from gatewayd.doctor.way import way_to
 from gatewayd.links.examination import Examination, Observation, Surroundings
@@ -48,7 +48,11 @@ class ModbusExamination(Examination):
             except TimeoutError as error:
                 failure = error
             facts = diagnosis.PortFacts(
-                first_unprivileged_port(), has_capability(NET_BIND_SERVICE), holder(plan.port), os.geteuid()
+                first_unprivileged_port(),
+                has_capability(NET_BIND_SERVICE),
+                holder(plan.port),
+                os.geteuid(),
+                listened=any(listening_inodes(plan.port)),
             )
             for found in diagnosis.listener(plan.host, plan.port, failure, facts):
                 yield found

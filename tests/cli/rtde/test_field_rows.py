@@ -3,7 +3,15 @@ from __future__ import annotations
 import csv
 import io
 
-from gatewayd.cli.rtde.field_rows import FieldRow, answered_rows, as_csv, catalogue_rows, folded, is_there
+from gatewayd.cli.rtde.field_rows import (
+    FieldRow,
+    answered_rows,
+    as_csv,
+    catalogue_rows,
+    folded,
+    is_there,
+    remark,
+)
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Series, SoftwareVersion
 
 
@@ -30,6 +38,8 @@ def test_answers_stand_beside_the_catalogue() -> None:
     assert (new.type, new.catalogue, new.comment) == ("DOUBLE", "", "not in the catalogue")
     assert (q.type, q.catalogue) == ("NOT_FOUND", "VECTOR6D")
     assert (register.direction, register.type) == ("input", "IN_USE")
+    assert remark(register).startswith("in use, probably by the robot's PROFINET or EtherNet/IP adapter")
+    assert (q.holder, remark(q)) == ("", "joint positions")
     assert [is_there(row) for row in (new, q, register)] == [True, False, True]
 
 

@@ -66,6 +66,13 @@ def test_a_privileged_port_needs_the_capability(privileged: bool, outcome: Outco
     assert len(port) == privileged
 
 
+def test_who_may_not_try_the_port_sees_at_least_that_somebody_listens() -> None:
+    facts = PortFacts(1024, privileged=False, holder="", user=1000, listened=True)
+    *_, port = listener("192.0.2.7", 502, failed(errno.EACCES), facts)
+    assert (port.check, port.outcome) == ("port", Outcome.NOTE)
+    assert "a process of another user" in port.text
+
+
 def test_the_sysctl_counts() -> None:
     facts = PortFacts(502, privileged=False, holder="", user=1000)
     assert looked(None, port=502, facts=facts) == [ADDRESS, "port ok: 192.0.2.7:502 is free"]
