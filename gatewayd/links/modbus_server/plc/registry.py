@@ -13,6 +13,9 @@ from gatewayd.links.modbus_server.plc.names import Holds, refuse_unfit
 
 TARGETS: Final[Mapping[str, str]] = {
     "iec-st": "structured text of edition 2, for every tool",
+    "codesys": "CODESYS 3: PLCopen XML, and a table of the channels",
+    "twincat": "TwinCAT 3: a file for each object, client TF6250",
+    "tia": "TIA Portal: external sources in SCL, client MB_CLIENT",
     "c": "a C99 header, for soft PLCs and test benches",
 }
 """Name -> what it is for. The module has the name with `_`."""

@@ -7,25 +7,17 @@ from typing import Final
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.st.dialect import Dialect, Primitives, elementary
 from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection
+from gatewayd.links.modbus_server.plc.st.types import has_wide
 
 
 def functions(model: PlcModel, dialect: Dialect) -> tuple[ProgramUnit, ...]:
     """All of them; those for 64 bits only where something has so many."""
     prefix = model.prefix
     joined = [_swap(prefix, dialect), _join(prefix, "Double", "DWORD", ("high", "low"), dialect)]
-    if has_wide(model):
-        joined.append(_join(prefix, "Quad", "LWORD", ("a", "b", "c", "d"), dialect))
     wide = has_wide(model)
+    if wide:
+        joined.append(_join(prefix, "Quad", "LWORD", ("a", "b", "c", "d"), dialect))
     return (*joined, *(unit for unit in dialect.primitives.units(prefix) if wide or "Lreal" not in unit.name))
-
-
-def has_wide(model: PlcModel) -> bool:
-    """Whether some number has four registers."""
-    return any(
-        tag.encoding is not None and tag.encoding.type.endswith("64")
-        for member in (*model.inputs, *model.outputs)
-        for tag in member.tags
-    )
 
 
 def function(
@@ -51,7 +43,7 @@ def _swap(prefix: str, dialect: Dialect) -> ProgramUnit:
         name,
         "WORD",
         (("value", "WORD"),),
-        (f"{dialect.own(name)} := {dialect.shift('ROL', 'value', '8')};",),
+        (f"{dialect.result(name)} := {dialect.shift('ROL', 'value', '8')};",),
         comment="the two bytes of a register exchanged",
     )
 
@@ -65,7 +57,7 @@ def _join(prefix: str, name: str, kind: str, words: tuple[str, ...], dialect: Di
         f"{prefix}_{name}",
         kind,
         tuple((each, "WORD") for each in words),
-        (f"{dialect.own(f'{prefix}_{name}')} := {' OR '.join(parts)};",),
+        (f"{dialect.result(f'{prefix}_{name}')} := {' OR '.join(parts)};",),
         comment="registers in one number, the most significant first",
     )
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.st.program import DataType, ProgramUnit, TypeName
+from gatewayd.links.modbus_server.plc.st.program import ProgramUnit, TypeName
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,8 +17,6 @@ class Primitives:
 
     units: Callable[[str], tuple[ProgramUnit, ...]]
     """Functions by the prefix: `ToReal`, `FromReal`, `ToLreal`, `FromLreal`."""
-    types: Callable[[str], tuple[DataType, ...]] = lambda _prefix: ()
-    """Data types that they need."""
     only_finite: bool = False
     """NaN and the infinities cannot be made: whoever reads them is told instead."""
 
@@ -38,6 +36,14 @@ class Dialect:
     def own(self, name: str) -> str:
         """The name of a type or block of the program itself."""
         return f'"{name}"' if self.quotes else name
+
+    def result(self, name: str) -> str:
+        """What a function's result is assigned to."""
+        return f"#{name}" if self.quotes else name
+
+    def bit_of(self, number: str) -> str:
+        """An INT as the number of places to shift by."""
+        return f"INT_TO_UINT({number})" if self.names_operands else number
 
     def shift(self, function: str, operand: str, by: str) -> str:
         """`SHL`, `SHR` or `ROL`."""

@@ -17,15 +17,16 @@ def cyclic(model: PlcModel) -> tuple[Poll, ...]:
     return (*fast, *asked, *slow)
 
 
+def demands(model: PlcModel) -> tuple[PlcVariable, ...]:
+    """Inputs by which a program asks for what others may hold."""
+    comment = "TRUE: write it in every round, which takes its lock"
+    return tuple(
+        PlcVariable(f"demand_{poll.name}", elementary("BOOL"), comment) for poll in model.polls if poll.shared
+    )
+
+
 def sequence(model: PlcModel) -> ProgramUnit:
     """The block that walks through the poll plan, one request at a time."""
-    asked = [poll for poll in model.polls if poll.shared]
-    demands = tuple(
-        PlcVariable(
-            f"demand_{poll.name}", elementary("BOOL"), "TRUE: write it in every round, which takes its lock"
-        )
-        for poll in asked
-    )
     return ProgramUnit(
         "FUNCTION_BLOCK",
         f"{model.prefix}_Sequence",
@@ -47,7 +48,7 @@ def sequence(model: PlcModel) -> ProgramUnit:
                         f"T#{round(model.period * 1000)}ms",
                     ),
                     PlcVariable("time_out", elementary("TIME"), "for one request", "T#1s"),
-                    *demands,
+                    *demands(model),
                 ),
             ),
             VariableSection(

@@ -17,6 +17,7 @@ class TypeName:
     """None: no array."""
     is_own: bool = False
     """Declared by the program itself, not by the language."""
+    is_pointer: bool = False
 
     @property
     def count(self) -> int:

@@ -23,6 +23,8 @@ def comment(text: str) -> str:
 
 def type_text(name: TypeName) -> str:
     """`ARRAY[0..5] OF REAL`."""
+    if name.is_pointer:
+        return f"POINTER TO {name.name}"
     return name.name if name.last is None else f"ARRAY[{name.first}..{name.last}] OF {name.name}"
 
 

@@ -49,7 +49,6 @@ def data_types(model: PlcModel, dialect: Dialect) -> tuple[DataType, ...]:
 
 def _types(model: PlcModel, dialect: Dialect) -> Iterator[DataType]:
     prefix = model.prefix
-    yield from dialect.primitives.types(prefix)
     if dialect.enumerations:
         for kind, named in meanings().items():
             literals = tuple((f"{prefix}_{kind}_{name}", text) for name, text in named)
@@ -89,6 +88,15 @@ def description(member: TagFamily) -> str:
     limits = f", {exact(first.limits.low)} to {exact(first.limits.high)}" if first.limits else ""
     about = f": {first.comment}" if first.comment else ""
     return f"{where} {how}{f', {first.unit}' if first.unit else ''}{limits}{about}"
+
+
+def has_wide(model: PlcModel) -> bool:
+    """Whether some number has four registers."""
+    return any(
+        tag.encoding is not None and tag.encoding.type.endswith("64")
+        for member in (*model.inputs, *model.outputs)
+        for tag in member.tags
+    )
 
 
 def array_type(poll: Poll) -> TypeName:

@@ -112,7 +112,7 @@ def _tables(model: PlcModel, dialect: Dialect) -> Iterator[str]:
     count = len(model.variables)
     array, index = model.array_of(_GOOD)
     shifted = dialect.shift(
-        "SHR", f"image.{array}[{index} + (n - 1) / {WORD_BITS}]", f"(n - 1) MOD {WORD_BITS}"
+        "SHR", f"image.{array}[{index} + (n - 1) / {WORD_BITS}]", dialect.bit_of(f"(n - 1) MOD {WORD_BITS}")
     )
     yield f"FOR n := 1 TO {count} DO"
     yield f"  status.good[n] := status.trusted AND (({shifted} AND {word(1)}) <> {word(0)});"

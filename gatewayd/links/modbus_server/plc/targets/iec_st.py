@@ -15,14 +15,12 @@ from gatewayd.links.modbus_server.plc.keywords import IEC
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.names import Holds
 from gatewayd.links.modbus_server.plc.st.convert import PORTABLE, functions
-from gatewayd.links.modbus_server.plc.st.decode import unpack
 from gatewayd.links.modbus_server.plc.st.dialect import Dialect, elementary, own
-from gatewayd.links.modbus_server.plc.st.encode import pack
-from gatewayd.links.modbus_server.plc.st.exchange import cyclic, handshake, sequence
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection
+from gatewayd.links.modbus_server.plc.st.exchange import cyclic, sequence
+from gatewayd.links.modbus_server.plc.st.main import blocks, main
+from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit
 from gatewayd.links.modbus_server.plc.st.source import data_type_source, text_of, unit_source
 from gatewayd.links.modbus_server.plc.st.types import data_types
-from gatewayd.links.modbus_server.plc.st.watch import watch
 
 HOLDS: Final = Holds(
     "edition 2",
@@ -32,6 +30,7 @@ HOLDS: Final = Holds(
     "controllers without 64-bit numbers",
 )
 DIALECT: Final = Dialect(PORTABLE)
+_ANSWERS: Final = (("connected", ""), ("answered", ": one cycle long"), ("failed", ": one cycle long"))
 
 
 def files(model: PlcModel) -> Iterator[ExportedFile]:
@@ -49,7 +48,8 @@ def files(model: PlcModel) -> Iterator[ExportedFile]:
         text_of(header(model, "conversions"), map(unit_source, functions(model, DIALECT))),
     )
     yield ExportedFile(
-        f"{prefix}_Blocks.st", text_of(header(model, "blocks"), map(unit_source, blocks(model)))
+        f"{prefix}_Blocks.st",
+        text_of(header(model, "blocks"), map(unit_source, (*blocks(model, DIALECT), sequence(model)))),
     )
     yield ExportedFile(
         f"{prefix}_Main.st",
@@ -61,69 +61,31 @@ def files(model: PlcModel) -> Iterator[ExportedFile]:
     )
 
 
-def blocks(model: PlcModel) -> tuple[ProgramUnit, ...]:
-    """What a program calls."""
-    found = [watch(model, DIALECT)]
-    if model.outputs:
-        found.append(unpack(model, DIALECT))
-    if model.inputs:
-        found.append(pack(model, DIALECT))
-    found.append(sequence(model))
-    if model.inputs:
-        found.append(handshake(model))
-    return tuple(found)
-
-
 def _main(model: PlcModel) -> ProgramUnit:
-    prefix = model.prefix
-    instances = [
-        PlcVariable("image", own(f"{prefix}_Image")),
-        PlcVariable("status", own(f"{prefix}_Status")),
-        PlcVariable("numbers", own(f"{prefix}_Numbers")),
-        PlcVariable("watch", own(f"{prefix}_Watch")),
-        PlcVariable("sequence", own(f"{prefix}_Sequence")),
-    ]
-    body = ["watch(image := image, status := status);"]
-    if model.outputs:
-        instances += [
-            PlcVariable("outputs", own(f"{prefix}_Outputs")),
-            PlcVariable("unpack", own(f"{prefix}_Unpack")),
-        ]
-        body.append("unpack(trusted := status.trusted, image := image, outputs := outputs);")
-    body += ["", "(* your program: it reads outputs, and writes inputs *)", ""]
-    if model.inputs:
-        instances += [
-            PlcVariable("inputs", own(f"{prefix}_Inputs")),
-            PlcVariable("pack", own(f"{prefix}_Pack")),
-        ]
-        body.append("pack(inputs := inputs, image := image);")
-    instances += [
-        PlcVariable(
-            "write",
-            elementary("BOOL"),
-            "set it when the inputs hold what you want: nothing is written before",
+    """The standard has no client: what one needs for each step stands in variables."""
+    variables = [
+        PlcVariable("sequence", own(f"{model.prefix}_Sequence")),
+        *(
+            PlcVariable(name, elementary("BOOL"), f"from your Modbus client block{more}")
+            for name, more in _ANSWERS
         ),
-        PlcVariable("connected", elementary("BOOL"), "from your Modbus client block"),
-        PlcVariable("answered", elementary("BOOL"), "from your Modbus client block: one cycle long"),
-        PlcVariable("failed", elementary("BOOL"), "from your Modbus client block: one cycle long"),
         PlcVariable("function_code", elementary("INT"), "for your Modbus client block"),
         PlcVariable("address", elementary("UINT"), "for your Modbus client block"),
         PlcVariable("quantity", elementary("UINT"), "for your Modbus client block"),
     ]
-    body += [
-        "sequence(run := connected, trusted := status.trusted, write := write, done := answered, failed := failed);",
+    write = "write" if model.inputs else "FALSE"
+    lines = [
+        f"sequence(run := connected, trusted := status.trusted, write := {write}, done := answered, failed := failed);",
         "CASE sequence.current OF",
     ]
     for step, poll in enumerate(cyclic(model), 1):
-        body.append(
-            f"  {step}: function_code := {poll.function}; address := {poll.address}; quantity := {poll.count}; "
-            f"(* image.{poll.name} *)"
-        )
-    body += [
+        parts = f"function_code := {poll.function}; address := {poll.address}; quantity := {poll.count};"
+        lines.append(f"  {step}: {parts} (* image.{poll.name} *)")
+    lines += [
         "END_CASE;",
         "(* Call your Modbus client block here: it sends when sequence.request rises, with the array named above. *)",
     ]
-    return ProgramUnit("PROGRAM", f"{prefix}_Main", (VariableSection("VAR", tuple(instances)),), tuple(body))
+    return main(model, lines, variables)
 
 
 def _configuration(model: PlcModel) -> list[str]:
