@@ -150,7 +150,11 @@ class RobotFeed(ConnectionObserver):
                     raise self.failure
                 waiter = asyncio.get_running_loop().create_future()
                 self._waiters.append(waiter)
-                await waiter
+                try:
+                    await waiter
+                finally:
+                    if waiter in self._waiters:
+                        self._waiters.remove(waiter)
         return result
 
     # what the client calls

@@ -77,8 +77,10 @@ async def test_what_is_waited_for_is_asked_again_when_something_happens() -> Non
     one.give_up(ConnectionLostError("gone"), ConnectionState.LOST)
     with pytest.raises(ConnectionLostError, match="gone"):
         await in_vain
+    idle = feed()
     with pytest.raises(TimeoutError):
-        await feed().until(lambda: None, 0.001)
+        await idle.until(lambda: None, 0.001)
+    assert idle._waiters == []
 
 
 async def test_another_type_than_declared_ends_the_client() -> None:
