@@ -15,7 +15,7 @@ _SIZE = (6.0, 2.2)
 """Of a panel, in inches."""
 _FEW = 4
 """Panels that stand below each other; more make columns."""
-_LINE = 0.9
+_LINE, _POINT = 0.9, 2.0
 
 
 def draw(
@@ -48,6 +48,9 @@ def draw(
                         found.values[curve.column],
                         label=curve.field if len(drawn) == 1 else f"{name}: {curve.field}",
                         linewidth=_LINE,
+                        marker=".",
+                        markersize=_POINT,
+                        markevery=found.lone,
                         drawstyle="steps-post" if curve.stepped else "default",
                     )
             area.set_ylabel(panel.label, fontsize="small")

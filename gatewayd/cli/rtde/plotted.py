@@ -6,6 +6,7 @@ import math
 from array import array
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from gatewayd.cli.rtde.panels import TIMESTAMP
 from gatewayd.rtde.recipe import Recipe, Scalar
@@ -26,10 +27,19 @@ class Plotted:
     """Column -> values, as many as `time` has."""
     packages: int = 0
     """Packages that are drawn."""
+    breaks: list[int] = field(default_factory=list)
+    """Places of NaN."""
+
+    @property
+    def lone(self) -> list[int]:
+        """Places of packages between two interruptions, which a line alone would not show."""
+        ends = [-1, *self.breaks, len(self.time)]
+        return [first + 1 for first, second in pairwise(ends) if second - first == 2]
 
     def add(self, moment: float, row: Iterable[Scalar], *, apart: bool) -> None:
         """Take in a package, the value of each column; `apart`: its curve is not joined to the package before."""
         if self.time and (apart or moment < self.time[-1]):
+            self.breaks.append(len(self.time))
             self.time.append(self.time[-1])
             for values in self.values.values():
                 values.append(math.nan)

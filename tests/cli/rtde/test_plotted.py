@@ -56,5 +56,13 @@ def test_without_a_timestamp_the_host_time_or_the_number_of_the_package_counts()
     assert time_label(RECIPE, host_time=False) == "time in s"
 
 
+def test_packages_between_two_interruptions_are_known() -> None:
+    found = rows(*((float(number), 1, 1.0) for number in range(8)))
+    drawn = plotted(found, RECIPE, [FORCE], gaps={1, 4, 5, 7})
+    assert [drawn.time[place] for place in drawn.lone] == [0.0, 4.0, 7.0]
+    assert plotted(found, RECIPE, [FORCE]).lone == []
+    assert plotted(found[:1], RECIPE, [FORCE]).lone == [0]
+
+
 def test_columns_that_a_recording_lacks_are_left_out() -> None:
     assert list(plotted(rows((0.0, 1, 1.0)), RECIPE, ["payload", FORCE]).values) == [FORCE]
