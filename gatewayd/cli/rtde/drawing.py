@@ -59,8 +59,9 @@ def draw(
                 area.legend(fontsize="x-small", loc="upper right")
         for area in axes[len(panels) :]:
             area.set_visible(False)
-        for area in grid[-1]:
-            area.set_xlabel(time_label)
+        for lowest in {place // down: area for place, area in enumerate(axes[: len(panels)])}.values():
+            lowest.set_xlabel(time_label)
+            lowest.tick_params(labelbottom=True)
         picture = BytesIO()
         figure.savefig(picture, format=form, dpi=120, metadata={"Date": None} if form == "svg" else None)
     return picture.getvalue()

@@ -37,6 +37,7 @@ def test_an_svg_has_its_texts_as_text_and_a_curve_for_each_column() -> None:
         "runtime_state",
     ):
         assert text in texts
+    assert texts.count("time in s") == 2
     groups = [element.get("id") or "" for element in root.iter("{http://www.w3.org/2000/svg}g")]
     assert sum(group.startswith("axes_") for group in groups) == 7
 
