@@ -19,6 +19,7 @@ SUBJECTS = {
     "packages": "packages of the robot that were not shown, one by one and in bursts",
     "growth": "cells, connections and variables: what each of them adds, and where that ends",
     "canopen": "CPU per PDO, a saturated bus and SYNC, beside python-canopen's own node",
+    "rtde": "RTDE clients: CPU per package, recordings, a control loop, beside ur_rtde and the official style",
     "check": "start and `gatewayd check`, as multiples of an empty Python",
     "script": "the script that a user would write instead: ur_rtde feeding a pymodbus server",
 }

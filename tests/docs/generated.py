@@ -13,7 +13,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from textwrap import indent
@@ -41,8 +41,10 @@ from gatewayd.report.schema import documented
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Field, Series
 from gatewayd.web.histogram import BOUNDS
 from gatewayd.web.metrics import METRICS, PROCESS_METRICS
-from tests.docs import canopen
+from tests.docs import canopen, examples
 from tests.docs.canopen import table
+from tests.docs.rtde_clients.rows import CLIENTS
+from tests.docs.rtde_clients.rows import part as rtde_client_rows
 
 ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"
@@ -515,5 +517,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "layers": layers,
     "simulator-control": simulator_control,
     **canopen.PARTS,
+    **examples.PARTS,
+    **{f"rtde-clients-{client}": partial(rtde_client_rows, client) for client in CLIENTS},
 }
 """Name of a part -> what makes it."""
