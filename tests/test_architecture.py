@@ -39,6 +39,7 @@ LAYERS: dict[str, set[str]] = {
     "loop": {"loop"},
     "core": {"core"},
     "rtde": {"loop", "report.format", "rtde"},
+    "rtde.testing": {"simulator"},
     "encoding": {"core.definition", "encoding"},
     "modbus": {"core.definition", "encoding", "modbus"},
     "canopen": {"canopen", "core.definition", "loop"},
@@ -215,6 +216,7 @@ LIBRARIES: dict[str, set[str]] = {
     "numpy": {"cli.rtde", "rtde.recording"},
     "prometheus_client": {"web.metrics"},
     "pymodbus": {"demo.plc"},
+    "pytest": {"rtde.testing"},
     "rich": {"cli", "demo", "report.screen"},
     "ruamel": {"mapping.source"},
 }

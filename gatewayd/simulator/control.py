@@ -40,7 +40,7 @@ from gatewayd.rtde.enums import STATES
 from gatewayd.rtde.types import INTEGER_RANGES
 from gatewayd.simulator.faults import DropAt
 from gatewayd.simulator.modes import POWER_COMMANDS, PROGRAM, SAFETY
-from gatewayd.simulator.server import SimulatedController
+from gatewayd.simulator.server import NOT_STEPPED, SimulatedController
 from gatewayd.simulator.store import Scalar
 
 Action = Callable[[], str | Awaitable[str | None] | None]
@@ -170,6 +170,8 @@ class Control:
         return lambda: self._simulator.raw(data)
 
     def _step(self, rest: str) -> Action:
+        if not self._simulator.stepped:
+            raise ValueError(NOT_STEPPED)
         cycles = int(rest or "1")
         if not 0 < cycles <= MAX_STEPS:
             message = f"{cycles} is not within 1..{MAX_STEPS}"

@@ -91,7 +91,7 @@ def replayed_robots(path: str | Path, settings: RobotSettings, at: RobotHost, *,
                 settings,
                 frequency=settings.frequency or recording.rate,
                 fields=tuple(own.values()),
-                replayed=recording.names,
+                replayed=recording.recipe.names,
             ),
             port,
         )

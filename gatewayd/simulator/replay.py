@@ -32,16 +32,14 @@ class RecordedRobot:
 
     def __init__(self, path: str | Path) -> None:
         self.path = str(path)
-        self.reader: RecordingReader = open_recording(path)
-        """The open file."""
-        self.names = self.reader.recipe.names
-        """The recorded fields."""
-        place = self.reader.recipe.slots.get("timestamp")
+        with open_recording(path) as reader:
+            self.recipe = reader.recipe
+            """What a row consists of."""
+            rows = list(islice(reader, _LOOKED_AT))
+        place = self.recipe.slots.get("timestamp")
         self.clock = None if place is None else place.start
         """Where the timestamp lies in a row; None: rows follow each other at the rate."""
-        rows = list(islice(self.reader, _LOOKED_AT))
         if not rows:
-            self.reader.close()
             raise RecordingError(f"{path}: has no package to replay")
         self.rate = self._rate(rows)
         """Packages per second by their timestamps; None if they do not say."""
@@ -49,7 +47,7 @@ class RecordedRobot:
     @property
     def fields(self) -> tuple[Field, ...]:
         """The outputs as a controller of its own has them: inputs, which every controller has, and time excluded."""
-        kinds = self.reader.recipe.kinds.items()
+        kinds = self.recipe.kinds.items()
         return tuple(
             Field(name, kind, "recorded")
             for name, kind in kinds
@@ -84,16 +82,20 @@ class Replay:
         self._controller = simulator.controller
         self._recorded = recorded
         self._repeat = repeat
-        recipe, store = recorded.reader.recipe, simulator.controller.store
+        recipe, store = recorded.recipe, simulator.controller.store
         self._places = [
             (name, recipe.slots[name], store.place(name)) for name in recipe.names if name in store
         ]
         self._own = [name for name in recipe.names if name in INPUTS]
         self._counter = recipe.slots["control_step"].start if "control_step" in recipe.slots else None
-        self.begin()
+        self._reader: RecordingReader | None = None
+        self._rows: Iterator[_Row] = iter(())
+        self._next: _Row | None = None
 
     def begin(self) -> None:
-        """Wait for the first client again, and begin with the first row."""
+        """Wait for the first client, and begin with the first row."""
+        self.close()
+        self._reader = open_recording(self._recorded.path)
         self._waiting = True
         self._over = False
         self._shift = 0.0
@@ -128,8 +130,14 @@ class Replay:
     async def settle(self) -> None:
         """Nothing takes longer than its cycle."""
 
+    def close(self) -> None:
+        """Close the file."""
+        if self._reader is not None:
+            self._reader.close()
+            self._reader = None
+
     def _begin_round(self) -> None:
-        self._rows: Iterator[_Row] = iter(self._recorded.reader)
+        self._rows = iter(()) if self._reader is None else iter(self._reader)
         self._first = math.nan
         self._last = math.nan
 
@@ -194,7 +202,7 @@ class Replay:
 
     def _end(self) -> None:
         self._over = True
-        torn = self._recorded.reader.torn
+        torn = "" if self._reader is None else self._reader.torn
         _log.info("%s is through%s", self._recorded.path, f"; {torn}" if torn else "")
         if self._simulator.ended is not None:
             self._simulator.ended()

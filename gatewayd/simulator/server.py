@@ -26,6 +26,8 @@ MAKE_UP = 25
 """Cycles of lateness that are made up for."""
 MAX_CONNECTIONS = 16
 """Clients served at a time by default."""
+NOT_STEPPED = "time follows the clock here; a stepped simulator has steps (--stepped, stepped=True)"
+"""Why there are no steps."""
 
 _SHORTEST_CYCLE = 0.75  # of a period, before the timer's error
 _TIMER_ERROR = 0.0005  # epoll rounds up to 1 ms: aiming this much early spreads the error evenly
@@ -48,6 +50,9 @@ class CycleFollower(Protocol):
 
     async def settle(self) -> None:
         """Returns when all that has begun is done."""
+
+    def close(self) -> None:
+        """The controller has been stopped."""
 
 
 class SimulatedController:
@@ -144,6 +149,8 @@ class SimulatedController:
             self._restarting.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await self._restarting
+        if self.follower is not None:
+            self.follower.close()
         await self._close()
 
     async def restart(self) -> None:
@@ -163,8 +170,7 @@ class SimulatedController:
         is waited for as long as `overflow_close` says, and then closed.
         """
         if not self.stepped:
-            message = "time follows the clock here; a stepped simulator has steps (--stepped, stepped=True)"
-            raise RuntimeError(message)
+            raise RuntimeError(NOT_STEPPED)
         for _ in range(cycles):
             for connection in list(self._connections.values()):
                 await connection.drained()

@@ -61,16 +61,21 @@ class Timeline:
         while self._tasks:
             await asyncio.wait(self._tasks)
 
+    def close(self) -> None:
+        """Leave what has not been done."""
+        for task in self._tasks:
+            task.cancel()
+
     def _read(self, control: Control, rate: float, entries: Iterable[ScenarioEntry]) -> list[_Due]:
         found = []
         for entry in entries:
+            if entry.command.split()[0] in _NOT_HERE:
+                message = f"`{entry.command}`: of no use in a scenario; give it on standard input"
+                raise ScenarioError(self._file, entry.line, message)
             try:
                 action = control.prepare(entry.command)
             except ValueError as error:
                 raise ScenarioError(self._file, entry.line, f"`{entry.command}`: {error}") from None
-            if entry.command.split()[0] in _NOT_HERE:
-                message = f"`{entry.command}`: of no use in a scenario; give it on standard input"
-                raise ScenarioError(self._file, entry.line, message)
             found.append(_Due(round(entry.at * rate), action, entry))
         return found
 
