@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from tests.e2e.plc import PLC, Plc
@@ -94,8 +95,11 @@ class Plant:
 
     def start(self, module: str, *arguments: str | int) -> Process:
         """Another program: a module of this directory."""
-        command = [sys.executable, "-m", f"tests.e2e.{module}", *map(str, arguments)]
-        process = Process(command, self._log(module))
+        return self.program([sys.executable, "-m", f"tests.e2e.{module}", *map(str, arguments)], module)
+
+    def program(self, command: Sequence[str], name: str) -> Process:
+        """Any other program."""
+        process = Process(command, self._log(name))
         self._processes.append(process)
         return process
 
