@@ -14,6 +14,7 @@ import asyncio
 import threading
 from collections import deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping
+from functools import wraps
 from types import TracebackType
 from typing import Any, Generic, ParamSpec, Self, TypeVar
 
@@ -40,10 +41,10 @@ _NOT_OPEN = "the robot is not open: `with sync.connect(...) as robot` opens it"
 def _blocking(make: Callable[_Wishes, Robot]) -> Callable[_Wishes, BlockingRobot]:
     """The same call for a blocking robot."""
 
+    @wraps(make)
     def connect(*wishes: _Wishes.args, **named: _Wishes.kwargs) -> BlockingRobot:
         return BlockingRobot(make(*wishes, **named))
 
-    connect.__doc__ = make.__doc__
     return connect
 
 

@@ -82,7 +82,7 @@ class AttemptFailedEvent:
 
 @dataclass(frozen=True, slots=True)
 class TextEvent:
-    """The controller has sent a text."""
+    """The controller has sent a text (guide, RTDE_TEXT_MESSAGE)."""
 
     message: str
     source: str

@@ -71,7 +71,10 @@ class RobotInformation:
 
     @property
     def version(self) -> ControllerVersion:
-        """The controller's software. This and what follows: ConnectionLostError without a session."""
+        """The controller's software (guide, RTDE_GET_URCONTROL_VERSION).
+
+        This and what follows, down to `unavailable`: ConnectionLostError without a session.
+        """
         return self._session().controller
 
     @property
@@ -81,17 +84,17 @@ class RobotInformation:
 
     @property
     def protocol(self) -> int:
-        """RTDE protocol version spoken."""
+        """RTDE protocol version spoken (guide, RTDE_REQUEST_PROTOCOL_VERSION)."""
         return self._session().protocol
 
     @property
     def max_frequency(self) -> float:
-        """Packages that the controller can send per second."""
+        """Packages that the controller can send per second; protocol version 1 has 125."""
         return self._session().max_frequency
 
     @property
     def frequency(self) -> float:
-        """Packages per second, as the controller divides its own rate."""
+        """Packages per second: what was asked for, at the controller's own rate divided by a whole number."""
         return 1 / self._session().period
 
     @property

@@ -59,7 +59,7 @@ def connect(
     by name, which are compared with the controller's.
     inputs: input recipes by name, each claimed and sent by itself.
     frequency: packages per second; 0 is the controller's own rate (500 Hz, CB3 125 Hz), which it divides by a whole
-    number otherwise (guide, "Setup outputs"): `Robot.frequency` is what came of it.
+    number otherwise (guide, RTDE_CONTROL_PACKAGE_SETUP_OUTPUTS): `Robot.frequency` is what came of it.
     strict: opening fails with FieldsRefusedError if a field is refused or absent; else `Robot.unavailable` has it.
     protocol: 1 or 2 to force it; None: 2, or 1 where the controller refuses it.
     start: let the output run; else it is paused until `Robot.resume`.
@@ -233,14 +233,17 @@ class Robot(InputWriter):
     # recipes
 
     async def pause(self) -> None:
-        """Have the output paused, in this session and in those to come; returns when it is."""
+        """Have the output paused, in this session and in those to come; returns when it is.
+
+        Guide, RTDE_CONTROL_PACKAGE_PAUSE. Without a session it is noted for the next one.
+        """
         feed = self._feed
         feed.running = False
         await self._client.pause()
         await feed.until(lambda: True if feed.state is not ConnectionState.RUNNING else None, None)
 
     async def resume(self) -> None:
-        """Have it sent again."""
+        """Have it sent again (guide, RTDE_CONTROL_PACKAGE_START); returns when it is."""
         self._feed.running = True
         await self._client.resume()
 
@@ -256,7 +259,7 @@ class Robot(InputWriter):
 
         Inputs that are no longer wanted stay claimed until the connection ends: RTDE cannot give them back. RtdeError
         if the output is not paused; FieldsRefusedError where `strict`, after the change; TypesDifferError ends the
-        connection; TimeoutError.
+        connection; TimeoutError. Guide, RTDE_CONTROL_PACKAGE_SETUP_OUTPUTS and _INPUTS.
         """
         if self.state is not ConnectionState.PAUSED:
             message = f"recipes can be changed while the output is paused, and it is {self.state.value}"
@@ -280,7 +283,7 @@ class Robot(InputWriter):
     # texts and properties
 
     async def message(self, text: str, level: TextLevel = TextLevel.INFO, source: str = "gatewayd") -> None:
-        """Put a line into the controller's log (guide, "Text message"); EXCEPTION says that the program has failed.
+        """Put a line into the controller's log (guide, RTDE_TEXT_MESSAGE); EXCEPTION says that the program has failed.
 
         ValueError: more than 255 bytes of UTF-8; ConnectionLostError: no session.
         """

@@ -52,7 +52,7 @@ class InputWriter(RobotInformation):
 
         WriteRefusedError: nothing was sent, with the reason for each field; TypeError, ValueError: a value that does
         not fit its type; ConnectionLostError: no session, or lost meanwhile, and then it is not known whether the
-        robot has it; NotVerifiedError. Source: guide, "Data package" and the table of inputs.
+        robot has it; NotVerifiedError. Guide, RTDE_DATA_PACKAGE and "Robot controller inputs".
         """
         asked = {**(values or {}), **fields}
         if not asked:
