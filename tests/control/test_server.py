@@ -6,6 +6,7 @@ import asyncio
 import getpass
 import json
 import socket
+import struct
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from functools import partial
@@ -18,7 +19,9 @@ from gatewayd.control import server
 from gatewayd.control.api import Api
 from gatewayd.control.client import Client, ControlError
 from gatewayd.control.endpoint import bind
+from gatewayd.control.packages import MAX_FEEDS
 from gatewayd.core.objection import ObjectionKind
+from gatewayd.links.contract import PackageLayout, PackageTap
 from gatewayd.loop.share import Busy, LoopShare
 from gatewayd.service.audit import Audit
 from tests.control.served import CYCLES, LIMIT, FixedGateway, Served
@@ -264,3 +267,33 @@ class TestFollowing:
                     press.cell.robot_lost("gone", 1.0)
                 assert (await get(client, "/v1/version"))["api"] == 1
                 await asyncio.sleep(0.03)
+
+
+async def test_packages_of_the_robot_are_followed(
+    client: Client, press: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taps: asyncio.Queue[PackageTap | None] = asyncio.Queue()
+    monkeypatch.setattr(press.source, "tap_packages", taps.put_nowait, raising=False)
+    rows = client.follow("/v1/packages")
+    async with asyncio.TaskGroup() as group:
+        reading = group.create_task(asyncio.to_thread(lambda: [next(rows) for _ in range(3)]))
+        tap = await taps.get()
+        assert tap is not None
+        pack = struct.Struct(">d").pack
+        tap.begin(PackageLayout("10.0.0.5", ("timestamp",), ("DOUBLE",), 0.002, lambda values: pack(*values)))
+        tap.package((1.5,), 2.0)
+        tap.lost("pulled")
+    head, packages, lost = reading.result()
+    assert head["layout"]["names"] == ["timestamp"]
+    assert packages["packages"][0][1] == pack(1.5).hex()
+    assert lost == {"lost": "pulled"}
+    await asyncio.to_thread(rows.close)
+
+
+async def test_packages_of_no_cell_and_of_too_many_recorders(client: Client, api: Api) -> None:
+    with pytest.raises(ControlError, match="there is no cell other"):
+        await asyncio.to_thread(lambda: next(client.follow("/v1/packages", cell="other")))
+    for _ in range(MAX_FEEDS):
+        assert api.feeds.open("press")
+    with pytest.raises(ControlError, match="4 recordings are running already"):
+        await asyncio.to_thread(lambda: next(client.follow("/v1/packages")))

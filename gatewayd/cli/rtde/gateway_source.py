@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from gatewayd.cli.rtde.recorder import SourceLayout, Values
@@ -25,15 +25,24 @@ _ENDED = "the gateway has ended"
 
 
 class GatewaySource:
-    """The packages of one cell. `reconnect`: wait for the robot and the gateway, and go on when they are back.
+    """The packages of one cell, whose fields have to have the types that `declared` names.
 
+    `reconnect`: wait for the robot and the gateway, and go on when they are back.
     What the gateway refuses is raised as `gatewayd.control.client.ControlError`.
     """
 
-    def __init__(self, client: Client, cell: str | None, *, reconnect: bool = False) -> None:
+    def __init__(
+        self,
+        client: Client,
+        cell: str | None,
+        declared: Mapping[str, DataType | None],
+        *,
+        reconnect: bool = False,
+    ) -> None:
         self.waiting = ""
         self._client = client
         self._cell = cell
+        self._declared = declared
         self._reconnect = reconnect
         self._rows: Iterator[dict[str, Any]] | None = None
         self._pending: asyncio.Future[dict[str, Any] | None] | None = None
@@ -118,6 +127,12 @@ class GatewaySource:
 
     def _set_up(self, layout: dict[str, Any]) -> None:
         recipe = Recipe(layout["names"], [DataType.from_word(word) for word in layout["types"]])
+        for name, kind in recipe.kinds.items():
+            declared = self._declared.get(name)
+            if declared is not None and declared is not kind:
+                raise SourceRefusedError(
+                    f"{name} was declared as {declared.word}, the gateway has {kind.word}"
+                )
         if self._layout is not None and recipe.kinds != self._layout.recipe.kinds:
             raise SourceRefusedError(
                 "the gateway now has other fields of the robot than the recording has: begin another one"

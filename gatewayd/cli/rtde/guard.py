@@ -17,11 +17,13 @@ _PATIENCE = 1.0
 def gateway_in_the_way(host: str, port: int, named: Path | None = None) -> str:
     """Why a gateway on this machine forbids to write to the robot, in words; empty if none does.
 
+    All are asked that are found, and the one at the socket `named`.
     One that is there and gives no answer forbids it too: what it serves is not known.
     """
     from gatewayd.doctor.running import ask, sockets
 
-    found = ask(sockets(named, os.environ))
+    places = [*sockets(None, os.environ), *(() if named is None else (named,))]
+    found = ask(tuple(dict.fromkeys(places)))
     wanted = _addresses(host, port)
     for cell in found.cells:
         address = str(cell.status["robot"]["address"])

@@ -177,7 +177,7 @@ def command(
     )
     _refuse_existing(order)
     making = (
-        partial(_gateway_source, socket, cell, reconnect=reconnect)
+        partial(_gateway_source, socket, cell, fields, reconnect=reconnect)
         if target is None
         else partial(_robot_source, target, fields, conditions.fields, frequency, reconnect=reconnect)
     )
@@ -277,11 +277,13 @@ def _robot_source(
     return RobotSource(*target, subscribed, frequency=frequency, reconnect=reconnect)
 
 
-def _gateway_source(socket: Path | None, cell: str | None, *, reconnect: bool) -> PackageSource:
+def _gateway_source(
+    socket: Path | None, cell: str | None, fields: Fields, *, reconnect: bool
+) -> PackageSource:
     from gatewayd.cli.rtde.gateway_source import GatewaySource
     from gatewayd.control.client import Client
 
-    return GatewaySource(Client(socket), cell, reconnect=reconnect)
+    return GatewaySource(Client(socket), cell, fields, reconnect=reconnect)
 
 
 def _run(

@@ -14,7 +14,7 @@ from gatewayd.cli.rtde.windows import Always, StreamClock, Trigger, Windows
 from gatewayd.report.format import listed
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.recording.errors import RecordingError
-from gatewayd.rtde.recording.gaps import GapWatch, GapWriter
+from gatewayd.rtde.recording.gaps import GapWatch, GapWriter, RecordedGap
 from gatewayd.rtde.recording.writing import create_recording
 from gatewayd.rtde.session import TIMESTAMP
 
@@ -79,6 +79,7 @@ class Recorder:
         slot = recipe.slots.get(TIMESTAMP)
         self._timestamp = slot.start if slot is not None else None
         self._watch = GapWatch(recipe, layout.period)
+        self._found: list[RecordedGap] = []
         self._gap_count = 0
         self._left_out = 0
         self._packages = 0
@@ -104,7 +105,10 @@ class Recorder:
             if self.over:
                 break
             self._take(values, host_time, now)
-        self._file.flush()
+        try:
+            self._file.flush()
+        finally:
+            self._write_gaps()
 
     def lost(self, reason: str) -> None:
         """Packages are missing from here on, for this reason in words."""
@@ -168,6 +172,13 @@ class Recorder:
             self.over = self.over or time - self._began >= order.duration - self._clock.period / 2
         return self.over
 
+    def _write_gaps(self) -> None:
+        """Those before packages that the file has; one that found no room is in no gap either."""
+        found, self._found = self._found, []
+        for gap in found:
+            if gap.package < self._file.packages:
+                self._gaps.write(gap)
+
     def _write(self, values: Values, host_time: float, left_out: int) -> None:
         self._left_out += left_out
         gap = self._watch.check(values, host_time if self._order.host_time else None)
@@ -177,7 +188,7 @@ class Recorder:
             else:
                 self._gap_count += 1
                 self.lost_packages += gap.missing or 0
-            self._gaps.write(gap)
+            self._found.append(gap)
         self._file.write(self._pick(values), host_time)
         self._packages += 1
 

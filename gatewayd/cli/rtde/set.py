@@ -51,7 +51,8 @@ Exit codes:
 @click.option(
     "--socket",
     type=click.Path(path_type=Path),
-    help="Ask the gateway at this control socket whether it serves the robot. Default: all that are found here.",
+    envvar="GATEWAYD_CONTROL",
+    help="Ask the gateway at this control socket, too, whether it serves the robot; all that are found here are asked.",
 )
 def command(host: Target, assignments: tuple[str, ...], *, while_running: bool, socket: Path | None) -> None:
     """Write to inputs of the robot at HOST: claim them, write, wait until the robot shows it, and give them back.

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from gatewayd.cli.rtde.gateway_source import GatewaySource
 from gatewayd.cli.rtde.sources import SourceLostError, SourceRefusedError
 from gatewayd.control.client import Client, NoDaemon
+from gatewayd.rtde.types import DataType
 
 LAYOUT = {"layout": {"names": ["timestamp"], "types": ["DOUBLE"], "period": 0.002}}
 OTHER = {"layout": {"names": ["timestamp"], "types": ["INT32"], "period": 0.002}}
@@ -38,7 +39,7 @@ def packages(*stamps: float) -> dict[str, Any]:
 
 
 async def test_packages_have_their_values_and_times() -> None:
-    source = GatewaySource(Played([LAYOUT, packages(1.0, 2.0), {"dropped": 5}, packages(3.0)]), None)
+    source = GatewaySource(Played([LAYOUT, packages(1.0, 2.0), {"dropped": 5}, packages(3.0)]), None, {})
     layout = await source.open()
     assert (layout.recipe.names, layout.period) == (("timestamp",), 0.002)
     assert (await source.next(5)).packages == [((1.0,), 1e9 + 1), ((2.0,), 1e9 + 2)]
@@ -51,12 +52,12 @@ async def test_packages_have_their_values_and_times() -> None:
 
 async def test_a_loss_ends_it_unless_it_is_to_go_on() -> None:
     lost = {"lost": "the cable"}
-    source = GatewaySource(Played([LAYOUT, lost]), None)
+    source = GatewaySource(Played([LAYOUT, lost]), None, {})
     await source.open()
     with pytest.raises(SourceLostError, match="the cable"):
         await source.next(5)
     patient = GatewaySource(
-        Played([LAYOUT, lost, LAYOUT, packages(1.0)], [LAYOUT, packages(2.0)]), None, reconnect=True
+        Played([LAYOUT, lost, LAYOUT, packages(1.0)], [LAYOUT, packages(2.0)]), None, {}, reconnect=True
     )
     await patient.open()
     arrivals = await patient.next(5)
@@ -67,10 +68,18 @@ async def test_a_loss_ends_it_unless_it_is_to_go_on() -> None:
 
 
 async def test_other_fields_end_the_recording() -> None:
-    source = GatewaySource(Played([LAYOUT, OTHER]), None, reconnect=True)
+    source = GatewaySource(Played([LAYOUT, OTHER]), None, {}, reconnect=True)
     await source.open()
     with pytest.raises(SourceRefusedError, match="other fields"):
         await source.next(5)
+
+
+async def test_declared_types_are_compared() -> None:
+    fitting: dict[str, DataType | None] = {"timestamp": DataType.DOUBLE, "x": None}
+    layout = await GatewaySource(Played([LAYOUT]), None, fitting).open()
+    assert layout.recipe.types == (DataType.DOUBLE,)
+    with pytest.raises(SourceRefusedError, match="timestamp was declared as INT32, the gateway has DOUBLE"):
+        await GatewaySource(Played([LAYOUT]), None, {"timestamp": DataType.INT32}).open()
 
 
 JSON = st.recursive(
@@ -82,7 +91,7 @@ JSON = st.recursive(
 
 @given(st.sampled_from(["layout", "packages", "dropped", "lost", "x"]), JSON)
 async def test_whatever_comes_is_a_package_or_refused(key: str, value: object) -> None:
-    source = GatewaySource(Played([LAYOUT, {key: value}]), None)
+    source = GatewaySource(Played([LAYOUT, {key: value}]), None, {})
     await source.open()
     try:
         await source.next(5)

@@ -9,6 +9,12 @@ from gatewayd.cli.rtde.guard import gateway_in_the_way, program_in_the_way
 from tests.cli.conftest import Running
 
 
+@pytest.fixture(autouse=True)
+def no_other_gateway(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Gateways of this machine are no matter of these tests."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+
 @pytest.mark.parametrize(
     "state, words",
     [
@@ -32,6 +38,12 @@ def test_the_gateway_of_the_robot_is_in_the_way(gateway: Running) -> None:
     assert gateway_in_the_way("192.168.1.10", 30005, gateway.path) == ""
     assert gateway_in_the_way("192.168.1.11", 30004, gateway.path) == ""
     assert gateway_in_the_way("no such host", 30004, gateway.path) == ""
+
+
+def test_a_named_gateway_is_asked_beside_those_that_are_found(gateway: Running, tmp_path: Path) -> None:
+    (tmp_path / "gatewayd.sock").symlink_to(gateway.path)
+    assert gateway_in_the_way("192.168.1.10", 30004).startswith("the gateway at")
+    assert gateway_in_the_way("192.168.1.10", 30004, tmp_path / "other.sock").startswith("the gateway at")
 
 
 def test_a_gateway_that_does_not_answer_may_be_in_the_way(tmp_path: Path) -> None:

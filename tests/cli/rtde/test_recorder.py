@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -123,3 +125,26 @@ def test_without_a_timestamp_everything_is_recorded(tmp_path: Path) -> None:
         recorder.take([((3,), 0.0)], 0.0)
     assert path.read_text() == "x\n0\n1\n2\n3\n"
     assert [(gap.package, gap.reason) for gap in read_gaps(path)] == [(3, "pulled")]
+
+
+def test_a_package_that_finds_no_room_is_in_no_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row is cut off again where the disk is full; the gap before it goes too."""
+    path = tmp_path / "a.csv"
+    write, room = os.pwrite, 200
+
+    def limited(file: int, data: bytes, offset: int) -> int:
+        if Path(f"/proc/self/fd/{file}").readlink() != path:
+            return write(file, data, offset)
+        if offset >= room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(file, data[: room - offset], offset)
+
+    monkeypatch.setattr(os, "pwrite", limited)
+    recorder = Recorder(RecordingOrder(path=str(path)), LAYOUT)
+    with pytest.raises(RecordingError, match="No space left on device"):
+        recorder.take([package(number * 3) for number in range(50)], 0.0)
+    recorder.close()
+    monkeypatch.undo()
+    count = len(stamps(path))
+    assert 1 < count < 50
+    assert [gap.package for gap in read_gaps(path)] == list(range(1, count))
