@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.recipes import DeclaredField, DeclaredRecipe
 from gatewayd.rtde.recipes.declared import OUTPUT_KEY
@@ -100,6 +101,9 @@ def _objection(
 ) -> str:
     """Why a field cannot be carried, and what to do; empty if it can."""
     name = field.name
+    mask = COMPANIONS[name].mask if as_input and name in COMPANIONS else None
+    if mask is not None and mask not in recipe.names:
+        return f"{name} has no effect without {mask}, which the recipe lacks; add it, or strike the field"
     if as_input and name not in INPUTS:
         return f"{name} is no input of the guides; a mapping cannot write it: strike it"
     if as_input or name in fields:

@@ -75,6 +75,15 @@ def test_what_cannot_be_carried_has_its_line_and_a_remedy(
     assert len(fields) == 1
 
 
+def test_an_input_without_the_mask_that_makes_it_act_is_left_out() -> None:
+    fields, findings = imported([recipe("in", "input_int_register_0", "speed_slider_fraction")])
+    assert [field.name for field in fields] == ["input_int_register_0"]
+    assert str(findings[0]).startswith(
+        "x:3: error: speed_slider_fraction has no effect without speed_slider_mask, which "
+    )
+    assert imported([recipe("in", "speed_slider_mask", "speed_slider_fraction")])[1] == ()
+
+
 def test_an_input_that_is_read_back_as_well_is_one_variable() -> None:
     fields, findings = imported(
         [recipe("out", "timestamp", "input_int_register_0"), recipe("in", "input_int_register_0")]
