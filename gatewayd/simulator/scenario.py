@@ -76,6 +76,8 @@ class ScenarioRobot:
     """What has happened before anybody can connect, and again after each restart."""
     timeline: tuple[ScenarioEntry, ...] = ()
     """In the order of their times."""
+    begin: str = "start"
+    """From when the timeline counts: the `start` of the robot, or the first `client` that starts its outputs."""
     repeat: float | None = None
     """Seconds after which the timeline begins again."""
 
@@ -170,6 +172,7 @@ class _Reader:
             values.get("port"),
             start=tuple(self._entries((*path, "start"), timed=False)) if "start" in table else (),
             timeline=tuple(self._entries((*path, "timeline"), timed=True)) if "timeline" in table else (),
+            begin=values.get("begin", "start"),
             repeat=values.get("repeat"),
         )
 

@@ -85,6 +85,7 @@ ROBOT_KEYS: Mapping[str, Callable[[Any], Any]] = {
     "hold": lambda value: tuple(sorted(read_inputs(_texts(value)))),
     "start": _text,
     "timeline": _text,
+    "begin": _choice(("start", "client")),
     "repeat": _positive,
     "faults": _table,
 }

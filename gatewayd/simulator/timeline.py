@@ -33,7 +33,9 @@ class Timeline:
         self.problems: deque[str] = deque(maxlen=_KEPT)
         """What the robot refused when it was due, with file and line; the newest."""
         self._file = file
+        self._simulator = simulator
         self._controller = simulator.controller
+        self._waiting = robot.begin == "client"
         control, rate = Control(simulator), simulator.controller.rate
         self._start = self._read(control, rate, robot.start)
         self._entries = self._read(control, rate, robot.timeline)
@@ -50,6 +52,10 @@ class Timeline:
 
     def follow(self, cycle: int) -> None:
         """Do what is due by this cycle."""
+        if self._waiting:
+            if not self._simulator.streaming:
+                return
+            self._waiting, self._origin = False, cycle
         if self._repeat is not None and cycle - self._origin >= self._repeat:
             self._until(self._origin + self._repeat)
             self._origin += (cycle - self._origin) // self._repeat * self._repeat

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 
 from gatewayd.simulator.faults import Faults
-from gatewayd.simulator.scenario_keys import FAULT_ATTRIBUTES, FAULT_KEYS
+from gatewayd.simulator.scenario_keys import FAULT_ATTRIBUTES, FAULT_KEYS, ROBOT_KEYS
 from tests.sources import ROOT
 
 
@@ -17,4 +17,4 @@ def test_every_fault_has_a_key_and_every_key_a_fault() -> None:
 
 def test_every_key_is_documented() -> None:
     page = (ROOT / "docs/reference/simulator.md").read_text()
-    assert [key for key in FAULT_KEYS if f"`{key}`" not in page] == []
+    assert [key for key in (*ROBOT_KEYS, *FAULT_KEYS) if f"`{key}`" not in page] == []

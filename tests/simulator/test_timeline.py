@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -12,7 +12,8 @@ from gatewayd.simulator.scenario import ScenarioError, parse_scenario
 from gatewayd.simulator.server import SimulatedController
 from gatewayd.simulator.timeline import Timeline
 
-Make = Callable[[str], SimulatedController]
+if TYPE_CHECKING:
+    from tests.simulator.conftest import Client
 
 
 def robot(table: str) -> SimulatedController:
@@ -117,3 +118,12 @@ def test_a_scenario_is_checked_before_it_is_played(table: str, message: str) -> 
     with pytest.raises(ScenarioError) as caught:
         robot(table)
     assert str(caught.value).startswith(message)
+
+
+async def test_a_timeline_may_wait_for_the_first_client(client: type[Client]) -> None:
+    table = "begin = 'client'\ntimeline = '0.004 set output_int_register_0 1'"
+    async with robot(table) as simulator, client(simulator.port) as one:
+        await simulator.step(50)
+        await one.stream("output_int_register_0")
+        await simulator.step(5)
+        assert [(await one.package())[0] for _ in range(5)] == [0, 0, 1, 1, 1]
