@@ -11,7 +11,7 @@ from gatewayd.core.definition import CellDefinition, Value
 from gatewayd.core.refusal import Refusal
 from gatewayd.core.requester import Requester, new_connection
 from gatewayd.maptest.chronicle import Chronicle
-from gatewayd.maptest.robot import SimulatedRobot, typed
+from gatewayd.maptest.robot import PlantRobot, typed
 
 TICK = 0.02
 """Seconds between two looks of the core at the time, and between two packages of the robot: as in the daemon."""
@@ -26,7 +26,7 @@ class Plant:
     def __init__(self, definition: CellDefinition) -> None:
         self.cell = Cell(definition)
         self.chronicle = Chronicle(self.cell)
-        self.robot = SimulatedRobot(self.cell)
+        self.robot = PlantRobot(self.cell)
         self._microseconds = 0
         self._peers: dict[int, Requester] = {}
         """The writers that are connected."""

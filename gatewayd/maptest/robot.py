@@ -13,7 +13,7 @@ PLAYING = 2
 _PROGRAM_FIELD = "runtime_state"
 
 
-class SimulatedRobot:
+class PlantRobot:
     """Takes what the cell gives it at once, and reports what it was told to show. Times are simulated seconds."""
 
     def __init__(self, cell: Cell) -> None:
