@@ -81,7 +81,7 @@ class _RowReader:
 
     def place(self, row: ListRow) -> ListedPlace | None:
         """None with an error where a cell cannot be understood."""
-        before = sum(finding.is_error for finding in self._findings.found)
+        before = self._findings.errors
         name, found = self._name(row), self._address(row)
         area = self._area(row, found)
         kind = self._type(row, area)
@@ -104,7 +104,7 @@ class _RowReader:
         self._names(row)
         if row.text("canopen"):
             self._error(row, "canopen", "CANopen objects are not imported", "delete the columns for CANopen")
-        return place if sum(finding.is_error for finding in self._findings.found) == before else None
+        return place if self._findings.errors == before else None
 
     def _name(self, row: ListRow) -> str:
         written = row.text("name")

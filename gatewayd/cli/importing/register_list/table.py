@@ -11,12 +11,13 @@ from typing import Final
 from gatewayd.cli.importing.register_list.columns import DETAIL, MEANINGS, column_of
 from gatewayd.cli.importing.register_list.findings import ListFindings
 
-MAX_BYTES: Final = 4 * 1024 * 1024
+MAX_BYTES: Final = 1024 * 1024
 MAX_ROWS: Final = 5000
+MAX_COLUMNS: Final = 500
 MAX_CELL: Final = 2000
 _DELIMITERS: Final = ",;\t|"
 _HEAD_WITHIN: Final = 50
-"""The head line is among the first so many lines: titles and empty lines may be before it."""
+"""The head line is among the first so many lines that are not empty: titles may be before it."""
 _MARKS: Final = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 
 
@@ -108,13 +109,18 @@ def _places(text: str, wanted: object) -> Iterator[tuple[int, int]]:
 
 
 def _records(text: str, delimiter: str) -> list[list[ListCell]]:
-    """The records; none where the text is not CSV with this delimiter."""
+    """The records with anything in them, as many as a list may have and some more; none where this is no CSV."""
     lines = text.splitlines()
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=False)
     records: list[list[ListCell]] = []
     before = 0
     try:
         for record in reader:
+            if len(record) > MAX_COLUMNS:
+                return []
+            if not any(record):
+                before = reader.line_num
+                continue
             starts = _starts(lines[before], delimiter) if before < len(lines) else []
             records.append(
                 [
@@ -123,6 +129,8 @@ def _records(text: str, delimiter: str) -> list[list[ListCell]]:
                 ]
             )
             before = reader.line_num
+            if len(records) > MAX_ROWS + _HEAD_WITHIN:
+                break
     except csv.Error:
         return []
     return records

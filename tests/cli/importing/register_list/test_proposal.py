@@ -170,6 +170,28 @@ def test_a_list_of_inputs_needs_the_address_of_its_writer() -> None:
     )
 
 
+def test_of_very_many_errors_the_first_are_listed() -> None:
+    found = made("name,address,type,access\n" + "?,x,y,z\n" * 5000)
+    assert found.text is None
+    assert len(errors(found)) == 201
+    assert errors(found)[-1][2] == "and 19800 more"
+
+
+def test_a_list_of_doubts_is_short() -> None:
+    """Names that had to change are one doubt each, up to what a mapping can hold; the others are said once."""
+    rows = "".join(f"value {number},{number},int16,R\n" for number in range(24))
+    assert (
+        len(
+            [
+                text
+                for *_, text in doubts(made("name,address,type,access\n" + rows, "from-0"))
+                if "GW" not in text
+            ]
+        )
+        == 25
+    )
+
+
 NASTY = st.text(st.sampled_from(",;\t|\"\n\r0123456789.xhMW%[]{}:#'- aäRW"), max_size=40)
 CELLS = st.one_of(
     NASTY,
