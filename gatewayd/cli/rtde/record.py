@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -12,7 +11,6 @@ import click
 
 from gatewayd.cli.remote import DURATION, cell_option, refusals
 from gatewayd.cli.rtde.recordings import FAILED, WRONG, delimiter_option, reported
-from gatewayd.cli.rtde.target import TARGET, Target
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
@@ -22,7 +20,7 @@ if TYPE_CHECKING:
     from gatewayd.cli.rtde.recorder import RecordingOrder
     from gatewayd.cli.rtde.recording_run import RecordingEnd
     from gatewayd.cli.rtde.sources import PackageSource
-    from gatewayd.cli.rtde.triggers import Conditions
+    from gatewayd.cli.rtde.target import Target
 
 
 def _condition(_context: click.Context, _parameter: click.Parameter, text: str | None) -> Condition | None:
@@ -155,16 +153,24 @@ def command(
 
     Nothing is written to the robot and nothing claimed: recording disturbs nobody.
     """
+    from gatewayd.cli.rtde.field_choice import USUAL
+    from gatewayd.cli.rtde.record_options import (
+        conditions_of,
+        default_name,
+        fields_of,
+        refuse_existing,
+        target_of,
+    )
     from gatewayd.cli.rtde.recorder import RecordingOrder
 
     if gateway and out is None:
         host, out = None, host
-    target = _target(context, host, gateway=gateway, cell=cell, frequency=frequency)
-    conditions = _conditions(during, start, stop, once=once, before=before, after=after)
-    fields = _fields(names, config, key)
+    target = target_of(context, host, gateway=gateway, cell=cell, frequency=frequency)
+    conditions = conditions_of(during, start, stop, once=once, before=before, after=after)
+    fields = fields_of(names, config, key)
     order = RecordingOrder(
-        path=out or _default_name(host or cell or "gateway", binary=binary),
-        fields=tuple(fields) or (() if gateway else tuple(_usual())),
+        path=out or default_name(host or cell or "gateway", binary=binary),
+        fields=tuple(fields) or (() if gateway else USUAL),
         binary=binary,
         delimiter=delimiter,
         host_time=host_time,
@@ -175,7 +181,7 @@ def command(
         before=before or 0.0,
         after=after or 0.0,
     )
-    _refuse_existing(order)
+    refuse_existing(order.path, overwrite=force)
     making = (
         partial(_gateway_source, socket, cell, fields, reconnect=reconnect)
         if target is None
@@ -184,95 +190,14 @@ def command(
     context.exit(_run(context, making, order, quiet=quiet))
 
 
-def _target(
-    context: click.Context,
-    host: str | None,
-    *,
-    gateway: bool,
-    cell: str | None,
-    frequency: float,
-) -> Target | None:
-    """The robot; None: the gateway's."""
-    if gateway:
-        if host is not None:
-            raise click.UsageError("a gateway knows its robot: leave HOST out, or --gateway")
-        if frequency:
-            raise click.UsageError("the gateway's session has the rate of its mapping: leave --frequency out")
-        return None
-    if host is None:
-        raise click.UsageError("name the robot's HOST, or record a running gateway's with --gateway")
-    if cell is not None:
-        raise click.UsageError("--cell is for --gateway")
-    return TARGET.convert(host, None, context)
-
-
-def _conditions(
-    during: Condition | None,
-    start: Condition | None,
-    stop: Condition | None,
-    *,
-    once: bool,
-    before: float | None,
-    after: float | None,
-) -> Conditions:
-    from gatewayd.cli.rtde.triggers import Conditions
-
-    if during is not None and (start is not None or stop is not None):
-        raise click.UsageError("--while is a start and a stop by itself: leave --start and --stop out")
-    if once and during is None:
-        raise click.UsageError("--once is for --while")
-    if before is not None and during is None and start is None:
-        raise click.UsageError("--before needs a condition that recording begins with: --while or --start")
-    if after is not None and during is None and stop is None:
-        raise click.UsageError("--after needs a condition that recording ends with: --while or --stop")
-    return Conditions(during, start, stop, once)
-
-
-def _usual() -> tuple[str, ...]:
-    from gatewayd.cli.rtde.field_choice import USUAL
-
-    return USUAL
-
-
-def _fields(names: tuple[str, ...], config: str | None, key: str | None) -> Fields:
-    """What is to be recorded; none: what is usual."""
-    from gatewayd.cli.rtde.field_choice import named, of_file
-    from gatewayd.rtde.session import TIMESTAMP
-
-    if config is not None:
-        if names:
-            raise click.UsageError("--config has the fields: leave --fields out")
-        return of_file(config, key)
-    if key is not None:
-        raise click.UsageError("--key is for --config")
-    found = named(names)
-    return dict.fromkeys((TIMESTAMP, *(name for name in found if name != TIMESTAMP))) if found else {}
-
-
-def _default_name(host: str, *, binary: bool) -> str:
-    """`rtde-192.168.1.10-20261129-141500.csv`, in the present directory."""
-    safe = "".join(letter if letter.isalnum() or letter in ".-_" else "-" for letter in host)
-    return f"rtde-{safe}-{time.strftime('%Y%m%d-%H%M%S')}{'.bin' if binary else '.csv'}"
-
-
-def _refuse_existing(order: RecordingOrder) -> None:
-    """Before anybody is asked for anything; the file itself is created so that none is overwritten in between."""
-    from gatewayd.rtde.recording.gaps import SUFFIX
-
-    for path in (order.path, f"{order.path}{SUFFIX}"):
-        if not order.overwrite and Path(path).exists():
-            raise click.UsageError(
-                f"{path} is there already: choose another name, or overwrite it with --force"
-            )
-
-
 def _robot_source(
     target: Target, fields: Fields, tested: tuple[str, ...], frequency: float, *, reconnect: bool
 ) -> PackageSource:
+    from gatewayd.cli.rtde.field_choice import USUAL
     from gatewayd.cli.rtde.robot_source import RobotSource
     from gatewayd.rtde.session import TIMESTAMP
 
-    wanted = fields or dict.fromkeys(_usual())
+    wanted = fields or dict.fromkeys(USUAL)
     subscribed = {**dict.fromkeys((TIMESTAMP, *wanted, *tested)), **wanted}
     return RobotSource(*target, subscribed, frequency=frequency, reconnect=reconnect)
 

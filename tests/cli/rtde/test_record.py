@@ -441,6 +441,40 @@ def test_a_running_gateway_is_recorded_without_another_connection(
     program.kill()
 
 
+def test_the_fieldbus_does_not_notice_a_recorder_that_stands_still(
+    plant: Plant, out: Path, tmp_path: Path, recording: Recording
+) -> None:
+    """What it has not read meanwhile it gets afterwards, as far as the gateway keeps it."""
+    simulator = robot(plant, "--program", "demo")
+    socket = tmp_path / "control.sock"
+    plant.daemon(
+        plant.mapping(
+            "writers: {plc: {modbus: 127.0.0.1}}\nvariables:\n"
+            "  part: {robot: input_int_register_0, modbus: 0, owner: plc}\n"
+            "  echo: {robot: output_int_register_0, modbus: 100}\n",
+            simulator.port,
+        ),
+        "--control",
+        str(socket),
+    )
+    plc = plant.ready_plc("127.0.0.1")
+    wait_for(socket.exists, "the control socket")
+    program = recording("--gateway", out, "--socket", socket)
+    wait_for(lambda: _length(out) > 2000, "packages to be recorded")
+    program.signal(signal.SIGSTOP)
+    for value in range(1, 40):
+        assert plc.write_integers(0, value) == 0
+        wait_for(lambda: plc.integers(100) == [value], "the echo")  # noqa: B023 - waited for at once
+    program.signal(signal.SIGCONT)
+    wait_for(lambda: columns(out)["output_int_register_0"][-1] == 39, "the last echo to be recorded")
+    program.signal(signal.SIGINT)
+    assert program.wait() == 0
+    missing(out)
+    program.kill()
+    echoes = columns(out)["output_int_register_0"]
+    assert {float(value) for value in range(1, 40)} <= set(echoes)
+
+
 def test_no_gateway_is_said(tmp_path: Path, out: Path) -> None:
     result = record("--gateway", out, "--socket", tmp_path / "no.sock")
     assert result.exit_code == 2
