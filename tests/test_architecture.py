@@ -351,6 +351,7 @@ WITHOUT_TEST_FILE: dict[str, str] = {
 
 TESTED_TOGETHER = {
     "links.canopen_node.rules": "tests/mapping/test_rules.py",
+    "links.modbus_server.plc.logix": "tests/links/modbus_server/plc/test_logix.py",
     "links.modbus_server.plc.st": "tests/links/modbus_server/plc/test_structured_text.py",
     "links.modbus_server.plc.targets": "tests/links/modbus_server/plc/test_targets.py",
     "links.modbus_server.rules": "tests/mapping/test_rules.py",

@@ -16,6 +16,7 @@ TARGETS: Final[Mapping[str, str]] = {
     "codesys": "CODESYS 3: PLCopen XML, and a table of the channels",
     "twincat": "TwinCAT 3: a file for each object, client TF6250",
     "tia": "TIA Portal: external sources in SCL, client MB_CLIENT",
+    "studio5000": "Studio 5000: data types and routines as L5X, tags as CSV",
     "c": "a C99 header, for soft PLCs and test benches",
 }
 """Name -> what it is for. The module has the name with `_`."""
