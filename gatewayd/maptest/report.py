@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from gatewayd.mapping.compiled import Unreadable
-from gatewayd.maptest.run import FileOutcome, Outcome
+from gatewayd.maptest.run import FileOutcome, MappingTestOutcome
 from gatewayd.maptest.steps import FailedStep
 from gatewayd.report.findings import finding_lines, finding_object
 from gatewayd.report.format import counted, seconds
@@ -117,16 +117,16 @@ def as_junit(report: RunReport) -> str:
 # -- inside -----------------------------------------------------------------------------------------------------------
 
 
-def _failure_text(outcome: Outcome, failure: FailedStep) -> str:
+def _failure_text(outcome: MappingTestOutcome, failure: FailedStep) -> str:
     return f'failed: "{printable(outcome.test.name)}": step {failure.step}: {printable(failure.message)}'
 
 
-def _failure_lines(outcome: Outcome, failure: FailedStep) -> Iterator[str]:
+def _failure_lines(outcome: MappingTestOutcome, failure: FailedStep) -> Iterator[str]:
     yield f"{printable(str(failure.position))}: {_failure_text(outcome, failure)}"
     yield f"    hint: {printable(failure.hint)}"
 
 
-def _test_object(outcome: Outcome) -> dict[str, object]:
+def _test_object(outcome: MappingTestOutcome) -> dict[str, object]:
     return {
         "name": outcome.test.name,
         "line": outcome.test.position.line,
@@ -162,7 +162,7 @@ def _suite(file: FileOutcome) -> ET.Element:
     return suite
 
 
-def _case(file: FileOutcome, outcome: Outcome) -> ET.Element:
+def _case(file: FileOutcome, outcome: MappingTestOutcome) -> ET.Element:
     case = ET.Element(
         "testcase",
         name=printable(outcome.test.name),

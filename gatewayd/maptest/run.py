@@ -15,7 +15,7 @@ from gatewayd.maptest.steps import FailedStep, run_step
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class MappingTestOutcome:
     """What became of one test."""
 
     test: MappingTest
@@ -30,7 +30,7 @@ class Outcome:
         return not self.failures
 
 
-def run_test(definition: CellDefinition, test: MappingTest) -> Outcome:
+def run_test(definition: CellDefinition, test: MappingTest) -> MappingTestOutcome:
     """Carry out a test that passed its check. Never raises for one that did."""
     plant = Plant(definition)
     names = CellNames(definition)
@@ -39,7 +39,7 @@ def run_test(definition: CellDefinition, test: MappingTest) -> Outcome:
         failures = run_step(plant, names, number, step)
         if failures:
             break
-    return Outcome(test, tuple(failures), plant.now)
+    return MappingTestOutcome(test, tuple(failures), plant.now)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class FileOutcome:
     """Errors, for which no test of the file was carried out, and warnings about its tests."""
     tests: int
     """Tests that the file has, carried out or not."""
-    outcomes: tuple[Outcome, ...] = ()
+    outcomes: tuple[MappingTestOutcome, ...] = ()
 
     @property
     def errors(self) -> tuple[Diagnostic, ...]:
@@ -75,7 +75,7 @@ def run_file(loaded: Loaded, chosen: Callable[[str], bool] = lambda _name: True)
         for finding in loaded.diagnostics
         if finding.severity is Severity.ERROR or finding.rule.family == _FAMILY
     )
-    outcomes: tuple[Outcome, ...] = ()
+    outcomes: tuple[MappingTestOutcome, ...] = ()
     if loaded.plan is not None:
         definition = loaded.plan.cell
         outcomes = tuple(run_test(definition, test) for test in tests if chosen(test.name))
