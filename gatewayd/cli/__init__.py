@@ -15,7 +15,7 @@ COMMANDS = {
     "test": "Carry out the tests of mapping files, in simulated time.",
     "diff": "Print what a new mapping file changes.",
     "show": "Print the register table of a mapping file.",
-    "export": "Write the EDS, the DCF or robot program functions of a mapping.",
+    "export": "Write a PLC program, robot program functions, an EDS or a DCF.",
     "simulate": "Simulate a robot controller to connect to.",
     "run": "Serve the cells of mapping files: the daemon.",
     "reload": "Make the running gateway read its mapping files again.",
@@ -27,7 +27,7 @@ COMMANDS = {
     "force": "Force a variable to a value, for commissioning.",
     "unforce": "End a force before its time.",
     "rtde": "Work with a robot's RTDE interface, without a mapping.",
-    "import": "Make a mapping file from another tool's file.",
+    "import": "Make a mapping file from a register list or an RTDE recipe.",
     "completion": "Print the completion script of a shell.",
 }
 """Name -> what the list of commands says. Module `gatewayd.cli.NAME` has the click command as `command`."""
