@@ -31,7 +31,7 @@ ELSEWHERE = {
     r"pip install 'gatewayd\[\w+\]'": "the extras of pyproject.toml, locked in requirements-dev.lock",
     r"\.venv/bin/python docs/examples/.*": "tests/docs/test_examples.py",
     r"gatewayd reload|systemctl reload .*": "tests/e2e/test_reload.py",
-    r"gatewayd simulate .*": "test_simulator_takes_the_options_of_the_guides below, tests/cli/test_simulate.py",
+    r"gatewayd simulate\b.*": "test_simulator_takes_the_options_of_the_guides below, tests/cli/test_simulate.py",
     r"mbpoll -0 -p 1502 -t 4:int -B -r 101 -c 2 127\.0\.0\.1": "tests/demo/test_view.py: the demonstration's own",
     r"mbpoll -0 .*": "tests/docs/test_tutorial.py, with another Modbus client",
     r"make (bench|demo)\b.*": "the Makefile; tests/test_docs.py knows its targets",
