@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -122,16 +122,18 @@ def _command_of_set(export: ExportSet) -> click.Command:
 
 
 def _option(option: ExportOption) -> click.Option:
+    # To click a default of None is a default too, with which no option is missing.
+    default: dict[str, Any] = {} if option.default is None else {"default": option.default}
     return click.Option(
         [option.flag, option.name],
         help=option.help,
         metavar=option.metavar or None,
         type=click.Choice(option.choices) if option.choices else None,
-        default=option.default,
         show_default=option.default is not None,
         required=option.required,
         multiple=option.multiple,
         is_flag=not option.metavar,
+        **default,
     )
 
 

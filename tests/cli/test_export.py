@@ -69,3 +69,60 @@ def test_what_cannot_be_exported_is_explained(arguments: list[str | Path], code:
     done = export(*arguments)
     assert (done.exit_code, done.stdout) == (code, "")
     assert message in done.stderr
+
+
+PLC = ("plc", WATCHED, "--for", "iec-st")
+
+
+def test_a_plc_program_fills_a_folder(tmp_path: Path) -> None:
+    """And says of each file what happened to it."""
+    folder = tmp_path / "plc"
+    assert export(*PLC, "-o", folder).stdout.count(": new\n") == 4
+    assert export(*PLC, "-o", folder).stdout.count(": the same\n") == 4
+    assert b"GW_Inputs" in (folder / "GW_Types.st").read_bytes()
+
+
+def test_what_was_changed_by_hand_is_left_alone(tmp_path: Path) -> None:
+    """Nothing at all is written then."""
+    export(*PLC, "-o", tmp_path)
+    types, blocks = tmp_path / "GW_Types.st", tmp_path / "GW_Blocks.st"
+    types.write_text(types.read_text(encoding="utf-8") + "mine", encoding="utf-8")
+    blocks.unlink()
+    done = export(*PLC, "-o", tmp_path)
+    assert (done.exit_code, done.stdout) == (1, "")
+    assert "GW_Types.st: changed by hand, so nothing was written" in done.stderr
+    assert not blocks.exists()
+    assert export(*PLC, "-o", tmp_path, "--force").exit_code == 0
+    assert "mine" not in types.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "arguments, code, message",
+    [
+        (["plc", TWO_BUSES], 2, "Missing option '--for'"),
+        (["plc", TWO_BUSES, "--for", "step7"], 2, "'step7' is not one of"),
+        (["plc", ROOT / "mappings/canopen-only.yaml", "--for", "iec-st"], 1, "the cell has no Modbus server"),
+        (
+            ["plc", ROOT / "mappings/two-plcs.yaml", "--for", "iec-st"],
+            1,
+            "say which the PLC is, with --writer",
+        ),
+        ([*PLC, "--name", "start"], 1, "write --name OLD=NEW"),
+        ([*PLC, "--name", "start=step"], 1, "`step` is a word of edition 2's language"),
+        ([*PLC, "--prefix", "a-b"], 1, "`a-b` is no prefix"),
+        (
+            ["plc", WATCHED, "--for", "tia", "--host", "gateway.example.org"],
+            1,
+            "TCON_IP_v4 takes an IPv4 address",
+        ),
+        ([*PLC, "-o", "/dev/null/plc"], 2, "cannot be written"),
+    ],
+)
+def test_a_plc_program_that_cannot_be_made(
+    arguments: list[str | Path], code: int, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = export(*arguments)
+    assert (done.exit_code, done.stdout) == (code, "")
+    assert message in done.stderr
+    assert list(tmp_path.iterdir()) == []
