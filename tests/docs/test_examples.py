@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -73,6 +74,18 @@ def test_record(run: Run, tmp_path: Path) -> None:
     first, *rows = (tmp_path / "robot.csv").read_text().splitlines()
     assert first.startswith("timestamp actual_q_0 actual_q_1")
     assert len(rows) == int(counts[1])
+
+
+def test_plot(run: Run, tmp_path: Path) -> None:
+    recording, picture = tmp_path / "robot.csv", tmp_path / "robot.png"
+    run("record", str(recording), "0.1")
+    subprocess.run(
+        [sys.executable, path_of("plot"), recording, picture],
+        env={**os.environ, "MPLBACKEND": "agg", "MPLCONFIGDIR": str(tmp_path)},
+        check=True,
+        timeout=2 * PATIENCE,
+    )
+    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_control_loop(run: Run) -> None:
