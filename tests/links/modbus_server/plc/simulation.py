@@ -1,0 +1,93 @@
+"""Function blocks put into Python statement by statement, with a clock of their own, to be stepped through."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+from gatewayd.links.modbus_server.plc.st.program import ProgramUnit
+
+CYCLE = 10
+"""Milliseconds from call to call."""
+WORDS = (
+    ("<>", "!="),
+    (r"(?<![<>!:=])=(?!=)", "=="),
+    (r"\bAND\b", "and"),
+    (r"\bOR\b", "or"),
+    (r"\bNOT\b", "not"),
+    (r"\bTRUE\b", "True"),
+    (r"\bFALSE\b", "False"),
+)
+
+
+class Timer:
+    """TON."""
+
+    def __init__(self) -> None:
+        self.Q, self.elapsed = False, 0
+
+    def tick(self, running: bool, limit: int) -> None:
+        self.elapsed = self.elapsed + CYCLE if running else 0
+        self.Q = self.elapsed > limit
+
+
+def instance(unit: ProgramUnit, **values: object) -> tuple[Any, Callable[[], None]]:
+    """The variables of a block, and its call."""
+    fields = [field for section in unit.sections for field in section.fields]
+    starts = {"TON": Timer, "BOOL": bool}
+    present = SimpleNamespace(**{field.name: starts.get(field.type.name, int)() for field in fields})
+    vars(present).update(values)
+    names = re.compile(rf"\b({'|'.join(field.name for field in fields)})\b")
+    code = compile("\n".join(_lines(unit, names)), unit.name, "exec")
+
+    def call() -> None:
+        exec(code, {"own": present})  # noqa: S102 - generated here
+
+    return present, call
+
+
+def _lines(unit: ProgramUnit, names: re.Pattern[str]) -> list[str]:
+    lines: list[str] = []
+    open_blocks: list[str] = []
+
+    def put(text: str, less: int = 0) -> None:
+        depth = sum(kind != "CASE" for kind in open_blocks)
+        lines.append("  " * (depth - less) + text)
+
+    for statement in (line.strip().rstrip(";") for line in unit.body):
+        if match := re.match(r"(IF|WHILE) (.*) (?:THEN|DO)$", statement):
+            put(f"{match[1].lower()} {_expression(match[2], names)}:")
+            open_blocks.append(match[1])
+        elif match := re.match(r"ELSIF (.*) THEN$", statement):
+            put(f"elif {_expression(match[1], names)}:", 1)
+        elif match := re.match(r"CASE (.*) OF$", statement):
+            put(f"case = {_expression(match[1], names)}")
+            put("if False: pass")
+            open_blocks.append("CASE")
+        elif match := re.match(r"(\d+): (\w+) := (.*)$", statement):
+            put(f"elif case == {match[1]}: own.{match[2]} = {_expression(match[3], names)}")
+        elif statement == "ELSE":
+            is_case = open_blocks[-1] == "CASE"
+            put("else:", 0 if is_case else 1)
+            open_blocks[-1] = "OTHERWISE" if is_case else open_blocks[-1]
+        elif statement.startswith("END_"):
+            open_blocks.pop()
+        else:
+            put(_simple(statement, names))
+    return lines
+
+
+def _simple(statement: str, names: re.Pattern[str]) -> str:
+    """A call of a timer, or an assignment."""
+    if match := re.match(r"(\w+)\(IN := (.*), PT := (.*)\)$", statement):
+        return f"own.{match[1]}.tick({_expression(match[2], names)}, {_expression(match[3], names)})"
+    target, value = statement.split(" := ")
+    return f"{_expression(target, names)} = {_expression(value, names)}"
+
+
+def _expression(text: str, names: re.Pattern[str]) -> str:
+    for pattern, replacement in WORDS:
+        text = re.sub(pattern, replacement, text)
+    return names.sub(r"own.\1", text)
