@@ -168,12 +168,15 @@ class RtdeClient:
             limited=self._settings.limited or self._lists.limited,
             running=not self._paused,
         )
+        connecting = asyncio.ensure_future(self._connect(settings))
         try:
-            connection = await wait_with_progress(
-                self._connect(settings), self._count, settings.connect_timeout
-            )
+            connection = await wait_with_progress(connecting, self._count, settings.connect_timeout)
         except OSError as error:
             return connect_failure(error, settings.address), 0.0
+        except asyncio.CancelledError:
+            if not connecting.cancelled() and connecting.exception() is None:
+                await connecting.result().close()  # it came about as the wait for it was cancelled
+            raise
         self._connection = connection
         try:
             loss = await connection.done

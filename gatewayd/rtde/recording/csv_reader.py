@@ -45,7 +45,7 @@ class CsvReader:
     def rows(self) -> Iterator[tuple[tuple[Scalar, ...], float | None]]:
         """The packages with their host time."""
         for number, line in self._lines():
-            values = self._values(number, self._cells(line))
+            values = self._values(number, self._cells(number, line))
             packed = values[:-1] if self.host_time else values
             try:
                 self.recipe.pack(packed)
@@ -69,11 +69,15 @@ class CsvReader:
             elif line := line.strip(b"\r\n"):
                 yield number, line
 
-    def _cells(self, line: bytes) -> Sequence[bytes]:
+    def _cells(self, number: int, line: bytes) -> Sequence[bytes]:
         if b'"' not in line:
             return line.split(self._delimiter.encode())
         text = line.decode(errors="backslashreplace")
-        return [cell.encode() for row in csv.reader([text], delimiter=self._delimiter) for cell in row]
+        try:
+            return [cell.encode() for row in csv.reader([text], delimiter=self._delimiter) for cell in row]
+        except csv.Error as error:
+            text = "the line cannot be split into columns; is it a recording of RTDE?"
+            raise self._error(number, text) from error
 
     def _values(self, number: int, cells: Sequence[bytes]) -> tuple[Scalar, ...]:
         if len(cells) != len(self._names):

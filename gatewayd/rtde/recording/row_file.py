@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
+import stat
 from contextlib import suppress
 from itertools import accumulate
 from pathlib import Path
@@ -24,7 +26,8 @@ class RowFile:
     ) -> None:
         """Create the file, with what stands before its rows.
 
-        RecordingExistsError if it is there and not to be overwritten, RecordingError for whatever else is in the way.
+        RecordingExistsError if it is there and not to be overwritten, RecordingError for whatever else is in the way:
+        also another process that writes it.
         """
         self.path = str(path)
         self._flush_every = max(1, flush_every)
@@ -35,15 +38,19 @@ class RowFile:
         """Bytes in the file."""
         self.rows = 0
         """Rows in the file, without those that wait to be flushed."""
-        emptied_or_new = os.O_TRUNC if overwrite else os.O_EXCL
+        new = 0 if overwrite else os.O_EXCL
         try:
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | emptied_or_new, 0o666)
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | new, 0o666)
         except FileExistsError:
             raise RecordingExistsError(self.path) from None
         except (OSError, ValueError) as error:
             raise RecordingWriteError(self.path, error, "cannot be written: {reason}") from error
         try:
+            self._take_over()
             self._write(head)
+        except RecordingError:
+            os.close(self._file)
+            raise
         except OSError as error:
             os.close(self._file)
             raise RecordingWriteError(self.path, error, "cannot be written: {reason}") from error
@@ -81,6 +88,19 @@ class RowFile:
                 self._sync()
         finally:
             os.close(self._file)
+
+    def _take_over(self) -> None:
+        """Lock the file as long as it is open, and empty it. Two that write at once would spoil each other's rows."""
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise RecordingError(
+                f"{self.path}: another recording is writing it; choose another name"
+            ) from error
+        except OSError:
+            pass  # a file system without locks
+        if stat.S_ISREG(os.fstat(self._file).st_mode):
+            os.ftruncate(self._file, 0)
 
     def _write(self, data: bytes) -> None:
         # At its place, not at the end: whoever interrupts this and flushes again writes the same bytes again.

@@ -326,3 +326,19 @@ async def test_a_slow_reader_is_told_what_it_lost(connect: Connect) -> None:
 def test_arguments_that_cannot_be_meant_are_refused(wishes: dict[str, Any], problem: str) -> None:
     with pytest.raises(ValueError, match=problem):
         rtde.connect("127.0.0.1", **wishes)
+
+
+async def test_cancelling_while_it_connects_leaves_no_connection(connect: Connect) -> None:
+    """Also where the connection has just come about: it would set itself up, and hold its claims for ever."""
+    wishes = {"inputs": {"a": ["input_int_register_0"]}}
+    for steps in range(40):
+        robot = connect(**wishes)
+        opening = asyncio.ensure_future(robot.open())
+        for _ in range(steps):
+            await asyncio.sleep(0)
+        opening.cancel()
+        await asyncio.wait((opening,))
+        if not opening.cancelled():
+            await robot.close()
+    async with asyncio.timeout(PATIENCE), connect(**wishes, claim_timeout=PATIENCE) as robot:
+        assert robot.unavailable == ()

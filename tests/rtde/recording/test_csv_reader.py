@@ -42,6 +42,7 @@ def test_whoever_wrote_it(tmp_path: Path, change: object) -> None:
     "text, message",
     [
         ("a b\n1 2\n1\n", "3: 1 column, where the first line has 2"),
+        ('a b\n1\r"2\n', "2: the line cannot be split into columns; is it a recording of RTDE?"),
         ("a b\n1 2 3\n", "2: 3 columns, where the first line has 2"),
         ("a;b\n1;0,5\n", "2: '0,5' in column b is no DOUBLE; correct the cell, or leave out the line"),
         ("a b\n1 \n", "2: '' in column b is no DOUBLE; correct the cell, or leave out the line"),

@@ -94,3 +94,26 @@ def test_what_the_system_reports_at_the_end(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(os, "fsync", refused)
     with pytest.raises(RecordingError, match="may lack its end: Disk quota exceeded"):
         file.close()
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_nobody_overwrites_what_is_being_written(tmp_path: Path, overwrite: bool) -> None:
+    """Neither a second recording with --force, which would spoil both; when the first is closed it may."""
+    path = tmp_path / "x"
+    path.write_bytes(b"former, and longer than what comes\n")
+    if not overwrite:
+        path.unlink()
+    first = RowFile(path, b"head\n", overwrite=overwrite)
+    first.append(b"1\n")
+    with pytest.raises(RecordingError, match="another recording is writing it; choose another name"):
+        RowFile(path, b"other\n", overwrite=True)
+    first.append(b"2\n")
+    first.close()
+    assert path.read_bytes() == b"head\n1\n2\n"
+    RowFile(path, b"other\n", overwrite=True).close()
+    assert path.read_bytes() == b"other\n"
+
+
+def test_a_device_is_taken_as_it_is() -> None:
+    RowFile("/dev/null", b"head\n", overwrite=True).close()
+    RowFile("/dev/null", b"head\n", overwrite=True).close()
