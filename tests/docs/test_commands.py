@@ -6,8 +6,10 @@ import re
 import shlex
 from collections.abc import Iterator
 from contextlib import chdir
+from itertools import takewhile
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner, Result
 
@@ -78,6 +80,34 @@ def test_every_command_is_known() -> None:
         if not RUN.fullmatch(line) and not any(re.fullmatch(known, line) for known in ELSEWHERE)
     ]
     assert not unknown
+
+
+def refusal(line: str) -> str:
+    """What the command says against its arguments, without being carried out; empty if it takes them."""
+    current: click.Command = command
+    arguments = list(takewhile(lambda word: word not in {"|", ">", "&", "&&"}, shlex.split(line)))[1:]
+    context = click.Context(command, info_name="gatewayd")
+    while isinstance(current, click.Group) and arguments and not arguments[0].startswith("-"):
+        name, found, arguments = current.resolve_command(context, arguments)
+        assert found is not None
+        current, context = found, click.Context(found, parent=context, info_name=name)
+    try:
+        current.parse_args(context, list(arguments))
+    except click.exceptions.Exit:
+        return ""
+    except click.UsageError as error:
+        return "" if "does not exist" in error.format_message() else error.format_message()
+    return ""
+
+
+def test_every_command_takes_its_arguments() -> None:
+    """Options, their values and the number of arguments; also of commands that other tests carry out."""
+    refused = [
+        f"{page.name}: {line}: {why}"
+        for page, line in ALL
+        if line.startswith("gatewayd ") and (why := refusal(line))
+    ]
+    assert not refused
 
 
 @pytest.fixture

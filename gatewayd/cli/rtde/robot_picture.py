@@ -26,7 +26,7 @@ class RobotGlimpse:
     timestamp: float = 0.0
     """Of the controller, in seconds."""
     rate: float = 0.0
-    """Packages per second."""
+    """Packages per second; 0: not measured yet."""
     skipped: int = 0
     """Packages that the controller has not sent."""
     lost: str = ""
@@ -65,5 +65,5 @@ def picture(glimpse: RobotGlimpse, before: RobotGlimpse | None, height: int) -> 
 def _head(glimpse: RobotGlimpse) -> str:
     if glimpse.lost:
         return f"{glimpse.address}: everything below is old: {glimpse.lost}"
-    rate = f"{glimpse.rate:.0f} Hz, {glimpse.skipped or 'none'} skipped"
-    return f"{glimpse.address}  {glimpse.timestamp:.3f} s  {rate}"
+    rate = f"{glimpse.rate:.0f} Hz" if glimpse.rate else "measuring the rate"
+    return f"{glimpse.address}  {glimpse.timestamp:.3f} s  {rate}, {glimpse.skipped or 'none'} skipped"

@@ -23,6 +23,11 @@ def test_lines_begin_with_who_and_how_fast() -> None:
     ]
 
 
+def test_a_rate_that_was_not_measured_yet_is_not_shown_as_zero() -> None:
+    new = RobotGlimpse("10.0.0.5:30004", FRESH.values, 7.5)
+    assert plain(new)[0] == "10.0.0.5:30004  7.500 s  measuring the rate, none skipped"
+
+
 def test_what_is_old_says_so() -> None:
     old = RobotGlimpse("10.0.0.5:30004", FRESH.values, lost="connection refused\x1b[2J")
     assert plain(old)[0] == "10.0.0.5:30004: everything below is old: connection refused\\x1b[2J"
