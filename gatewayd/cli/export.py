@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gatewayd.cli.files import load_plan, reason_of
+from gatewayd.cli.output import write_text
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
@@ -193,14 +194,7 @@ def _made(context: click.Context, export: Export, file: str, options: Mapping[st
 
 
 def _write(context: click.Context, output: str, text: str) -> None:
-    from pathlib import Path
-
     if output == STDOUT:
         click.echo(text, nl=False)
-        return
-    try:
-        Path(output).write_text(text, encoding="ascii", newline="\n")
-    except (OSError, ValueError) as error:
-        message = f"{click.format_filename(output)}: cannot be written: {reason_of(error)}"
-        click.echo(printable(message), err=True)
-        context.exit(UNREADABLE)
+    else:
+        write_text(context, output, text, encoding="ascii")

@@ -10,6 +10,7 @@ import click
 
 from gatewayd.cli.files import reason_of
 from gatewayd.cli.importing.defaults import cell_name, listen_address
+from gatewayd.cli.output import refuse_existing, write_text
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
 
@@ -102,8 +103,8 @@ def command(
     from gatewayd.cli.importing.register_list.mapping import ListSettings
     from gatewayd.cli.importing.register_list.proposal import proposal
 
-    if out is not None and not force and Path(out).exists():
-        raise click.UsageError(f"{click.format_filename(out)} exists; overwrite it with --force")
+    if out is not None:
+        refuse_existing(out, overwrite=force)
     name = "stdin" if file == "-" else Path(file).name
     known = dict(map(_writer, writers))
     settings = ListSettings(
@@ -121,8 +122,10 @@ def command(
         why = "" if found.text is None else ": doubts count as errors with --strict"
         click.echo(f"nothing was written{why}", err=True)
         context.exit(FOUND)
-    _write(context, found.text, out)
-    if out is not None:
+    if out is None:
+        click.echo(found.text, nl=False)
+    else:
+        write_text(context, out, found.text)
         remark = f", {counted(doubts, 'doubt')}" if doubts else ""
         click.echo(printable(f"{out}: {counted(found.variables, 'variable')}{remark}"))
 
@@ -154,16 +157,3 @@ def _print_findings(file: str, findings: Sequence[ListFinding]) -> None:
         click.echo(printable(f"{place}: {kind}: {finding.text}"), err=True)
         if finding.hint:
             click.echo(printable(f"    hint: {finding.hint}"), err=True)
-
-
-def _write(context: click.Context, text: str, out: str | None) -> None:
-    if out is None:
-        click.echo(text, nl=False)
-        return
-    try:
-        Path(out).write_text(text, encoding="utf-8", newline="\n")
-    except (OSError, ValueError) as error:
-        click.echo(
-            printable(f"{click.format_filename(out)}: cannot be written: {reason_of(error)}"), err=True
-        )
-        context.exit(WRONG)

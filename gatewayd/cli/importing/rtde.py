@@ -10,6 +10,7 @@ import click
 
 from gatewayd.cli.files import reason_of
 from gatewayd.cli.importing.defaults import cell_name, listen_address
+from gatewayd.cli.output import refuse_existing, write_text
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
 
@@ -89,8 +90,8 @@ def command(
     """
     from gatewayd.cli.importing.recipe import ImportSettings, imported, mapping_text
 
-    if out is not None and not force and Path(out).exists():
-        raise click.UsageError(f"{click.format_filename(out)} exists; overwrite it with --force")
+    if out is not None:
+        refuse_existing(out, overwrite=force)
     fields, findings = imported(_recipes(context, file, keys))
     for finding in findings:
         click.echo(printable(str(finding)), err=True)
@@ -146,11 +147,7 @@ def _write(context: click.Context, text: str, out: str | None) -> None:
     if out is None:
         click.echo(text, nl=False)
         return
-    try:
-        Path(out).write_text(text, encoding="utf-8", newline="\n")
-    except (OSError, ValueError) as error:
-        click.echo(printable(f"{out}: cannot be written: {reason_of(error)}"), err=True)
-        context.exit(WRONG)
+    write_text(context, out, text)
     warnings = len(loaded.diagnostics)
     remark = f"; {counted(warnings, 'warning')}, see: gatewayd check {out}" if warnings else ""
     click.echo(printable(f"{out}: {counted(len(loaded.plan.cell.variables), 'variable')}{remark}"))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gatewayd.cli.files import reason_of
-from gatewayd.cli.rtde.recordings import FAILED, WRONG, Progress, delimiter_option, reported
+from gatewayd.cli.output import refuse_existing, write_bytes
+from gatewayd.cli.rtde.recordings import FAILED, Progress, delimiter_option, reported
 from gatewayd.report.format import counted, listed
 from gatewayd.report.printable import printable
 
@@ -103,7 +103,7 @@ def command(
         above = title if title is not None else ", ".join(drawn)
         label = " or ".join(sorted({time_label(recipe, host_time=host_time) for recipe, host_time in heads}))
         picture = draw(form, panels, drawn, title=above, time_label=label)
-    _save(context, target, picture)
+    write_bytes(context, target, picture)
     click.echo(printable(f"{target}: {counted(len(panels), 'panel')}, {counted(packages, 'package')}"))
 
 
@@ -115,8 +115,7 @@ def _target(files: Sequence[str], out: str | None, *, force: bool) -> tuple[Path
     form = _FORMS.get(target.suffix.lower())
     if form is None:
         raise click.UsageError(f"{target.name!r} is no picture that can be drawn: name it .png, .svg or .pdf")
-    if target.exists() and not force:
-        raise click.UsageError(f"{click.format_filename(target)} exists; overwrite it with --force")
+    refuse_existing(target, overwrite=force)
     return target, form
 
 
@@ -171,11 +170,3 @@ def _watched(recording: RecordingReader, progress: Progress) -> Iterator[Row]:
         if number % _TOGETHER == 0:
             progress(recording, number)
         yield row
-
-
-def _save(context: click.Context, target: Path, picture: bytes) -> None:
-    try:
-        target.write_bytes(picture)
-    except OSError as error:
-        click.echo(printable(f"{target}: cannot be written: {reason_of(error)}"), err=True)
-        context.exit(WRONG)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gatewayd.cli.output import refuse_existing
 from gatewayd.cli.remote import DURATION, cell_option, refusals
 from gatewayd.cli.rtde.recordings import FAILED, WRONG, delimiter_option, reported
 from gatewayd.report.printable import printable
@@ -158,10 +159,10 @@ def command(
         conditions_of,
         default_name,
         fields_of,
-        refuse_existing,
         target_of,
     )
     from gatewayd.cli.rtde.recorder import RecordingOrder
+    from gatewayd.rtde.recording.gaps import SUFFIX
 
     if gateway and out is None:
         host, out = None, host
@@ -181,7 +182,8 @@ def command(
         before=before or 0.0,
         after=after or 0.0,
     )
-    refuse_existing(order.path, overwrite=force)
+    # The file itself is created so that none is overwritten in between; this is asked before anybody else is.
+    refuse_existing(order.path, f"{order.path}{SUFFIX}", overwrite=force)
     making = (
         partial(_gateway_source, socket, cell, fields, reconnect=reconnect)
         if target is None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 
 import click
 
@@ -11,7 +10,6 @@ from gatewayd.cli.rtde.conditions import Condition
 from gatewayd.cli.rtde.field_choice import Fields, named, of_file
 from gatewayd.cli.rtde.target import TARGET, Target
 from gatewayd.cli.rtde.triggers import Conditions
-from gatewayd.rtde.recording.gaps import SUFFIX
 from gatewayd.rtde.session import TIMESTAMP
 
 
@@ -74,12 +72,3 @@ def default_name(host: str, *, binary: bool) -> str:
     """`rtde-192.168.1.10-20261129-141500.csv`, in the present directory."""
     safe = "".join(letter if letter.isalnum() or letter in ".-_" else "-" for letter in host)
     return f"rtde-{safe}-{time.strftime('%Y%m%d-%H%M%S')}{'.bin' if binary else '.csv'}"
-
-
-def refuse_existing(path: str, *, overwrite: bool) -> None:
-    """Before anybody is asked for anything; the file itself is created so that none is overwritten in between."""
-    for name in (path, f"{path}{SUFFIX}"):
-        if not overwrite and Path(name).exists():
-            raise click.UsageError(
-                f"{name} is there already: choose another name, or overwrite it with --force"
-            )

@@ -100,7 +100,7 @@ def test_an_existing_file_wants_force(recipe: Path, tmp_path: Path) -> None:
     out.write_text("precious")
     done = import_rtde(recipe, *WRITER, "-o", out)
     assert (done.exit_code, out.read_text()) == (2, "precious")
-    assert "exists; overwrite it with --force" in done.stderr
+    assert "is there already; choose another name, or overwrite it with --force" in done.stderr
     assert import_rtde(recipe, *WRITER, "-o", out, "--force").exit_code == 0
 
 

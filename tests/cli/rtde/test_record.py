@@ -179,7 +179,7 @@ def test_nothing_is_overwritten_unless_that_is_wanted(plant: Plant, out: Path) -
     out.write_text("precious")
     result = record(place(simulator), out)
     assert result.exit_code == 2
-    assert "is there already: choose another name, or overwrite it with --force" in " ".join(
+    assert "is there already; choose another name, or overwrite it with --force" in " ".join(
         result.output.split()
     )
     assert out.read_text() == "precious"
