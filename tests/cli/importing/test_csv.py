@@ -55,8 +55,9 @@ def test_a_list_becomes_a_mapping_that_passes_the_check(listed: Path, tmp_path: 
     made = tmp_path / "press.yaml"
     done = import_csv(listed, *HOST, *WRITER, "--series", "e", "-o", made)
     assert done.exit_code == 0
-    assert done.stdout == f"{made}: 5 variables, 1 doubt\n"
+    assert done.stdout == f"{made}: 5 variables, 2 doubts\n"
     assert f"{listed}:4:1: doubt: the list names no field of the robot" in done.stderr
+    assert f"{listed}:7:15: doubt: no byte order is said" in done.stderr
     assert "cell: press-3\n" in made.read_text()
     assert gatewayd("check", made).exit_code == 0
 

@@ -8,6 +8,8 @@ from typing import Final
 
 _PLAIN = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?", re.ASCII)
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
+"""Where decimals may have a comma, 1.500 may be one and a half or fifteen hundred."""
 _HEX = re.compile(
     r"(?:0[xX]|16#|\$)(?P<after>[0-9A-Fa-f]{1,4})|(?P<before>[0-9][0-9A-Fa-f]{0,3})[hH]", re.ASCII
 )
@@ -71,6 +73,8 @@ class NotReadable(Exception):
 
 def real(text: str, *, comma: bool) -> float:
     """A number; with `comma` a comma may stand before the decimals. Raises NotReadable."""
+    if comma and _THOUSANDS.fullmatch(text):
+        raise NotReadable(f"write {text.replace('.', '')} or {text.replace('.', ',')}: it may be either")
     if _PLAIN.fullmatch(text):
         return float(text)
     if comma and _COMMA.fullmatch(text):

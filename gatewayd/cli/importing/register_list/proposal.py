@@ -67,14 +67,14 @@ def _with_writers(
         return replace(settings, writers={})
     named = owners(found)
     missing = [name for name in named if name not in settings.writers]
-    if missing:
-        first = next(place for place in found if missing[0] in place.row.text("owner"))
-        text = f"the address of the writer `{missing[0]}` is not known"
-        findings.error(first.row.place("owner"), text, f"--writer {missing[0]}=ADDRESS")
-    elif not settings.writers:
+    for name in missing:
+        first = next(place for place in found if name in owners([place]))
+        text = f"the address of the writer `{name}` is not known"
+        findings.error(first.row.place("owner"), text, f"--writer {name}=ADDRESS")
+    if not missing and not settings.writers:
         text = "the PLC writes this, and its address is not known"
         findings.error(inputs[0].row.place("name"), text, "--writer ADDRESS, which names it plc")
-    elif not named and len(settings.writers) > 1:
+    elif not missing and not named and len(settings.writers) > 1:
         text = "the list does not say which writer owns this"
         findings.error(inputs[0].row.place("name"), text, "add a column `owner`, or give one --writer")
     return settings

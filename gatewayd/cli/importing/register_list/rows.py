@@ -81,11 +81,16 @@ class _RowReader:
 
     def place(self, row: ListRow) -> ListedPlace | None:
         """None with an error where a cell cannot be understood."""
+        if row.text("canopen"):
+            only = not row.text("address") and not row.text("notation")
+            hint = "delete the row: it has no register" if only else "delete the columns for CANopen"
+            self._error(row, "canopen", "CANopen objects are not imported", hint)
+            return None
         before = self._findings.errors
         name, found = self._name(row), self._address(row)
         area = self._area(row, found)
-        kind = self._type(row, area)
         part = self._part(row, found)
+        kind = self._type(row, area, part)
         place = ListedPlace(
             row=row,
             name=name,
@@ -95,15 +100,13 @@ class _RowReader:
             address=found.number if found is not None else 0,
             part=part,
             type="bit" if area in BIT_AREAS or (part and kind in ("", "bool", "bit")) else kind,
-            order=self._read(row, "order", numbers.word_order) or "",
+            order=self._order(row, kind, area),
             scale=self._number(row, "scale"),
             offset=self._number(row, "offset"),
             limits=self._limits(row),
             lease=self._number(row, "lease"),
         )
         self._names(row)
-        if row.text("canopen"):
-            self._error(row, "canopen", "CANopen objects are not imported", "delete the columns for CANopen")
         return place if self._findings.errors == before else None
 
     def _name(self, row: ListRow) -> str:
@@ -194,10 +197,10 @@ class _RowReader:
             self._error(row, column, text, "correct one of them")
         return named[0] if named else "holding"
 
-    def _type(self, row: ListRow, area: str) -> str:
+    def _type(self, row: ListRow, area: str, part: str) -> str:
         words = self._read(row, "words", numbers.whole) if row.text("words") else None
         if not row.text("type"):
-            return ""
+            return "" if part or area in BIT_AREAS else self._untyped(row, words)
         found = self._read(row, "type", numbers.number_type)
         if found is None:
             return ""
@@ -208,6 +211,27 @@ class _RowReader:
             text = f"{kind} has {counted(WORDS[kind], 'register')}, the list says {words}"
             self._error(row, "words", text, "correct the type or the length")
         return kind
+
+    def _untyped(self, row: ListRow, words: int | None) -> str:
+        """The type where the list has none: the usual one of the robot's field, or a whole number of that length."""
+        kind = "" if words is None else {1: "int16", 2: "int32", 4: "int64"}.get(words, "")
+        taken = kind or "the usual one of the robot's field"
+        text = f"no type is said: {taken} is taken"
+        self._findings.repeated_doubt(
+            row.place("address"), text, "add a column `type`: uint16, int32, float32 ..."
+        )
+        return kind
+
+    def _order(self, row: ListRow, kind: str, area: str) -> str:
+        """Empty where there is nothing to order, or where the usual one is taken, which is a doubt."""
+        order = self._read(row, "order", numbers.word_order) or ""
+        if not row.text("order") and area not in BIT_AREAS and WORDS.get(kind, 1) > 1:
+            self._findings.repeated_doubt(
+                row.place("type"),
+                "no byte order is said: ABCD is taken, the high word first",
+                "add a column `byte order`: ABCD, or CDAB where the low word is first",
+            )
+        return order
 
     def _settled(self, row: ListRow, kind: str, words: int | None) -> str:
         """A type whose name alone does not say how long it is."""

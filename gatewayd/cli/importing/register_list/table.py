@@ -18,6 +18,8 @@ MAX_CELL: Final = 2000
 _DELIMITERS: Final = ",;\t|"
 _HEAD_WITHIN: Final = 50
 """The head line is among the first so many lines that are not empty: titles may be before it."""
+_END: Final = "\x1a"
+"""A line of its own behind the list: where it belongs to a cell, a quotation mark is not closed."""
 _MARKS: Final = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 
 
@@ -28,6 +30,8 @@ class ListCell:
     text: str
     line: int
     column: int
+    goes_on: bool = False
+    """Whether it goes on in further lines of the file."""
 
     @property
     def place(self) -> tuple[int, int]:
@@ -111,20 +115,25 @@ def _places(text: str, wanted: object) -> Iterator[tuple[int, int]]:
 def _records(text: str, delimiter: str) -> list[list[ListCell]]:
     """The records with anything in them, as many as a list may have and some more; none where this is no CSV."""
     lines = text.splitlines()
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=False)
+    reader = csv.reader(io.StringIO(f"{text}\n{_END}", newline=""), delimiter=delimiter, strict=False)
     records: list[list[ListCell]] = []
     before = 0
     try:
         for record in reader:
             if len(record) > MAX_COLUMNS:
                 return []
-            if not any(record):
+            if not any(record) or record == [_END]:
                 before = reader.line_num
                 continue
             starts = _starts(lines[before], delimiter) if before < len(lines) else []
             records.append(
                 [
-                    ListCell(" ".join(cell.split()), before + 1, starts[index] if index < len(starts) else 1)
+                    ListCell(
+                        " ".join(cell.split()),
+                        before + 1,
+                        starts[index] if index < len(starts) else 1,
+                        goes_on=reader.line_num > before + 1 and "\n" in cell,
+                    )
                     for index, cell in enumerate(record)
                 ]
             )
@@ -183,6 +192,12 @@ def _table(
 def _row(columns: Sequence[str], record: Sequence[ListCell], findings: ListFindings) -> ListRow:
     cells: dict[str, ListCell] = {}
     for index, cell in enumerate(record):
+        if cell.text.endswith(_END):
+            text = "a quotation mark is not closed: all that follows would be this cell"
+            findings.error(cell.place, text, "close it, or write it twice where it belongs to the text")
+        elif cell.goes_on:
+            text = "a text in quotation marks goes on in the next line"
+            findings.repeated_doubt(cell.place, text, "see whether rows are missing: a quotation mark may be")
         if len(cell.text) > MAX_CELL:
             findings.error(
                 cell.place, f"more than {MAX_CELL} characters in one cell", "see the quotation marks"

@@ -57,6 +57,9 @@ def _variables(found: Sequence[ListedPlace], findings: ListFindings) -> list[tup
             findings.error(
                 place.row.place("name"), f"`{place.name}` is in line {line} already", "give it another name"
             )
+        if any(not place.row.text("robot") and place.area == other.area for other in known):
+            text = f"`{place.name}` is in line {known[0].row.line} already: one value at two addresses"
+            findings.doubt(place.row.place("name"), text, "give it another name if that is another value")
         known.append(place)
         last = place.name
     return [tuple(rows) for rows in made.values()]

@@ -18,6 +18,13 @@ def test_numbers(text: str, value: float, *, comma: bool) -> None:
     assert numbers.real(text, comma=comma) == value
 
 
+def test_thousands_and_decimals_that_look_alike_are_refused() -> None:
+    with pytest.raises(NotReadable, match="write 1500 or 1,500"):
+        numbers.real("1.500", comma=True)
+    assert numbers.real("0.001", comma=True) == 0.001
+    assert numbers.real("1.500", comma=False) == 1.5
+
+
 @pytest.mark.parametrize("text", ["0,1", "1.000,5", "1,000.5", "1'000", "½", "nan", "inf", "", "٣"])
 def test_what_may_be_another_number_is_refused(text: str) -> None:
     with pytest.raises(NotReadable):

@@ -152,6 +152,7 @@ def test_what_may_be_meant_otherwise_is_a_doubt_said_once() -> None:
         (2, 12, "limits are taken as of the value, not of the raw number (and 2 more)"),
         (4, 3, "five digits are taken as an address with the area before it: 40001 is holding register 0"),
         (4, 9, "`FLOAT` is taken as float32, as in IEC 61131-3"),
+        (4, 9, "no byte order is said: ABCD is taken, the high word first"),
     ]
 
 
@@ -168,6 +169,46 @@ def test_a_list_of_inputs_needs_the_address_of_its_writer() -> None:
     assert (
         errors(made(alone, "from-0", writers={}))[0][2] == "the PLC writes this, and its address is not known"
     )
+
+
+def test_every_writer_without_an_address_is_named() -> None:
+    text = "name,address,type,access,owner\na,1,int16,W,hmi\nb,2,int16,W,panel > line\n"
+    assert errors(made(text, "from-0")) == [
+        (2, 13, "the address of the writer `hmi` is not known"),
+        (3, 13, "the address of the writer `line` is not known"),
+        (3, 13, "the address of the writer `panel` is not known"),
+    ]
+
+
+@pytest.mark.parametrize(
+    "head, row, doubt",
+    [
+        ("type", "int32", "no byte order is said: ABCD is taken, the high word first"),
+        ("type,order", "int32,CDAB", None),
+        ("type", "int16", None),
+        ("length", "1", "no type is said: int16 is taken"),
+        ("length,order", "2,CDAB", "no type is said: int32 is taken"),
+        ("comment", "x", "no type is said: the usual one of the robot's field is taken"),
+    ],
+)
+def test_what_the_list_does_not_say_of_a_number_is_a_doubt(head: str, row: str, doubt: str | None) -> None:
+    found = made(f"name,address,access,robot,{head}\na,1,R,output_int_register_0,{row}\n", "from-0")
+    assert found.text is not None
+    assert [text for *_, text in doubts(found) if "GW703" not in text] == ([doubt] if doubt else [])
+
+
+def test_one_name_at_two_registers_is_a_doubt_unless_the_robots_field_is_said() -> None:
+    text = "name,address,type,access\na,1,int16,R\na,2,int16,R\n"
+    assert (3, 1, "`a` is in line 2 already: one value at two addresses") in doubts(made(text, "from-0"))
+    said = "name,address,type,access,robot\na,1,int16,R,runtime_state\na,2,int16,R,runtime_state\n"
+    assert not any("already" in text for *_, text in doubts(made(said, "from-0")))
+
+
+def test_a_row_with_an_object_alone_says_that_the_row_has_to_go() -> None:
+    text = "name,address,type,access,object\na,,int16,R,2000h:01\nb,1,int16,R,2000h:02\n"
+    found = made(text, "from-0")
+    hints = [finding.hint for finding in found.findings if "CANopen" in finding.text]
+    assert hints == ["delete the row: it has no register", "delete the columns for CANopen"]
 
 
 def test_of_very_many_errors_the_first_are_listed() -> None:

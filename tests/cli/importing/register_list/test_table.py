@@ -29,6 +29,16 @@ def test_a_cell_may_have_several_lines() -> None:
     assert rows[1]["name"] == ("b", 4, 1)
 
 
+def test_a_quotation_mark_that_is_not_closed_swallows_no_rows() -> None:
+    _, findings = read('name,comment,address\na,"one,7\nb,two,8\n')
+    assert findings == ["a quotation mark is not closed: all that follows would be this cell"]
+
+
+def test_rows_between_two_quotation_marks_are_a_doubt() -> None:
+    _, findings = read('name,address,comment\na,7,"one\nb,8,"two"\nc,9,\n')
+    assert findings == ["a text in quotation marks goes on in the next line"]
+
+
 def test_titles_before_the_head_and_empty_lines_are_passed_over() -> None:
     rows, findings = read("Press 3\n\n;;\nName;Adresse\n;;\na;1\n")
     assert len(rows) == 1
