@@ -20,7 +20,7 @@ from tests.sources import MODULES, ROOT, nodes, tree
 LINK = {
     "core",
     "doctor.machine",
-    "doctor.way",
+    "doctor.route",
     "links.contract",
     "links.examination",
     "links.exports",
@@ -115,7 +115,7 @@ LAYERS: dict[str, set[str]] = {
         "report",
     },
     "doctor.machine": {"doctor.machine", "loop"},
-    "doctor.way": {"doctor.machine", "links.examination"},
+    "doctor.route": {"doctor.machine", "links.examination"},
     "service": {
         "control",
         "core",

@@ -74,10 +74,10 @@ def advice_text(report: DoctorReport) -> Iterator[str]:
     advice = report.advice
     if advice:
         yield "What to do, the most important first:"
-    for number, one in zip(count(1), advice, strict=False):
-        seen = one.observation
-        where = f"{listed(one.cells, _LISTED)}, " if one.cells else ""
-        yield printable(f"{number:>3}. {where}{one.link}: {seen.text}")
+    for number, item in zip(count(1), advice, strict=False):
+        seen = item.observation
+        where = f"{listed(item.cells, _LISTED)}, " if item.cells else ""
+        yield printable(f"{number:>3}. {where}{item.link}: {seen.text}")
         if seen.cause:
             yield printable(f"     cause:  {seen.cause}")
         if seen.remedy:
@@ -89,7 +89,7 @@ def _summary(report: DoctorReport, advice: Sequence[Advice]) -> str:
     skipped = sum(line.observation.outcome is Outcome.SKIPPED for line in report.lines)
     made = counted(len(report.lines) - skipped, "check")
     parts = [made, *([f"{skipped} not made"] if skipped else [])]
-    found = {outcome: sum(one.observation.outcome is outcome for one in advice) for outcome in _ORDER}
+    found = {outcome: sum(item.observation.outcome is outcome for item in advice) for outcome in _ORDER}
     said = ", ".join(counted(number, outcome.value) for outcome, number in found.items() if number)
     return f"{', '.join(parts)}: {said or 'nothing to do'}"
 
@@ -111,8 +111,8 @@ def as_json(report: DoctorReport) -> str:
             for line in report.lines
         ],
         "advice": [
-            {"cells": list(one.cells), "link": one.link, **_as_object(one.observation)}
-            for one in report.advice
+            {"cells": list(item.cells), "link": item.link, **_as_object(item.observation)}
+            for item in report.advice
         ],
     }
     return json_document(document)

@@ -10,7 +10,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Value
 from gatewayd.core.refusal import Refusal
 from gatewayd.core.requester import Requester, new_connection
-from gatewayd.maptest.chronicle import Chronicle
+from gatewayd.maptest.explanation import Explanation
 from gatewayd.maptest.robot import PlantRobot, typed
 
 TICK = 0.02
@@ -25,7 +25,7 @@ class Plant:
 
     def __init__(self, definition: CellDefinition) -> None:
         self.cell = Cell(definition)
-        self.chronicle = Chronicle(self.cell)
+        self.explanation = Explanation(self.cell)
         self.robot = PlantRobot(self.cell)
         self._microseconds = 0
         self._peers: dict[int, Requester] = {}

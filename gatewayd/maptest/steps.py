@@ -13,7 +13,7 @@ from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Part
 from gatewayd.mapping.testing import FREE, OPERATOR_NAME, StepSpec, action_of
 from gatewayd.maptest.actions import CellNames, act, reason_of
-from gatewayd.maptest.chronicle import Chronicle
+from gatewayd.maptest.explanation import Explanation
 from gatewayd.maptest.plant import Plant
 from gatewayd.report.format import exact
 
@@ -46,7 +46,7 @@ def run_step(plant: Plant, names: CellNames, number: int, part: Part[StepSpec]) 
         plant.wait(step.after, [names.writers[name] for name in step.alive or ()])
     refusal = act(plant, names, step)
     found = [*_answers(plant, names, part, refusal), *_mismatches(plant, names, part)]
-    return [FailedStep(one.position, number, one.message, one.hint) for one in found]
+    return [FailedStep(step.position, number, step.message, step.hint) for step in found]
 
 
 def value_of(plant: Plant, index: int) -> Value:
@@ -81,7 +81,7 @@ def _answers(
         message = f"expected the request to be refused ({step.refused}), but it was accepted"
         yield _Found(part.at("refused"), message, _after(plant, names, step))
         return
-    said = plant.chronicle.refusal(refusal)
+    said = plant.explanation.refusal(refusal)
     if step.refused is None:
         place, message = part.key_at(action_of(step) or ""), f"the request was refused: {said}"
     else:
@@ -95,7 +95,7 @@ def _answers(
 def _after(plant: Plant, names: CellNames, step: StepSpec) -> str:
     """Who owns what a request was about, now that it was accepted."""
     asked = [*(step.write or step.force or ()), *(step.take or step.release or ())]
-    owners = dict.fromkeys(plant.chronicle.owner(lock) for lock in names.locks(asked))
+    owners = dict.fromkeys(plant.explanation.owner(lock) for lock in names.locks(asked))
     return f"after it: {', '.join(owners)}" if owners else "remove `refused`"
 
 
@@ -107,8 +107,8 @@ class _Comparison(NamedTuple):
     same: Callable[[Any, Any], bool]
     subject: str
     """What is compared, with the place of the name."""
-    circumstances: Callable[[Chronicle, int], str]
-    hint: Callable[[Chronicle, int], str]
+    circumstances: Callable[[Explanation, int], str]
+    hint: Callable[[Explanation, int], str]
 
 
 def _same_value(value: Value, expected: Value) -> bool:
@@ -120,12 +120,12 @@ def _same_word(value: str, expected: str) -> bool:
 
 
 _COMPARED: Final = {
-    "expect": _Comparison(value_of, _same_value, "{}", Chronicle.circumstances, Chronicle.hint),
+    "expect": _Comparison(value_of, _same_value, "{}", Explanation.circumstances, Explanation.hint),
     "owner": _Comparison(
-        owner_of, _same_word, "the owner of {} to be", Chronicle.circumstances, Chronicle.hint
+        owner_of, _same_word, "the owner of {} to be", Explanation.circumstances, Explanation.hint
     ),
     "quality": _Comparison(
-        quality_of, _same_word, "the quality of {} to be", Chronicle.source, Chronicle.quality_hint
+        quality_of, _same_word, "the quality of {} to be", Explanation.source, Explanation.quality_hint
     ),
 }
 """By key of a step."""
@@ -139,9 +139,9 @@ def _mismatches(plant: Plant, names: CellNames, part: Part[StepSpec]) -> Iterato
             value = compared.present(plant, index)
             if not compared.same(value, expected):
                 subject = compared.subject.format(name)
-                why = compared.circumstances(plant.chronicle, index)
+                why = compared.circumstances(plant.explanation, index)
                 message = f"expected {subject} {_text(expected)}, is {_text(value)} ({why})"
-                yield _Found(part.at(key, name), message, compared.hint(plant.chronicle, index))
+                yield _Found(part.at(key, name), message, compared.hint(plant.explanation, index))
 
 
 def _text(value: object) -> str:

@@ -40,7 +40,7 @@ def bind_failure(host: str, port: int) -> OSError | None:
     return None
 
 
-async def connect_failure(addresses: list[str], port: int, patience: float) -> OSError | None:
+async def connect_error(addresses: list[str], port: int, patience: float) -> OSError | None:
     """Why none of the addresses accepts a connection at the port; None: one does. It is closed at once."""
     failure: OSError = OSError(errno.EADDRNOTAVAIL, "no address")
     for address in addresses:

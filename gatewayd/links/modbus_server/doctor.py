@@ -10,7 +10,7 @@ from functools import partial
 from gatewayd.core.definition import CellDefinition
 from gatewayd.doctor.machine.ports import bind_failure, holder, listening_inodes
 from gatewayd.doctor.machine.privileges import NET_BIND_SERVICE, first_unprivileged_port, has_capability
-from gatewayd.doctor.way import way_to
+from gatewayd.doctor.route import look_up_route
 from gatewayd.links.examination import Examination, Observation, Surroundings
 from gatewayd.links.modbus_server import diagnosis
 from gatewayd.links.modbus_server.declaration import KIND
@@ -65,7 +65,7 @@ def _clients(plan: ModbusPlan, cell: CellDefinition) -> Iterator[Observation]:
     for network, writer in plan.writers:
         if network.num_addresses == 1 and not network.is_loopback:
             name = cell.writers[writer].name
-            for found in way_to(str(network.network_address), name):
+            for found in look_up_route(str(network.network_address), name):
                 yield diagnosis.of_client(found, name, str(network.network_address))
 
 

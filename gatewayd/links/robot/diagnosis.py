@@ -122,7 +122,7 @@ def outputs(
     session: Session, plan: RobotPlan, cell: CellDefinition, read: Collection[str]
 ) -> Iterator[Observation]:
     """Every output of the mapping, and the inputs in `read`, which are read back: what of them is missing or other."""
-    refused = {one.field: one.word for one in session.unavailable if one.output}
+    refused = {item.field: item.word for item in session.unavailable if item.output}
     wanted = (*plan.outputs, *read)
     missing = [name for name in wanted if refused.get(name) == NOT_FOUND]
     for name in missing:
@@ -234,7 +234,7 @@ def rate(visited: Visit, session: Session) -> Observation:
     return Observation.well("data", text)
 
 
-def said(texts: Sequence[TextMessage]) -> Iterator[Observation]:
+def text_messages(texts: Sequence[TextMessage]) -> Iterator[Observation]:
     """The controller's last texts, each once."""
     for text in list(dict.fromkeys(texts))[-_TEXTS:]:
         level = {each.value: each.name.lower() for each in TextLevel}.get(text.level, f"level {text.level}")

@@ -12,8 +12,8 @@ from collections.abc import AsyncIterator, Collection, Iterator, Sequence
 
 from gatewayd.core.definition import CellDefinition
 from gatewayd.doctor.machine.addresses import resolved
-from gatewayd.doctor.machine.ports import connect_failure
-from gatewayd.doctor.way import way_to
+from gatewayd.doctor.machine.ports import connect_error
+from gatewayd.doctor.route import look_up_route
 from gatewayd.links.examination import Examination, Observation, Outcome, RunningCell, Surroundings
 from gatewayd.links.robot import diagnosis
 from gatewayd.links.robot.companions import all_inputs, all_outputs
@@ -48,10 +48,10 @@ class RobotExamination(Examination):
             yield _unresolved(plan, error)
             return
         yield Observation.well("name", _name(plan.host, addresses))
-        for found in way_to(addresses[0], "the robot"):
+        for found in look_up_route(addresses[0], "the robot"):
             yield found
         where = address(plan.host, plan.port)
-        failure = await connect_failure(addresses, plan.port, CONNECT)
+        failure = await connect_error(addresses, plan.port, CONNECT)
         if failure is not None:
             yield diagnosis.port_refused(failure, where)
             return
@@ -84,7 +84,7 @@ async def _met(
             yield found
         if not probe and len(own) < len(inputs):
             yield _not_probed(len(inputs) - len(own))
-    for found in diagnosis.said(visited.texts):
+    for found in diagnosis.text_messages(visited.texts):
         yield found
     for package in visited.strange:
         yield Observation("package", Outcome.NOTE, f"could not be used: {package.reason}")
@@ -176,7 +176,7 @@ def own_claims(plan: RobotPlan, serving: Sequence[RunningCell]) -> set[str]:
     fields: set[str] = set()
     for cell in serving:
         inputs = (variable for variable in cell.variables if variable.get("direction") == "input")
-        fields |= {field_of(str(variable.get("robot", ""))) for variable in inputs}
+        fields |= {carrier_of(str(variable.get("robot", ""))) for variable in inputs}
         feeds = any(link.get("watchdog") is not None for link in cell.links(KIND.title))
         if feeds and plan.watchdog is not None:
             fields.add(plan.watchdog.field)
@@ -184,7 +184,7 @@ def own_claims(plan: RobotPlan, serving: Sequence[RunningCell]) -> set[str]:
     return fields | {name for name in types if name is not None}
 
 
-def field_of(name: str) -> str:
+def carrier_of(name: str) -> str:
     """The field of `input_int_register_3`, `input_bit_register_5`, `target_q[2]`, `speed_slider_mask.0`."""
     field = name.partition("[")[0].partition(".")[0]
     side, _, number = field.partition("_bit_register_")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.doctor.machine.ports import bind_failure, connect_failure, holder, listening_inodes
+from gatewayd.doctor.machine.ports import bind_failure, connect_error, holder, listening_inodes
 from tests.e2e.processes import HOST, free_port
 
 
@@ -50,7 +50,7 @@ def test_an_address_of_another_machine_cannot_be_had(host: str, number: int | No
 
 async def test_who_accepts_is_connected_to_once_and_left() -> None:
     with socket.create_server((HOST, free_port())) as server:
-        assert await connect_failure([HOST], server.getsockname()[1], 5) is None
+        assert await connect_error([HOST], server.getsockname()[1], 5) is None
         accepted, _ = server.accept()
         with accepted:
             assert accepted.recv(1) == b""
@@ -58,14 +58,14 @@ async def test_who_accepts_is_connected_to_once_and_left() -> None:
 
 async def test_one_address_that_answers_is_enough() -> None:
     with socket.create_server((HOST, free_port())) as server:
-        assert await connect_failure(["127.0.0.2", HOST], server.getsockname()[1], 5) is None
+        assert await connect_error(["127.0.0.2", HOST], server.getsockname()[1], 5) is None
 
 
 async def test_who_refuses_says_so() -> None:
-    failure = await connect_failure([HOST], free_port(), 5)
+    failure = await connect_error([HOST], free_port(), 5)
     assert failure is not None
     assert failure.errno == errno.ECONNREFUSED
-    assert await connect_failure([], 1, 5) is not None
+    assert await connect_error([], 1, 5) is not None
 
 
 async def test_who_does_not_answer_is_not_waited_for() -> None:
@@ -74,7 +74,7 @@ async def test_who_does_not_answer_is_not_waited_for() -> None:
         full.bind((HOST, free_port()))
         full.listen(0)
         with socket.create_connection(full.getsockname()):
-            failure = await connect_failure([HOST], full.getsockname()[1], 0.05)
+            failure = await connect_error([HOST], full.getsockname()[1], 0.05)
     assert failure is not None
     assert failure.errno == errno.ETIMEDOUT
 

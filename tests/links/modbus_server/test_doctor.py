@@ -41,7 +41,7 @@ async def look(plan: Plan, *running: RunningCell) -> list[Observation]:
 def _way(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine whose route to the PLC is known."""
     monkeypatch.setattr(
-        doctor, "way_to", lambda address, whom: [Observation.well("route", f"{whom} {address}")]
+        doctor, "look_up_route", lambda address, whom: [Observation.well("route", f"{whom} {address}")]
     )
 
 

@@ -206,7 +206,7 @@ def test_the_rate_is_compared_with_what_was_agreed(found: Visit, outcome: Outcom
 
 def test_each_text_of_the_controller_is_said_once() -> None:
     message = TextMessage("confirm the safety set-up", "URControl", 2)
-    found = list(diagnosis.said([message, message, replace(message, level=9)]))
+    found = list(diagnosis.text_messages([message, message, replace(message, level=9)]))
     assert [seen.text for seen in found] == [
         "the controller says (warning): confirm the safety set-up",
         "the controller says (level 9): confirm the safety set-up",

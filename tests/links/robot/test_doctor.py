@@ -12,7 +12,7 @@ import pytest
 from gatewayd.links.examination import Observation, Outcome, RunningCell, Surroundings
 from gatewayd.links.robot import doctor
 from gatewayd.links.robot.declaration import KIND
-from gatewayd.links.robot.doctor import EXAMINATION, field_of, wanted_inputs
+from gatewayd.links.robot.doctor import EXAMINATION, carrier_of, wanted_inputs
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.mapping.plan import Plan
 from gatewayd.rtde import survey
@@ -218,4 +218,4 @@ async def test_a_name_that_nobody_knows_ends_the_look() -> None:
     ],
 )
 def test_the_field_of_what_the_control_interface_names(name: str, field: str) -> None:
-    assert field_of(name) == field
+    assert carrier_of(name) == field

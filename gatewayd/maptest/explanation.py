@@ -24,14 +24,14 @@ _SILENT = "no request for"
 """In the words of the core for a writer whose time-out has passed."""
 
 
-class Chronicle:
-    """Hears the events of a cell, and says what came of them. Variables and locks are indices."""
+class Explanation:
+    """Explains the state of a cell from the events that it has had. Variables and locks are indices."""
 
     def __init__(self, cell: Cell) -> None:
         self._cell = cell
         self._changes: dict[int, Event] = {}
         """The last change of ownership, by lock."""
-        cell.events.listeners.append(self._hear)
+        cell.events.listeners.append(self._note)
 
     def owner(self, lock: int) -> str:
         """Who owns a lock, and since when: `owner plc since 1 s`, `free since 2 s: lease ended`."""
@@ -82,7 +82,7 @@ class Chronicle:
 
     # -- inside --------------------------------------------------------------------------------------------------
 
-    def _hear(self, event: Event) -> None:
+    def _note(self, event: Event) -> None:
         if event.kind in _OWNERSHIP and event.lock is not None:
             self._changes[event.lock] = event
 

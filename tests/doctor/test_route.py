@@ -5,9 +5,9 @@ import os
 
 import pytest
 
-from gatewayd.doctor import way
+from gatewayd.doctor import route
 from gatewayd.doctor.machine.routes import Route
-from gatewayd.doctor.way import described, way_to
+from gatewayd.doctor.route import described, look_up_route
 from gatewayd.links.examination import Outcome
 
 
@@ -49,12 +49,12 @@ def refuse(number: int) -> Route:
 def test_no_route_is_a_problem_and_a_sandbox_is_none(
     monkeypatch: pytest.MonkeyPatch, number: int, outcome: Outcome, text: str
 ) -> None:
-    monkeypatch.setattr(way, "route_to", lambda _address: refuse(number))
-    (found,) = way_to("192.0.2.9", "the robot")
+    monkeypatch.setattr(route, "route_to", lambda _address: refuse(number))
+    (found,) = look_up_route("192.0.2.9", "the robot")
     assert found.outcome is outcome
     assert found.text.startswith(text)
 
 
 def test_this_machine_is_found() -> None:
-    (found,) = way_to("127.0.0.1", "the robot")
+    (found,) = look_up_route("127.0.0.1", "the robot")
     assert found.text == "127.0.0.1 is this machine"

@@ -11,21 +11,21 @@ def test_says_who_owns_since_when_and_why_not() -> None:
     one = plant()
     names = CellNames(one.cell.definition)
     (lock,) = names.locks(["speed"])
-    assert one.chronicle.owner(lock) == "nobody has owned it"
+    assert one.explanation.owner(lock) == "nobody has owned it"
     one.wait(1.5)
     one.take(names.writers["plc"], names.indices(["speed"]))
-    assert one.chronicle.owner(lock) == "owner plc since 1.5 s"
+    assert one.explanation.owner(lock) == "owner plc since 1.5 s"
     one.release(names.writers["plc"], names.indices(["speed"]))
-    assert one.chronicle.owner(lock) == "free since 1.5 s: released by its owner"
+    assert one.explanation.owner(lock) == "free since 1.5 s: released by its owner"
 
 
 def test_a_refusal_may_be_about_no_variable() -> None:
-    assert plant().chronicle.refusal(Refusal(Reason.WAITED)) == Reason.WAITED.text
+    assert plant().explanation.refusal(Refusal(Reason.WAITED)) == Reason.WAITED.text
 
 
 def test_the_hint_of_a_value_names_its_policy() -> None:
     one = plant()
     names = CellNames(one.cell.definition).variables
-    assert one.chronicle.hint(names["part"]).endswith("`on_release`: hold")
-    assert one.chronicle.hint(names["light"]).endswith("`on_release`: true")
-    assert one.chronicle.hint(names["cycles"]).endswith("`on_stale`: hold")
+    assert one.explanation.hint(names["part"]).endswith("`on_release`: hold")
+    assert one.explanation.hint(names["light"]).endswith("`on_release`: true")
+    assert one.explanation.hint(names["cycles"]).endswith("`on_stale`: hold")

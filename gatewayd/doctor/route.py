@@ -1,4 +1,4 @@
-"""The way from this machine to an address, as kinds of links report it."""
+"""The route from this machine to an address, as kinds of links report it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ CHECK = "route"
 _NONE = {errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN}
 
 
-def way_to(address: str, whom: str) -> list[Observation]:
-    """Which way packages for `whom` (in words) take; one observation."""
+def look_up_route(address: str, whom: str) -> list[Observation]:
+    """The route that packages for `whom` (in words) take; one observation."""
     try:
         return [described(route_to(address), address, whom)]
     except OSError as error:
