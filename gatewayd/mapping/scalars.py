@@ -20,6 +20,7 @@ from gatewayd.mapping.diagnostics import Rule
 from gatewayd.mapping.source import RealNumber, WholeNumber
 from gatewayd.mapping.typed import AfterValidator, BeforeValidator, Field, InstanceOf, ValueRefused
 from gatewayd.report.format import address as address_text
+from gatewayd.report.wording import did_you_mean
 
 _DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?")
 _NUMBER_LIKE = re.compile(r"[-+]?[0-9.][0-9a-fA-FxXoO_.,:+-]*")
@@ -334,7 +335,7 @@ def _policy(value: Any, words: tuple[str, ...]) -> Fallback:
         return Fallback(FallbackKind.VALUE, _decimal(value))  # type: ignore[arg-type]
     text = scalar(value, "a policy", f"write {choices}")
     if text not in words:
-        refuse(syntax.BAD_CHOICE, f"`{text}` is not a policy", f"write {choices}")
+        refuse(syntax.BAD_CHOICE, f"`{text}` is not a policy", did_you_mean(text, words, f"write {choices}"))
     return Fallback(FallbackKind(text))
 
 

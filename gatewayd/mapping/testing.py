@@ -67,7 +67,7 @@ def _robot(value: object) -> object:
         otherwise = f"write {alternatives(ROBOT_WORDS)}, or the values that it shows: {{cycles: 5}}"
         text = scalar(value, "what the robot does", otherwise)
         hint = did_you_mean(text, ROBOT_WORDS, otherwise)
-        refuse(syntax.BAD_CHOICE, f"`{text}` is nothing that a robot does", hint)
+        refuse(syntax.BAD_CHOICE, f"`{text}` is no event of the robot", hint)
     return value
 
 

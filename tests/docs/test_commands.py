@@ -183,6 +183,24 @@ def test_table_of_the_tutorial_is_the_real_one(files: Path) -> None:
         assert line in page
 
 
+def test_fingerprint_of_the_guide_to_word_order_is_that_of_the_tutorial(files: Path) -> None:
+    page = (DOCS / "howto" / "word-order.md").read_text()
+    found = re.search(
+        r"fingerprint (\w{4})(\w{4})$", gatewayd("show press-plc.yaml", files).stdout, re.MULTILINE
+    )
+    assert found
+    high, low = found.groups()
+    assert f"prints the fingerprint: {high}{low}\n" in page
+    orders = {
+        "ABCD": high + low,
+        "CDAB": low + high,
+        "BADC": high[2:] + high[:2] + low[2:] + low[:2],
+        "DCBA": low[2:] + low[:2] + high[2:] + high[:2],
+    }
+    for order, shown in orders.items():
+        assert f"| 16#{shown} | `{order}` |" in page
+
+
 OPTIONS = {
     option
     for page in PAGES

@@ -129,6 +129,11 @@ def test_policies(text: str, fallback: Fallback) -> None:
     assert read(scalars.OutputPolicy, text) == fallback
 
 
+def test_a_misspelt_policy_is_suggested() -> None:
+    assert refused(scalars.OutputPolicy, "excepton")[2] == "did you mean `exception`?"
+    assert refused(scalars.OutputPolicy, "nothing")[2] == "write clear, hold, exception or a value"
+
+
 def test_inputs_know_no_exception() -> None:
     """An exception is an answer to a reader; the robot reads nothing."""
     assert refused(scalars.ReleasePolicy, "exception")[0] == "bad-choice"

@@ -115,9 +115,8 @@ class _RowReader:
             return written
         name = re.sub(r"[^A-Za-z0-9]+", "_", written.translate(_LETTERS)).strip("_")[:_MAX_NAME].rstrip("_")
         if not re.match(r"[A-Za-z]", name):
-            self._error(
-                row, "name", f"`{written}` is no name", "begin with a letter, then letters, digits and `_`"
-            )
+            wrong = f"`{written}` is no name" if written else "no name"
+            self._error(row, "name", wrong, "begin with a letter, then letters, digits and `_`")
         else:
             self._findings.doubt(
                 row.place("name"), f"`{written}` is called `{name}`", "names have no blanks and marks"

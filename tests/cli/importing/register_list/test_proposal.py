@@ -55,6 +55,7 @@ HEAD = "name,address,type,access,scale,bit,length,order,min,max,robot,area,funct
 @pytest.mark.parametrize(
     "row, message",
     [
+        (",1,int16,R", "no name"),
         ("a,,int16,R", "no address"),
         ("a,x,int16,R", "`x` cannot be read here"),
         ("a,70000,int16,R", "`70000` cannot be read here"),
