@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import pytest
 
-from gatewayd.cli.watch import keys
 from tests.cli.conftest import Invoke, Running
 
 
@@ -100,13 +99,3 @@ def test_a_signal_ends_it_and_leaves_the_terminal_as_it_was(terminal: Terminal, 
     assert terminal.program.wait(10) == 0
     assert termios.tcgetattr(terminal.master) == before
     assert "Traceback" not in terminal.seen
-
-
-def test_typed_keys_are_named() -> None:
-    reading, writing = os.pipe()
-    os.write(writing, b"a\x1b[A\x1b[6~\x1b\x7f\xc3\xa9\r")
-    assert list(keys(reading, 1.0)) == ["a", "up", "pgdn", "esc", "backspace", "é", "enter"]
-    assert list(keys(reading, 0.0)) == []
-    os.close(writing)
-    assert list(keys(reading, 1.0)) == ["\x03"]
-    os.close(reading)

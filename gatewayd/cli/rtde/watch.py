@@ -61,7 +61,7 @@ def command(host: Target, fields: tuple[str, ...], *, interval: float) -> None:
 
     from gatewayd.cli.rtde.field_choice import USUAL, named
     from gatewayd.cli.rtde.robots import failures
-    from gatewayd.cli.watch import ending_on_signals
+    from gatewayd.cli.terminal import ending_on_signals
     from gatewayd.rtde import sync
 
     console = Console(highlight=False)
@@ -119,7 +119,7 @@ def _live(console: Console, robot: BlockingRobot, names: tuple[str, ...], interv
     from rich.live import Live
 
     from gatewayd.cli.rtde.robot_picture import picture
-    from gatewayd.cli.watch import keys, raw
+    from gatewayd.cli.terminal import keys, raw
 
     glimpse, before = _look(robot, names, None), None
     descriptor = sys.stdin.fileno()
