@@ -95,7 +95,7 @@ def _claims(
 ) -> Iterator[Observation]:
     """What is known of claims: by claiming, and from the gateway on this machine."""
     if claimed is not None:
-        text = f"{counted(len(claimed.inputs), 'input')} claimed for a moment to see who holds them, and given back"
+        text = f"{counted(len(claimed.inputs), 'input')} claimed for a moment to see what others hold, and given back"
         yield Observation("claims", Outcome.NOTE, text)
         yield from diagnosis.claims(claimed.inputs, session)
         if claimed.loss is not None:
@@ -111,8 +111,8 @@ def _not_probed(inputs: int) -> Observation:
     return Observation(
         "claims",
         Outcome.SKIPPED,
-        f"{counted(inputs, 'input')} not tried: only claiming shows whether others hold them, and it takes them from "
-        "all others for a moment (--probe-claims)",
+        f"{counted(inputs, 'input')} not tried: only claiming shows what others hold, and it takes that from all "
+        "others for a moment (--probe-claims)",
     )
 
 
