@@ -246,6 +246,7 @@ IMPURE = {
     "control.endpoint": "has the socket",
     "control.server": "speaks HTTP",
     "doctor.machine.addresses": "asks the name service",
+    "doctor.machine.connections": "names sockets",
     "doctor.machine.ports": "has sockets",
     "doctor.machine.routes": "asks the kernel",
     "links.canopen_node.doctor": "hears the bus",

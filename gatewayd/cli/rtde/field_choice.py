@@ -40,7 +40,10 @@ def named(texts: Iterable[str], known: Mapping[str, object] = OUTPUTS) -> tuple[
     One that is in no guide is let through, as the controller may be newer, unless a known one comes so near that it
     is a slip of the pen.
     """
-    names = tuple(dict.fromkeys(name for text in texts for name in text.replace(",", " ").split()))
+    given = tuple(texts)
+    names = tuple(dict.fromkeys(name for text in given for name in text.replace(",", " ").split()))
+    if given and not names:
+        raise click.UsageError("no field is named: gatewayd rtde fields lists them")
     for name in names:
         if name in known or name in UNTYPED:
             continue

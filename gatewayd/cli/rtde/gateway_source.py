@@ -66,8 +66,10 @@ class GatewaySource:
         try:
             row = await self._row(patience)
         except NoDaemon as error:
-            if not self._reconnect or self._layout is None:
+            if self._layout is None:
                 raise
+            if not self._reconnect:
+                raise SourceLostError(str(error)) from error
             await asyncio.sleep(_AGAIN)
             return Arrivals(lost=_ENDED, waiting=f"waiting for the gateway: {error}")
         if row is None:

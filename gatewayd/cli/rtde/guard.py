@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 from gatewayd.rtde.enums import MEANINGS, ProgramState
@@ -12,14 +13,17 @@ from gatewayd.rtde.enums import MEANINGS, ProgramState
 _QUIET = frozenset({ProgramState.STOPPED, ProgramState.PAUSED})
 """States in which no program moves the robot or reads what it is given."""
 _PATIENCE = 1.0
+_GATEWAY_COMMANDS = ("run", "demo")
 
 
 def gateway_in_the_way(host: str, port: int, named: Path | None = None) -> str:
     """Why a gateway on this machine forbids to write to the robot, in words; empty if none does.
 
     All are asked that are found, and the one at the socket `named`.
-    One that is there and gives no answer forbids it too: what it serves is not known.
+    One that is there and gives no answer forbids it too: what it serves is not known. So does one that has a
+    connection to the robot, and no socket that was found.
     """
+    from gatewayd.doctor.machine.connections import connected_processes
     from gatewayd.doctor.running import ask, sockets
 
     places = [*sockets(None, os.environ), *(() if named is None else (named,))]
@@ -36,6 +40,12 @@ def gateway_in_the_way(host: str, port: int, named: Path | None = None) -> str:
     for place, reason in found.silent:
         if not _is_dead(place):
             return f"a gateway may serve this robot, and does not say so: {reason}"
+    for process in connected_processes(wanted):
+        if _is_gateway(process.command):
+            return (
+                f"a gateway (process {process.pid}) is connected to this robot, and its control socket was not found: "
+                "write by it, with gatewayd force --socket PATH"
+            )
     return ""
 
 
@@ -47,6 +57,14 @@ def program_in_the_way(state: int | None) -> str:
         return "the controller does not say whether a program runs"
     words: Mapping[int, str] = MEANINGS["runtime_state"]
     return f"the program is {words.get(state, f'in state {state}')}"
+
+
+def _is_gateway(command: Sequence[str]) -> bool:
+    """Whether a command line is `gatewayd run`, by whatever interpreter."""
+    return any(
+        Path(program).name == "gatewayd" and argument in _GATEWAY_COMMANDS
+        for program, argument in pairwise(command)
+    )
 
 
 def _addresses(host: str, port: int) -> set[tuple[str, int]]:

@@ -34,7 +34,12 @@ def failures() -> Iterator[None]:
         raise RobotFailure(
             "; ".join(f"{each.field}: {each.word}, {each.hint}{hint(each.field)}" for each in error.fields)
         ) from error
-    except RtdeError as error:
-        raise RobotFailure(str(error)) from error
-    except TimeoutError as error:
-        raise RobotFailure("the robot sends no data: its safety set-up may be unconfirmed") from error
+    except (RtdeError, TimeoutError) as error:
+        raise RobotFailure(failure_text(error)) from error
+
+
+def failure_text(error: Exception) -> str:
+    """What went wrong with a robot, in words."""
+    if isinstance(error, TimeoutError):
+        return "the robot sends no data: its safety set-up may be unconfirmed"
+    return str(error)

@@ -82,7 +82,7 @@ def command(host: Target, assignments: tuple[str, ...], *, while_running: bool, 
 async def _set(host: Target, wanted: Assignments, *, while_running: bool) -> None:
     from gatewayd import rtde
     from gatewayd.cli.rtde.guard import program_in_the_way
-    from gatewayd.cli.rtde.robots import RobotFailure
+    from gatewayd.cli.rtde.robots import RobotFailure, failure_text
     from gatewayd.report.printable import printable
 
     robot = rtde.connect(
@@ -98,7 +98,10 @@ async def _set(host: Target, wanted: Assignments, *, while_running: bool) -> Non
         if held:
             texts = "; ".join(f"{each.field}: {each.word}, {each.hint}" for each in held)
             raise RobotFailure(f"nothing was written: {texts}")
-        sample = await robot.newer(_PATIENCE)
+        try:
+            sample = await robot.newer(_PATIENCE)
+        except (rtde.RtdeError, TimeoutError) as error:
+            raise RobotFailure(f"nothing was written: {failure_text(error)}") from error
         problem = program_in_the_way(sample.runtime_state if _STATE in sample else None)
         if problem and not while_running:
             raise RobotFailure(f"nothing was written: {problem}; --while-running writes all the same")

@@ -63,21 +63,17 @@ def holder(port: int, proc: Path = _PROC) -> str:
     """The process that listens on the port: `python3 (pid 1234)`; empty if that cannot be seen, or nobody does."""
     inodes = set(listening_inodes(port, proc))
     for directory in proc.glob("[0-9]*"):
-        if inodes.isdisjoint(_sockets(directory)):
-            continue
-        with suppress(OSError):
+        with suppress(OSError):  # ended meanwhile, or of another user
+            if inodes.isdisjoint(socket_inodes(directory)):
+                continue
             name = (directory / "comm").read_text("utf-8", "replace").strip()
             return f"{name} (pid {directory.name})"
     return ""
 
 
-def _sockets(process: Path) -> Iterator[str]:
-    """The inodes of the process's sockets; nothing of another user's process."""
-    try:
-        descriptors = list((process / "fd").iterdir())
-    except OSError:
-        return
-    for descriptor in descriptors:
+def socket_inodes(process: Path) -> Iterator[str]:
+    """The inodes of the sockets of a process, named by its directory in /proc; PermissionError: another user's."""
+    for descriptor in list((process / "fd").iterdir()):
         with suppress(OSError):  # closed meanwhile
             found = _INODE.fullmatch(str(descriptor.readlink()))
             if found is not None:

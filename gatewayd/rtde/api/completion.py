@@ -24,16 +24,26 @@ _SELECTED_BY: dict[str, tuple[str, int]] = {
 } | {needs.type: (needs.mask, -1) for needs in COMPANIONS.values() if needs.type is not None}
 """Field that acts through a mask -> the mask, and the bits of it that select the field."""
 _RATIOS = frozenset(name for name, needs in COMPANIONS.items() if needs.bit is not None)
+_FINITE = frozenset({"external_force_torque"})
+"""Real inputs that act by themselves; a register may carry NaN, which is the program's affair."""
 
 
 def elements(name: str, value: Value | Iterable[Scalar], kind: DataType) -> Elements:
     """The elements of a value of this type; ValueError or TypeError says what does not fit."""
+    given: object = value
+    if not isinstance(given, bool | int | float | Iterable):
+        message = f"{name} is {kind.word} and does not take {given!r}"
+        raise TypeError(message)
     flat: Elements = (value,) if isinstance(value, bool | int | float) else tuple(value)
     if len(flat) != kind.count:
         raise ValueError(wrong_count(name, flat, kind.count))
     for element in flat:
         _check(name, element, kind)
-    return tuple(float(element) for element in flat) if kind.code == "d" else flat
+    try:
+        return tuple(map(float, flat)) if kind.code == "d" else flat
+    except OverflowError as error:
+        message = f"{name} is {kind.word} and cannot hold so large a number"
+        raise ValueError(message) from error
 
 
 def _check(name: str, value: object, kind: DataType) -> None:
@@ -48,6 +58,9 @@ def _check(name: str, value: object, kind: DataType) -> None:
     low, high = INTEGER_RANGES.get(kind.code, (-math.inf, math.inf))
     if not low <= value <= high and not (isinstance(value, float) and math.isnan(value)):
         message = f"{name} is {kind.word} and holds {low} to {high}, not {value!r}"
+        raise ValueError(message)
+    if name in _FINITE and not -math.inf < value < math.inf:
+        message = f"{name} takes finite numbers, not {value!r}"
         raise ValueError(message)
     if name in _RATIOS and not 0 <= value <= 1:
         message = f"{name} is a share from 0 to 1, not {value!r}"

@@ -75,6 +75,10 @@ def wanted(outputs: Fields, inputs: Mapping[str, Fields] | None, frequency: floa
             f"frequency {frequency} is not a number of packages per second; 0 is the controller's own rate"
         )
         raise ValueError(message)
+    given: object = inputs
+    if given is not None and not isinstance(given, Mapping):
+        message = f"inputs is {given!r}: give the fields of each recipe by its name, say {{'in': [...]}}"
+        raise TypeError(message)
     names, declared = _read("outputs", outputs)
     recipes: dict[str, tuple[str, ...]] = {}
     types: dict[str, DataType] = {}

@@ -337,7 +337,7 @@ class InputWriter(RobotInformation):
 
 
 def _share(value: float | None, low: float, high: float, unit: str) -> float:
-    if value is None or not (math.isfinite(value) and low <= value <= high):
+    if value is None or isinstance(value, bool) or not (math.isfinite(value) and low <= value <= high):
         message = f"an analog output takes {low:g} to {high:g} {unit}, not {value!r}"
         raise ValueError(message)
     return (value - low) / (high - low)

@@ -45,7 +45,7 @@ async def test_packages_have_their_values_and_times() -> None:
     assert (await source.next(5)).packages == [((1.0,), 1e9 + 1), ((2.0,), 1e9 + 2)]
     assert (await source.next(5)).lost == "the gateway dropped 5: the recorder was too slow"
     assert (await source.next(5)).packages == [((3.0,), 1e9 + 3)]
-    with pytest.raises(NoDaemon, match="the gateway has ended"):
+    with pytest.raises(SourceLostError, match="the gateway has ended"):
         await source.next(5)
     await source.close()
 

@@ -95,6 +95,7 @@ def out(tmp_path: Path) -> Path:
         (("127.0.0.1:1", "--key", "out"), "--key is for --config"),
         (("127.0.0.1:1", "--config", "no/such.xml"), "no/such.xml: cannot be read"),
         (("127.0.0.1:1", "-f", "actual_Q"), "there is no field actual_Q: it is written actual_q"),
+        (("127.0.0.1:1", "-f", ","), "no field is named"),
         (("127.0.0.1:1", "-f", "a;b"), "'a;b' is not the name of a field"),
         (("127.0.0.1:1", "--delimiter", "."), "cannot separate columns"),
     ],
@@ -439,6 +440,21 @@ def test_a_running_gateway_is_recorded_without_another_connection(
         assert reader.host_time
         assert all(time for _, time in reader.rows())
     program.kill()
+
+
+def test_a_gateway_that_ends_leaves_what_came_until_then(
+    plant: Plant, out: Path, tmp_path: Path, recording: Recording
+) -> None:
+    simulator = robot(plant)
+    socket = tmp_path / "control.sock"
+    daemon = plant.daemon(plant.mapping(CELL, simulator.port), "--control", str(socket))
+    wait_for(socket.exists, "the control socket")
+    program = recording("--gateway", out, "--socket", socket)
+    wait_for(lambda: _length(out) > 5000, "packages to be recorded")
+    daemon.stop()
+    assert program.wait() == 1
+    assert "the gateway has ended; the file has what came until then" in program.text()
+    assert columns(out)
 
 
 def test_the_fieldbus_does_not_notice_a_recorder_that_stands_still(

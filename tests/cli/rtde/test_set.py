@@ -101,10 +101,30 @@ def test_a_gateway_that_serves_the_robot_forbids_it(plant: Plant, tmp_path: Path
     assert rtde("set", place(other), "input_int_register_24=7").exit_code == 0, "another robot is nobody's"
 
 
+def test_a_gateway_without_a_control_socket_forbids_it_too(plant: Plant) -> None:
+    simulator = stop_program(plant.simulator())
+    plant.daemon(plant.mapping(CELL, simulator.port, name="press"), "--control", "none")
+    wait_for(lambda: simulator.do("clients") not in {"ok", "ok 0"}, "the gateway's connection")
+    result = rtde("set", place(simulator), "input_int_register_24=7")
+    assert result.exit_code == 1
+    assert "is connected to this robot, and its control socket was not found" in result.output
+    assert simulator.integer("input_int_register_24") == 0
+    assert rtde("set", place(stop_program(plant.simulator())), "input_int_register_24=7").exit_code == 0
+
+
 def test_who_cannot_be_reached_is_said() -> None:
     result = rtde("set", f"{HOST}:{free_port()}", "input_int_register_24=7")
     assert result.exit_code == 1
     assert "its RTDE service is off" in result.output
+
+
+def test_a_robot_that_sends_no_data_is_written_nothing(plant: Plant) -> None:
+    """Whether a program runs is not known then."""
+    simulator = stop_program(plant.simulator("--silence"))
+    result = rtde("set", place(simulator), "input_int_register_24=7")
+    assert result.exit_code == 1
+    assert "nothing was written: " in result.output
+    assert simulator.integer("input_int_register_24") == 0
 
 
 def test_wrong_usage_says_what_to_do() -> None:

@@ -117,6 +117,10 @@ def test_no_value_comes_from_nowhere(data: st.DataObject) -> None:
         ("input_double_register_0", "1"),
         ("speed_slider_fraction", 1.01),
         ("speed_slider_fraction", math.nan),
+        ("external_force_torque", (math.nan,) * 6),
+        ("external_force_torque", (0, 0, math.inf, 0, 0, 0)),
+        ("input_double_register_0", None),
+        ("input_double_register_0", 10**400),
         ("standard_analog_output_0", -0.1),
     ],
 )

@@ -33,6 +33,12 @@ def test_what_is_no_list_of_names_is_refused(fields: Any) -> None:
         wanted(fields, None, 0)
 
 
+@pytest.mark.parametrize("inputs", [["input_int_register_0"], "in"])
+def test_input_recipes_have_names(inputs: Any) -> None:
+    with pytest.raises(TypeError, match="give the fields of each recipe by its name"):
+        wanted([], inputs, 0)
+
+
 @pytest.mark.parametrize("name", ["", "a,b", " a"])
 def test_a_name_that_no_field_can_have_is_refused(name: str) -> None:
     with pytest.raises(ValueError, match="not the name of a field"):

@@ -130,6 +130,7 @@ async def test_analog_outputs_are_set_in_their_unit(connect: Connect, simulator:
             (0, {}),
             (0, {"volts": 1, "milliamperes": 5}),
             (0, {"volts": 10.5}),
+            (0, {"volts": True}),
             (0, {"milliamperes": 3}),
         ]
         for number, level in wrong:
