@@ -15,6 +15,7 @@ from gatewayd.links.modbus_server.plc.polling import numbered, read_polls, statu
 from gatewayd.links.modbus_server.plc.tags import members, owners, places, tag_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.areas import Area
+from gatewayd.report.printable import printable
 from gatewayd.report.wording import alternatives, did_you_mean, one_and_more
 
 NOBODY: Final = "none"
@@ -56,7 +57,7 @@ def model_of(plan: Plan, wishes: PlcWishes) -> PlcModel:
         polls += write_polls(inputs, cell, writer, others)
     return PlcModel(
         cell=cell.name,
-        source=PurePath(plan.source).name,
+        source=printable(PurePath(plan.source).name),
         fingerprint=cell.fingerprint,
         prefix=wishes.prefix,
         host=wishes.host or ("192.168.1.2" if modbus.host in _ANYWHERE else modbus.host),

@@ -11,6 +11,7 @@ from gatewayd.links.modbus_server.plan import Placement
 from gatewayd.links.modbus_server.plc.model import Encoding, Tag, TagFamily
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import TYPES, Codec
+from gatewayd.report.printable import printable
 
 WIRE_TYPES: Final[Mapping[str, str]] = {
     "bool": "BOOL",
@@ -65,8 +66,8 @@ def tag_of(place: Placement, cell: CellDefinition) -> Tag:
         bit=place.bit,
         area=place.area,
         address=place.address,
-        unit=variable.unit,
-        comment=variable.comment,
+        unit=printable(variable.unit),
+        comment=printable(variable.comment),
         limits=variable.limits,
         on_stale=variable.on_stale,
         owners=tuple(writer + 1 for writer in owners(variable, cell)),

@@ -42,6 +42,7 @@ def test_the_table_of_tags_has_its_escapes() -> None:
     text = tags(("a",), [LogixMember("A", "INT", 3, 'say "ä" for $1')])
     assert text.splitlines()[0] == 'remark,"CSV-Import-Export"'
     assert text.splitlines()[-1].startswith('TAG,,A,"say $Q$00E4$Q for $$1","INT[3]","",')
+    assert '"$D83D$DE00"' in tags((), [LogixMember("A", "INT", 3, "\U0001f600")])
 
 
 @pytest.mark.parametrize(

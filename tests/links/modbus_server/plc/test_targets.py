@@ -48,6 +48,17 @@ def test_generated_files_know_that_they_are(target: str) -> None:
 
 
 @EVERY_TARGET
+def test_texts_of_the_mapping_never_leave_their_comment(target: str) -> None:
+    """TIA Portal's comments end with the line: what follows would be code."""
+    found = model(
+        r"""a: {robot: output_int_register_0, modbus: 1, unit: "s\nOUTSIDE", comment: "x\r\nOUTSIDE\u2028OUTSIDE"}"""
+    )
+    text = b"".join(file.content() for file in files_for(target, found)).decode("utf-8-sig")
+    assert "OUTSIDE" in text
+    assert not any(line.startswith("OUTSIDE") for line in text.splitlines())
+
+
+@EVERY_TARGET
 def test_a_great_cell(target: str) -> None:
     text = b"".join(file.content() for file in files_for(target, great()))
     assert b"a4[23]" in text

@@ -28,4 +28,7 @@ def _character(character: str) -> str:
     known = {'"': "$Q", "$": "$$", "\n": "$N"}.get(character)
     if known is not None:
         return known
-    return character if " " <= character <= "~" else f"${ord(character) & 0xFFFF:04X}"
+    if " " <= character <= "~":
+        return character
+    units = character.encode("utf-16-be", "surrogatepass")
+    return "".join(f"${units[at]:02X}{units[at + 1]:02X}" for at in range(0, len(units), 2))
