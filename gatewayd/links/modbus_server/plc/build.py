@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
@@ -21,6 +22,7 @@ from gatewayd.report.wording import alternatives, did_you_mean, one_and_more
 NOBODY: Final = "none"
 """The writer of a program that only reads."""
 _PERIOD: Final = 0.1
+_HOST: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9.:%_-]{0,252}", re.ASCII)
 _ANYWHERE: Final = frozenset({"0.0.0.0", "::"})
 
 
@@ -60,7 +62,7 @@ def model_of(plan: Plan, wishes: PlcWishes) -> PlcModel:
         source=printable(PurePath(plan.source).name),
         fingerprint=cell.fingerprint,
         prefix=wishes.prefix,
-        host=wishes.host or ("192.168.1.2" if modbus.host in _ANYWHERE else modbus.host),
+        host=_host(wishes.host, modbus),
         port=modbus.port,
         unit=modbus.unit,
         writer="" if writer is None else cell.writers[writer].name,
@@ -74,6 +76,17 @@ def model_of(plan: Plan, wishes: PlcWishes) -> PlcModel:
         left_out=tuple(_left_out(cell, chosen, inputs)),
         period=_PERIOD,
     )
+
+
+def _host(wished: str | None, modbus: ModbusPlan) -> str:
+    """How the PLC reaches the gateway. It stands in the program as a text: nothing that could end one may be in it."""
+    if wished is None:
+        return "192.168.1.2" if modbus.host in _ANYWHERE else modbus.host
+    if not _HOST.fullmatch(wished):
+        raise ExportError(
+            f"`{printable(wished)}` is no address: --host takes an IP address or the name of a host"
+        )
+    return wished
 
 
 def _modbus_of(plan: Plan) -> ModbusPlan:

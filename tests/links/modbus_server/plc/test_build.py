@@ -36,6 +36,15 @@ def test_a_program_may_only_read() -> None:
     assert (found.inputs, found.writer, found.writes) == ((), "", ())
 
 
+@pytest.mark.parametrize("host", ["", "10.0.0.1';x:=1", "a b", "a\nb", "ä.example", "$N", "x" * 254])
+def test_an_address_that_could_end_a_text_of_the_program_is_refused(host: str) -> None:
+    assert "--host takes an IP address" in refused(READY, wishes=PlcWishes(writer="none", host=host))
+    assert (
+        model(READY, wishes=PlcWishes(writer="none", host="gw-3.plant.example")).host == "gw-3.plant.example"
+    )
+    assert model(READY, wishes=PlcWishes(writer="none", host="fe80::1%eth0")).host == "fe80::1%eth0"
+
+
 def test_who_the_plc_is_has_to_be_said() -> None:
     assert "--writer: `plc`, `hmi` or `none`" in refused(START, wishes=PlcWishes())
     assert "`plx` is no writer on Modbus" in refused(START, wishes=PlcWishes(writer="plx"))
