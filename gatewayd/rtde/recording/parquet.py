@@ -6,10 +6,11 @@ of its columns. A Parquet file is finished at its end, so one is made of a recor
 
 from __future__ import annotations
 
+import struct
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
-from io import RawIOBase
+from io import SEEK_END, RawIOBase
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 MAGIC = b"PAR1"
 """The first bytes of every Parquet file."""
 
+_END = struct.Struct("<I4s")
+"""How a file ends: the length of what describes it, which stands before, and MAGIC."""
 _TOGETHER = 4096
 """Packages that are turned into columns together."""
 _GROUP = 1 << 17
@@ -131,6 +134,7 @@ class ParquetReader:
         """Open it. Raises RecordingError for columns that no RTDE field can have, MissingExtraError."""
         self._path = path
         self._core, self._io = _library()
+        _check_end(path)
         self.total = Path(path).stat().st_size
         self.position = 0
         self.torn = ""
@@ -180,6 +184,19 @@ class ParquetReader:
 
     def __exit__(self, *problem: object) -> None:
         self.close()
+
+
+def _check_end(path: str) -> None:
+    """RecordingError for a file without its end, about which the library would print a panic of its own."""
+    with Path(path).open("rb") as file:
+        size = file.seek(0, SEEK_END)
+        file.seek(-min(size, _END.size), SEEK_END)
+        end = file.read(_END.size)
+    length, magic = _END.unpack(end.rjust(_END.size, b"\0"))
+    if magic != MAGIC or length > size - len(MAGIC) - _END.size:
+        raise RecordingError(
+            f"{path}: no recording: this Parquet file lacks its end; convert the recording again"
+        )
 
 
 @contextmanager

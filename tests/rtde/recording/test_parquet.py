@@ -105,6 +105,19 @@ def test_a_missing_value_is_refused(tmp_path: Path) -> None:
         list(found)
 
 
+@pytest.mark.parametrize("kept", [4, 7, 12, 300, -1])
+def test_a_file_without_its_end_is_refused_in_our_words(
+    tmp_path: Path, kept: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The library panics, and prints that by itself."""
+    path = tmp_path / "x.parquet"
+    write_parquet(rows(), path, RECIPE, host_time=False)
+    path.write_bytes(path.read_bytes()[:kept])
+    with pytest.raises(RecordingError, match="this Parquet file lacks its end; convert the recording again"):
+        open_recording(path)
+    assert capfd.readouterr().err == ""
+
+
 @given(st.data())
 def test_any_bytes_are_read_or_refused(data: st.DataObject) -> None:
     with tempfile.TemporaryDirectory() as folder:
