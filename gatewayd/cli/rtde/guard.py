@@ -10,8 +10,8 @@ from pathlib import Path
 
 from gatewayd.rtde.enums import MEANINGS, ProgramState
 
-_QUIET = frozenset({ProgramState.STOPPED, ProgramState.PAUSED})
-"""States in which no program moves the robot or reads what it is given."""
+_QUIET = frozenset({ProgramState.STOPPED})
+"""States in which no program reads what it is given. A paused one goes on with what it finds then."""
 _PATIENCE = 1.0
 _GATEWAY_COMMANDS = ("run", "demo")
 

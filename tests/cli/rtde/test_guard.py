@@ -19,7 +19,7 @@ def no_other_gateway(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     "state, words",
     [
         (1, ""),
-        (4, ""),
+        (4, "the program is paused"),
         (0, "the program is stopping"),
         (2, "the program is running"),
         (5, "the program is resuming"),
