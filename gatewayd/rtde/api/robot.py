@@ -29,6 +29,7 @@ from gatewayd.rtde.types import DEFAULT_PORT
 BOOTED = 40.0
 """Controller time in seconds from which its RTDE service does not restart any more (UR's client library)."""
 _MAX_TEXT = 255
+_MAX_PORT = 65535
 _FOREVER = Retry()
 _PROTOCOLS = (None, 1, 2)
 
@@ -80,6 +81,7 @@ def connect(
     if boot_wait and not start:
         message = "boot_wait needs the output to run: it reads the controller's time"
         raise ValueError(message)
+    _check_numbers(port, buffer, connect_timeout, handshake_timeout, data_timeout)
     settings = ClientSettings(
         host=host,
         port=port,
@@ -342,6 +344,19 @@ class Robot(InputWriter):
         if self._feed.state is ConnectionState.CLOSED:
             message = "the robot was closed"
             raise RtdeError(message)
+
+
+def _check_numbers(port: int, buffer: int, *timeouts: float) -> None:
+    if not 0 < port <= _MAX_PORT:
+        message = f"port {port!r}: TCP has 1 to {_MAX_PORT}"
+        raise ValueError(message)
+    if buffer < 0:
+        message = f"a buffer of {buffer} samples cannot be; 0 keeps none"
+        raise ValueError(message)
+    for timeout in timeouts:
+        if not timeout > 0:
+            message = f"a timeout of {timeout} s: each has to be more than 0"
+            raise ValueError(message)
 
 
 def _wishing(settings: ClientSettings, wishes: Wanted) -> ClientSettings:

@@ -40,7 +40,9 @@ class RowFile:
         """Rows in the file, without those that wait to be flushed."""
         new = 0 if overwrite else os.O_EXCL
         try:
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | new, 0o666)
+            # Not blocking: a pipe that nobody reads would hold it up for ever, Ctrl-C included.
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | os.O_NONBLOCK | new, 0o666)
+            os.set_blocking(self._file, True)
         except FileExistsError:
             raise RecordingExistsError(self.path) from None
         except (OSError, ValueError) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -342,3 +343,18 @@ async def test_cancelling_while_it_connects_leaves_no_connection(connect: Connec
             await robot.close()
     async with asyncio.timeout(PATIENCE), connect(**wishes, claim_timeout=PATIENCE) as robot:
         assert robot.unavailable == ()
+
+
+@pytest.mark.parametrize(
+    "wishes, words",
+    [
+        ({"port": 0}, "port 0: TCP has 1 to 65535"),
+        ({"port": 70000}, "port 70000"),
+        ({"buffer": -1}, "a buffer of -1 samples"),
+        ({"data_timeout": 0}, "a timeout of 0 s"),
+        ({"connect_timeout": math.nan}, "a timeout of nan s"),
+    ],
+)
+def test_numbers_that_cannot_be_meant_are_refused(wishes: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        rtde.connect("127.0.0.1", **wishes)

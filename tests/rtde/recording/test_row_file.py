@@ -114,6 +114,14 @@ def test_nobody_overwrites_what_is_being_written(tmp_path: Path, overwrite: bool
     assert path.read_bytes() == b"other\n"
 
 
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
+    """Rows are written at their places, which a pipe does not have; without a reader it could not even be opened."""
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    with pytest.raises(RecordingError, match="cannot be written"):
+        RowFile(path, b"head\n", overwrite=True)
+
+
 def test_a_device_is_taken_as_it_is() -> None:
     RowFile("/dev/null", b"head\n", overwrite=True).close()
     RowFile("/dev/null", b"head\n", overwrite=True).close()
