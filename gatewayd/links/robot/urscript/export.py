@@ -16,7 +16,7 @@ from gatewayd.links.robot.urscript.accessors import accessors, index_check, wrap
 from gatewayd.links.robot.urscript.handshake import Handshake
 from gatewayd.links.robot.urscript.registers import ScriptRegister, others, registers
 from gatewayd.mapping.plan import Plan
-from gatewayd.report.wording import did_you_mean
+from gatewayd.report.wording import alternatives, did_you_mean
 
 _MARGIN = 2
 """The program stops when so many feeds in a row are missing."""
@@ -123,7 +123,8 @@ def _of_writer(cell: CellDefinition, writer: str | None) -> frozenset[int]:
     """Numbers of the inputs that the writer may own; all inputs without one."""
     names = [known.name for known in cell.writers]
     if writer is not None and writer not in names:
-        hint = did_you_mean(writer, names, "the mapping declares no writer")
+        known = f"the mapping declares {alternatives(names)}" if names else "the mapping declares no writer"
+        hint = did_you_mean(writer, names, known)
         raise ExportError(f"--writer {writer}: there is no such writer: {hint}")
     return frozenset(
         variable.number

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from gatewayd.links.exports import ExportError
 from tests.links.robot.urscript.language import Halted, load
 from tests.links.robot.urscript.scripts import MAPPINGS, Registers, plan_of, script, shipped
 
@@ -72,3 +73,8 @@ def test_the_golden_program() -> None:
     golden = Path(__file__).with_name("small-cell.script")
     text = script(shipped("small-cell.yaml"), handshake=("start:busy",), writer="plc")
     assert text == golden.read_text(encoding="ascii")
+
+
+def test_an_unknown_writer_is_told_which_there_are() -> None:
+    with pytest.raises(ExportError, match="there is no such writer: the mapping declares `plc`"):
+        script(shipped("small-cell.yaml"), handshake=("start:busy",), writer="ghost")
