@@ -41,8 +41,8 @@ poll plan.
 \b
 {_TARGET_LIST}
 
-Files that nobody changed are made anew, a changed one is left as it is and named. The one with Main in its name is
-yours: it is only written where there is none.
+Generated files are made anew; where somebody changed one, it is named and nothing is written. The one with Main in its
+name is yours: it is only written where there is none.
 
 What a tool cannot hold (a keyword, a long name, a 64-bit number in a small controller) is refused with a remedy;
 nothing is renamed in silence.
