@@ -36,7 +36,7 @@ class PlcWishes:
     names: Mapping[str, str] = field(default_factory=dict)
     """Variable or family of the mapping -> what it is called in the PLC."""
     host: str | None = None
-    """How the PLC reaches the gateway; None: as the mapping says where it listens."""
+    """How the PLC reaches the gateway; None: at the address where it listens, if it is one."""
 
 
 def model_of(plan: Plan, wishes: PlcWishes) -> PlcModel:
@@ -81,7 +81,11 @@ def model_of(plan: Plan, wishes: PlcWishes) -> PlcModel:
 def _host(wished: str | None, modbus: ModbusPlan) -> str:
     """How the PLC reaches the gateway. It stands in the program as a text: nothing that could end one may be in it."""
     if wished is None:
-        return "192.168.1.2" if modbus.host in _ANYWHERE else modbus.host
+        if modbus.host in _ANYWHERE:
+            raise ExportError(
+                "the gateway listens at all addresses of its machine: say with --host by which the PLC reaches it"
+            )
+        return modbus.host
     if not _HOST.fullmatch(wished):
         raise ExportError(
             f"`{printable(wished)}` is no address: --host takes an IP address or the name of a host"

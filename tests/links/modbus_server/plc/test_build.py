@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from gatewayd.links.exports import ExportError
+from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.plc.build import PlcWishes, model_of
 from gatewayd.links.modbus_server.plc.model import Poll
 from gatewayd.mapping.plan import Plan
@@ -43,6 +46,18 @@ def test_an_address_that_could_end_a_text_of_the_program_is_refused(host: str) -
         model(READY, wishes=PlcWishes(writer="none", host="gw-3.plant.example")).host == "gw-3.plant.example"
     )
     assert model(READY, wishes=PlcWishes(writer="none", host="fe80::1%eth0")).host == "fe80::1%eth0"
+
+
+def test_no_address_is_made_up_where_the_gateway_listens_at_all() -> None:
+    plan = plan_of(READY)
+    everywhere = Plan(
+        plan.source,
+        plan.cell,
+        {name: replace(link, host="0.0.0.0") for name, link in plan.of(ModbusPlan).items()},
+    )
+    with pytest.raises(ExportError, match="say with --host"):
+        model_of(everywhere, PlcWishes(writer="none"))
+    assert model_of(everywhere, PlcWishes(writer="none", host="10.0.0.7")).host == "10.0.0.7"
 
 
 def test_who_the_plc_is_has_to_be_said() -> None:
