@@ -100,6 +100,8 @@ ROWS: dict[str, list[Row]] = {
         # The version has one value; a file of another one is refused by `check`.
         row("gatewayd", 1),
         row("cell", "stamp", "release gone", NOBODY),
+        # `gatewayd test` reads them; whoever serves does not.
+        row("tests", {"it begins at rest": [{"expect": {"speed": 0}}]}),
     ],
     "robot": [
         Row("robot", {"robot.host": "127.0.0.9"}, "release", NOBODY),
