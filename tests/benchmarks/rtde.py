@@ -147,7 +147,7 @@ def _recorded(title: str, options: tuple[str, ...], seconds: float, samples: Sam
 def _loops() -> Table:
     table = Table("A control loop", LOOP, ("client", "cycles p50", "p99", "ms p50", "p99"))
     for kind in ("gatewayd", *(["ur_rtde"] if find_spec("rtde_receive") else [])):
-        with _robot("--program", "output_int_register_20 = input_int_register_20") as host:
+        with _robot("--program", "output_int_register_18 = input_int_register_18") as host:
             command = python(CLIENT, "loop", kind, host, str(PORT), str(LOOPS))
             lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
         cycles, times = zip(*(map(float, line.split()) for line in lines), strict=True)

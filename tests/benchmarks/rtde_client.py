@@ -1,7 +1,7 @@
 """RTDE clients that are compared: `python rtde_client.py TASK KIND HOST PORT NAME...`.
 
 TASK `read`: receive every package, look at the first eight fields, until stopped. TASK `loop`: write numbers into
-`input_int_register_20`, each as soon as `output_int_register_20` shows the one before; after as many as the only NAME
+`input_int_register_18`, each as soon as `output_int_register_18` shows the one before; after as many as the only NAME
 says prints a line for each: cycles of the controller, and seconds, until it was seen.
 
 KIND `gatewayd` and `ur_rtde` are these; `official` is a client in the style of the one that Universal Robots publishes:
@@ -21,8 +21,8 @@ from collections.abc import Callable
 from gatewayd import rtde
 
 LOOKED_AT = 8
-REGISTER = 20
-"""The first of those that every client can write; ur_rtde has 18 to 22 of the lower ones."""
+REGISTER = 18
+"""One that every client can write and read: ur_rtde writes 18 to 22 of the lower ones, and reads 12 to 19."""
 CYCLE = 0.002
 
 # -- every package -----------------------------------------------------------------------------------------------------
