@@ -7,7 +7,14 @@ from typing import Final
 
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.st.dialect import array, elementary, own
-from gatewayd.links.modbus_server.plc.st.exchange import cyclic, demands
+from gatewayd.links.modbus_server.plc.st.exchange import (
+    FAILURES,
+    RUN,
+    WRITTEN,
+    cyclic,
+    demands,
+    sequence_call,
+)
 from gatewayd.links.modbus_server.plc.st.program import (
     PlcVariable,
     ProgramUnit,
@@ -40,9 +47,7 @@ def client(model: PlcModel) -> ProgramUnit:
             VariableSection(
                 "VAR_INPUT",
                 (
-                    PlcVariable("run", elementary("BOOL")),
-                    PlcVariable("trusted", elementary("BOOL"), "from the status: nothing is written before"),
-                    PlcVariable("write", elementary("BOOL"), "the inputs hold what you want: write them"),
+                    *RUN,
                     PlcVariable("host", elementary("STRING"), "address of the gateway", f"'{model.host}'"),
                     PlcVariable("port", elementary("UINT"), "", str(model.port)),
                     PlcVariable("unit", elementary("BYTE"), "", str(model.unit)),
@@ -53,9 +58,9 @@ def client(model: PlcModel) -> ProgramUnit:
             VariableSection(
                 "VAR_OUTPUT",
                 (
-                    PlcVariable("failures", elementary("UDINT"), "requests that failed"),
+                    FAILURES,
                     PlcVariable("error_id", elementary("UDINT"), "nErrId of the last one"),
-                    PlcVariable("written", elementary("UDINT"), "rounds in which all writes were confirmed"),
+                    WRITTEN,
                 ),
             ),
             VariableSection("VAR_IN_OUT", (PlcVariable("image", own(f"{model.prefix}_Image")),)),
@@ -85,16 +90,7 @@ def client(model: PlcModel) -> ProgramUnit:
 
 
 def _body(model: PlcModel, used: list[int]) -> Iterator[str]:
-    operands = [
-        "run",
-        "trusted",
-        "write",
-        "done",
-        "failed",
-        "time_out",
-        *(each.name for each in demands(model)),
-    ]
-    yield f"sequence({', '.join(f'{name} := {name}' for name in operands)});"
+    yield sequence_call(model, "time_out")
     yield "failures := sequence.failures;"
     yield "written := sequence.written;"
     yield "CASE sequence.current OF"

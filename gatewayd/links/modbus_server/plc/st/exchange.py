@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 
 from gatewayd.links.modbus_server.plc.model import PlcModel, Poll
 from gatewayd.links.modbus_server.plc.st.dialect import elementary
@@ -23,6 +24,29 @@ def demands(model: PlcModel) -> tuple[PlcVariable, ...]:
     return tuple(
         PlcVariable(f"demand_{poll.name}", elementary("BOOL"), comment) for poll in model.polls if poll.shared
     )
+
+
+RUN: Final = (
+    PlcVariable("run", elementary("BOOL")),
+    PlcVariable("trusted", elementary("BOOL"), "from the status: nothing is written before"),
+    PlcVariable("write", elementary("BOOL"), "the inputs hold what you want: write them"),
+)
+"""Inputs of a client block, in front of those of its own."""
+FAILURES: Final = PlcVariable("failures", elementary("UDINT"), "requests that failed")
+WRITTEN: Final = PlcVariable("written", elementary("UDINT"), "rounds in which all writes were confirmed")
+"""Outputs of a client block."""
+
+
+def sequence_call(model: PlcModel, *others: str) -> str:
+    """A client block's call of its sequence, with variables named as its inputs; `others`: besides the usual ones."""
+    inputs = [
+        *(each.name for each in RUN),
+        "done",
+        "failed",
+        *others,
+        *(each.name for each in demands(model)),
+    ]
+    return f"sequence({', '.join(f'{name} := {name}' for name in inputs)});"
 
 
 def sequence(model: PlcModel) -> ProgramUnit:

@@ -8,7 +8,14 @@ from typing import Final
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.st.convert import function
 from gatewayd.links.modbus_server.plc.st.dialect import Primitives, elementary, own
-from gatewayd.links.modbus_server.plc.st.exchange import cyclic, demands
+from gatewayd.links.modbus_server.plc.st.exchange import (
+    FAILURES,
+    RUN,
+    WRITTEN,
+    cyclic,
+    demands,
+    sequence_call,
+)
 from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection
 
 _MODES: Final = {1: 101, 2: 102, 3: 103, 4: 104, 15: 115, 16: 116}
@@ -40,9 +47,7 @@ def client(model: PlcModel) -> ProgramUnit:
             VariableSection(
                 "VAR_INPUT",
                 (
-                    PlcVariable("run", elementary("BOOL")),
-                    PlcVariable("trusted", elementary("BOOL"), "from the status: nothing is written before"),
-                    PlcVariable("write", elementary("BOOL"), "the inputs hold what you want: write them"),
+                    *RUN,
                     PlcVariable(
                         "interface",
                         elementary("HW_ANY"),
@@ -56,9 +61,9 @@ def client(model: PlcModel) -> ProgramUnit:
             VariableSection(
                 "VAR_OUTPUT",
                 (
-                    PlcVariable("failures", elementary("UDINT"), "requests that failed"),
+                    FAILURES,
                     PlcVariable("error_status", elementary("WORD"), "STATUS of the last one"),
-                    PlcVariable("written", elementary("UDINT"), "rounds in which all writes were confirmed"),
+                    WRITTEN,
                 ),
             ),
             VariableSection(
@@ -88,8 +93,7 @@ def _body(model: PlcModel) -> Iterator[str]:
         yield f"connection.RemoteAddress.ADDR[{position}] := {part};"
     yield f"connection.RemotePort := {model.port};"
     yield f"client.MB_Unit_ID := {model.unit};"
-    operands = ["run", "trusted", "write", "done", "failed", *(each.name for each in demands(model))]
-    yield f"sequence({', '.join(f'{name} := {name}' for name in operands)});"
+    yield sequence_call(model)
     yield "done := FALSE;"
     yield "failed := FALSE;"
     yield "CASE sequence.current OF"
