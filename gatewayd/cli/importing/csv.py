@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gatewayd.cli.files import reason_of
-from gatewayd.cli.importing.defaults import cell_name, listen_address
+from gatewayd.cli.importing.defaults import cell_name, cell_options, listen_address
 from gatewayd.cli.output import refuse_existing, write_text
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
@@ -60,9 +60,7 @@ Exit codes:
     metavar="ADDRESS:PORT",
     help="Where the PLC connects to; otherwise port 502, from other machines only if a writer is one.",
 )
-@click.option("--cell", metavar="NAME", help="Name of the cell; otherwise made of the file's name.")
-@click.option("--series", type=click.Choice(["cb3", "e", "x"]), help="Series of the controller, for `check`.")
-@click.option("--version", metavar="VERSION", help="Its software, for example 5.12, for `check`.")
+@cell_options
 @click.option(
     "-o",
     "--output",

@@ -1,15 +1,33 @@
-"""What imports make of what nobody said: the name of the cell, and where the PLC connects to."""
+"""What imports are told of the cell, and what they make of what nobody said: its name, where the PLC connects to."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from ipaddress import ip_network
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+
+import click
 
 _EVERYWHERE, _HERE = "0.0.0.0:502", "127.0.0.1:502"
 _MAX_CELL: Final = 64
+
+
+_CELL_OPTIONS: Final = (
+    click.option("--cell", metavar="NAME", help="Name of the cell; otherwise made of the file's name."),
+    click.option(
+        "--series", type=click.Choice(["cb3", "e", "x"]), help="Series of the controller, for `check`."
+    ),
+    click.option("--version", metavar="VERSION", help="Its software, for example 5.12, for `check`."),
+)
+
+
+def cell_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give an import the options --cell, --series and --version."""
+    for option in reversed(_CELL_OPTIONS):
+        command = option(command)
+    return command
 
 
 def cell_name(file: str) -> str:
