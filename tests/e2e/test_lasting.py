@@ -58,6 +58,7 @@ runpy.run_module("gatewayd", run_name="__main__")
 
 WALL_CLOCK = {
     "cli/events": "what `--since 10min` means",
+    "cli/rtde/robot_source": "the time of a package in a recording",
     "control/server": "the time in answers",
     "demo/snapshot": "the time on the screen",
     "service/audit": "the time of a record",
