@@ -4,8 +4,8 @@ The robot program reads six doubles from 24 on when integer 25 has changed, move
 its output integer 25. It stops when integer 24 is not fed: rtde_set_watchdog("input_int_register_24", 10, "stop").
 """
 
+import argparse
 import asyncio
-import sys
 
 from gatewayd import rtde
 
@@ -14,12 +14,12 @@ POINT = [f"input_double_register_{number}" for number in range(24, 30)]
 INPUTS = {"point": [*POINT, "input_int_register_25"], "watchdog": ["input_int_register_24"]}
 
 
-async def main(host: str, port: str = "30004", points: str = "4") -> None:
+async def main(host: str, port: int, points: int) -> None:
     outputs = ["actual_TCP_pose", "output_int_register_25"]
-    async with rtde.connect(host, port=int(port), outputs=outputs, inputs=INPUTS, frequency=125) as robot:
+    async with rtde.connect(host, port=port, outputs=outputs, inputs=INPUTS, frequency=125) as robot:
         feeding = asyncio.create_task(feed(robot))
         try:
-            for number in range(1, int(points) + 1):
+            for number in range(1, points + 1):
                 pose = POSES[number % len(POSES)]
                 await robot.write(
                     "point", {**dict(zip(POINT, pose, strict=True)), "input_int_register_25": number}
@@ -39,4 +39,8 @@ async def feed(robot: rtde.Robot) -> None:
         await asyncio.sleep(0.05)
 
 
-asyncio.run(main(*sys.argv[1:]))
+arguments = argparse.ArgumentParser(description=__doc__)
+arguments.add_argument("host")
+arguments.add_argument("port", nargs="?", type=int, default=30004)
+arguments.add_argument("points", nargs="?", type=int, default=4)
+asyncio.run(main(**vars(arguments.parse_args())))

@@ -3,6 +3,7 @@
 Other inputs: `q` ends it. The outputs stay as they are.
 """
 
+import argparse
 import asyncio
 import sys
 
@@ -12,8 +13,8 @@ OUTPUTS = ["actual_digital_input_bits", "actual_digital_output_bits"]
 INPUTS = {"io": ["standard_digital_output_mask", "standard_digital_output"]}
 
 
-async def main(host: str, port: str = "30004") -> None:
-    async with rtde.connect(host, port=int(port), outputs=OUTPUTS, inputs=INPUTS, frequency=25) as robot:
+async def main(host: str, port: int) -> None:
+    async with rtde.connect(host, port=port, outputs=OUTPUTS, inputs=INPUTS, frequency=25) as robot:
         panel = asyncio.create_task(show(robot))
         try:
             while (word := (await asyncio.to_thread(sys.stdin.readline)).strip()) and word != "q":
@@ -37,4 +38,7 @@ async def show(robot: rtde.Robot) -> None:
             shown = bits
 
 
-asyncio.run(main(*sys.argv[1:]))
+arguments = argparse.ArgumentParser(description=__doc__)
+arguments.add_argument("host")
+arguments.add_argument("port", nargs="?", type=int, default=30004)
+asyncio.run(main(**vars(arguments.parse_args())))

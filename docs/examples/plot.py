@@ -1,6 +1,6 @@
 """Draw joint angles of a recording: python plot.py FILE PICTURE. Needs the extras `numpy` and `plot`."""
 
-import sys
+import argparse
 
 import matplotlib.pyplot as plt
 
@@ -17,4 +17,7 @@ def main(file: str, picture: str) -> None:
     plt.savefig(picture)
 
 
-main(*sys.argv[1:])
+arguments = argparse.ArgumentParser(description=__doc__)
+arguments.add_argument("file")
+arguments.add_argument("picture")
+main(**vars(arguments.parse_args()))

@@ -56,7 +56,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def simulate_robot(request: pytest.FixtureRequest) -> Iterator[Callable[..., SimulatedRobot]]:
     """Starts a robot by the arguments of `SimulatedRobot`; it is stopped after the test.
 
-    Files are relative to that of the test.
+    Files are relative to that of the test; FileNotFoundError says where one was looked for.
     """
     with ExitStack() as stack:
 
@@ -79,4 +79,13 @@ def simulated_robot(
 
 def _beside(test: Path, file: str | Path | None) -> str | Path | None:
     """A file as the test names it; the content of a scenario stays what it is."""
-    return file if file is None or "\n" in str(file) else test.parent / file
+    if file is None or "\n" in str(file):
+        return file
+    found = test.parent / file
+    if not found.is_file():
+        message = (
+            f"there is no file {str(file)!r} for the simulated robot of {test.name}: it was looked for as {found}, "
+            "relative to the file of the test"
+        )
+        raise FileNotFoundError(message)
+    return found

@@ -115,6 +115,15 @@ def test_notebook(run: Run) -> None:
     assert run("notebook").stdout.splitlines()[1] == "the controller has taken 7"
 
 
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
+def test_without_arguments_an_example_says_which_it_takes(path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, path], capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"usage: {path.name} ")
+
+
 def test_no_example_is_left_out() -> None:
     tested = {name.removeprefix("test_") for name in globals() if name.startswith("test_")}
     assert {path.stem for path in EXAMPLES.glob("*.py")} <= tested

@@ -79,6 +79,24 @@ def test_the_fixtures_work_in_a_project_of_others(tmp_path: Path) -> None:
     assert ended.returncode == 0
 
 
+def test_a_file_that_is_not_there_is_named_with_its_place(tmp_path: Path) -> None:
+    (tmp_path / "conftest.py").write_text(CONFTEST)
+    (tmp_path / "test_mine.py").write_text(
+        """
+import pytest
+@pytest.mark.simulated_robot("no.toml")
+def test_of_a_scenario(simulated_robot): ...
+@pytest.mark.simulated_robot(replay="no.csv")
+def test_of_a_recording(simulated_robot): ...
+"""
+    )
+    ended = run(tmp_path)
+    assert "2 errors" in ended.stdout
+    for name in ("no.toml", "no.csv"):
+        assert f"there is no file {name!r} for the simulated robot of test_mine.py" in ended.stdout
+        assert f"it was looked for as {tmp_path / name}" in ended.stdout
+
+
 def test_without_pytest_the_error_names_the_extra() -> None:
     program = "import sys; sys.modules['pytest'] = None; import gatewayd.rtde.testing"
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

@@ -11,7 +11,7 @@ import click
 
 from gatewayd.cli.output import refuse_existing
 from gatewayd.cli.remote import DURATION, cell_option, refusals
-from gatewayd.cli.rtde.recordings import FAILED, WRONG, delimiter_option, reported
+from gatewayd.cli.rtde.recordings import FAILED, WRONG, delimiter_option, reported, typed
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
@@ -167,6 +167,8 @@ def command(
     if gateway and out is None:
         host, out = None, host
     target = target_of(context, host, gateway=gateway, cell=cell, frequency=frequency)
+    if binary and typed(context, "delimiter"):
+        raise click.UsageError("--delimiter separates the columns of text: leave it out, or --binary")
     conditions = conditions_of(during, start, stop, once=once, before=before, after=after)
     fields = fields_of(names, config, key)
     order = RecordingOrder(

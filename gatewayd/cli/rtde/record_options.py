@@ -8,6 +8,7 @@ import click
 
 from gatewayd.cli.rtde.conditions import Condition
 from gatewayd.cli.rtde.field_choice import Fields, named, of_file
+from gatewayd.cli.rtde.recordings import typed
 from gatewayd.cli.rtde.target import TARGET, Target
 from gatewayd.cli.rtde.triggers import Conditions
 from gatewayd.rtde.session import TIMESTAMP
@@ -32,6 +33,8 @@ def target_of(
         raise click.UsageError("name the robot's HOST, or record a running gateway's with --gateway")
     if cell is not None:
         raise click.UsageError("--cell is for --gateway")
+    if typed(context, "socket"):
+        raise click.UsageError("--socket is for --gateway")
     return TARGET.convert(host, None, context)
 
 

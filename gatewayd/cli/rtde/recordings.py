@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
 import click
+from click.core import ParameterSource
 
 from gatewayd.cli.files import reason_of
 from gatewayd.report.format import counted
@@ -46,6 +47,11 @@ def delimiter_option(name: str, text: str, default: str | None = None) -> Callab
         show_default=default is not None,
         help=text,
     )
+
+
+def typed(context: click.Context, name: str) -> bool:
+    """Whether an option stands in the command line, with whatever value: not its default, not the environment's."""
+    return context.get_parameter_source(name) is ParameterSource.COMMANDLINE
 
 
 @contextmanager

@@ -51,6 +51,13 @@ def test_delimiters_have_words(source: Path, tmp_path: Path) -> None:
     assert "'.' cannot separate columns" in refused.stderr
 
 
+def test_a_delimiter_of_what_is_no_text_is_wrong_usage(source: Path, tmp_path: Path) -> None:
+    refused = convert("--delimiter", "tab", source, tmp_path / "x.bin")
+    assert refused.exit_code == 2
+    assert "x.bin is to be binary" in " ".join(refused.stderr.split())
+    assert not (tmp_path / "x.bin").exists()
+
+
 def test_gaps_go_along(source: Path, tmp_path: Path) -> None:
     with GapWriter(source) as gaps:
         gaps.write(RecordedGap(3, "skipped", 2))

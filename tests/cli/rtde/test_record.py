@@ -98,6 +98,8 @@ def out(tmp_path: Path) -> Path:
         (("127.0.0.1:1", "-f", ","), "no field is named"),
         (("127.0.0.1:1", "-f", "a;b"), "'a;b' is not the name of a field"),
         (("127.0.0.1:1", "--delimiter", "."), "cannot separate columns"),
+        (("127.0.0.1:1", "--binary", "--delimiter", "space"), "--delimiter separates the columns of text"),
+        (("127.0.0.1:1", "--socket", "x.sock"), "--socket is for --gateway"),
     ],
 )
 def test_wrong_usage_says_what_to_do(arguments: tuple[str, ...], words: str) -> None:
