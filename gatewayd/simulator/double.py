@@ -252,6 +252,7 @@ class _ThreadBackend:
         if self._loop.is_closed():
             return
         self._wait(_each(robot.stop for robot in self._robots.values()))
+        self._wait(_others())
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
@@ -263,6 +264,13 @@ class _ThreadBackend:
 async def _each(calls: Iterable[Callable[[], Awaitable[None]]]) -> None:
     for call in calls:
         await call()
+
+
+async def _others() -> None:
+    """Returns when all other tasks have ended: a client that was accepted just before the end is told that it is one."""
+    while others := asyncio.all_tasks() - {asyncio.current_task()}:
+        await asyncio.wait(others)
+    await asyncio.sleep(0)  # lets the transports of those close
 
 
 def _scenario(scenario: str | Path | None, keys: Mapping[str, Any]) -> tuple[str, str]:

@@ -228,11 +228,16 @@ class SimulatedController:
 
     async def _listen(self) -> None:
         loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(self._accept, self.host, self.port)
+        self._server = await loop.create_server(self._accept, self.host, self.port, start_serving=False)
+        await self._server.start_serving()  # only now: `enter` asks it
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def _close(self) -> None:
         if self._server is not None:
+            # asyncio (3.11) leaks a connection that it accepted and has not handed on when its server is closed.
+            for listening in self._server.sockets:
+                asyncio.get_running_loop().remove_reader(listening.fileno())
+            await asyncio.sleep(0)
             self._server.close()
         for connection in list(self._connections.values()):
             connection.abort("controller stops")
@@ -243,7 +248,9 @@ class SimulatedController:
         return _Connection(self, self._number)
 
     def enter(self, number: int, connection: _Connection) -> bool:
-        """Note a new connection; False if there are too many."""
+        """Note a new connection; False if there are too many, or if it was accepted just before the end."""
+        if self._server is None or not self._server.is_serving():
+            return False
         if len(self._connections) >= self._most:
             self.refused += 1
             return False
@@ -313,7 +320,7 @@ class _Connection(asyncio.Protocol):
             self._server.controller, f"client {self._number} ({peer[0]}:{peer[1]})"
         )
         if not self._server.enter(self._number, self):
-            self.abort("too many connections")
+            self.abort("turned away")
             return
         # A small send buffer makes it show soon that a client does not read.
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -190,3 +192,13 @@ def test_it_can_be_closed_twice() -> None:
         robot = SimulatedRobot(process=process)
         robot.close()
         robot.close()
+
+
+def test_a_client_that_was_accepted_just_before_the_end_is_closed() -> None:
+    for _ in range(20):
+        robot = SimulatedRobot()
+        with socket.create_connection((robot.host, robot.port)) as client:
+            robot.close()
+            client.settimeout(5)
+            with suppress(ConnectionResetError):
+                assert client.recv(1) == b""
