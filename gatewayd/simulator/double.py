@@ -267,7 +267,7 @@ async def _each(calls: Iterable[Callable[[], Awaitable[None]]]) -> None:
 
 
 async def _others() -> None:
-    """Returns when all other tasks have ended: a client that was accepted just before the end is told that it is one."""
+    """Returns when all other tasks have ended: also those of a client that was accepted just before the end."""
     while others := asyncio.all_tasks() - {asyncio.current_task()}:
         await asyncio.wait(others)
     await asyncio.sleep(0)  # lets the transports of those close
