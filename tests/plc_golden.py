@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from gatewayd.links.modbus_server.plc.build import PlcWishes, model_of
+from gatewayd.links.modbus_server.plc.build import model_of
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.registry import TARGETS, files_for
+from gatewayd.links.modbus_server.plc.registry import files_for
 from gatewayd.mapping.loader import load
+from gatewayd.plc.export import TARGETS
+from gatewayd.plc.tags import PlcWishes
 from tests.sources import ROOT
 
 GOLDEN = ROOT / "tests" / "golden" / "plc"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -11,9 +11,11 @@ from gatewayd.cli.output import write_text
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
-    from gatewayd.links.exports import Export, ExportedFile, ExportOption, ExportSet
+    from gatewayd.links.exports import AnyExport, Export, ExportedFile, ExportOption, ExportSet
+
+_Made = TypeVar("_Made")
 
 BROKEN, UNREADABLE = 1, 2
 """Exit codes."""
@@ -43,11 +45,7 @@ class ExportGroup(click.Group):
         from gatewayd.links.registry import exports
 
         export = exports().get(cmd_name)
-        if export is None:
-            return None
-        from gatewayd.links.exports import Export
-
-        return _command(export) if isinstance(export, Export) else _command_of_set(export)
+        return None if export is None else _command(export)
 
 
 @click.group(
@@ -66,60 +64,69 @@ def command() -> None:
     """Write files for other tools from a mapping FILE: the CANopen data sheet, robot and PLC programs."""
 
 
-def _command(export: Export) -> click.Command:
+def _command(export: AnyExport) -> click.Command:
+    """A command: what is common to all, and where it writes."""
     from inspect import cleandoc
 
-    def run(file: str, output: str, **options: object) -> None:
-        context = click.get_current_context()
-        _write(context, output, _made(context, export, file, options))
+    from gatewayd.links.exports import ExportSet
 
-    return click.Command(
-        export.name,
-        callback=run,
-        params=[
-            click.Argument(["file"], type=click.Path(allow_dash=True)),
-            *map(_option, export.options),
-            click.Option(
-                ["-o", "--output"],
-                metavar="OUT",
-                type=click.Path(allow_dash=True),
-                default=STDOUT,
-                help="Where to write it; standard output otherwise.",
-            ),
-        ],
-        help=cleandoc(export.help),
-        short_help=export.summary,
-        epilog=f"\b\nExamples:\n  {export.example}\n\n{_EXIT_CODES}",
-    )
-
-
-def _command_of_set(export: ExportSet) -> click.Command:
-    from inspect import cleandoc
-
-    def run(file: str, output: str, force: bool, **options: object) -> None:
-        _write_set(click.get_current_context(), export, file, output, options, force=force)
-
+    is_set = isinstance(export, ExportSet)
     examples = "\n".join(f"  {example}" for example in export.examples)
     return click.Command(
         export.name,
-        callback=run,
+        callback=_into_folder(export) if isinstance(export, ExportSet) else _into_file(export),
         params=[
             click.Argument(["file"], type=click.Path(allow_dash=True)),
             *map(_option, export.options),
-            click.Option(
-                ["-o", "--output"],
-                metavar="FOLDER",
-                type=click.Path(file_okay=False),
-                default=".",
-                show_default=True,
-                help="Where to write the files; it is made where there is none.",
-            ),
-            click.Option(["--force"], is_flag=True, help="Overwrite generated files that somebody changed."),
+            *((_option(export.link_option),) if isinstance(export, ExportSet) else ()),
+            *(_FOLDER_OPTIONS if is_set else _FILE_OPTIONS),
         ],
         help=cleandoc(export.help),
         short_help=export.summary,
         epilog=f"\b\nExamples:\n{examples}\n\n{_EXIT_CODES}",
     )
+
+
+_FILE_OPTIONS = (
+    click.Option(
+        ["-o", "--output"],
+        metavar="OUT",
+        type=click.Path(allow_dash=True),
+        default=STDOUT,
+        help="Where to write it; standard output otherwise.",
+    ),
+)
+_FOLDER_OPTIONS = (
+    click.Option(
+        ["-o", "--output"],
+        metavar="FOLDER",
+        type=click.Path(file_okay=False),
+        default=".",
+        show_default=True,
+        help="Where to write the files; it is made where there is none.",
+    ),
+    click.Option(["--force"], is_flag=True, help="Overwrite generated files that somebody changed."),
+)
+
+
+def _into_file(export: Export) -> Callable[..., None]:
+    def run(file: str, output: str, **options: object) -> None:
+        context = click.get_current_context()
+        text = _made(context, export.make, file, options)
+        if output == STDOUT:
+            click.echo(text, nl=False)
+        else:
+            write_text(context, output, text, encoding="ascii")
+
+    return run
+
+
+def _into_folder(export: ExportSet) -> Callable[..., None]:
+    def run(file: str, output: str, force: bool, **options: object) -> None:
+        context = click.get_current_context()
+        _write_set(context, _made(context, export.make, file, options), output, force=force)
+
+    return run
 
 
 def _option(option: ExportOption) -> click.Option:
@@ -138,20 +145,11 @@ def _option(option: ExportOption) -> click.Option:
     )
 
 
-def _write_set(
-    context: click.Context,
-    export: ExportSet,
-    file: str,
-    output: str,
-    options: Mapping[str, object],
-    *,
-    force: bool,
-) -> None:
+def _write_set(context: click.Context, made: Sequence[ExportedFile], output: str, *, force: bool) -> None:
     from pathlib import Path
 
     from gatewayd.cli.generated import planned, write
 
-    made = _set(context, export, file, options)
     try:
         files = planned(Path(output), made, force=force)
         changed = [each for each in files if each.state == "changed by hand"]
@@ -170,31 +168,15 @@ def _write_set(
         click.echo(printable(f"{each.path}: {each.state}"))
 
 
-def _set(
-    context: click.Context, export: ExportSet, file: str, options: Mapping[str, object]
-) -> Sequence[ExportedFile]:
+def _made(
+    context: click.Context, make: Callable[..., _Made], file: str, options: Mapping[str, object]
+) -> _Made:
+    """What an export makes of a mapping; each line of why it does not is said, and ends the command."""
     from gatewayd.links.exports import ExportError
 
     try:
-        return export.make(load_plan(context, file)[1], **options)
+        return make(load_plan(context, file)[1], **options)
     except ExportError as error:
         for line in str(error).splitlines():
             click.echo(printable(line), err=True)
         context.exit(BROKEN)
-
-
-def _made(context: click.Context, export: Export, file: str, options: Mapping[str, object]) -> str:
-    from gatewayd.links.exports import ExportError
-
-    try:
-        return export.make(load_plan(context, file)[1], **options)
-    except ExportError as error:
-        click.echo(printable(str(error)), err=True)
-        context.exit(BROKEN)
-
-
-def _write(context: click.Context, output: str, text: str) -> None:
-    if output == STDOUT:
-        click.echo(text, nl=False)
-    else:
-        write_text(context, output, text, encoding="ascii")

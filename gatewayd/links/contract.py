@@ -113,6 +113,8 @@ class LinkKind:
     metrics: ClassVar[tuple[LinkMetric, ...]] = ()
     traffic: ClassVar[str] = ""
     """Module whose `DECODER` makes what puts its links' traffic into words (`links.traffic`); empty: there is none."""
+    exports: ClassVar[str] = ""
+    """Module with `EXPORTS`, what is written of its links for other tools (`links.exports`); empty: nothing is."""
     doctor: ClassVar[str] = ""
     """Module whose `EXAMINATION` looks at what its links need, where they are to run (`links.examination`); empty:
     nothing is looked at.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 
 class ExportError(Exception):
@@ -35,19 +35,29 @@ class ExportOption:
 
 
 @dataclass(frozen=True, slots=True)
-class Export:
-    """A file for another tool, made from a plan."""
+class ExportCommand:
+    """What a command of `gatewayd export` is called, and what it says of itself."""
 
     name: str
     """Of the command: `eds`."""
     summary: str
     """One line for the list of commands."""
     help: str
-    example: str
-    """A command line."""
+    examples: tuple[str, ...]
+    """Command lines."""
+    options: tuple[ExportOption, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Export(ExportCommand):
+    """A file for another tool, made from a plan."""
+
     make: Callable[..., str]
     """The text, of a plan and of the options by name. Raises ExportError."""
-    options: tuple[ExportOption, ...] = ()
+
+    def joined(self, other: AnyExport) -> AnyExport:
+        """Refused: a file has one writer."""
+        raise TypeError(f"two kinds of link write {self.name} ({other.summary})")
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,16 +78,50 @@ class ExportedFile:
 
 
 @dataclass(frozen=True, slots=True)
-class ExportSet:
-    """Several files for another tool, made from a plan and from what its options say."""
+class ExportWay:
+    """How one kind of link writes a set of files."""
 
-    name: str
-    summary: str
-    help: str
-    examples: tuple[str, ...]
-    options: tuple[ExportOption, ...]
+    link: str
+    """Key of the kind: `modbus`."""
+    has: Callable[[Any], bool]
+    """Whether a plan has such a link."""
     make: Callable[..., Sequence[ExportedFile]]
     """The files, of a plan and of the options by name. Raises ExportError."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportSet(ExportCommand):
+    """Several files for another tool, which several kinds of link may write, each its own."""
+
+    ways: tuple[ExportWay, ...]
+    """In the order in which they are preferred, where a plan has several."""
+
+    def joined(self, other: AnyExport) -> ExportSet:
+        """The set of both: alike but for who writes it."""
+        if not isinstance(other, ExportSet) or replace(other, ways=()) != replace(self, ways=()):
+            raise TypeError(f"two kinds of link say different things of {self.name}")
+        return replace(self, ways=(*self.ways, *other.ways))
+
+    @property
+    def link_option(self) -> ExportOption:
+        """By which link, where a cell has several."""
+        keys = tuple(way.link for way in self.ways)
+        return ExportOption(
+            "--link", f"By which link, where the cell has several; otherwise {' before '.join(keys)}.", "LINK",
+            choices=keys,
+        )  # fmt: skip
+
+    def make(self, plan: Any, *, link: str | None = None, **options: object) -> Sequence[ExportedFile]:
+        """The files. Raises ExportError."""
+        for way in self.ways:
+            if way.link == link or (link is None and way.has(plan)):
+                return way.make(plan, **options)
+        raise ExportError(
+            f"{plan.source}: the cell has no link of these: {', '.join(way.link for way in self.ways)}"
+        )
+
+
+AnyExport = Export | ExportSet
 
 
 _MARK: Final = "gatewayd-checksum: "

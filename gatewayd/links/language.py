@@ -59,8 +59,6 @@ class LinkLanguage:
     """Modules whose import enters the kind's rules."""
     tables: ClassVar[str] = ""
     """Module with `TABLES`, the kind's `LinkTables`, for `show`."""
-    exports: ClassVar[str] = ""
-    """Module with `EXPORTS`, a tuple of `Export`."""
 
     def concerns(self, document: Document) -> bool:
         """Whether the file says anything of this kind of link. Where it does not, none of the kind's rules is asked."""

@@ -78,9 +78,13 @@ def tables() -> tuple[LinkTables, ...]:
 
 @cache
 def exports() -> Mapping[str, Export | ExportSet]:
-    """What all kinds write for other tools, by name."""
-    modules = [import_module(language.exports) for language in languages() if language.exports]
-    return {export.name: export for module in modules for export in module.EXPORTS}
+    """What all kinds write for other tools, by name; what several write is one, with a way for each of them."""
+    found: dict[str, Export | ExportSet] = {}
+    for kind in kinds():
+        for export in import_module(kind.exports).EXPORTS if kind.exports else ():
+            known = found.get(export.name)
+            found[export.name] = export if known is None else known.joined(export)
+    return found
 
 
 def decoder_of(key: str) -> TrafficDecoder:

@@ -101,7 +101,11 @@ def test_what_was_changed_by_hand_is_left_alone(tmp_path: Path) -> None:
     [
         (["plc", TWO_BUSES], 2, "Missing option '--for'"),
         (["plc", TWO_BUSES, "--for", "step7"], 2, "'step7' is not one of"),
-        (["plc", ROOT / "mappings/canopen-only.yaml", "--for", "iec-st"], 1, "the cell has no Modbus server"),
+        (
+            ["plc", ROOT / "mappings/canopen-only.yaml", "--for", "iec-st"],
+            1,
+            "the cell has no link of these: modbus",
+        ),
         (
             ["plc", ROOT / "mappings/two-plcs.yaml", "--for", "iec-st"],
             1,

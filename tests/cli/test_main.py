@@ -48,9 +48,10 @@ def test_help_teaches_the_first_five_commands_and_the_exit_codes(run: Run) -> No
         assert text in done.stdout
 
 
-def test_help_imports_no_library_but_click() -> None:
+@pytest.mark.parametrize("arguments", [["--help"], ["export", "--help"]])
+def test_help_imports_no_library_but_click(arguments: list[str]) -> None:
     script = (
-        "import sys; sys.argv=['gatewayd', '--help']\n"
+        f"import sys; sys.argv={['gatewayd', *arguments]!r}\n"
         "from gatewayd.__main__ import main\n"
         "try: main()\n"
         "except SystemExit: pass\n"

@@ -34,6 +34,7 @@ class CanopenNode(LinkKind):
     key = "canopen"
     title = "CANopen node"
     traffic = "gatewayd.links.canopen_node.traffic"
+    exports = "gatewayd.links.canopen_node.exports"
     doctor = "gatewayd.links.canopen_node.doctor"
     fields = {  # noqa: RUF012 - never changed
         "channel": "interface:channel of the bus",

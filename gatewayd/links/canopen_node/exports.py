@@ -42,7 +42,8 @@ EXPORTS: Final = (
         mapping gives the same bytes. The sheet is valid for any node-ID; COB-IDs beyond the four predefined ones of
         each direction are those of the mapping.
         """,
-        "gatewayd export eds my-cell.yaml -o my-cell.eds",
+        ("gatewayd export eds my-cell.yaml -o my-cell.eds",),
+        (),
         partial(_exported, configured=False),
     ),
     Export(
@@ -51,7 +52,8 @@ EXPORTS: Final = (
         """Write the device configuration file (CiA 306) of a mapping FILE: its data sheet with the node-ID, the
         bit-rate and the value of every parameter as the mapping has them.
         """,
-        "gatewayd export dcf my-cell.yaml -o my-cell.dcf",
+        ("gatewayd export dcf my-cell.yaml -o my-cell.dcf",),
+        (),
         partial(_exported, configured=True),
     ),
 )

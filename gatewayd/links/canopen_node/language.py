@@ -53,7 +53,6 @@ class CanopenLanguage(LinkLanguage):
         f"gatewayd.links.canopen_node.rules.{name}" for name in ("node", "pdos", "pdo_members", "bus")
     )
     tables = "gatewayd.links.canopen_node.tables"
-    exports = "gatewayd.links.canopen_node.exports"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
         (VariableSpec, "canopen"): CanopenPlace,
         (Canopen, "identity"): IdentitySpec,

@@ -19,6 +19,7 @@ class ModbusServer(LinkKind):
     key = ModbusPlan.kind
     title = "Modbus TCP server"
     traffic = "gatewayd.links.modbus_server.traffic"
+    exports = "gatewayd.links.modbus_server.exports"
     doctor = "gatewayd.links.modbus_server.doctor"
     usual = True
     fields = {  # noqa: RUF012 - never changed

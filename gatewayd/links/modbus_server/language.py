@@ -61,7 +61,6 @@ class ModbusLanguage(LinkLanguage):
         for name in ("places", "listener", "peers", "sharing", "conversion")
     )
     tables = "gatewayd.links.modbus_server.tables"
-    exports = "gatewayd.links.modbus_server.exports"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
         (VariableSpec, "modbus"): PlacementSpec
     }

@@ -19,6 +19,7 @@ class RobotKind(LinkKind):
     key = RobotPlan.kind
     title = "Universal Robots controller"
     traffic = "gatewayd.links.robot.traffic"
+    exports = "gatewayd.links.robot.urscript.export"
     doctor = "gatewayd.links.robot.doctor"
     usual = True
     fields = {  # noqa: RUF012 - never changed

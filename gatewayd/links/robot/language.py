@@ -55,7 +55,6 @@ class RobotLanguage(DefiningLanguage):
              "gatewayd.links.robot.rules.watchdog", "gatewayd.links.robot.rules.rates",
              "gatewayd.links.robot.rules.validity")  # fmt: skip
     tables = "gatewayd.links.robot.tables"
-    exports = "gatewayd.links.robot.urscript.export"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
         (RobotSection, "watchdog"): Watchdog,
         (VariableSpec, "robot"): RobotField,

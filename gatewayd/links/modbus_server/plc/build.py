@@ -4,48 +4,33 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Final
 
 from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.links.exports import ExportError
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.links.modbus_server.plc.model import PlcModel, Tag
+from gatewayd.links.modbus_server.plc.model import PlcModel, RegisterTag
 from gatewayd.links.modbus_server.plc.polling import numbered, read_polls, status_polls, write_polls
-from gatewayd.links.modbus_server.plc.tags import members, owners, places, tag_of
+from gatewayd.links.modbus_server.plc.tags import places, tag_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.areas import Area
+from gatewayd.plc.tags import PlcWishes, members, owners, renamed, writer_of
 from gatewayd.report.printable import printable
-from gatewayd.report.wording import alternatives, did_you_mean, one_and_more
+from gatewayd.report.wording import one_and_more
 
-NOBODY: Final = "none"
-"""The writer of a program that only reads."""
 _PERIOD: Final = 0.1
 _HOST: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9.:%_-]{0,252}", re.ASCII)
 _ANYWHERE: Final = frozenset({"0.0.0.0", "::"})
-
-
-@dataclass(frozen=True, slots=True)
-class PlcWishes:
-    """What a mapping cannot say of the program."""
-
-    writer: str | None = None
-    """Which writer of the mapping the PLC is; `NOBODY`: it only reads; None: the only one there is."""
-    prefix: str = "GW"
-    names: Mapping[str, str] = field(default_factory=dict)
-    """Variable or family of the mapping -> what it is called in the PLC."""
-    host: str | None = None
-    """How the PLC reaches the gateway; None: at the address where it listens, if it is one."""
 
 
 def model_of(plan: Plan, wishes: PlcWishes) -> PlcModel:
     """The model. Raises ExportError for a cell without Modbus, and where no program could do what the mapping says."""
     modbus = _modbus_of(plan)
     cell = plan.cell
-    writer = _writer_of(cell, modbus, wishes.writer)
+    writer = writer_of(cell, {writer for _network, writer in modbus.writers}, wishes.writer, "Modbus")
     chosen = places(modbus.placements, cell)
-    tags = _renamed([tag_of(place, cell) for place in chosen.values()], wishes.names)
+    tags = renamed([tag_of(place, cell) for place in chosen.values()], wishes.names)
     outputs = [tag for tag in tags if cell.variables[tag.number - 1].direction is Direction.OUTPUT]
     inputs = [tag for tag in tags if writer is not None and writer + 1 in tag.owners]
     others = {
@@ -97,40 +82,12 @@ def _modbus_of(plan: Plan) -> ModbusPlan:
     found = list(plan.of(ModbusPlan).values())
     if not found:
         raise ExportError(
-            f"{plan.source}: the cell has no Modbus server: add `modbus: {{listen: 0.0.0.0:502}}`; "
-            "for a CANopen master there is `gatewayd export eds`"
+            f"{plan.source}: the cell has no Modbus server: add `modbus: {{listen: 0.0.0.0:502}}`"
         )
     return found[0]
 
 
-def _writer_of(cell: CellDefinition, modbus: ModbusPlan, name: str | None) -> int | None:
-    known = sorted({writer for _network, writer in modbus.writers})
-    names = [cell.writers[writer].name for writer in known]
-    if name == NOBODY or not (known or name):
-        return None
-    if name is None and len(known) == 1:
-        return known[0]
-    if name in names:
-        return known[names.index(name)]
-    choice = alternatives([*names, NOBODY])
-    if name is None:
-        raise ExportError(
-            f"the mapping has several writers on Modbus: say which the PLC is, with --writer: {choice}"
-        )
-    raise ExportError(f"`{name}` is no writer on Modbus: --writer is one of {choice}")
-
-
-def _renamed(tags: Sequence[Tag], names: Mapping[str, str]) -> list[Tag]:
-    known = {tag.member for tag in tags}
-    for name in names:
-        if name not in known:
-            raise ExportError(
-                f"--name {name}={names[name]}: {did_you_mean(name, known, f'there is no `{name}`')}"
-            )
-    return [replace(tag, member=names.get(tag.member, tag.member)) for tag in tags]
-
-
-def _left_out(cell: CellDefinition, chosen: Mapping[int, object], inputs: Sequence[Tag]) -> list[str]:
+def _left_out(cell: CellDefinition, chosen: Mapping[int, object], inputs: Sequence[RegisterTag]) -> list[str]:
     """Inputs of other writers, and variables without a place on Modbus."""
     written = {tag.number for tag in inputs}
     foreign = [

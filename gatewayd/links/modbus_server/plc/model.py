@@ -1,69 +1,25 @@
-"""What a PLC program needs of a cell, whatever the make of the PLC: the neutral model that every target writes down.
-
-Types are the elementary types of IEC 61131-3. Numbers of variables are those of the status block, counted from 1.
-"""
+"""What a PLC program needs of the registers of a cell: the neutral model that every target writes down."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gatewayd.core.definition import Fallback, Limits, Value, ValueKind
 from gatewayd.core.status_layout import BASE
 from gatewayd.modbus.areas import Area
+from gatewayd.plc.model import CellModel, Tag
 
 WORD_BITS = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Encoding:
-    """How a number lies in registers."""
+class RegisterTag(Tag):
+    """One variable as the PLC sees it, and its registers."""
 
-    type: str
-    """A key of `gatewayd.modbus.codec.TYPES`."""
-    order: str
-    scale: float
-    offset: float
-
-    @property
-    def is_scaled(self) -> bool:
-        """Whether the raw number is not the value."""
-        return (self.scale, self.offset) != (1, 0)
-
-
-@dataclass(frozen=True, slots=True)
-class Tag:
-    """One variable as the PLC sees it."""
-
-    number: int
-    name: str
-    """Of the mapping: `tcp[0]`."""
-    member: str
-    """Of the data type that it is in: `tcp`."""
-    element: int | None
-    """Index in the member, where that is an array."""
-    kind: ValueKind
-    type: str
-    """Elementary type of the value in the PLC."""
-    arithmetic: str
-    """REAL or LREAL: in which scale and offset are applied; empty where nothing is scaled."""
-    encoding: Encoding | None
-    """None: a bit of a register, a coil or a discrete input."""
     bit: int | None
     """Bit of the register, the lowest one of a byte; None: whole registers, or a coil or discrete input."""
     area: Area
     address: int
-    unit: str
-    comment: str
-    limits: Limits | None
-    on_stale: Fallback
-    owners: tuple[int, ...]
-    """Numbers of the writers that may own it."""
-
-    @property
-    def path(self) -> str:
-        """Below a variable of the data type: `tcp[0]`."""
-        return self.member if self.element is None else f"{self.member}[{self.element}]"
 
     @property
     def notation(self) -> str:
@@ -72,20 +28,6 @@ class Tag:
         if self.encoding is not None and self.bit is not None:
             part = ".high" if self.bit else ".low"
         return f"{self.area.notation(self.address)}{part} ({self.address}{part})"
-
-
-@dataclass(frozen=True, slots=True)
-class TagFamily:
-    """A variable, or a family of variables of one type as an array from 0."""
-
-    name: str
-    type: str
-    tags: tuple[Tag, ...]
-
-    @property
-    def is_array(self) -> bool:
-        """Whether it has elements."""
-        return self.tags[0].element is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +40,7 @@ class Poll:
     address: int
     count: int
     """Registers, or coils and discrete inputs."""
-    tags: tuple[Tag, ...] = ()
+    tags: tuple[RegisterTag, ...] = ()
     writes: bool = False
     slow: bool = False
     """Read in turns with the other slow ones, one in each round."""
@@ -123,34 +65,15 @@ WRITES: Mapping[Area, int] = {Area.COIL: 15, Area.HOLDING: 16}
 
 
 @dataclass(frozen=True, slots=True)
-class PlcModel:
-    """A cell for one PLC."""
+class PlcModel(CellModel):
+    """A cell for one PLC that reaches it by Modbus."""
 
-    cell: str
-    source: str
-    """Name of the mapping file, without its folder."""
-    fingerprint: int
-    prefix: str
-    """Of everything that is generated."""
     host: str
     port: int
     unit: int
-    writer: str
-    """Who the PLC is in the mapping; empty: it only reads."""
-    writer_number: int
-    """As in the owner table; 0: it only reads."""
-    writers: tuple[str, ...]
     timeout: float | None
     """Seconds within which the PLC has to ask for something."""
-    inputs: tuple[TagFamily, ...]
-    """What this PLC may write."""
-    outputs: tuple[TagFamily, ...]
-    """What it reads."""
-    variables: tuple[str, ...]
-    """All variables of the mapping by number, from 1 on."""
     polls: tuple[Poll, ...]
-    left_out: tuple[str, ...]
-    """What of the mapping is not there, and why."""
     period: float
     """Seconds from one round of requests to the next."""
 
@@ -176,8 +99,3 @@ class PlcModel:
             if 0 <= index < poll.count:
                 return poll.name, index
         raise KeyError(offset)
-
-
-def initial(tag: Tag) -> Value | None:
-    """What the value is while nothing fresh is known, as the mapping's `on_stale` says; None: as it was."""
-    return tag.on_stale.apply(None, tag.kind)  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ from gatewayd.core.definition import CellDefinition, FallbackKind
 from gatewayd.core.status_layout import BASE, HEADER_WORDS, TABLES
 from gatewayd.links.exports import ExportError
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.links.modbus_server.plc.model import WORD_BITS, Poll, Tag
+from gatewayd.links.modbus_server.plc.model import WORD_BITS, PlcModel, Poll, RegisterTag
 from gatewayd.modbus.areas import (
     MAX_READ_BITS,
     MAX_READ_REGISTERS,
@@ -35,7 +35,7 @@ class _Cell:
     """Some addresses that are read or written together, with the tags in them."""
 
     addresses: range
-    tags: tuple[Tag, ...]
+    tags: tuple[RegisterTag, ...]
     apart: Hashable
     """Only what is alike in this lies in one request."""
 
@@ -45,10 +45,10 @@ class _Span:
     start: int
     stop: int
     apart: Hashable
-    tags: list[Tag] = field(default_factory=list)
+    tags: list[RegisterTag] = field(default_factory=list)
 
 
-def read_polls(tags: Sequence[Tag], plan: ModbusPlan) -> Iterator[Poll]:
+def read_polls(tags: Sequence[RegisterTag], plan: ModbusPlan) -> Iterator[Poll]:
     """Requests that read all of these."""
     gap = _MAX_GAP if plan.fill_gaps else 0
     for area in (Area.HOLDING, Area.INPUT, Area.COIL, Area.DISCRETE):
@@ -61,7 +61,7 @@ def read_polls(tags: Sequence[Tag], plan: ModbusPlan) -> Iterator[Poll]:
 
 
 def write_polls(
-    tags: Sequence[Tag], cell: CellDefinition, writer: int, others: dict[int, str]
+    tags: Sequence[RegisterTag], cell: CellDefinition, writer: int, others: dict[int, str]
 ) -> Iterator[Poll]:
     """Requests that write all of these. Raises ExportError where a register belongs to several writers.
 
@@ -71,7 +71,7 @@ def write_polls(
         longest = MAX_WRITE_BITS if area.of_bits else MAX_WRITE_REGISTERS
         kept = others if area is Area.HOLDING else {}
 
-        def apart(address: int, its: Sequence[Tag], kept: dict[int, str] = kept) -> Hashable:
+        def apart(address: int, its: Sequence[RegisterTag], kept: dict[int, str] = kept) -> Hashable:
             return _lock_of(address, its, cell, writer, kept)
 
         for span in _spans(_cells(tags, area, apart), longest, 0):
@@ -111,16 +111,28 @@ def numbered(polls: Iterable[Poll]) -> tuple[Poll, ...]:
     )
 
 
+def plan_lines(model: PlcModel) -> tuple[str, ...]:
+    """The poll plan as a table."""
+    lines = [f"Modbus TCP {model.host}:{model.port}, unit {model.unit}"]
+    for poll in model.polls:
+        when = "in turns" if poll.slow else "on demand" if poll.shared else "every round"
+        lines.append(
+            f"{poll.name}: FC {poll.function}, address {poll.address} ({poll.notation}), count {poll.count}, "
+            f"{when}: {poll.what}"
+        )
+    return tuple(lines)
+
+
 def _status(offset: int, length: int, what: str) -> Poll:
     return Poll("status", Area.HOLDING, BASE + offset, length, what=what)
 
 
-def _is_held_back(tags: Sequence[Tag]) -> bool:
+def _is_held_back(tags: Sequence[RegisterTag]) -> bool:
     return any(tag.on_stale.kind is FallbackKind.EXCEPTION for tag in tags)
 
 
 def _lock_of(
-    address: int, tags: Sequence[Tag], cell: CellDefinition, writer: int, others: dict[int, str]
+    address: int, tags: Sequence[RegisterTag], cell: CellDefinition, writer: int, others: dict[int, str]
 ) -> int | None:
     """The lock that others may hold; None where all belong to this writer alone."""
     locks = {lock for tag in tags if (lock := cell.variables[tag.number - 1].lock) is not None}
@@ -136,10 +148,10 @@ def _lock_of(
 
 
 def _cells(
-    tags: Sequence[Tag], area: Area, apart: Callable[[int, Sequence[Tag]], Hashable]
+    tags: Sequence[RegisterTag], area: Area, apart: Callable[[int, Sequence[RegisterTag]], Hashable]
 ) -> Iterator[_Cell]:
     """What lies at each address of an area, ascending; bits of a register together."""
-    found: dict[int, list[Tag]] = {}
+    found: dict[int, list[RegisterTag]] = {}
     for tag in tags:
         if tag.area is area:
             found.setdefault(tag.address, []).append(tag)

@@ -1,25 +1,15 @@
-"""The targets: a new one is a module and a line here."""
+"""The targets of `plc.export.TARGETS`, each with a module."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Final, cast
+from typing import cast
 
 from gatewayd.links.exports import ExportedFile
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.names import Holds, refuse_unfit
-
-TARGETS: Final[Mapping[str, str]] = {
-    "iec-st": "structured text of edition 2, for every tool",
-    "codesys": "CODESYS 3: PLCopen XML, and a table of the channels",
-    "twincat": "TwinCAT 3: a file for each object, client TF6250",
-    "tia": "TIA Portal: external sources in SCL, client MB_CLIENT",
-    "studio5000": "Studio 5000: data types and routines as L5X, tags as CSV",
-    "c": "a C99 header, for soft PLCs and test benches",
-}
-"""Name -> what it is for. The module has the name with `_`."""
+from gatewayd.plc.names import Holds, refuse_unfit
 
 
 @dataclass(frozen=True, slots=True)

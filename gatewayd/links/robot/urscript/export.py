@@ -147,8 +147,7 @@ EXPORTS: Final = (
         it. A handshake towards the robot also brings a self test, which goes through all registers together with the
         PLC; the file has the values of every round.
         """,
-        "gatewayd export urscript my-cell.yaml -o my-cell.script",
-        _urscript,
+        ("gatewayd export urscript my-cell.yaml -o my-cell.script",),
         (
             ExportOption("--prefix", "What the names of the functions begin with.", "NAME", default="gw"),
             ExportOption(
@@ -159,5 +158,6 @@ EXPORTS: Final = (
             ),
             ExportOption("--writer", "The self test is with this writer: its inputs only.", "NAME"),
         ),
+        _urscript,
     ),
 )

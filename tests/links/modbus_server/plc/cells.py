@@ -7,12 +7,13 @@ from itertools import product
 
 from gatewayd.core.definition import CellDefinition, Direction, Lock, ValueKind, Variable, Writer
 from gatewayd.links.modbus_server.plan import ModbusPlan, Placement
-from gatewayd.links.modbus_server.plc.build import PlcWishes, model_of
+from gatewayd.links.modbus_server.plc.build import model_of
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import ORDERS, TYPES, make_codec
+from gatewayd.plc.tags import PlcWishes
 
 HEAD = """\
 gatewayd: 1

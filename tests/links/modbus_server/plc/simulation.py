@@ -7,7 +7,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from gatewayd.links.modbus_server.plc.st.program import ProgramUnit
+from gatewayd.plc.st.program import ProgramUnit
 
 CYCLE = 10
 """Milliseconds from call to call."""

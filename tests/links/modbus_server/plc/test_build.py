@@ -8,9 +8,10 @@ import pytest
 
 from gatewayd.links.exports import ExportError
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.links.modbus_server.plc.build import PlcWishes, model_of
+from gatewayd.links.modbus_server.plc.build import model_of
 from gatewayd.links.modbus_server.plc.model import Poll
 from gatewayd.mapping.plan import Plan
+from gatewayd.plc.tags import PlcWishes
 from tests.links.modbus_server.plc.cells import model, plan_of
 
 START = "start: {robot: input_bit_register_0, modbus: 0.0, owner: plc}"
@@ -65,9 +66,9 @@ def test_who_the_plc_is_has_to_be_said() -> None:
     assert "`plx` is no writer on Modbus" in refused(START, wishes=PlcWishes(writer="plx"))
 
 
-def test_a_cell_without_modbus_has_the_data_sheet() -> None:
+def test_a_cell_without_modbus_is_refused() -> None:
     plan = plan_of(START)
-    with pytest.raises(ExportError, match="gatewayd export eds"):
+    with pytest.raises(ExportError, match="no Modbus server: add `modbus"):
         model_of(Plan(plan.source, plan.cell), PlcWishes())
 
 

@@ -14,9 +14,10 @@ from tree_sitter import Language, Node, Parser
 from xsdata.formats.dataclass.parsers import XmlParser
 from xsdata.formats.dataclass.parsers.config import ParserConfig
 
-from gatewayd.links.modbus_server.plc.build import PlcWishes, model_of
+from gatewayd.links.modbus_server.plc.build import model_of
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.registry import files_for
+from gatewayd.plc.tags import PlcWishes
 from tests.links.modbus_server.plc.cells import complete_plan
 from tests.plc_golden import golden_model
 

@@ -9,9 +9,9 @@ import pytest
 
 from gatewayd.links.exports import ExportError
 from gatewayd.links.modbus_server.plc.logix.code import pack, unpack
-from gatewayd.links.modbus_server.plc.logix.l5x import LogixMember, data_type
-from gatewayd.links.modbus_server.plc.logix.tags_csv import tags
 from gatewayd.links.modbus_server.plc.registry import files_for
+from gatewayd.plc.logix.l5x import LogixMember, data_type
+from gatewayd.plc.logix.tags_csv import tags
 from tests.links.modbus_server.plc.cells import model
 from tests.plc_golden import golden_model
 

@@ -22,11 +22,13 @@ from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Value, ValueKind
 from gatewayd.links.modbus_server.listener import ModbusListener
 from gatewayd.links.modbus_server.plan import ModbusPlan
-from gatewayd.links.modbus_server.plc.build import PlcWishes, model_of
-from gatewayd.links.modbus_server.plc.model import PlcModel, Tag
+from gatewayd.links.modbus_server.plc.build import model_of
+from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.registry import files_for
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.codec import TYPES, make_codec
+from gatewayd.plc.model import Tag
+from gatewayd.plc.tags import PlcWishes
 from tests.links.modbus_server.plc.cells import complete_plan
 from tests.links.modbus_server.plc.translation import header
 
@@ -273,9 +275,9 @@ async def test_a_wrong_word_order_is_found(gateway: Gateway, tmp_path: Path) -> 
         and tag.kind is ValueKind.FLOAT
     )
     assert wrong.encoding is not None
-    mistaken = replace(wrong, encoding=replace(wrong.encoding, order="CDAB"))
+    order = replace(wrong.encoding, order="CDAB")
     polls = tuple(
-        replace(poll, tags=tuple(mistaken if tag is wrong else tag for tag in poll.tags))
+        replace(poll, tags=tuple(replace(tag, encoding=order) if tag is wrong else tag for tag in poll.tags))
         for poll in model.polls
     )
     binary = program(tmp_path, replace(model, polls=polls))

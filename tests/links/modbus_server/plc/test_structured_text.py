@@ -7,11 +7,11 @@ import re
 import pytest
 
 from gatewayd.links.modbus_server.plc.st.decode import unpack
-from gatewayd.links.modbus_server.plc.st.dialect import literal, real
 from gatewayd.links.modbus_server.plc.st.encode import pack
 from gatewayd.links.modbus_server.plc.st.exchange import cyclic
-from gatewayd.links.modbus_server.plc.st.source import comment
 from gatewayd.links.modbus_server.plc.targets.iec_st import DIALECT, files
+from gatewayd.plc.st.dialect import literal, real
+from gatewayd.plc.st.source import comment
 from tests.links.modbus_server.plc.cells import model
 from tests.plc_golden import golden_model
 

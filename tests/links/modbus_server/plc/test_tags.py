@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.links.exports import ExportError
-from gatewayd.links.modbus_server.plc.build import PlcWishes, model_of
+from gatewayd.links.modbus_server.plc.build import model_of
+from gatewayd.plc.tags import PlcWishes
 from tests.links.modbus_server.plc.cells import model, plan_of
 
 

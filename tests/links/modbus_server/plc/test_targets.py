@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.links.exports import is_as_generated
-from gatewayd.links.modbus_server.plc.build import PlcWishes
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.registry import TARGETS, files_for
+from gatewayd.links.modbus_server.plc.registry import files_for
+from gatewayd.plc.export import TARGETS
+from gatewayd.plc.tags import PlcWishes
 from tests.links.modbus_server.plc.cells import model
 from tests.plc_golden import GOLDEN, golden_model, made
 

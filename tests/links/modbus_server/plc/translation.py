@@ -10,12 +10,12 @@ import re
 from collections.abc import Iterable, Iterator
 
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.st.convert import functions
 from gatewayd.links.modbus_server.plc.st.decode import unpack
 from gatewayd.links.modbus_server.plc.st.encode import pack
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, Structure, TypeName
 from gatewayd.links.modbus_server.plc.st.types import data_types
 from gatewayd.links.modbus_server.plc.targets.iec_st import DIALECT
+from gatewayd.plc.st.convert import functions
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, Structure, TypeName
 
 TYPES = {
     "BOOL": "bool",

@@ -7,11 +7,12 @@ from itertools import groupby
 from typing import Final
 
 from gatewayd.core.status_layout import HEADER_WORDS, LAYOUT_VERSION
-from gatewayd.links.modbus_server.plc.model import WORD_BITS, Encoding, PlcModel, Poll, Tag, initial
-from gatewayd.links.modbus_server.plc.st.types import meanings
-from gatewayd.links.modbus_server.plc.tags import WIRE_TYPES
+from gatewayd.links.modbus_server.plc.model import WORD_BITS, PlcModel, Poll, RegisterTag
 from gatewayd.links.registry import status_fields
 from gatewayd.modbus.codec import TYPES
+from gatewayd.plc.model import Encoding, initial
+from gatewayd.plc.numbers import NUMBERS
+from gatewayd.plc.st.types import meanings
 
 _SWAPPED: Final = frozenset({"BADC", "DCBA"})
 _REVERSED: Final = frozenset({"CDAB", "DCBA"})
@@ -38,11 +39,11 @@ def unpack(model: PlcModel) -> Iterator[str]:
             yield from (f"  {line}" for line in _read(tag, poll, prefix))
     yield "ELSE"
     for member in model.outputs:
-        for tag in member.tags:
-            value = initial(tag)
+        for lost in member.tags:
+            value = initial(lost)
             if value is not None:
-                number = repr(float(value)) if tag.type in ("REAL", "LREAL") else str(int(value))
-                yield f"  {prefix}_Outputs.{tag.path} := {number};"
+                number = repr(float(value)) if lost.type in ("REAL", "LREAL") else str(int(value))
+                yield f"  {prefix}_Outputs.{lost.path} := {number};"
     yield "END_IF;"
 
 
@@ -62,13 +63,13 @@ def _place(poll_array: str, index: int, count: int, encoding: Encoding) -> list[
     return places if encoding.order in _REVERSED else places[::-1]
 
 
-def _read(tag: Tag, poll: Poll, prefix: str) -> Iterator[str]:
+def _read(tag: RegisterTag, poll: Poll, prefix: str) -> Iterator[str]:
     target, index = f"{prefix}_Outputs.{tag.path}", tag.address - poll.address
     array = f"{prefix}_Image.{poll.name}"
     if tag.encoding is None:
         yield f"{target} := {array}[{index}]{'' if poll.area.of_bits else f'.{tag.bit}'};"
         return
-    number, wire = TYPES[tag.encoding.type], WIRE_TYPES[tag.encoding.type]
+    number, wire = TYPES[tag.encoding.type], NUMBERS[tag.encoding.type].type
     is_whole = tag.type == wire and tag.type != "BOOL"
     raw = target if is_whole else f"{prefix}_{_raw_type(wire)}"
     if number.is_byte:
@@ -91,12 +92,12 @@ def _raw_type(wire: str) -> str:
     return "INT" if wire == "BOOL" else wire
 
 
-def _write(tag: Tag, array: str, index: int, prefix: str) -> Iterator[str]:
+def _write(tag: RegisterTag, array: str, index: int, prefix: str) -> Iterator[str]:
     source = f"{prefix}_Inputs.{tag.path}"
     if tag.encoding is None:
         yield f"{array}[{index}]{'' if tag.bit is None else f'.{tag.bit}'} := {source};"
         return
-    number, wire = TYPES[tag.encoding.type], WIRE_TYPES[tag.encoding.type]
+    number, wire = TYPES[tag.encoding.type], NUMBERS[tag.encoding.type].type
     raw = source
     if tag.type != wire or tag.type == "BOOL":
         raw = f"{prefix}_{_raw_type(wire)}"
@@ -113,7 +114,7 @@ def _write(tag: Tag, array: str, index: int, prefix: str) -> Iterator[str]:
         yield f"SWPB({copied}, REVERSE, {place});" if swapped else f"{place} := {copied};"
 
 
-def _raw(tag: Tag, encoding: Encoding, source: str, raw: str, prefix: str) -> Iterator[str]:
+def _raw(tag: RegisterTag, encoding: Encoding, source: str, raw: str, prefix: str) -> Iterator[str]:
     """The raw number; an assignment rounds to the nearest, halves to even."""
     if tag.type == "BOOL":
         yield f"{raw} := {source};"

@@ -1,1 +1,1 @@
-"""Structured text (IEC 61131-3): the parts of a program as data, and what their bodies say in each dialect."""
+"""What the bodies of structured text say of registers: joined and split, packed and unpacked, polled and watched."""

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import Final
 
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.st.dialect import array, elementary, own
 from gatewayd.links.modbus_server.plc.st.exchange import (
     FAILURES,
     RUN,
@@ -15,7 +14,8 @@ from gatewayd.links.modbus_server.plc.st.exchange import (
     demands,
     sequence_call,
 )
-from gatewayd.links.modbus_server.plc.st.program import (
+from gatewayd.plc.st.dialect import array, elementary, own
+from gatewayd.plc.st.program import (
     PlcVariable,
     ProgramUnit,
     TypeName,

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gatewayd.links.modbus_server.plc.model import Encoding, PlcModel, Poll, Tag, initial
-from gatewayd.links.modbus_server.plc.st.dialect import REALS, Dialect, elementary, literal, own, real, word
-from gatewayd.links.modbus_server.plc.st.program import (
+from gatewayd.links.modbus_server.plc.model import PlcModel, Poll, RegisterTag
+from gatewayd.modbus.codec import TYPES
+from gatewayd.plc.model import Encoding
+from gatewayd.plc.numbers import NUMBERS, REALS
+from gatewayd.plc.st.dialect import Dialect, elementary, own, word
+from gatewayd.plc.st.program import (
     PlcVariable,
     ProgramUnit,
     VariableSection,
     indented,
     used,
 )
-from gatewayd.links.modbus_server.plc.tags import WIRE_TYPES
-from gatewayd.modbus.codec import TYPES
+from gatewayd.plc.st.scaling import fallback, value_of
 
 _SWAPPED = frozenset({"BADC", "DCBA"})
 _REVERSED = frozenset({"CDAB", "DCBA"})
@@ -32,7 +34,7 @@ def unpack(model: PlcModel, dialect: Dialect) -> ProgramUnit:
     decoded = [
         line for poll in model.reads for tag in poll.tags for line in statement(tag, poll, model, dialect)
     ]
-    lost = [line for member in model.outputs for tag in member.tags for line in _fallback(tag)]
+    lost = [line for member in model.outputs for tag in member.tags for line in fallback(tag)]
     if dialect.primitives.only_finite:
         decoded.insert(0, "unreadable := FALSE;")
     body = ["IF trusted THEN", *indented(decoded)]
@@ -72,7 +74,7 @@ def unpack(model: PlcModel, dialect: Dialect) -> ProgramUnit:
     )
 
 
-def statement(tag: Tag, poll: Poll, model: PlcModel, dialect: Dialect) -> Iterator[str]:
+def statement(tag: RegisterTag, poll: Poll, model: PlcModel, dialect: Dialect) -> Iterator[str]:
     """What brings one value from the image."""
     target, index = f"outputs.{tag.path}", tag.address - poll.address
     place = f"image.{poll.name}[{index}]"
@@ -80,16 +82,16 @@ def statement(tag: Tag, poll: Poll, model: PlcModel, dialect: Dialect) -> Iterat
         packed = f"({place} AND {word(1 << (tag.bit or 0))}) <> {word(0)}"
         yield f"{target} := {place if poll.area.of_bits else packed};"
         return
-    wire = WIRE_TYPES[tag.encoding.type]
+    wire = NUMBERS[tag.encoding.type].type
     if TYPES[tag.encoding.type].words == 1:
-        yield f"{target} := {_value(_single(place, tag, tag.encoding, model, dialect), tag)};"
+        yield f"{target} := {value_of(_single(place, tag, tag.encoding, model, dialect), tag)};"
         return
     bits, kind = ("double", "DWORD") if TYPES[tag.encoding.type].words == 2 else ("quad", "LWORD")
     yield f"{bits} := {_joined(poll, index, tag.encoding, model, dialect)};"
     if wire not in REALS:
-        yield f"{target} := {_value(f'{kind}_TO_{wire}({bits})', tag)};"
+        yield f"{target} := {value_of(f'{kind}_TO_{wire}({bits})', tag)};"
         return
-    assigned = f"{target} := {_value(dialect.call(model, f'To{wire.capitalize()}', bits=bits), tag)};"
+    assigned = f"{target} := {value_of(dialect.call(model, f'To{wire.capitalize()}', bits=bits), tag)};"
     if not dialect.primitives.only_finite:
         yield assigned
         return
@@ -100,17 +102,17 @@ def statement(tag: Tag, poll: Poll, model: PlcModel, dialect: Dialect) -> Iterat
     yield "END_IF;"
 
 
-def _single(place: str, tag: Tag, encoding: Encoding, model: PlcModel, dialect: Dialect) -> str:
+def _single(place: str, tag: RegisterTag, encoding: Encoding, model: PlcModel, dialect: Dialect) -> str:
     """The raw number of one register or of a byte of it."""
     number = TYPES[encoding.type]
     if number.is_byte:
         byte = dialect.shift("SHR", place, "8") if tag.bit else f"{place} AND {word(0xFF)}"
-        return f"BYTE_TO_{WIRE_TYPES[encoding.type]}(WORD_TO_BYTE({byte}))"
+        return f"BYTE_TO_{NUMBERS[encoding.type].type}(WORD_TO_BYTE({byte}))"
     is_turned = encoding.order in _SWAPPED and encoding.type != "bool"
     turned = dialect.call(model, "Swap", value=place) if is_turned else place
     if encoding.type == "bool":
         return f"WORD_TO_UINT({turned})"
-    return f"WORD_TO_{WIRE_TYPES[encoding.type]}({turned})"
+    return f"WORD_TO_{NUMBERS[encoding.type].type}({turned})"
 
 
 def _joined(poll: Poll, index: int, encoding: Encoding, model: PlcModel, dialect: Dialect) -> str:
@@ -122,26 +124,3 @@ def _joined(poll: Poll, index: int, encoding: Encoding, model: PlcModel, dialect
         words.reverse()
     names = ("high", "low") if count == 2 else ("a", "b", "c", "d")
     return dialect.call(model, "Double" if count == 2 else "Quad", **dict(zip(names, words, strict=True)))
-
-
-def _value(raw: str, tag: Tag) -> str:
-    """The raw number with scale and offset, as the type of the value."""
-    encoding = tag.encoding
-    assert encoding is not None
-    wire = WIRE_TYPES[encoding.type]
-    if tag.type == "BOOL":
-        return f"{raw} <> {real(0, wire) if wire in REALS else 0}"
-    if not tag.arithmetic:
-        return raw
-    number = raw if wire == tag.arithmetic else f"{wire}_TO_{tag.arithmetic}({raw})"
-    scaled = number if encoding.scale == 1 else f"{number} * {real(encoding.scale, tag.arithmetic)}"
-    if encoding.offset:
-        scaled = f"{scaled} + {real(encoding.offset, tag.arithmetic)}"
-    return scaled
-
-
-def _fallback(tag: Tag) -> Iterator[str]:
-    """What the value is when gateway or connection are lost: the same that the gateway shows when the robot is."""
-    value = initial(tag)
-    if value is not None:
-        yield f"outputs.{tag.path} := {literal(value, tag.type)};"

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Sequence
 from itertools import groupby
 
-from gatewayd.links.modbus_server.plc.model import Encoding, PlcModel, Poll, Tag
-from gatewayd.links.modbus_server.plc.st.dialect import REALS, Dialect, elementary, own, real, word
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection, used
-from gatewayd.links.modbus_server.plc.tags import WIRE_TYPES
+from gatewayd.links.modbus_server.plc.model import PlcModel, Poll, RegisterTag
 from gatewayd.modbus.codec import TYPES
+from gatewayd.plc.numbers import NUMBERS, REALS
+from gatewayd.plc.st.dialect import Dialect, elementary, own, word
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection, used
+from gatewayd.plc.st.scaling import raw_of
 
 _SWAPPED = frozenset({"BADC", "DCBA"})
 _REVERSED = frozenset({"CDAB", "DCBA"})
-_LARGEST = {"int64": 9223372036854774784.0, "uint64": 18446744073709549568.0}
-"""Greatest LREAL that a 64-bit integer can hold."""
 
 _SCRATCH = (
     ("value", "WORD"),
@@ -63,7 +62,7 @@ def pack(model: PlcModel, dialect: Dialect) -> ProgramUnit:
 
 
 def _register(
-    index: int, tags: Sequence[Tag], poll: Poll, model: PlcModel, dialect: Dialect
+    index: int, tags: Sequence[RegisterTag], poll: Poll, model: PlcModel, dialect: Dialect
 ) -> Iterator[str]:
     place = f"image.{poll.name}[{index}]"
     first = tags[0]
@@ -78,20 +77,20 @@ def _register(
         yield f"{place} := value;"
 
 
-def _part(tag: Tag, dialect: Dialect) -> Iterator[str]:
+def _part(tag: RegisterTag, dialect: Dialect) -> Iterator[str]:
     """A bit or a byte of the register that is being put together in `value`."""
     if tag.encoding is None or tag.type == "BOOL":
         yield f"IF inputs.{tag.path} THEN value := value OR {word(1 << (tag.bit or 0))}; END_IF;"
         return
-    raw = yield from _raw(tag, tag.encoding)
-    byte = f"BYTE_TO_WORD({WIRE_TYPES[tag.encoding.type]}_TO_BYTE({raw}))"
+    raw = yield from raw_of(tag, tag.encoding)
+    byte = f"BYTE_TO_WORD({NUMBERS[tag.encoding.type].type}_TO_BYTE({raw}))"
     yield f"value := value OR {dialect.shift('SHL', byte, '8') if tag.bit else byte};"
 
 
-def _number(index: int, tag: Tag, poll: Poll, model: PlcModel, dialect: Dialect) -> Iterator[str]:
+def _number(index: int, tag: RegisterTag, poll: Poll, model: PlcModel, dialect: Dialect) -> Iterator[str]:
     encoding = tag.encoding
     assert encoding is not None
-    wire, count = WIRE_TYPES[encoding.type], TYPES[encoding.type].words
+    wire, count = NUMBERS[encoding.type].type, TYPES[encoding.type].words
     places = [f"image.{poll.name}[{index + offset}]" for offset in range(count)]
     if encoding.order in _REVERSED:
         places.reverse()
@@ -99,48 +98,19 @@ def _number(index: int, tag: Tag, poll: Poll, model: PlcModel, dialect: Dialect)
     if tag.type == "BOOL":
         words = yield from _truth(tag, wire, count)
     else:
-        raw = yield from _raw(tag, encoding)
+        raw = yield from raw_of(tag, encoding)
         words = yield from _split(raw, wire, count, model, dialect)
     for place, each in zip(places, words, strict=True):
         yield f"{place} := {dialect.call(model, 'Swap', value=each) if turned else each};"
 
 
-def _truth(tag: Tag, wire: str, count: int) -> Generator[str, None, list[str]]:
+def _truth(tag: RegisterTag, wire: str, count: int) -> Generator[str, None, list[str]]:
     """TRUE is the number 1."""
     one = {"REAL": [0x3F80, 0], "LREAL": [0x3FF0, 0, 0, 0]}.get(wire, [0] * (count - 1) + [1])
     nonzero = next(number for number in one if number)
     yield f"value := {word(0)};"
     yield f"IF inputs.{tag.path} THEN value := {word(nonzero)}; END_IF;"
     return ["value" if number else word(0) for number in one]
-
-
-def _raw(tag: Tag, encoding: Encoding) -> Generator[str, None, str]:
-    """The raw number as the register's type: rounded to the nearest, and never beyond the type."""
-    source = f"inputs.{tag.path}"
-    if not tag.arithmetic:
-        return source
-    wire, kind = WIRE_TYPES[encoding.type], tag.arithmetic
-    value = source
-    if encoding.offset:
-        value = f"({value} - {real(encoding.offset, kind)})"
-    if encoding.scale != 1:
-        value = f"{value} / {real(encoding.scale, kind)}"
-    name = kind.lower()
-    yield f"{name}_raw := {value};"
-    if wire in REALS:
-        return f"{name}_raw" if wire == kind else f"{kind}_TO_{wire}({name}_raw)"
-    number = TYPES[encoding.type]
-    high = _LARGEST.get(encoding.type, number.high)
-    yield f"{name}_nearest := {name}_raw;"
-    yield f"IF {name}_raw >= {real(high, kind)} THEN"
-    yield f"  {name}_nearest := {real(high, kind)};"
-    yield f"ELSIF {name}_raw <= {real(number.low, kind)} THEN"
-    yield f"  {name}_nearest := {real(number.low, kind)};"
-    yield f"ELSIF {name}_raw <> {name}_raw THEN"
-    yield f"  {name}_nearest := {real(0, kind)};"
-    yield "END_IF;"
-    yield f"clipped := clipped OR NOT (ABS({name}_raw - {name}_nearest) <= {real(0.5, kind)});"
-    return f"{kind}_TO_{wire}({name}_nearest)"
 
 
 def _split(

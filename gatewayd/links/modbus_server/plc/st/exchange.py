@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from gatewayd.links.modbus_server.plc.model import PlcModel, Poll
-from gatewayd.links.modbus_server.plc.st.dialect import elementary
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection, indented
+from gatewayd.plc.st.dialect import elementary
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection, indented
 
 
 def cyclic(model: PlcModel) -> tuple[Poll, ...]:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.st.decode import unpack
-from gatewayd.links.modbus_server.plc.st.dialect import Dialect, elementary, own
 from gatewayd.links.modbus_server.plc.st.encode import pack
 from gatewayd.links.modbus_server.plc.st.exchange import handshake
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection
 from gatewayd.links.modbus_server.plc.st.watch import watch
+from gatewayd.plc.st.dialect import Dialect, elementary, own
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection
 
 WRITE = PlcVariable(
     "write", elementary("BOOL"), "set it when the inputs hold what you want: nothing is written before"

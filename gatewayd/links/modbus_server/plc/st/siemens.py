@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from typing import Final
 
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.st.convert import function
-from gatewayd.links.modbus_server.plc.st.dialect import Primitives, elementary, own
 from gatewayd.links.modbus_server.plc.st.exchange import (
     FAILURES,
     RUN,
@@ -16,7 +14,9 @@ from gatewayd.links.modbus_server.plc.st.exchange import (
     demands,
     sequence_call,
 )
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection
+from gatewayd.plc.st.convert import function
+from gatewayd.plc.st.dialect import Primitives, elementary, own
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection
 
 _MODES: Final = {1: 101, 2: 102, 3: 103, 4: 104, 15: 115, 16: 116}
 """Function code -> MB_MODE with addresses from 0 to 65535: the 4xxxxx modes end below the status block."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.st.dialect import elementary
 from gatewayd.links.modbus_server.plc.st.exchange import demands
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection
+from gatewayd.plc.st.dialect import elementary
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection
 
 
 def triggers(model: PlcModel) -> ProgramUnit:

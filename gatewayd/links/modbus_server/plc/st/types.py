@@ -1,120 +1,24 @@
-"""The data types of the program: inputs and outputs with their units and addresses, the image, names of numbers."""
+"""The data types of the program: those that every link has, and the image of registers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gatewayd.core.freshness import Source
-from gatewayd.core.image import Quality
-from gatewayd.core.program import STATES
-from gatewayd.core.refusal import Reason
-from gatewayd.links.modbus_server.plc.model import PlcModel, Poll, TagFamily
-from gatewayd.links.modbus_server.plc.st.dialect import Dialect, array, elementary, own
-from gatewayd.links.modbus_server.plc.st.program import (
-    DataType,
-    Enumeration,
-    PlcVariable,
-    Structure,
-    TypeName,
-)
-from gatewayd.report.format import exact
-
-Named = tuple[tuple[str, str], ...]
-
-
-def meanings() -> dict[str, Named]:
-    """Kind of number in the status block -> name and words of each number, from 0 without a gap."""
-    return {
-        "quality": (
-            *((quality.name.lower(), "") for quality in Quality),
-            ("unknown", "the gateway is not trusted now, or it is newer than this program"),
-        ),
-        "robot": (*((source.name.lower(), "") for source in Source), ("unknown", "newer than this program")),
-        "refusal": (
-            ("none", "nothing was refused yet"),
-            *((reason.name.lower(), reason.text) for reason in Reason),
-            ("unknown", "newer than this program"),
-        ),
-        "program": (
-            ("unknown", "the controller does not report it, or newer than this program"),
-            *((name, "") for name, _runs in STATES.values()),
-        ),
-    }
+from gatewayd.links.modbus_server.plc.model import PlcModel, Poll
+from gatewayd.plc.st.dialect import Dialect, array
+from gatewayd.plc.st.program import DataType, PlcVariable, Structure, TypeName
+from gatewayd.plc.st.types import named_types, status_type, value_types
 
 
 def data_types(model: PlcModel, dialect: Dialect) -> tuple[DataType, ...]:
     """All of them, what others are made of first."""
-    return tuple(_types(model, dialect))
-
-
-def _types(model: PlcModel, dialect: Dialect) -> Iterator[DataType]:
-    prefix = model.prefix
-    if dialect.enumerations:
-        for kind, named in meanings().items():
-            literals = tuple((f"{prefix}_{kind}_{name}", text) for name, text in named)
-            yield Enumeration(f"{prefix}_{kind.capitalize()}", literals)
-    else:
-        yield Structure(f"{prefix}_Names", tuple(_names()), "what the numbers in the status mean")
-    if model.inputs:
-        yield Structure(
-            f"{prefix}_Inputs",
-            tuple(map(member_field, model.inputs)),
-            f"to the robot, written by {model.writer}",
-        )
-    if model.outputs:
-        yield Structure(f"{prefix}_Outputs", tuple(map(member_field, model.outputs)), "from the robot")
-    yield Structure(f"{prefix}_Numbers", tuple(_numbers(model)), "number of each variable in the status")
-    yield Structure(f"{prefix}_Image", tuple(_arrays(model)), "registers as they go over the wire")
-    yield Structure(f"{prefix}_Status", tuple(_status(model, dialect)), "the status block")
-
-
-def member_field(member: TagFamily) -> PlcVariable:
-    """A variable with its address, type in the register, unit, limits and comment."""
-    last = member.tags[-1].element
-    kind = elementary(member.type) if last is None else array(member.type, last)
-    return PlcVariable(member.name, kind, description(member))
-
-
-def description(member: TagFamily) -> str:
-    """`400021 (20) int16 * 0.1 N, 0 to 150: the comment`."""
-    first, last = member.tags[0], member.tags[-1]
-    where = first.notation if first is last else f"{first.notation} to {last.notation}"
-    encoding = first.encoding
-    how = "bit"
-    if encoding is not None:
-        how = f"{encoding.type} {encoding.order}"
-        how += f" * {exact(encoding.scale)}" if encoding.scale != 1 else ""
-        how += f" + {exact(encoding.offset)}" if encoding.offset else ""
-    limits = f", {exact(first.limits.low)} to {exact(first.limits.high)}" if first.limits else ""
-    about = f": {first.comment}" if first.comment else ""
-    return f"{where} {how}{f', {first.unit}' if first.unit else ''}{limits}{about}"
-
-
-def has_wide(model: PlcModel) -> bool:
-    """Whether some number has four registers."""
-    return any(
-        tag.encoding is not None and tag.encoding.type.endswith("64")
-        for member in (*model.inputs, *model.outputs)
-        for tag in member.tags
-    )
+    image = Structure(f"{model.prefix}_Image", tuple(_arrays(model)), "registers as they go over the wire")
+    return (*named_types(model, dialect), *value_types(model), image, status_type(model, dialect))
 
 
 def array_type(poll: Poll) -> TypeName:
     """What one request carries."""
     return array("BOOL" if poll.area.of_bits else "WORD", poll.count - 1)
-
-
-def _names() -> Iterator[PlcVariable]:
-    for kind, named in meanings().items():
-        for number, (name, text) in enumerate(named):
-            yield PlcVariable(f"{kind}_{name}", elementary("INT"), text, str(number))
-
-
-def _numbers(model: PlcModel) -> Iterator[PlcVariable]:
-    for member in (*model.inputs, *model.outputs):
-        number = member.tags[0].number
-        more = f"of element 0; element n has {number} + n" if member.is_array else ""
-        yield PlcVariable(member.name, elementary("INT"), more, str(number))
 
 
 def _arrays(model: PlcModel) -> Iterator[PlcVariable]:
@@ -125,44 +29,3 @@ def _arrays(model: PlcModel) -> Iterator[PlcVariable]:
             array_type(poll),
             f"FC {poll.function} {verb} {poll.notation} ({poll.address}), {poll.count}: {poll.what}",
         )
-
-
-def _status(model: PlcModel, dialect: Dialect) -> Iterator[PlcVariable]:
-    variables = len(model.variables)
-
-    def named(kind: str) -> TypeName:
-        return own(f"{model.prefix}_{kind.capitalize()}") if dialect.enumerations else elementary("INT")
-
-    quality = named("quality")
-    yield PlcVariable("alive", elementary("BOOL"), "the heartbeat of the gateway is heard")
-    yield PlcVariable(
-        "right_mapping", elementary("BOOL"), "its mapping is the one for which this program was made"
-    )
-    yield PlcVariable("trusted", elementary("BOOL"), "both: values may be used and written")
-    yield PlcVariable(
-        "wrong_mapping", elementary("BOOL"), "alive, but with another mapping: make these files anew"
-    )
-    yield PlcVariable("values_fresh", elementary("BOOL"), "the robot's values are fresh")
-    yield PlcVariable("robot_writable", elementary("BOOL"), "writes reach the robot")
-    yield PlcVariable("all_good", elementary("BOOL"), "every variable is good")
-    yield PlcVariable("lock_owned", elementary("BOOL"), "somebody owns something")
-    yield PlcVariable("watchdog_fed", elementary("BOOL"), "the watchdog of the robot program is fed")
-    yield PlcVariable("fingerprint", elementary("DWORD"), "of the gateway's mapping")
-    yield PlcVariable("robot_state", named("robot"), "the robot as a source of values")
-    yield PlcVariable("program_state", named("program"), "state of the robot program")
-    yield PlcVariable(
-        "robot_age", elementary("UDINT"), "ms since the newest package of the robot; 16#FFFFFFFF: not known"
-    )
-    yield PlcVariable(
-        "refusals", elementary("UDINT"), "requests refused since the gateway started, of all writers"
-    )
-    yield PlcVariable("refused_now", elementary("BOOL"), "one cycle long: something was refused")
-    yield PlcVariable("refusal", named("refusal"), "why the last request was refused")
-    yield PlcVariable("refusal_variable", elementary("UINT"), "number of the variable")
-    yield PlcVariable("refusal_writer", elementary("UINT"), "who was refused, 255: the local operator")
-    yield PlcVariable("refusal_holder", elementary("UINT"), "who held it, 255: the local operator")
-    yield PlcVariable("good", array("BOOL", variables, first=1), "by number: the value may be used")
-    yield PlcVariable("quality", array(quality.name, variables, first=1, is_own=quality.is_own), "by number")
-    listed = ", ".join(f"{number} {name}" for number, name in enumerate(model.writers, 1))
-    owners = f"by number: 0 nobody, {listed}, 255 the local operator" if listed else "by number"
-    yield PlcVariable("owner", array("UINT", variables, first=1), owners)

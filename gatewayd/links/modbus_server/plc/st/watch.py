@@ -6,13 +6,11 @@ from collections.abc import Iterator
 
 from gatewayd.core.status_layout import HEADER_WORDS, LAYOUT_VERSION
 from gatewayd.links.modbus_server.plc.model import WORD_BITS, PlcModel
-from gatewayd.links.modbus_server.plc.st.dialect import Dialect, elementary, own, word
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection, indented
-from gatewayd.links.modbus_server.plc.st.types import meanings
 from gatewayd.links.registry import status_fields
+from gatewayd.plc.st.dialect import Dialect, elementary, own, word
+from gatewayd.plc.st.naming import FLAGS, name_of, trusted_name
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection, indented
 
-_FLAGS = ("values_fresh", "robot_writable", "all_good", "lock_owned", None, None, "watchdog_fed")
-"""Bits of `flags`, from 0; None: not shown."""
 _GOOD = HEADER_WORDS
 """Offset of the table of good variables."""
 
@@ -90,11 +88,10 @@ def _liveness(model: PlcModel, dialect: Dialect) -> Iterator[str]:
 
 def _numbers(model: PlcModel, dialect: Dialect) -> Iterator[str]:
     flags = _word(model, "flags")
-    for bit, name in enumerate(_FLAGS):
-        if name:
-            yield f"status.{name} := status.trusted AND (({flags} AND {word(1 << bit)}) <> {word(0)});"
-    yield from _trusted("robot_state", _word(model, "robot_state"), "robot", model, dialect)
-    yield from _trusted("program_state", _word(model, "program"), "program", model, dialect)
+    for bit, name in FLAGS.items():
+        yield f"status.{name} := status.trusted AND (({flags} AND {word(1 << bit)}) <> {word(0)});"
+    yield from trusted_name("robot_state", _word(model, "robot_state"), "robot", model, dialect)
+    yield from trusted_name("program_state", _word(model, "program"), "program", model, dialect)
     yield f"status.robot_age := DWORD_TO_UDINT({_double(model, dialect, 'robot_age')});"
     yield "IF NOT status.trusted THEN"
     yield "  status.robot_age := UDINT#4294967295;"
@@ -103,7 +100,7 @@ def _numbers(model: PlcModel, dialect: Dialect) -> Iterator[str]:
     yield "status.refused_now := status.trusted AND known AND (status.refusals <> last_refusals);"
     yield "known := status.trusted;"
     yield "last_refusals := status.refusals;"
-    yield from _named("refusal", _word(model, "refusal_reason"), "refusal", model, dialect)
+    yield from name_of("refusal", _word(model, "refusal_reason"), "refusal", model, dialect)
     for name in ("refusal_variable", "refusal_writer", "refusal_holder"):
         yield f"status.{name} := WORD_TO_UINT({_word(model, name)});"
 
@@ -133,33 +130,4 @@ def _entry(table: str, place: str, model: PlcModel, dialect: Dialect) -> Iterato
     if table == "owner":
         yield f"status.owner[n] := WORD_TO_UINT({place});"
     else:
-        yield from _trusted("quality[n]", place, "quality", model, dialect)
-
-
-def _trusted(target: str, place: str, kind: str, model: PlcModel, dialect: Dialect) -> Iterator[str]:
-    """The same, but what is old is not known."""
-    yield "IF status.trusted THEN"
-    yield from indented(list(_named(target, place, kind, model, dialect)))
-    yield "ELSE"
-    unknown = [name for name, _text in meanings()[kind]].index("unknown")
-    yield f"  status.{target} := {_literal(kind, unknown, model, dialect)};"
-    yield "END_IF;"
-
-
-def _named(target: str, place: str, kind: str, model: PlcModel, dialect: Dialect) -> Iterator[str]:
-    """A number of the status block as a name; one that this program does not know is `unknown`."""
-    named = [name for name, _text in meanings()[kind]]
-    unknown = named.index("unknown")
-    yield f"CASE WORD_TO_INT({place}) OF"
-    for number in range(len(named)):
-        if number != unknown:
-            yield f"  {number}: status.{target} := {_literal(kind, number, model, dialect)};"
-    yield "ELSE"
-    yield f"  status.{target} := {_literal(kind, unknown, model, dialect)};"
-    yield "END_CASE;"
-
-
-def _literal(kind: str, number: int, model: PlcModel, dialect: Dialect) -> str:
-    if not dialect.enumerations:
-        return str(number)
-    return f"{model.prefix}_{kind}_{meanings()[kind][number][0]}"
+        yield from trusted_name("quality[n]", place, "quality", model, dialect)

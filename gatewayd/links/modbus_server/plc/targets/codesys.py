@@ -10,18 +10,18 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from gatewayd.links.exports import ExportedFile
-from gatewayd.links.modbus_server.plc.header import beginning, header, overview
-from gatewayd.links.modbus_server.plc.keywords import CODESYS
 from gatewayd.links.modbus_server.plc.model import PlcModel, Poll
-from gatewayd.links.modbus_server.plc.names import Holds
-from gatewayd.links.modbus_server.plc.st.cast import POINTER
-from gatewayd.links.modbus_server.plc.st.convert import functions
-from gatewayd.links.modbus_server.plc.st.dialect import Dialect, elementary, own
 from gatewayd.links.modbus_server.plc.st.main import blocks, data, main
-from gatewayd.links.modbus_server.plc.st.plcopen import project
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit
 from gatewayd.links.modbus_server.plc.st.triggers import triggers
 from gatewayd.links.modbus_server.plc.st.types import data_types
+from gatewayd.plc.header import beginning, header, overview
+from gatewayd.plc.keywords import CODESYS
+from gatewayd.plc.names import Holds
+from gatewayd.plc.st.cast import POINTER
+from gatewayd.plc.st.convert import functions
+from gatewayd.plc.st.dialect import Dialect, elementary, own
+from gatewayd.plc.st.plcopen import project
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit
 
 HOLDS: Final = Holds(
     "CODESYS", 255, CODESYS, frozenset({"LINT", "ULINT", "LREAL"}), "controllers without 64-bit numbers"

@@ -10,17 +10,18 @@ from collections.abc import Iterator
 from typing import Final
 
 from gatewayd.links.exports import ExportedFile
-from gatewayd.links.modbus_server.plc.header import beginning, header, overview, plan_lines
-from gatewayd.links.modbus_server.plc.keywords import IEC
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.names import Holds
-from gatewayd.links.modbus_server.plc.st.convert import PORTABLE, functions
-from gatewayd.links.modbus_server.plc.st.dialect import Dialect, elementary, own
+from gatewayd.links.modbus_server.plc.polling import plan_lines
 from gatewayd.links.modbus_server.plc.st.exchange import cyclic, sequence
 from gatewayd.links.modbus_server.plc.st.main import blocks, main
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit
-from gatewayd.links.modbus_server.plc.st.source import data_type_source, text_of, unit_source
 from gatewayd.links.modbus_server.plc.st.types import data_types
+from gatewayd.plc.header import beginning, header, overview
+from gatewayd.plc.keywords import IEC
+from gatewayd.plc.names import Holds
+from gatewayd.plc.st.convert import PORTABLE, functions
+from gatewayd.plc.st.dialect import Dialect, elementary, own
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit
+from gatewayd.plc.st.source import data_type_source, text_of, unit_source
 
 HOLDS: Final = Holds(
     "edition 2",

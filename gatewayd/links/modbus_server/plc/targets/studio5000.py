@@ -11,14 +11,16 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from gatewayd.links.exports import ExportedFile
-from gatewayd.links.modbus_server.plc.header import beginning, header, overview, plan_lines
-from gatewayd.links.modbus_server.plc.keywords import LOGIX
 from gatewayd.links.modbus_server.plc.logix.code import pack, unpack, watch
-from gatewayd.links.modbus_server.plc.logix.l5x import LogixMember, data_type, routine
-from gatewayd.links.modbus_server.plc.logix.tags_csv import tags
-from gatewayd.links.modbus_server.plc.model import PlcModel, TagFamily
-from gatewayd.links.modbus_server.plc.names import Holds
-from gatewayd.links.modbus_server.plc.st.types import description, meanings
+from gatewayd.links.modbus_server.plc.model import PlcModel
+from gatewayd.links.modbus_server.plc.polling import plan_lines
+from gatewayd.plc.header import beginning, header, overview
+from gatewayd.plc.keywords import LOGIX
+from gatewayd.plc.logix.l5x import LogixMember, data_type, routine
+from gatewayd.plc.logix.tags_csv import tags
+from gatewayd.plc.model import TagFamily
+from gatewayd.plc.names import Holds
+from gatewayd.plc.st.types import description, meanings
 
 _NEW_TYPES: Final = frozenset({"USINT", "UINT", "UDINT", "ULINT", "LINT", "LREAL"})
 HOLDS: Final = Holds("Studio 5000", 40, LOGIX, _NEW_TYPES, "controllers older than the 5380 and 5580")

@@ -7,18 +7,19 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from gatewayd.links.exports import ExportedFile, ExportError
-from gatewayd.links.modbus_server.plc.header import beginning, header, overview, plan_lines
-from gatewayd.links.modbus_server.plc.keywords import SIEMENS
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.names import Holds
-from gatewayd.links.modbus_server.plc.st.convert import functions
-from gatewayd.links.modbus_server.plc.st.dialect import Dialect, own
+from gatewayd.links.modbus_server.plc.polling import plan_lines
 from gatewayd.links.modbus_server.plc.st.exchange import sequence
 from gatewayd.links.modbus_server.plc.st.main import blocks, data, main
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit
-from gatewayd.links.modbus_server.plc.st.scl import data_block, note, type_source, unit_source
 from gatewayd.links.modbus_server.plc.st.siemens import CONVERSION, client
 from gatewayd.links.modbus_server.plc.st.types import data_types
+from gatewayd.plc.header import beginning, header, overview
+from gatewayd.plc.keywords import SIEMENS
+from gatewayd.plc.names import Holds
+from gatewayd.plc.st.convert import functions
+from gatewayd.plc.st.dialect import Dialect, own
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit
+from gatewayd.plc.st.scl import data_block, note, type_source, unit_source
 
 HOLDS: Final = Holds("TIA Portal", 125, SIEMENS, frozenset({"LINT", "ULINT"}), "S7-1200 controllers")
 DIALECT: Final = Dialect(CONVERSION, names_operands=True, quotes=True, enumerations=False)

@@ -10,19 +10,20 @@ from typing import Final
 from uuid import NAMESPACE_URL, uuid5
 
 from gatewayd.links.exports import ExportedFile
-from gatewayd.links.modbus_server.plc.header import beginning, header, overview, plan_lines
-from gatewayd.links.modbus_server.plc.keywords import CODESYS
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.names import Holds
+from gatewayd.links.modbus_server.plc.polling import plan_lines
 from gatewayd.links.modbus_server.plc.st.beckhoff import client
-from gatewayd.links.modbus_server.plc.st.cast import POINTER
-from gatewayd.links.modbus_server.plc.st.convert import functions
-from gatewayd.links.modbus_server.plc.st.dialect import Dialect, own
 from gatewayd.links.modbus_server.plc.st.exchange import sequence
 from gatewayd.links.modbus_server.plc.st.main import blocks, data, main
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection
-from gatewayd.links.modbus_server.plc.st.source import comment, data_type_source, declaration, section_source
 from gatewayd.links.modbus_server.plc.st.types import data_types
+from gatewayd.plc.header import beginning, header, overview
+from gatewayd.plc.keywords import CODESYS
+from gatewayd.plc.names import Holds
+from gatewayd.plc.st.cast import POINTER
+from gatewayd.plc.st.convert import functions
+from gatewayd.plc.st.dialect import Dialect, own
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection
+from gatewayd.plc.st.source import comment, data_type_source, declaration, section_source
 
 HOLDS: Final = Holds(
     "TwinCAT", 255, CODESYS, frozenset({"LINT", "ULINT", "LREAL"}), "controllers without 64-bit numbers"

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from typing import Final
 
-from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.st.dialect import Dialect, Primitives, elementary
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, VariableSection
-from gatewayd.links.modbus_server.plc.st.types import has_wide
+from gatewayd.plc.model import CellModel
+from gatewayd.plc.st.dialect import Dialect, Primitives, elementary
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection
+from gatewayd.plc.st.types import has_wide
 
 
-def functions(model: PlcModel, dialect: Dialect) -> tuple[ProgramUnit, ...]:
-    """All of them; those for 64 bits only where something has so many."""
+def functions(model: CellModel, dialect: Dialect, *, of_bytes: bool = False) -> tuple[ProgramUnit, ...]:
+    """All of them; those for 64 bits only where something has so many.
+
+    `of_bytes`: what comes are bytes with the least significant first, which make words; otherwise they are registers.
+    """
     prefix = model.prefix
-    joined = [_swap(prefix, dialect), _join(prefix, "Double", "DWORD", ("high", "low"), dialect)]
+    first = _pair(prefix, dialect) if of_bytes else _swap(prefix, dialect)
+    joined = [first, _join(prefix, "Double", "DWORD", ("high", "low"), dialect)]
     wide = has_wide(model)
     if wide:
         joined.append(_join(prefix, "Quad", "LWORD", ("a", "b", "c", "d"), dialect))
@@ -45,6 +49,19 @@ def _swap(prefix: str, dialect: Dialect) -> ProgramUnit:
         (("value", "WORD"),),
         (f"{dialect.result(name)} := {dialect.shift('ROL', 'value', '8')};",),
         comment="the two bytes of a register exchanged",
+    )
+
+
+def _pair(prefix: str, dialect: Dialect) -> ProgramUnit:
+    name = f"{prefix}_Word"
+    return function(
+        name,
+        "WORD",
+        (("low", "BYTE"), ("high", "BYTE")),
+        (
+            f"{dialect.result(name)} := {dialect.shift('SHL', 'BYTE_TO_WORD(high)', '8')} OR BYTE_TO_WORD(low);",
+        ),
+        comment="two bytes of a PDO in one number, the least significant first",
     )
 
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from gatewayd.links.modbus_server.plc.st.convert import function
-from gatewayd.links.modbus_server.plc.st.dialect import Primitives
-from gatewayd.links.modbus_server.plc.st.program import PlcVariable, ProgramUnit, TypeName
+from gatewayd.plc.st.convert import function
+from gatewayd.plc.st.dialect import Primitives
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, TypeName
 
 _PAIRS: Final = (("REAL", "DWORD"), ("LREAL", "LWORD"))
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from gatewayd.links.exports import ExportError
-from gatewayd.links.modbus_server.plc.build import PlcWishes
 from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.names import refuse_unfit
 from gatewayd.links.modbus_server.plc.targets.iec_st import HOLDS
+from gatewayd.plc.names import refuse_unfit
+from gatewayd.plc.tags import PlcWishes
 from tests.links.modbus_server.plc.cells import model
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from gatewayd.links.exports import ExportError
-from gatewayd.links.modbus_server.plc.model import PlcModel, TagFamily
+from gatewayd.plc.model import CellModel, TagFamily
 from gatewayd.report.format import counted
 
 _NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")
@@ -33,7 +33,7 @@ class Holds:
     """Which controllers these are, in words."""
 
 
-def refuse_unfit(model: PlcModel, holds: Holds, *, small: bool) -> None:
+def refuse_unfit(model: CellModel, holds: Holds, *, small: bool) -> None:
     """Raises ExportError with all that the target cannot hold, and the remedy of each."""
     found = [*_names(model, holds), *_types(model, holds, small=small)]
     if found:
@@ -41,7 +41,7 @@ def refuse_unfit(model: PlcModel, holds: Holds, *, small: bool) -> None:
         raise ExportError("\n".join([*found[:_SHOWN], *more]))
 
 
-def _names(model: PlcModel, holds: Holds) -> Iterator[str]:
+def _names(model: CellModel, holds: Holds) -> Iterator[str]:
     if not _NAME.fullmatch(model.prefix) or len(model.prefix) > _LONGEST_PREFIX:
         yield f"`{model.prefix}` is no prefix: --prefix takes a letter, then up to 5 letters, digits and single `_`"
     known: dict[str, str] = {}
@@ -65,7 +65,7 @@ def _problem(name: str, holds: Holds) -> str:
     return "" if _NAME.fullmatch(name) else "is no name in IEC 61131-3: no double `_`, none at the end"
 
 
-def _types(model: PlcModel, holds: Holds, *, small: bool) -> Iterator[str]:
+def _types(model: CellModel, holds: Holds, *, small: bool) -> Iterator[str]:
     if not small:
         return
     for member in (*model.inputs, *model.outputs):

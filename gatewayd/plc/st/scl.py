@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from gatewayd.links.modbus_server.plc.st.program import (
+from gatewayd.plc.st.program import (
     DataType,
     PlcVariable,
     ProgramUnit,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
 
-from gatewayd.links.modbus_server.plc.model import PlcModel
-from gatewayd.links.modbus_server.plc.st.program import ProgramUnit, TypeName
+from gatewayd.plc.model import CellModel
+from gatewayd.plc.numbers import REALS
+from gatewayd.plc.st.program import ProgramUnit, TypeName
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Dialect:
             else f"{function}({operand}, {by})"
         )
 
-    def call(self, model: PlcModel, function: str, **operands: str) -> str:
+    def call(self, model: CellModel, function: str, **operands: str) -> str:
         """A call of one of the program's own functions."""
         listed = ", ".join(f"{name} := {value}" for name, value in operands.items())
         return f"{self.own(f'{model.prefix}_{function}')}({listed})"
@@ -80,9 +80,6 @@ def literal(value: float, type_name: str) -> str:
     if type_name in REALS:
         return real(value, type_name)
     return str(round(value))
-
-
-REALS: Final = frozenset({"REAL", "LREAL"})
 
 
 def elementary(name: str) -> TypeName:

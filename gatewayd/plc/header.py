@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from gatewayd.links.exports import CHECKSUM
-from gatewayd.links.modbus_server.plc.model import PlcModel
+from gatewayd.plc.model import CellModel
 
 
-def header(model: PlcModel, subject: str) -> tuple[str, ...]:
+def header(model: CellModel, subject: str) -> tuple[str, ...]:
     """Lines for a file that is made anew with each export."""
     return (
         f"cell {model.cell}: {subject}",
@@ -16,12 +16,12 @@ def header(model: PlcModel, subject: str) -> tuple[str, ...]:
     )
 
 
-def beginning(model: PlcModel) -> str:
+def beginning(model: CellModel) -> str:
     """For the file that is the user's own."""
     return f"cell {model.cell}: a program to begin with. It is yours: the other files are made anew, this one is not."
 
 
-def overview(model: PlcModel) -> tuple[str, ...]:
+def overview(model: CellModel) -> tuple[str, ...]:
     """Who the PLC is, and what of the mapping is not there."""
     role = (
         f"The PLC is the writer {model.writer}, number {model.writer_number}."
@@ -29,15 +29,3 @@ def overview(model: PlcModel) -> tuple[str, ...]:
         else "The PLC only reads."
     )
     return (role, *(f"Left out: {text}." for text in model.left_out))
-
-
-def plan_lines(model: PlcModel) -> tuple[str, ...]:
-    """The poll plan as a table."""
-    lines = [f"Modbus TCP {model.host}:{model.port}, unit {model.unit}"]
-    for poll in model.polls:
-        when = "in turns" if poll.slow else "on demand" if poll.shared else "every round"
-        lines.append(
-            f"{poll.name}: FC {poll.function}, address {poll.address} ({poll.notation}), count {poll.count}, "
-            f"{when}: {poll.what}"
-        )
-    return tuple(lines)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from gatewayd.links.modbus_server.plc.st.program import (
+from gatewayd.plc.st.program import (
     DataType,
     Enumeration,
     PlcVariable,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from gatewayd.links.modbus_server.plc.logix.l5x import LogixMember
+from gatewayd.plc.logix.l5x import LogixMember
 
 
 def tags(remarks: Sequence[str], members: Iterable[LogixMember]) -> str:

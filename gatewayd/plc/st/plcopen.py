@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from gatewayd.links.modbus_server.plc.st.program import (
+from gatewayd.plc.st.program import (
     DataType,
     Enumeration,
     PlcVariable,

@@ -1,0 +1,61 @@
+"""Between raw numbers and values in structured text: scale, offset, rounding, and what a value is when it is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+
+from gatewayd.plc.model import Encoding, Tag, initial
+from gatewayd.plc.numbers import NUMBERS, REALS
+from gatewayd.plc.st.dialect import literal, real
+
+
+def value_of(raw: str, tag: Tag) -> str:
+    """The raw number with scale and offset, as the type of the value."""
+    encoding = tag.encoding
+    assert encoding is not None
+    wire = NUMBERS[encoding.type].type
+    if tag.type == "BOOL":
+        return f"{raw} <> {real(0, wire) if wire in REALS else 0}"
+    if not tag.arithmetic:
+        return raw
+    number = raw if wire == tag.arithmetic else f"{wire}_TO_{tag.arithmetic}({raw})"
+    scaled = number if encoding.scale == 1 else f"{number} * {real(encoding.scale, tag.arithmetic)}"
+    if encoding.offset:
+        scaled = f"{scaled} + {real(encoding.offset, tag.arithmetic)}"
+    return scaled
+
+
+def fallback(tag: Tag) -> Iterator[str]:
+    """What the value is when gateway or connection are lost: the same that the gateway shows when the robot is."""
+    value = initial(tag)
+    if value is not None:
+        yield f"outputs.{tag.path} := {literal(value, tag.type)};"
+
+
+def raw_of(tag: Tag, encoding: Encoding) -> Generator[str, None, str]:
+    """The raw number as the register's type: rounded to the nearest, and never beyond the type."""
+    source = f"inputs.{tag.path}"
+    if not tag.arithmetic:
+        return source
+    wire, kind = NUMBERS[encoding.type].type, tag.arithmetic
+    value = source
+    if encoding.offset:
+        value = f"({value} - {real(encoding.offset, kind)})"
+    if encoding.scale != 1:
+        value = f"{value} / {real(encoding.scale, kind)}"
+    name = kind.lower()
+    yield f"{name}_raw := {value};"
+    if wire in REALS:
+        return f"{name}_raw" if wire == kind else f"{kind}_TO_{wire}({name}_raw)"
+    number = NUMBERS[encoding.type]
+    high = number.largest
+    yield f"{name}_nearest := {name}_raw;"
+    yield f"IF {name}_raw >= {real(high, kind)} THEN"
+    yield f"  {name}_nearest := {real(high, kind)};"
+    yield f"ELSIF {name}_raw <= {real(number.low, kind)} THEN"
+    yield f"  {name}_nearest := {real(number.low, kind)};"
+    yield f"ELSIF {name}_raw <> {name}_raw THEN"
+    yield f"  {name}_nearest := {real(0, kind)};"
+    yield "END_IF;"
+    yield f"clipped := clipped OR NOT (ABS({name}_raw - {name}_nearest) <= {real(0.5, kind)});"
+    return f"{kind}_TO_{wire}({name}_nearest)"
