@@ -29,10 +29,10 @@ demo: $(VENV)/.runtime ## Set up, then run simulator, gateway and a small PLC pr
 	$(PY) -m gatewayd demo $(ARGS)
 
 test: $(VENV)/.dev ## Set up, then pass the tests (ARGS="tests/core -x")
-	$(PY) -m pytest -n $(JOBS) $(ARGS)
+	$(PY) -m pytest -n $(JOBS) --dist worksteal $(ARGS)
 
 quick: $(VENV)/.dev ## Pass the tests that are not slow: no kernel, no browser, few processes (ARGS="tests/core -x")
-	$(PY) -m pytest -n $(JOBS) -m "not slow" $(ARGS)
+	$(PY) -m pytest -n $(JOBS) --dist worksteal -m "not slow" $(ARGS)
 
 setup: $(VENV)/.runtime ## Set up what the daemon needs
 dev: $(VENV)/.dev ## Set up what developers need

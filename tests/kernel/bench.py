@@ -139,8 +139,14 @@ class SerialAdapter:
         await self._ip("down")
 
     async def _ip(self, *words: str) -> None:
-        """Run ip while the loop goes on: the kernel talks to the adapter meanwhile, and waits for it to read."""
-        process = subprocess.Popen(["ip", "link", "set", self.name, *words])  # noqa: ASYNC220 - starting it is quick
-        while process.poll() is None:  # noqa: ASYNC110 - without a thread nobody reports it
-            await asyncio.sleep(0.005)
-        assert process.returncode == 0
+        """Run ip while the loop goes on: the kernel talks to the adapter meanwhile, and waits a second for it to read.
+
+        A busy machine may need longer than that to let us read, so it is asked once more.
+        """
+        for _ in range(2):
+            process = subprocess.Popen(["ip", "link", "set", self.name, *words])  # noqa: ASYNC220 - starting it is quick
+            while process.poll() is None:  # noqa: ASYNC110 - without a thread nobody reports it
+                await asyncio.sleep(0.005)
+            if process.returncode == 0:
+                return
+        raise AssertionError(f"ip link set {self.name} {' '.join(words)}: exit code {process.returncode}")

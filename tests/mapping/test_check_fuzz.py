@@ -121,7 +121,7 @@ def change_number(chance: random.Random, data: bytes) -> bytes:
 CHANGES: list[Change] = [drop_bytes, insert_bytes, swap_words, repeat_line, change_number]
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(SEED)
 def test_mutated_text(seed: int) -> None:
     """Shipped mappings and rule examples with a few bytes, words, lines or numbers changed."""
@@ -174,7 +174,7 @@ def parent_of(tree: Tree, path: tuple[str | int, ...]) -> Tree:
     return tree
 
 
-@settings(max_examples=120)
+@settings(max_examples=60)
 @given(SEED)
 def test_mutated_trees(seed: int) -> None:
     """Valid YAML whose values were removed, exchanged, renamed or replaced by odd ones."""
@@ -208,7 +208,7 @@ def plain_copy(tree: Tree) -> Tree:
     return [plain_copy(value) for value in tree] if isinstance(tree, list) else tree
 
 
-@settings(max_examples=150)
+@settings(max_examples=75)
 @given(SEED)
 def test_mutated_plants(seed: int) -> None:
     """Several mutated files together: what they share is judged without a stumble."""

@@ -20,7 +20,7 @@ from tests.soak.starvation import Starvation
 from tests.soak.truth import FALLBACK, Period, Record, Stop, misheld, unheard
 from tests.soak.verdict import MEMORY_BOUND, THREADS_BOUND, Measured, Sample
 
-SECONDS = float(os.environ.get("GATEWAYD_SOAK_SECONDS", "20"))
+SECONDS = float(os.environ.get("GATEWAYD_SOAK_SECONDS", "10"))
 SEED = 4
 
 

@@ -17,10 +17,9 @@ from tests.e2e.plc import HMI, PLC, Plc
 from tests.e2e.processes import HOST, Daemon, Simulator, free_port
 from tests.web.browser import CHROMIUM, Page, browsing
 
-pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed (Debian package chromium)"),
-    pytest.mark.xdist_group("browser"),
-]
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="Chromium is not installed (Debian package chromium)"
+)
 
 MAPPING = """\
 writers:
@@ -526,15 +525,18 @@ OUTSIDE = """
 """
 BROKEN_WORDS = """
 (() => {
-  const lines = (node) => {
+  const lines = (node, start, end) => {
     const range = document.createRange();
-    range.selectNodeContents(node);
+    range.setStart(node, start);
+    range.setEnd(node, end);
     return new Set([...range.getClientRects()].map(({ top }) => Math.round(top))).size;
   };
+  const broken = (node) => [...node.data.matchAll(/\\S+/g)]
+    .filter(({ 0: word, index }) => lines(node, index, index + word.length) > 1)
+    .map(({ 0: word }) => word);
   return [...document.querySelectorAll("#variables td.name :is(button, span), #picture strong")]
     .filter((one) => one.checkVisibility())
-    .flatMap((one) => [...one.childNodes].filter((node) => node.nodeType === 3 && lines(node) > 1))
-    .map((node) => node.data);
+    .flatMap((one) => [...one.childNodes].filter((node) => node.nodeType === 3).flatMap(broken));
 })()
 """
 CONTRASTS = """

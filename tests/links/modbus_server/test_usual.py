@@ -136,7 +136,7 @@ steps = st.tuples(
 
 
 @pytest.mark.parametrize("gaps", CHANGEABLE, ids=["as declared", "gaps ignored", "gaps zero"])
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(acts=st.lists(steps, max_size=12))
 def test_the_second_answer_is_the_first(gaps: str, acts: list[tuple[int, bytes, int, float]]) -> None:
     usual, thorough = Plant(gaps, remembers=True), Plant(gaps, remembers=False)
