@@ -138,8 +138,8 @@ def answer_of(url: str) -> str:
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed (Debian package chromium)")
-async def test_the_page_shows_escapes(cell: Cell, tmp_path: Path) -> None:
-    async with browsing(tmp_path) as page:
+async def test_the_page_shows_escapes(cell: Cell) -> None:
+    async with browsing() as page:
         await page.open(cell.url, 1280, 800)
         await page.wait("document.body.dataset.contact === 'live'")
         await page.wait("document.body.textContent.includes('INT')")

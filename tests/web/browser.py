@@ -1,17 +1,21 @@
 """A headless Chromium, driven by the DevTools protocol over aiohttp's WebSocket: just what the page's tests need."""
 
-# ruff: noqa: ASYNC220, ASYNC240 - nothing else runs in a test's loop
+# ruff: noqa: ASYNC240 - nothing else runs in a test's loop
 
 from __future__ import annotations
 
 import asyncio
+import atexit
 import base64
 import json
 import shutil
 import subprocess
+import tempfile
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -119,39 +123,60 @@ class Page:
 
 
 @asynccontextmanager
-async def browsing(directory: Path) -> AsyncIterator[Page]:
-    """A browser with an empty profile in `directory`, gone at the end."""
+async def browsing() -> AsyncIterator[Page]:
+    """A tab with an empty profile of its own, in the browser that all tests of this process share."""
+    port = await _port(_browser())
+    async with (
+        aiohttp.ClientSession() as session,
+        session.get(f"http://127.0.0.1:{port}/json/version") as response,
+        session.ws_connect(json.loads(await response.text())["webSocketDebuggerUrl"]) as whole,
+    ):
+        browser = Page(whole)
+        context = (await browser.command("Target.createBrowserContext"))["browserContextId"]
+        target = await browser.command("Target.createTarget", url="about:blank", browserContextId=context)
+        url = f"ws://127.0.0.1:{port}/devtools/page/{target['targetId']}"
+        async with session.ws_connect(url, max_msg_size=0) as socket:
+            page = Page(socket)
+            for domain in ("Page", "Runtime", "Log"):
+                await page.command(f"{domain}.enable")
+            yield page
+        await browser.command("Target.disposeBrowserContext", browserContextId=context)
+
+
+@dataclass(frozen=True, slots=True)
+class _Browser:
+    process: subprocess.Popen[bytes]
+    port_file: Path
+
+
+@cache
+def _browser() -> _Browser:
+    """Starting one takes a second of a processor, so it is started once; gone with this process."""
     assert CHROMIUM is not None
-    profile = directory / "profile"
+    profile = Path(tempfile.mkdtemp(prefix="gatewayd-browser-"))
     process = subprocess.Popen(
         [CHROMIUM, *_OPTIONS, f"--user-data-dir={profile}", "about:blank"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
+    atexit.register(_end, process, profile)
+    return _Browser(process, profile / "DevToolsActivePort")
+
+
+def _end(process: subprocess.Popen[bytes], profile: Path) -> None:
+    process.terminate()
     try:
-        port = await _port(profile / "DevToolsActivePort", process)
-        async with aiohttp.ClientSession() as session:
-            async with session.get(f"http://127.0.0.1:{port}/json") as response:
-                tabs = json.loads(await response.text())
-            url = next(tab["webSocketDebuggerUrl"] for tab in tabs if tab["type"] == "page")
-            async with session.ws_connect(url, max_msg_size=0) as socket:
-                page = Page(socket)
-                for domain in ("Page", "Runtime", "Log"):
-                    await page.command(f"{domain}.enable")
-                yield page
-    finally:
-        process.terminate()
-        try:
-            process.wait(5)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        process.wait(5)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    shutil.rmtree(profile, ignore_errors=True)
 
 
-async def _port(file: Path, process: subprocess.Popen[bytes]) -> int:
-    start = time.monotonic()
+async def _port(browser: _Browser) -> int:
+    start, file = time.monotonic(), browser.port_file
     while not (file.exists() and file.read_text().count("\n")):
-        assert process.poll() is None, "Chromium ended"
+        assert browser.process.poll() is None, "Chromium ended"
         assert time.monotonic() - start < _PATIENCE, "Chromium does not begin"
         await asyncio.sleep(0.05)
     return int(file.read_text().splitlines()[0])

@@ -90,7 +90,7 @@ async def showing(
     daemon = plant.daemon(file, "--status", f"{HOST}:{port}", "--token-file", token)
     plc = plant.ready_plc(PLC)
     daemon.wait_for_line("status page")
-    async with browsing(plant.directory) as page:
+    async with browsing() as page:
         url = f"http://{HOST}:{port}/"
         await page.open(url, *size, dark=dark)
         await page.wait(LIVE)
@@ -448,7 +448,7 @@ async def test_one_page_shows_all_cells_at_a_glance(plant: Plant) -> None:
         for unit, simulator in enumerate(simulators, 1)
     ]
     plant.daemon(*files, "--status", f"{HOST}:{port}").wait_for_line("status page")
-    async with browsing(plant.directory) as page:
+    async with browsing() as page:
         await page.open(f"http://{HOST}:{port}/", *NARROW)
         await page.wait(f"{LIVE} && {text('button.name')} === 'cycles_1'")
         levels = "[...document.querySelectorAll('#cells a')].map((link) => link.dataset.level).join()"
