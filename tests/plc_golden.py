@@ -9,28 +9,55 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from gatewayd.links.canopen_node.plc import build as canopen_build
+from gatewayd.links.canopen_node.plc import registry as canopen_registry
+from gatewayd.links.canopen_node.plc.model import PdoModel
 from gatewayd.links.modbus_server.plc.build import model_of
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.registry import files_for
 from gatewayd.mapping.loader import load
+from gatewayd.mapping.plan import Plan
 from gatewayd.plc.export import TARGETS
 from gatewayd.plc.tags import PlcWishes
 from tests.sources import ROOT
 
 GOLDEN = ROOT / "tests" / "golden" / "plc"
 MAPPING = GOLDEN / "press-3.yaml"
+CANOPEN_GOLDEN = ROOT / "tests" / "golden" / "plc-canopen"
+CANOPEN_MAPPING = CANOPEN_GOLDEN / "line-2.yaml"
+MASTERS = tuple(target for target in TARGETS if target not in canopen_registry.REFUSED)
+"""Targets whose controllers can be a CANopen master."""
+
+
+def _plan(path: Path) -> Plan:
+    loaded = load(path.read_bytes(), path.name)
+    assert loaded.plan is not None, loaded.diagnostics
+    return loaded.plan
 
 
 def golden_model() -> PlcModel:
-    """The cell of the golden files, for its PLC."""
-    loaded = load(MAPPING.read_bytes(), MAPPING.name)
-    assert loaded.plan is not None, loaded.diagnostics
-    return model_of(loaded.plan, PlcWishes(writer="plc"))
+    """The cell of the golden files, for its PLC on Modbus."""
+    return model_of(_plan(MAPPING), PlcWishes(writer="plc"))
+
+
+def canopen_model() -> PdoModel:
+    """The cell of the golden files for a CANopen master."""
+    return canopen_build.model_of(_plan(CANOPEN_MAPPING), PlcWishes())
 
 
 def made() -> Mapping[Path, bytes]:
-    """Where each golden file lies, and what it has to be."""
+    """Where each golden file for a PLC on Modbus lies, and what it has to be."""
     return dict(_made(golden_model()))
+
+
+def made_for_canopen() -> Mapping[Path, bytes]:
+    """Where each golden file for a CANopen master lies, and what it has to be."""
+    model = canopen_model()
+    return {
+        CANOPEN_GOLDEN / target / file.name: file.content()
+        for target in MASTERS
+        for file in canopen_registry.files_for(target, model)
+    }
 
 
 def _made(model: PlcModel) -> Iterator[tuple[Path, bytes]]:
@@ -41,7 +68,7 @@ def _made(model: PlcModel) -> Iterator[tuple[Path, bytes]]:
 
 def main() -> None:
     """Write them."""
-    for path, content in made().items():
+    for path, content in {**made(), **made_for_canopen()}.items():
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(content)
 

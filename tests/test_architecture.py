@@ -323,6 +323,11 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "core.requester": "a record; tests/core/test_cell.py pins what its parts mean",
     "links.canopen_node.compile": "tests/mapping/test_compile.py compiles it",
     "links.canopen_node.exports": "tests/cli/test_export.py",
+    "links.canopen_node.plc.content": "tests/links/canopen_node/plc/test_running.py, test_targets.py",
+    "links.canopen_node.plc.blocks": "tests/links/canopen_node/plc/test_running.py, test_watch.py",
+    "links.canopen_node.plc.model": "records; tests/links/canopen_node/plc/test_build.py",
+    "links.canopen_node.plc.pdo_text": "a table; tests/links/canopen_node/plc/test_targets.py",
+    "links.canopen_node.plc.registry": "a table; tests/links/canopen_node/plc/test_build.py",
     "links.canopen_node.observer": "counters, and calls that do nothing; tests/links/canopen_node/test_node.py",
     "links.contract": "records and protocols; tests/links/test_registry.py",
     "links.canopen_node.tables": "tests/cli/test_show.py, tests/report/test_table.py",
@@ -358,6 +363,7 @@ WITHOUT_TEST_FILE: dict[str, str] = {
 
 TESTED_TOGETHER = {
     "links.canopen_node.rules": "tests/mapping/test_rules.py",
+    "links.canopen_node.plc.targets": "tests/links/canopen_node/plc/test_targets.py",
     "links.modbus_server.plc.logix": "tests/links/modbus_server/plc/test_logix.py",
     "links.modbus_server.plc.st": "tests/links/modbus_server/plc/test_structured_text.py",
     "links.modbus_server.plc.targets": "tests/links/modbus_server/plc/test_targets.py",

@@ -62,6 +62,10 @@ class Tag:
         """Where it lies, for people."""
         raise NotImplementedError
 
+    def type_in_mapping(self, name: str) -> str:
+        """How the mapping calls a type of `plc.numbers.NUMBERS` at this place."""
+        return name
+
 
 @dataclass(frozen=True, slots=True)
 class TagFamily:

@@ -74,11 +74,12 @@ def _types(model: CellModel, holds: Holds, *, small: bool) -> Iterator[str]:
 
 
 def _narrower(member: TagFamily, used: str) -> str:
+    first = member.tags[0]
+    called = {name: f"`type: {first.type_in_mapping(name)}`" for name in ("int16", "int32", "float32")}
     if used not in _WIDE:
-        return "give its place a type with a sign: `type: int16` or `type: int32`"
+        return f"give its place a type with a sign: {called['int16']} or {called['int32']}"
     if used in _WIDE_INTEGERS:
-        return "give its place `type: int32`"
-    encoding = member.tags[0].encoding
-    if encoding is not None and encoding.is_scaled:
-        return "give its place `type: float32` without a scale, or `type: int16` with one"
-    return "give its place `type: float32`"
+        return f"give its place {called['int32']}"
+    if first.encoding is not None and first.encoding.is_scaled:
+        return f"give its place {called['float32']} without a scale, or {called['int16']} with one"
+    return f"give its place {called['float32']}"

@@ -71,7 +71,25 @@ def test_what_cannot_be_exported_is_explained(arguments: list[str | Path], code:
     assert message in done.stderr
 
 
+def test_a_cell_without_a_link_for_a_plc() -> None:
+    robot_only = "gatewayd: 1\ncell: a\nrobot: {host: 127.0.0.9}\nvariables: {}\n"
+    done = export("plc", "-", "--for", "c", content=robot_only)
+    assert done.exit_code == 1
+    assert done.stderr == "stdin: the cell has no link of these: modbus, canopen\n"
+
+
 PLC = ("plc", WATCHED, "--for", "iec-st")
+
+
+def test_the_link_is_that_of_the_cell_or_the_one_asked_for(tmp_path: Path) -> None:
+    """A cell on both buses has a program for either."""
+    for arguments, text in (
+        ((ROOT / "mappings/canopen-only.yaml",), "from_node"),
+        ((TWO_BUSES,), "image"),
+        ((TWO_BUSES, "--link", "canopen"), "from_node"),
+    ):
+        export("plc", *arguments, "--for", "c", "-o", tmp_path, "--force")
+        assert f"struct gw_{text}" in (tmp_path / "gw.h").read_text(encoding="utf-8")
 
 
 def test_a_plc_program_fills_a_folder(tmp_path: Path) -> None:
@@ -102,9 +120,14 @@ def test_what_was_changed_by_hand_is_left_alone(tmp_path: Path) -> None:
         (["plc", TWO_BUSES], 2, "Missing option '--for'"),
         (["plc", TWO_BUSES, "--for", "step7"], 2, "'step7' is not one of"),
         (
-            ["plc", ROOT / "mappings/canopen-only.yaml", "--for", "iec-st"],
+            ["plc", ROOT / "mappings/canopen-only.yaml", "--for", "tia"],
             1,
-            "the cell has no link of these: modbus",
+            "S7 controllers are no CANopen master",
+        ),
+        (
+            ["plc", WATCHED, "--for", "c", "--link", "canopen"],
+            1,
+            "the cell is on no CAN bus: add",
         ),
         (
             ["plc", ROOT / "mappings/two-plcs.yaml", "--for", "iec-st"],

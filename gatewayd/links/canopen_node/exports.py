@@ -1,13 +1,16 @@
-"""The files for the configurator of a CANopen master."""
+"""The files for the configurator of a CANopen master, and for the engineering tool of a PLC that is one."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 from typing import Final
 
 from gatewayd.links.canopen_node.plan import canopen_of
-from gatewayd.links.exports import Export, ExportError
+from gatewayd.links.exports import Export, ExportedFile, ExportError
 from gatewayd.mapping.plan import Plan
+from gatewayd.plc.export import plc_export
+from gatewayd.plc.tags import PlcWishes
 
 
 def _exported(plan: Plan, *, configured: bool) -> str:
@@ -32,7 +35,16 @@ def _exported(plan: Plan, *, configured: bool) -> str:
     return made
 
 
+def _plc_files(plan: Plan, wishes: PlcWishes, target: str, small: bool) -> Iterable[ExportedFile]:
+    """Made by modules that are imported only here, like those of the sheet."""
+    from gatewayd.links.canopen_node.plc.build import model_of
+    from gatewayd.links.canopen_node.plc.registry import files_for
+
+    return files_for(target, model_of(plan, wishes), small=small)
+
+
 EXPORTS: Final = (
+    plc_export("canopen", lambda plan: canopen_of(plan) is not None, _plc_files),
     Export(
         "eds",
         "The electronic data sheet, for the master's configurator.",

@@ -6,7 +6,7 @@ from typing import Final
 
 from gatewayd.plc.model import CellModel
 from gatewayd.plc.st.dialect import Dialect, Primitives, elementary
-from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection
+from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection, indented
 from gatewayd.plc.st.types import has_wide
 
 
@@ -151,34 +151,13 @@ def _to_real(name: str, form: _Format) -> ProgramUnit:
 def _from_real(name: str, form: _Format) -> ProgramUnit:
     name = f"{name}{form.real.capitalize()}"
     integer, bits, real = form.integer, form.bits, form.real
-    body = [
+    body = (
         f"result := {form.zero};",
         "number := ABS(value);",
         "IF value <> value THEN",
         f"  result := {form.nan};",
         f"ELSIF number > {real}#0.0 THEN",
-        f"  exponent := {form.bias};",
-        *(
-            f"  {line}"
-            for line in _while(
-                f"(number >= {form.twice}) AND (exponent < {form.greatest})",
-                f"number := number / {real}#2.0;",
-                "exponent + 1",
-            )
-        ),
-        *(
-            f"  {line}"
-            for line in _while(
-                f"(number < {form.implied}) AND (exponent > 1)",
-                f"number := number * {real}#2.0;",
-                "exponent - 1",
-            )
-        ),
-        f"  IF exponent = {form.greatest} THEN",
-        f"    number := {real}#0.0;",
-        f"  ELSIF number < {form.implied} THEN",
-        "    exponent := 0;",
-        "  END_IF;",
+        *indented(_normalized(form)),
         f"  result := {integer}_TO_{bits}({real}_TO_{integer}(number)) AND {form.fraction_mask};",
         f"  result := result OR SHL({integer}_TO_{bits}(INT_TO_{integer}(exponent)), {form.fraction});",
         "END_IF;",
@@ -186,12 +165,12 @@ def _from_real(name: str, form: _Format) -> ProgramUnit:
         f"  result := result OR {form.sign};",
         "END_IF;",
         f"{name} := result;",
-    ]
+    )
     return function(
         name,
         bits,
         (("value", real),),
-        tuple(body),
+        body,
         local=(
             PlcVariable("exponent", elementary("INT")),
             PlcVariable("number", elementary(real)),
@@ -199,6 +178,29 @@ def _from_real(name: str, form: _Format) -> ProgramUnit:
         ),
         comment="the bits of a number (IEEE 754)",
     )
+
+
+def _normalized(form: _Format) -> list[str]:
+    """The number moved into the range of its fraction, and by how much; infinity and the subnormal stop at the ends."""
+    real = form.real
+    return [
+        f"exponent := {form.bias};",
+        *_while(
+            f"(number >= {form.twice}) AND (exponent < {form.greatest})",
+            f"number := number / {real}#2.0;",
+            "exponent + 1",
+        ),
+        *_while(
+            f"(number < {form.implied}) AND (exponent > 1)",
+            f"number := number * {real}#2.0;",
+            "exponent - 1",
+        ),
+        f"IF exponent = {form.greatest} THEN",
+        f"  number := {real}#0.0;",
+        f"ELSIF number < {form.implied} THEN",
+        "  exponent := 0;",
+        "END_IF;",
+    ]
 
 
 def _while(condition: str, step: str, exponent: str) -> tuple[str, ...]:

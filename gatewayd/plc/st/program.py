@@ -33,6 +33,8 @@ class PlcVariable:
     type: TypeName
     comment: str = ""
     initial: str = ""
+    address: str = ""
+    """`%I*`: the tool gives it a place in the process image."""
 
 
 @dataclass(frozen=True, slots=True)

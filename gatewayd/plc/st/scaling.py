@@ -3,10 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
+from typing import Final
 
-from gatewayd.plc.model import Encoding, Tag, initial
+from gatewayd.plc.model import CellModel, Encoding, Tag, initial
 from gatewayd.plc.numbers import NUMBERS, REALS
-from gatewayd.plc.st.dialect import literal, real
+from gatewayd.plc.st.dialect import Dialect, elementary, literal, real
+from gatewayd.plc.st.program import PlcVariable
+
+_INFINITE: Final = {"REAL": "DWORD#16#7F800000", "LREAL": "LWORD#16#7FF0000000000000"}
+"""The exponent of what is no finite number."""
+SCRATCH: Final = tuple(
+    PlcVariable(name, elementary(kind))
+    for name, kind in (
+        ("octet", "BYTE"),
+        ("value", "WORD"),
+        ("double", "DWORD"),
+        ("quad", "LWORD"),
+        ("real_raw", "REAL"),
+        ("real_nearest", "REAL"),
+        ("lreal_raw", "LREAL"),
+        ("lreal_nearest", "LREAL"),
+    )
+)
+"""Local variables of blocks that convert; only those are declared that are used."""
+JOINED: Final = tuple(variable for variable in SCRATCH if variable.name in ("double", "quad"))
+"""Those of blocks that only read."""
+UNREADABLE: Final = PlcVariable(
+    "unreadable", elementary("BOOL"), "a real is NaN or infinite: its value stayed as it was"
+)
+
+
+def from_bits(target: str, bits: str, tag: Tag, model: CellModel, dialect: Dialect) -> Iterator[str]:
+    """What makes a value of the 32 or 64 bits that a DWORD or LWORD holds."""
+    assert tag.encoding is not None
+    wire = NUMBERS[tag.encoding.type].type
+    kind = "DWORD" if NUMBERS[tag.encoding.type].size == 4 else "LWORD"
+    if wire not in REALS:
+        yield f"{target} := {value_of(f'{kind}_TO_{wire}({bits})', tag)};"
+        return
+    assigned = f"{target} := {value_of(dialect.call(model, f'To{wire.capitalize()}', bits=bits), tag)};"
+    if not dialect.primitives.only_finite:
+        yield assigned
+        return
+    yield f"IF ({bits} AND {_INFINITE[wire]}) <> {_INFINITE[wire]} THEN"
+    yield f"  {assigned}"
+    yield "ELSE"
+    yield "  unreadable := TRUE;"
+    yield "END_IF;"
 
 
 def value_of(raw: str, tag: Tag) -> str:

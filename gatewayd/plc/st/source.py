@@ -53,7 +53,8 @@ def enumeration_lines(kind: Enumeration) -> list[str]:
 def field_source(field: PlcVariable) -> str:
     """`name : INT := 3; (* comment *)`."""
     initial = f" := {field.initial}" if field.initial else ""
-    return f"{field.name} : {type_text(field.type)}{initial}; {comment(field.comment)}".rstrip()
+    place = f" AT {field.address}" if field.address else ""
+    return f"{field.name}{place} : {type_text(field.type)}{initial}; {comment(field.comment)}".rstrip()
 
 
 def section_source(section: VariableSection) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +12,9 @@ from gatewayd.plc.st.program import ProgramUnit
 CYCLE = 10
 """Milliseconds from call to call."""
 WORDS = (
+    (r"\b(?:WORD|DWORD)#16#([0-9A-F]+)", r"0x\1"),
+    (r"\bUDINT#", ""),
+    (r"\bAND (?=0x)", "& "),
     ("<>", "!="),
     (r"(?<![<>!:=])=(?!=)", "=="),
     (r"\bAND\b", "and"),
@@ -33,8 +36,10 @@ class Timer:
         self.Q = self.elapsed > limit
 
 
-def instance(unit: ProgramUnit, **values: object) -> tuple[Any, Callable[[], None]]:
-    """The variables of a block, and its call."""
+def instance(
+    unit: ProgramUnit, known: Mapping[str, object] | None = None, /, **values: object
+) -> tuple[Any, Callable[[], None]]:
+    """The variables of a block, and its call; `known`: names that it uses, and what they are."""
     fields = [field for section in unit.sections for field in section.fields]
     starts = {"TON": Timer, "BOOL": bool}
     present = SimpleNamespace(**{field.name: starts.get(field.type.name, int)() for field in fields})
@@ -43,7 +48,7 @@ def instance(unit: ProgramUnit, **values: object) -> tuple[Any, Callable[[], Non
     code = compile("\n".join(_lines(unit, names)), unit.name, "exec")
 
     def call() -> None:
-        exec(code, {"own": present})  # noqa: S102 - generated here
+        exec(code, {**(known or {}), "own": present})  # noqa: S102 - generated here
 
     return present, call
 
@@ -66,8 +71,10 @@ def _lines(unit: ProgramUnit, names: re.Pattern[str]) -> list[str]:
             put(f"case = {_expression(match[1], names)}")
             put("if False: pass")
             open_blocks.append("CASE")
-        elif match := re.match(r"(\d+): (\w+) := (.*)$", statement):
-            put(f"elif case == {match[1]}: own.{match[2]} = {_expression(match[3], names)}")
+        elif match := re.match(r"(\d+): ([\w.\[\]]+) := (.*)$", statement):
+            put(
+                f"elif case == {match[1]}: {_expression(f'{match[2]} := {match[3]}', names).replace(':=', '=')}"
+            )
         elif statement == "ELSE":
             is_case = open_blocks[-1] == "CASE"
             put("else:", 0 if is_case else 1)

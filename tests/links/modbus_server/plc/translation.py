@@ -7,7 +7,8 @@ statement that is none of these does not compile.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.st.decode import unpack
@@ -63,34 +64,59 @@ EXPRESSIONS = (
     (r"\bNOT\b", "!"),
     (r"\bTRUE\b", "1"),
     (r"\bFALSE\b", "0"),
-    (r"\b(image|inputs|outputs)\.", r"\1->"),
+    (r"\b(image|inputs|outputs|from_node|to_node)\.", r"\1->"),
     (r"\bdouble\b", "double_"),
 )
 
 
+@dataclass(frozen=True, slots=True)
+class TranslatedBlock:
+    """A block that becomes a function with these operands; `declared`: what else it knows, as C."""
+
+    unit: ProgramUnit
+    operands: str
+    declared: Sequence[str]
+
+
 def header(model: PlcModel) -> str:
     """A header like that of the target `c`: structures, `gw_unpack` and `gw_pack`."""
-    return "\n".join(_lines(model)) + "\n"
+    image = "struct gw_image *image"
+    blocks = (
+        TranslatedBlock(unpack(model, DIALECT), f"{image}, struct gw_outputs *outputs", UNPACKING),
+        TranslatedBlock(pack(model, DIALECT), f"struct gw_inputs *inputs, {image}", PACKING),
+    )
+    return translated(data_types(model, DIALECT), functions(model, DIALECT), blocks)
 
 
-def _lines(model: PlcModel) -> Iterator[str]:
+UNPACKING = ("const bool trusted = true;", "bool unreadable;")
+PACKING = ("bool clipped;",)
+WANTED = frozenset({"GW_Inputs", "GW_Outputs", "GW_Image", "GW_FromNode", "GW_ToNode"})
+
+
+def translated(
+    types: Iterable[object], units: Iterable[ProgramUnit], blocks: Iterable[TranslatedBlock]
+) -> str:
+    """A header with the structures of values and images, the functions, and the blocks as functions."""
+    return "\n".join(_lines(types, units, blocks)) + "\n"
+
+
+def _lines(
+    types: Iterable[object], units: Iterable[ProgramUnit], blocks: Iterable[TranslatedBlock]
+) -> Iterator[str]:
     yield HEAD
     for source, old in TYPES.items():
         for target, new in TYPES.items():
             rounded = "rint" if source.endswith("REAL") and not target.endswith("REAL") else ""
             yield f"#define {source}_TO_{target}(x) (({new}){rounded}(({old})(x)))"
-    for kind in data_types(model, DIALECT):
-        if isinstance(kind, Structure) and kind.name in ("GW_Inputs", "GW_Outputs", "GW_Image"):
-            yield f"struct {kind.name.lower()} {{"
+    for kind in types:
+        if isinstance(kind, Structure) and kind.name in WANTED:
+            yield f"struct {re.sub('(?<=[a-z])(?=[A-Z])', '_', kind.name).lower()} {{"
             yield from (f"    {_declared(field)};" for field in kind.fields)
             yield "};"
-    for unit in functions(model, DIALECT):
+    for unit in units:
         yield from _function(unit)
-    image, trusted = "struct gw_image *image", "const bool trusted = true;"
-    yield from _block(
-        unpack(model, DIALECT), f"{image}, struct gw_outputs *outputs", [trusted, "bool unreadable;"]
-    )
-    yield from _block(pack(model, DIALECT), f"struct gw_inputs *inputs, {image}", ["bool clipped;"])
+    for block in blocks:
+        yield from _block(block)
 
 
 def _function(unit: ProgramUnit) -> Iterator[str]:
@@ -106,12 +132,12 @@ def _function(unit: ProgramUnit) -> Iterator[str]:
     yield "}"
 
 
-def _block(unit: ProgramUnit, operands: str, declared: list[str]) -> Iterator[str]:
-    yield f"static void {unit.name.lower()}({operands})"
+def _block(block: TranslatedBlock) -> Iterator[str]:
+    yield f"static void {block.unit.name.lower()}({block.operands})"
     yield "{"
-    yield from declared
-    yield from (f"    {_declared(field)};" for field in unit.sections[-1].fields)
-    yield from _statements(unit.body)
+    yield from block.declared
+    yield from (f"    {_declared(field)};" for field in block.unit.sections[-1].fields)
+    yield from _statements(block.unit.body)
     yield "}"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from gatewayd.links.modbus_server.plc.model import PlcModel, Poll, RegisterTag
 from gatewayd.modbus.codec import TYPES
 from gatewayd.plc.model import Encoding
-from gatewayd.plc.numbers import NUMBERS, REALS
+from gatewayd.plc.numbers import NUMBERS
 from gatewayd.plc.st.dialect import Dialect, elementary, own, word
 from gatewayd.plc.st.program import (
     PlcVariable,
@@ -16,16 +16,10 @@ from gatewayd.plc.st.program import (
     indented,
     used,
 )
-from gatewayd.plc.st.scaling import fallback, value_of
+from gatewayd.plc.st.scaling import JOINED, UNREADABLE, fallback, from_bits, value_of
 
 _SWAPPED = frozenset({"BADC", "DCBA"})
 _REVERSED = frozenset({"CDAB", "DCBA"})
-_INFINITE = {"REAL": "DWORD#16#7F800000", "LREAL": "LWORD#16#7FF0000000000000"}
-"""The exponent of what is no finite number."""
-
-_UNREADABLE = PlcVariable(
-    "unreadable", elementary("BOOL"), "a real is NaN or infinite: its value stayed as it was"
-)
 
 
 def unpack(model: PlcModel, dialect: Dialect) -> ProgramUnit:
@@ -54,7 +48,7 @@ def unpack(model: PlcModel, dialect: Dialect) -> ProgramUnit:
                     ),
                 ),
             ),
-            VariableSection("VAR_OUTPUT", (_UNREADABLE,) if dialect.primitives.only_finite else ()),
+            VariableSection("VAR_OUTPUT", (UNREADABLE,) if dialect.primitives.only_finite else ()),
             VariableSection(
                 "VAR_IN_OUT",
                 (
@@ -64,9 +58,7 @@ def unpack(model: PlcModel, dialect: Dialect) -> ProgramUnit:
             ),
             VariableSection(
                 "VAR",
-                used(
-                    body, PlcVariable("double", elementary("DWORD")), PlcVariable("quad", elementary("LWORD"))
-                ),
+                used(body, *JOINED),
             ),
         ),
         (*body, "END_IF;"),
@@ -82,24 +74,12 @@ def statement(tag: RegisterTag, poll: Poll, model: PlcModel, dialect: Dialect) -
         packed = f"({place} AND {word(1 << (tag.bit or 0))}) <> {word(0)}"
         yield f"{target} := {place if poll.area.of_bits else packed};"
         return
-    wire = NUMBERS[tag.encoding.type].type
     if TYPES[tag.encoding.type].words == 1:
         yield f"{target} := {value_of(_single(place, tag, tag.encoding, model, dialect), tag)};"
         return
-    bits, kind = ("double", "DWORD") if TYPES[tag.encoding.type].words == 2 else ("quad", "LWORD")
+    bits = "double" if TYPES[tag.encoding.type].words == 2 else "quad"
     yield f"{bits} := {_joined(poll, index, tag.encoding, model, dialect)};"
-    if wire not in REALS:
-        yield f"{target} := {value_of(f'{kind}_TO_{wire}({bits})', tag)};"
-        return
-    assigned = f"{target} := {value_of(dialect.call(model, f'To{wire.capitalize()}', bits=bits), tag)};"
-    if not dialect.primitives.only_finite:
-        yield assigned
-        return
-    yield f"IF ({bits} AND {_INFINITE[wire]}) <> {_INFINITE[wire]} THEN"
-    yield f"  {assigned}"
-    yield "ELSE"
-    yield "  unreadable := TRUE;"
-    yield "END_IF;"
+    yield from from_bits(target, bits, tag, model, dialect)
 
 
 def _single(place: str, tag: RegisterTag, encoding: Encoding, model: PlcModel, dialect: Dialect) -> str:

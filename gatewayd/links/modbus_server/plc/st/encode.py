@@ -10,21 +10,10 @@ from gatewayd.modbus.codec import TYPES
 from gatewayd.plc.numbers import NUMBERS, REALS
 from gatewayd.plc.st.dialect import Dialect, elementary, own, word
 from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection, used
-from gatewayd.plc.st.scaling import raw_of
+from gatewayd.plc.st.scaling import SCRATCH, raw_of
 
 _SWAPPED = frozenset({"BADC", "DCBA"})
 _REVERSED = frozenset({"CDAB", "DCBA"})
-
-_SCRATCH = (
-    ("value", "WORD"),
-    ("double", "DWORD"),
-    ("quad", "LWORD"),
-    ("real_raw", "REAL"),
-    ("real_nearest", "REAL"),
-    ("lreal_raw", "LREAL"),
-    ("lreal_nearest", "LREAL"),
-)
-"""Local variables by name and type; only those are declared that are used."""
 
 
 def pack(model: PlcModel, dialect: Dialect) -> ProgramUnit:
@@ -34,7 +23,6 @@ def pack(model: PlcModel, dialect: Dialect) -> ProgramUnit:
     for poll in model.writes:
         for address, tags in groupby(poll.tags, key=lambda tag: tag.address):
             lines += _register(address - poll.address, list(tags), poll, model, dialect)
-    scratch = [PlcVariable(name, elementary(kind)) for name, kind in _SCRATCH]
     return ProgramUnit(
         "FUNCTION_BLOCK",
         f"{prefix}_Pack",
@@ -54,7 +42,7 @@ def pack(model: PlcModel, dialect: Dialect) -> ProgramUnit:
                     PlcVariable("image", own(f"{prefix}_Image")),
                 ),
             ),
-            VariableSection("VAR", used(lines, *scratch)),
+            VariableSection("VAR", used(lines, *SCRATCH)),
         ),
         tuple(lines),
         comment="values for the robot to registers",

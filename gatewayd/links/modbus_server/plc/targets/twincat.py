@@ -5,9 +5,8 @@ The client is that of TF6250. Identifiers are made from the names, so that makin
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Final
-from uuid import NAMESPACE_URL, uuid5
 
 from gatewayd.links.exports import ExportedFile
 from gatewayd.links.modbus_server.plc.model import PlcModel
@@ -23,7 +22,8 @@ from gatewayd.plc.st.cast import POINTER
 from gatewayd.plc.st.convert import functions
 from gatewayd.plc.st.dialect import Dialect, own
 from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection
-from gatewayd.plc.st.source import comment, data_type_source, declaration, section_source
+from gatewayd.plc.st.source import data_type_source, section_source
+from gatewayd.plc.st.tree import lines_with, object_text, unit_file
 
 HOLDS: Final = Holds(
     "TwinCAT", 255, CODESYS, frozenset({"LINT", "ULINT", "LREAL"}), "controllers without 64-bit numbers"
@@ -36,16 +36,16 @@ def files(model: PlcModel) -> Iterator[ExportedFile]:
     prefix = model.prefix
     head = header(model, "TwinCAT 3")
     for kind in data_types(model, DIALECT):
-        text = _object(model, "DUT", kind.name, _with(head, data_type_source(kind)))
+        text = object_text(model, "DUT", kind.name, lines_with(head, data_type_source(kind)))
         yield ExportedFile(f"{kind.name}.TcDUT", text, line_end="\r\n")
     for unit in (*functions(model, DIALECT), *blocks(model, DIALECT), sequence(model), client(model)):
-        yield _pou(model, unit, head)
+        yield unit_file(model, unit, head)
     variables = section_source(VariableSection("VAR_GLOBAL", data(model)))
     about = (*head, *overview(model), *plan_lines(model))
-    lines = _with(about, ["{attribute 'qualified_only'}", *variables])
-    text = _object(model, "GVL", f"{prefix}_Data", lines)
+    lines = lines_with(about, ["{attribute 'qualified_only'}", *variables])
+    text = object_text(model, "GVL", f"{prefix}_Data", lines)
     yield ExportedFile(f"{prefix}_Data.TcGVL", text, line_end="\r\n")
-    yield _pou(model, _main(model), (beginning(model),), once=True)
+    yield unit_file(model, _main(model), (beginning(model),), once=True)
 
 
 def _main(model: PlcModel) -> ProgramUnit:
@@ -55,33 +55,3 @@ def _main(model: PlcModel) -> ProgramUnit:
         f"client(run := TRUE, trusted := {shared}status.trusted, write := {write}, image := {shared}image);"
     )
     return main(model, [call], [PlcVariable("client", own(f"{model.prefix}_Client"))], shared=shared)
-
-
-def _with(head: Sequence[str], lines: Sequence[str]) -> list[str]:
-    return [*map(comment, head), *lines]
-
-
-def _pou(model: PlcModel, unit: ProgramUnit, head: Sequence[str], *, once: bool = False) -> ExportedFile:
-    body = f"    <Implementation>\n      <ST>{_cdata(unit.body)}</ST>\n    </Implementation>"
-    text = _object(model, "POU", unit.name, _with(head, declaration(unit)), body)
-    return ExportedFile(f"{unit.name}.TcPOU", text, line_end="\r\n", once=once)
-
-
-def _object(model: PlcModel, element: str, name: str, declared: Sequence[str], body: str = "") -> str:
-    identifier = uuid5(NAMESPACE_URL, f"gatewayd/{model.cell}/{name}")
-    special = ' SpecialFunc="None"' if element == "POU" else ""
-    lines = (
-        '<?xml version="1.0" encoding="utf-8"?>',
-        '<TcPlcObject Version="1.1.0.1" ProductVersion="3.1.4024.0">',
-        f'  <{element} Name="{name}" Id="{{{identifier}}}"{special}>',
-        f"    <Declaration>{_cdata(declared)}</Declaration>",
-        *([body] if body else []),
-        f"  </{element}>",
-        "</TcPlcObject>",
-    )
-    return "\n".join(lines) + "\n"
-
-
-def _cdata(lines: Sequence[str]) -> str:
-    text = "\n".join(lines).replace("]]>", "]] >")
-    return f"<![CDATA[{text}\n]]>"

@@ -1,0 +1,142 @@
+"""The watch of the status words, stepped through: alive, the right mapping, names of numbers, and what is not known."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from gatewayd.core.freshness import Source
+from gatewayd.core.image import Quality
+from gatewayd.core.refusal import Reason
+from gatewayd.links.canopen_node.plc.blocks import watch
+from gatewayd.links.canopen_node.plc.content import Objects
+from gatewayd.links.canopen_node.plc.model import PdoModel
+from gatewayd.plc.st.cast import POINTER
+from gatewayd.plc.st.dialect import Dialect
+from gatewayd.plc.st.types import meanings
+from tests.links.canopen_node.plc.cells import model
+from tests.links.modbus_server.plc.simulation import CYCLE, instance
+from tests.plc_golden import canopen_model
+
+SECOND = 1000 // CYCLE
+NAMES = {f"GW_{kind}_{name}": name for kind, named in meanings().items() for name, _text in named}
+CONVERSIONS = dict.fromkeys(
+    ("UINT_TO_WORD", "UDINT_TO_DWORD", "WORD_TO_INT", "WORD_TO_UINT", "DWORD_TO_UDINT"), lambda number: number
+)
+
+
+class Master:
+    """A master with the block; `words` are those of the TPDOs."""
+
+    def __init__(self, found: PdoModel) -> None:
+        self.words: dict[str, Any] = {word.object_name: word for pdo in found.from_node for word in pdo.words}
+        self.from_node = SimpleNamespace(
+            **{
+                pdo.name: SimpleNamespace(**{word.object_name: 0 for word in pdo.words})
+                for pdo in found.from_node
+            }
+        )
+        count = len(found.variables) + 1
+        self.status = SimpleNamespace(alive=False, quality=[""] * count, good=[False] * count)
+        unit = watch(found, Dialect(POINTER), Objects())
+        self.block, self._call = instance(
+            unit,
+            {**NAMES, **CONVERSIONS},
+            from_node=self.from_node,
+            status=self.status,
+            operational=True,
+            patience=1000,
+        )
+
+    def set(self, **numbers: int) -> None:
+        for name, number in numbers.items():
+            setattr(getattr(self.from_node, self.words[name].pdo), name, number)
+
+    def run(self, cycles: int = 1, *, beating: bool = True) -> SimpleNamespace:
+        for _ in range(cycles):
+            if beating:
+                place = getattr(self.from_node, self.words["status_heartbeat"].pdo)
+                place.status_heartbeat += 1
+            self._call()
+        return self.status
+
+    def once(self) -> SimpleNamespace:
+        self._call()
+        return self.status
+
+
+def watching() -> Master:
+    found = canopen_model()
+    master = Master(found)
+    master.set(status_fingerprint=found.fingerprint)
+    return master
+
+
+def test_a_heartbeat_that_moves_is_alive_and_one_that_stands_is_not() -> None:
+    master = watching()
+    assert not master.run().alive
+    assert master.run().trusted
+    assert master.run(SECOND, beating=False).alive
+    assert not master.run(2, beating=False).alive
+    assert master.run().trusted
+
+
+def test_a_node_that_is_lost_is_not_alive_at_once() -> None:
+    master = watching()
+    assert master.run(3).alive
+    master.block.operational = False
+    assert not master.run().trusted
+
+
+def test_another_mapping_is_not_trusted() -> None:
+    master = watching()
+    master.set(status_fingerprint=1)
+    status = master.run(3)
+    assert (status.alive, status.wrong_mapping, status.trusted) == (True, True, False)
+
+
+def test_numbers_have_names() -> None:
+    master = watching()
+    master.set(
+        status_flags=0b1000001,
+        status_robot_state=Source.FRESH,
+        status_program=3,
+        status_refusal_reason=Reason.HELD,
+        status_refusal_variable=5,
+        status_robot_age=7,
+        quality_11=Quality.GOOD,
+        quality_7=Quality.STALE,
+    )
+    status = master.run(3)
+    assert (status.values_fresh, status.robot_writable, status.watchdog_fed) == (True, False, True)
+    assert (status.robot_state, status.program_state) == ("fresh", "playing")
+    assert (status.refusal, status.refusal_variable, status.robot_age) == ("held", 5, 7)
+    assert (status.quality[11], status.quality[7], status.quality[1]) == ("good", "stale", "unknown")
+    assert (status.good[11], status.good[7], status.good[1]) == (True, False, False)
+    master.set(status_robot_state=99)
+    assert master.run().robot_state == "unknown"
+
+
+def test_a_refusal_is_told_for_one_cycle() -> None:
+    master = watching()
+    master.set(status_refused=4)
+    assert not master.run(3).refused_now
+    master.set(status_refused=5)
+    assert master.run().refused_now
+    assert not master.run().refused_now
+
+
+def test_what_is_old_is_not_known() -> None:
+    master = watching()
+    master.set(status_robot_state=Source.FRESH, quality_11=Quality.GOOD)
+    master.run(3)
+    status = master.run(SECOND + 2, beating=False)
+    assert (status.robot_state, status.robot_age) == ("unknown", 4294967295)
+    assert (status.quality[11], status.good[11]) == ("unknown", False)
+
+
+def test_without_status_words_the_master_decides() -> None:
+    master = Master(model("ready: {robot: output_bit_register_0, canopen: auto}"))
+    assert master.once().trusted
+    master.block.operational = False
+    assert not master.once().trusted
