@@ -211,7 +211,7 @@ LIBRARIES: dict[str, set[str]] = {
     "arro3": {"rtde.recording"},
     "aiohttp": {"control.server", "web.guard", "web.listener"},
     "can": {"canopen.pythoncan", "demo.master"},
-    "canopen": {"canopen.importer"},
+    "canopen": {"canopen.importer", "canopen.manager.data_sheet"},
     "click": {"__main__", "cli"},
     "matplotlib": {"cli.rtde"},
     "numpy": {"cli.rtde", "rtde.recording"},
@@ -241,6 +241,7 @@ PURE = (
 
 IMPURE = {
     "canopen.interface": "asks a CAN interface for its state",
+    "canopen.manager.runtime": "has the bus and the timer",
     "canopen.pythoncan": "a driver",
     "canopen.socketcan": "a driver",
     "canopen.supervised": "a driver",
@@ -319,6 +320,8 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "cli.rtde.robot_source": "tests/cli/rtde/test_record.py, with a simulator",
     "cli.rtde.robots": "tests/cli/rtde/test_get.py and test_set.py",
     "cli.rtde.sources": "a protocol; tests/cli/rtde/test_record.py",
+    "canopen.manager.letters": "words; tests/canopen/manager/test_boot.py",
+    "canopen.manager.plan": "records; tests/canopen/manager/test_configuration.py",
     "canopen.product": "two numbers; tests/canopen/test_identity.py",
     "core.requester": "a record; tests/core/test_cell.py pins what its parts mean",
     "links.canopen_node.compile": "tests/mapping/test_compile.py compiles it",

@@ -40,6 +40,8 @@ _BEFORE_A_NOUN = re.compile(rf"^ (?:(?!has|is|was)\w+ )?(?:{_NOUNS})\b(?!/s)")
 _COUNTED = re.compile(r"counted\(|[A-Z_]+$|_HEADER\.size$")
 
 NEVER_ONE = {
+    "canopen.manager.configuration: count": "more than the limit",
+    "canopen.manager.pdo_content: shift": "more than 64",
     "control.names: len(text)": "longer than any pattern may be",
     "links.canopen_node.rules.bus: len(bus)": "where there are several cells",
     "links.canopen_node.rules.node: names": "not a number, and writes is a verb",

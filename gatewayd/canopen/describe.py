@@ -34,6 +34,7 @@ ABORTS = {
     AbortCode.NOT_MAPPABLE: "not mappable into the PDO",
     AbortCode.PDO_LENGTH: "PDO would be too long",
     AbortCode.PARAMETER_INCOMPATIBLE: "incompatible parameters",
+    AbortCode.INTERNALLY_INCOMPATIBLE: "incompatible within the device",
     AbortCode.HARDWARE: "hardware error",
     AbortCode.LENGTH: "length does not match",
     AbortCode.TOO_LONG: "too long",
@@ -42,10 +43,13 @@ ABORTS = {
     AbortCode.INVALID_VALUE: "invalid value",
     AbortCode.VALUE_TOO_HIGH: "value too high",
     AbortCode.VALUE_TOO_LOW: "value too low",
+    AbortCode.MAXIMUM_BELOW_MINIMUM: "maximum below minimum",
+    AbortCode.NO_CONNECTION: "no SDO connection",
     AbortCode.GENERAL: "general error",
     AbortCode.CANNOT_STORE: "cannot be stored",
     AbortCode.LOCAL_CONTROL: "held by another owner",
     AbortCode.DEVICE_STATE: "not in the present device state",
+    AbortCode.NO_DICTIONARY: "no object dictionary",
     AbortCode.NO_DATA: "no data",
 }
 """Abort codes in words."""

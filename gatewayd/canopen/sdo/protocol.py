@@ -115,3 +115,71 @@ def block_upload_initiated(multiplexer: bytes, size: int, *, checked: bool) -> b
 def block_upload_ended(unused: int, crc: int) -> bytes:
     """All came; `unused` bytes of the last segment are no data."""
     return _CRC.pack(0xC1 | unused << 2, crc)
+
+
+class SdoAnswer(Enum):
+    """What a server's frame says."""
+
+    UPLOAD_SEGMENT = auto()
+    DOWNLOAD_SEGMENT = auto()
+    UPLOAD = auto()
+    DOWNLOAD = auto()
+    ABORT = auto()
+    BLOCK = auto()
+    UNKNOWN = auto()
+
+
+_ANSWERS = (
+    SdoAnswer.UPLOAD_SEGMENT,
+    SdoAnswer.DOWNLOAD_SEGMENT,
+    SdoAnswer.UPLOAD,
+    SdoAnswer.DOWNLOAD,
+    SdoAnswer.ABORT,
+    SdoAnswer.BLOCK,
+    SdoAnswer.BLOCK,
+    SdoAnswer.UNKNOWN,
+)
+"""By the server command specifier (bits 7-5)."""
+ANSWERS = tuple(_ANSWERS[command >> 5] for command in range(256))
+"""What a command byte of a server means."""
+
+
+def download_request(multiplexer: bytes, data: bytes) -> bytes:
+    """One to four bytes at once, or the size of what follows in segments."""
+    if is_expedited(data):
+        unused = 4 - len(data)
+        return bytes((0x23 | unused << 2,)) + multiplexer + data + _PADDING[unused]
+    return b"\x21" + multiplexer + _SIZE.pack(len(data))
+
+
+def upload_request(multiplexer: bytes) -> bytes:
+    """The value of an object is asked for."""
+    return b"\x40" + multiplexer + _PADDING[4]
+
+
+def upload_segment_request(toggle: int) -> bytes:
+    """The segment with this toggle bit (0 or 0x10) is asked for."""
+    return bytes((0x60 | toggle,)) + _PADDING[7]
+
+
+def uploaded(data: bytes) -> bytes | None:
+    """The value in an answer that has it at once; None if it comes in segments.
+
+    All four bytes where the server does not say how many of them count.
+    """
+    command = data[0]
+    if not command & 0x02:
+        return None
+    return data[4 : 8 - (command >> 2 & 3) if command & 0x01 else 8]
+
+
+def announced_size(data: bytes) -> int | None:
+    """The bytes that will come in segments, if the answer says so."""
+    size: int = _SIZE.unpack_from(data, 4)[0]
+    return size if data[0] & 0x01 else None
+
+
+def abort_code(data: bytes) -> int:
+    """Why a transfer has ended."""
+    code: int = _SIZE.unpack_from(data, 4)[0]
+    return code
