@@ -12,8 +12,8 @@ from gatewayd.cli.files import mapping_files, read_named
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from gatewayd.control.running import RunningGateways
     from gatewayd.doctor.report import CheckLine, DoctorReport
-    from gatewayd.doctor.running import RunningGateways
     from gatewayd.mapping.loader import Loaded
 
 WELL, FOUND, UNREADABLE = 0, 1, 2
@@ -72,8 +72,8 @@ def command(
     """
     import os
 
+    from gatewayd.control.running import ask, sockets
     from gatewayd.doctor.report import as_json as document_of
-    from gatewayd.doctor.running import ask, sockets
 
     loaded, unreadable = _load(files)
     gateways = ask(sockets(socket, os.environ))

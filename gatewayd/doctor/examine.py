@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Iterator
 
+from gatewayd.control.running import RunningGateways
 from gatewayd.doctor.report import CheckLine
-from gatewayd.doctor.running import RunningGateways
 from gatewayd.links.examination import Observation, Outcome, Surroundings
 from gatewayd.links.registry import examination_of, kinds
 from gatewayd.mapping.compiled import CompiledFile

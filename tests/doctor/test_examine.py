@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
+from gatewayd.control.running import RunningGateways
 from gatewayd.core.definition import CellDefinition
 from gatewayd.doctor import examine as examining
 from gatewayd.doctor.examine import about_gateway, about_machine, about_mapping, examine
-from gatewayd.doctor.running import RunningGateways
 from gatewayd.links.examination import Examination, Observation, Outcome, RunningCell, Surroundings
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import LinkPlan

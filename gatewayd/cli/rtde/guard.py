@@ -23,8 +23,8 @@ def gateway_in_the_way(host: str, port: int, named: Path | None = None) -> str:
     One that is there and gives no answer forbids it too: what it serves is not known. So does one that has a
     connection to the robot, and no socket that was found.
     """
-    from gatewayd.doctor.machine.connections import connected_processes
-    from gatewayd.doctor.running import ask, sockets
+    from gatewayd.control.running import ask, sockets
+    from gatewayd.machine.connections import connected_processes
 
     places = [*sockets(None, os.environ), *(() if named is None else (named,))]
     found = ask(tuple(dict.fromkeys(places)))

@@ -8,14 +8,14 @@ from collections.abc import AsyncIterator, Iterator
 from functools import partial
 
 from gatewayd.core.definition import CellDefinition
-from gatewayd.doctor.machine.ports import bind_failure, holder, listening_inodes
-from gatewayd.doctor.machine.privileges import NET_BIND_SERVICE, first_unprivileged_port, has_capability
-from gatewayd.doctor.route import look_up_route
 from gatewayd.links.examination import Examination, Observation, Surroundings
 from gatewayd.links.modbus_server import diagnosis
 from gatewayd.links.modbus_server.declaration import KIND
 from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.route import look_up_route
 from gatewayd.loop.threads import in_daemon_thread
+from gatewayd.machine.ports import bind_failure, holder, listening_inodes
+from gatewayd.machine.privileges import NET_BIND_SERVICE, first_unprivileged_port, has_capability
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address
 

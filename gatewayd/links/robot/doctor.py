@@ -11,14 +11,14 @@ import socket
 from collections.abc import AsyncIterator, Collection, Iterator, Sequence
 
 from gatewayd.core.definition import CellDefinition
-from gatewayd.doctor.machine.addresses import resolved
-from gatewayd.doctor.machine.ports import connect_error
-from gatewayd.doctor.route import look_up_route
 from gatewayd.links.examination import Examination, Observation, Outcome, RunningCell, Surroundings
 from gatewayd.links.robot import diagnosis
 from gatewayd.links.robot.companions import all_inputs, all_outputs
 from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.plan import RobotPlan
+from gatewayd.links.route import look_up_route
+from gatewayd.machine.addresses import resolved
+from gatewayd.machine.ports import connect_error
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address, counted
 from gatewayd.rtde.catalogue import bit_word

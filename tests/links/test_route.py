@@ -5,10 +5,10 @@ import os
 
 import pytest
 
-from gatewayd.doctor import route
-from gatewayd.doctor.machine.routes import Route
-from gatewayd.doctor.route import described, look_up_route
+from gatewayd.links import route
 from gatewayd.links.examination import Outcome
+from gatewayd.links.route import described, look_up_route
+from gatewayd.machine.routes import Route
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gatewayd.doctor.machine.privileges import NET_BIND_SERVICE, first_unprivileged_port, has_capability
+from gatewayd.machine.privileges import NET_BIND_SERVICE, first_unprivileged_port, has_capability
 
 
 def test_the_sysctl_says_where_ports_are_free(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.doctor.machine import routes
-from gatewayd.doctor.machine.routes import Route, has_link, parse, route_to
+from gatewayd.machine import routes
+from gatewayd.machine.routes import Route, has_link, parse, route_to
 
 
 def attribute(kind: int, data: bytes) -> bytes:

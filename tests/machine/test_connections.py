@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.doctor.machine import connections
+from gatewayd.machine import connections
 from tests.e2e.processes import HOST
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.doctor.machine.ports import bind_failure, connect_error, holder, listening_inodes
+from gatewayd.machine.ports import bind_failure, connect_error, holder, listening_inodes
 from tests.e2e.processes import HOST, free_port
 
 

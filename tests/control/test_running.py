@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.doctor.running import RunningGateways, ask, sockets
+from gatewayd.control.running import RunningGateways, ask, sockets
 from tests.cli.conftest import Running, gateway
 
 __all__ = ["gateway"]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from gatewayd.doctor.machine.addresses import resolved
+from gatewayd.machine.addresses import resolved
 
 
 async def test_an_address_is_itself_and_a_name_is_looked_up() -> None:

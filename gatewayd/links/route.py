@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import errno
 
-from gatewayd.doctor.machine.routes import Route, route_to
 from gatewayd.links.examination import Observation, Outcome
+from gatewayd.machine.routes import Route, route_to
 
 CHECK = "route"
 _NONE = {errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN}

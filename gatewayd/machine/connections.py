@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from gatewayd.doctor.machine.ports import socket_inodes
+from gatewayd.machine.ports import socket_inodes
 
 _PROC = Path("/proc")
 _ESTABLISHED = "01"
