@@ -32,7 +32,7 @@ def test_numbers_are_the_guides(member: int, number: int) -> None:
     "enum, members",
     [
         (enums.RobotMode, 13),
-        (enums.SafetyStatus, 19),
+        (enums.SafetyStatus, 21),
         (enums.JointMode, 13),
         (enums.ProgramState, 7),
         (enums.TimeScaleSource, 17),

@@ -68,6 +68,8 @@ class RobotFeed(ConnectionObserver):
         self.last_loss: Loss | None = None
         self.failure: Exception | None = None
         """Why there is no session and none is tried for."""
+        self.given_up = False
+        """Whether the client ends, or has ended, because the limits of the attempts are reached."""
         self.events: BoundedStream[RobotEvent] = BoundedStream(_EVENTS)
         self.set_ups = 0
         """Times that recipes have been agreed."""
@@ -115,6 +117,7 @@ class RobotFeed(ConnectionObserver):
         self.limit(retry)
         self._ever = False
         self.failure = None
+        self.given_up = False
         self.state = ConnectionState.CONNECTING
         for stream in self.streams:
             stream.reopen()
@@ -228,6 +231,7 @@ class RobotFeed(ConnectionObserver):
         )
         self.state = ConnectionState.CONNECTING
         self._end_session()
+        self.given_up = not goes_on
         event = LostEvent if loss.started else AttemptFailedEvent
         self._tell(event(loss, final=not goes_on))
         if not goes_on:

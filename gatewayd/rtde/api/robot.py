@@ -178,6 +178,8 @@ class Robot(InputWriter):
         """
         self._refuse_closed()
         sessions = self.statistics.sessions
+        if self._task is not None and self._feed.given_up:
+            await asyncio.wait((self._task,))  # whoever hears of a final loss may ask before it has ended
         if self._task is not None and not self._task.done():
             self._feed.limit(self._retry)
             self._client.reconnect("a new connection was asked for")
