@@ -14,6 +14,8 @@ from functools import partial
 
 from gatewayd.core.admission import Admission, Change, value_for
 from gatewayd.core.adoption import Adoption, AdoptionStep, adopted, named
+from gatewayd.core.carried import Carried
+from gatewayd.core.commands import Commands
 from gatewayd.core.definition import CellDefinition, Direction, Value
 from gatewayd.core.delivery import Delivery
 from gatewayd.core.events import Event, EventKind, EventRing, translated
@@ -34,8 +36,6 @@ from gatewayd.core.requester import Requester
 from gatewayd.core.supervision import WriterTable
 from gatewayd.core.unserved import Unserved
 
-HEARTBEAT_PERIOD = 0.1
-"""Seconds between two counts of the heartbeat."""
 NOTABLE_GAP = 0.5
 """Seconds for which the gateway stood still, from which on it is an event."""
 
@@ -61,6 +61,7 @@ class Cell:
         self.adoption = Adoption(definition.adopt_for)
         fallbacks = Fallbacks(definition, self.image, self.ownership, self.delivery, record)
         self._fallbacks = fallbacks
+        self.commands = Commands(definition.variables, self.ownership)
         self.listeners: list[Callable[[Direction], None]] = []
         self.write_listeners: list[Callable[[int, Written, float], None]] = []
         """Called with every accepted write that changes something: writer, changes, time. They must not raise."""
@@ -76,9 +77,11 @@ class Cell:
             self.image, self.ownership, self.forcing, self._admission, self._locking, fallbacks, self.delivery,
             record, self.refuse, self._notify,
         )  # fmt: skip
+        self.carried = Carried(
+            self.image, self.commands, self.forcing, self.set_availability, self._adopt_late, self._notify
+        )
         self._refusals = RefusalLog(record)
         self._unserved = RefusalLog(record)
-        self._next_heartbeat: float | None = None
 
     @property
     def accepts_writes(self) -> bool:
@@ -113,6 +116,7 @@ class Cell:
         self.image.store_all(verdict.values, now)
         self.delivery.give(verdict.values, now)
         self.written(requester.writer, changed, now)
+        self.commands.written(requester, changes, now)
         return None
 
     def written(self, writer: int | None, changed: Written, now: float) -> None:
@@ -258,6 +262,7 @@ class Cell:
         self.events.append(Event(now, EventKind.ROBOT_LOST, detail=reason))
         self.forcing.lift()
         self.delivery.lost()
+        self.commands.disarm()
         self.image.inputs_lost()
         if was_fresh:
             self._outputs_lost()
@@ -329,6 +334,9 @@ class Cell:
             return
         first = not self.delivery.ready
         self.forcing.lift()
+        if first:
+            present = filter(self.image.available.__getitem__, self.commands.indices)
+            values = {**values, **self.commands.at_rest(present)}
         for index, value in values.items():
             self.image.store(index, value, now)
         entered = self.delivery.adopted(values.keys())
@@ -338,6 +346,10 @@ class Cell:
         self._fallbacks.apply(self._fallbacks.due(entered.union(values), over=self.adoption.over), now)
         self.operator.give_forced(now)
         self._notify(Direction.INPUT)
+
+    def _adopt_late(self, values: Mapping[int, Value], now: float) -> None:
+        if self.delivery.ready:
+            self.adopt(values, now)
 
     def fall_back(self, variables: Iterable[int], now: float) -> None:
         """Inputs take their release fallbacks; without the robot or the register they are owed."""
@@ -396,7 +408,7 @@ class Cell:
         self._count_adoption(now)
         self._refusals.tick(now)
         self._unserved.tick(now)
-        self._beat(now)
+        self.health.beat(now)
 
     def gap(self, since: float, now: float) -> None:
         """The process stood still from `since` to `now`; called before anything that waited is served."""
@@ -428,7 +440,6 @@ class Cell:
         self._unserved.succeed(former._unserved, match)
         self.forcing.succeed(former.forcing, match.values, match.locks)
         self.delivery.succeed(former.delivery, self.health, match.values, match.due)
-        self._next_heartbeat = former._next_heartbeat
 
     # -- inside --------------------------------------------------------------------------------------------------
 
@@ -482,14 +493,6 @@ class Cell:
         self.forcing.lift()
         self.image.outputs_lost()
         self._notify(Direction.OUTPUT)
-
-    def _beat(self, now: float) -> None:
-        if self._next_heartbeat is None:
-            self.health.started = now
-            self._next_heartbeat = now
-        if now >= self._next_heartbeat:
-            self.health.heartbeat += 1
-            self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_PERIOD, now)
 
     def _notify(self, direction: Direction) -> None:
         self.forcing.lay()

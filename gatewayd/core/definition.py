@@ -112,8 +112,15 @@ class Variable:
     """Whether every place of it can show NaN and the infinities as what they are."""
     valid_running: bool = False
     """Outputs that mean something only while the robot program runs."""
+    via: str = ""
+    """Name of the link that carries it, where the robot's packages do not; `field` is in its terms then."""
     unit: str = ""
     comment: str = ""
+
+    @property
+    def is_command(self) -> bool:
+        """Whether it is an input that a link of its own carries: it acts once, when it is written (`core.commands`)."""
+        return self.via != "" and self.direction is Direction.INPUT
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,6 +40,9 @@ class EventKind(Enum):
     FOLLOWED = "image follows the robot"
     STOOD_STILL = "gateway stood still"
     UNSERVED = "request not served"
+    COMMANDED = "command sent"
+    COMMAND_DONE = "command carried out"
+    COMMAND_REFUSED = "command refused"
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,11 +29,14 @@ class Fallbacks:
         """Give these inputs their fallbacks; without the robot or the register they are owed."""
         image, delivery = self._image, self._delivery
         for index in variables:
+            variable = self._definition.variables[index]
+            if variable.is_command:
+                self._rest(index, now)
+                continue
             if not (delivery.ready and image.available[index]):
                 delivery.owed.add(index)
                 continue
             delivery.owed.discard(index)
-            variable = self._definition.variables[index]
             if variable.on_release.kind is FallbackKind.HOLD:
                 continue
             old = image.values[index]
@@ -81,6 +84,13 @@ class Fallbacks:
         if len(declared.members) == 1 or declared.owners == (writer,):
             return []
         return [index for index in declared.members if not self._delivery.is_given(index)]
+
+    def _rest(self, index: int, now: float) -> None:
+        """A command comes to rest. The robot gets nothing of that, so nothing is owed or under way."""
+        old, new = self._image.values[index], self._definition.variables[index].kind.zero
+        if old != new:
+            self._image.store(index, new, now)
+            self._record(Event(now, EventKind.FALLBACK, variable=index, old=old, new=new))
 
     def _is_ownerless(self, index: int) -> bool:
         lock = self._definition.variables[index].lock

@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 
 from gatewayd.core.unserved import Unserved
 
+HEARTBEAT_PERIOD = 0.1
+"""Seconds between two counts of the heartbeat."""
+
 
 @dataclass(slots=True)
 class Health:
@@ -16,6 +19,8 @@ class Health:
     """Monotonic time of the first tick; infinity before it."""
     heartbeat: int = 0
     """Counts up every `HEARTBEAT_PERIOD` while the core works."""
+    next_beat: float | None = None
+    """Monotonic time of the next count; None before the first tick."""
     packages: int = 0
     skipped: int = 0
     """Packages the controller left out, seen from its timestamps."""
@@ -46,3 +51,11 @@ class Health:
     """Requests that nothing here serves, by reason."""
     words: dict[str, int] = field(default_factory=dict)
     """Numbers of the status block that links report, by name (`LinkKind.status_fields`)."""
+
+    def beat(self, now: float) -> None:
+        """Count the heartbeat, if it is time."""
+        if self.next_beat is None:
+            self.started = self.next_beat = now
+        if now >= self.next_beat:
+            self.heartbeat += 1
+            self.next_beat = max(self.next_beat + HEARTBEAT_PERIOD, now)

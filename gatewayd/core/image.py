@@ -45,17 +45,21 @@ class ProcessImage:
     """Values, times and qualities by variable index.
 
     The lists are public because links copy whole slices in and out of them; their lengths never change.
-    All outputs come with one package, so they share `output_time`. An output that is stale, unavailable or not running
-    shows its `on_stale`; one that is out of range shows its value as far as each place can.
+    All outputs that packages carry come with one, so they share `output_time`; others have a time each. An output that
+    is stale, unavailable or not running shows its `on_stale`; one that is out of range shows its value as far as each
+    place can.
     """
 
     def __init__(self, variables: Sequence[Variable]) -> None:
         self.variables = tuple(variables)
         self.inputs = _indices(variables, Direction.INPUT)
         self.outputs = _indices(variables, Direction.OUTPUT)
+        self.packaged = tuple(index for index in self.outputs if not variables[index].via)
+        """Outputs that the robot's packages carry."""
         self.values: list[Value] = [variable.kind.zero for variable in variables]
         self.times: list[float] = [-math.inf] * len(variables)
-        """Time of the last write, fallback or adoption, for inputs; of the force, for forced outputs."""
+        """Time of the last write, fallback or adoption, for inputs; of the force, for forced outputs; of the last
+        report, for outputs that a link of their own carries."""
         self.quality: list[Quality] = [Quality.NEVER] * len(variables)
         self.available = [True] * len(variables)
         """Whether the controller has the variable's field, and gave it to us if it is an input."""
@@ -73,9 +77,9 @@ class ProcessImage:
         }
         """Range, and whether NaN and infinities are shown, of variables of which a place cannot show every value."""
         self._restricted = tuple(
-            (index, *self._bounds[index]) for index in self.outputs if index in self._bounds
+            (index, *self._bounds[index]) for index in self.packaged if index in self._bounds
         )
-        self._running_only = tuple(index for index in self.outputs if variables[index].valid_running)
+        self._running_only = tuple(index for index in self.packaged if variables[index].valid_running)
         self._held: dict[int, Value] = {}
         """What outputs that are valid while the program runs, and hold their value otherwise, last were meanwhile."""
         self._stopped = False
@@ -94,11 +98,14 @@ class ProcessImage:
 
     def time_of(self, index: int) -> float:
         """When the source had the value; minus infinity if it never did."""
-        if self.variables[index].direction is Direction.INPUT or self.quality[index] is Quality.FORCED:
+        variable = self.variables[index]
+        if variable.direction is Direction.INPUT or self.quality[index] is Quality.FORCED:
             return self.times[index]
         if self.quality[index] not in _REPORTED:
             return -math.inf
-        return self.running_time if self.variables[index].valid_running else self.output_time
+        if variable.via:
+            return self.times[index]
+        return self.running_time if variable.valid_running else self.output_time
 
     def age(self, index: int, now: float) -> float:
         """Seconds since the source had the value; infinity if it never did."""
@@ -109,7 +116,7 @@ class ProcessImage:
         self.store_all(((index, value),), now)
 
     def store_all(self, changes: Iterable[tuple[int, Value]], now: float) -> None:
-        """Set several inputs of one moment."""
+        """Set several inputs of one moment, or outputs that a link of their own carries."""
         values, times, quality, available = self.values, self.times, self.quality, self.available
         good, bounds = Quality.GOOD, self._bounds
         for index, value in changes:
@@ -137,7 +144,7 @@ class ProcessImage:
         changed = not self._outputs_stored
         if changed:
             self._outputs_stored = True
-            for index in self.outputs:
+            for index in self.packaged:
                 if self.available[index]:
                     self.quality[index] = Quality.GOOD
         if self._restricted:
@@ -151,9 +158,18 @@ class ProcessImage:
         """The robot has stopped reporting: outputs show their fallbacks until `outputs_stored`."""
         self._outputs_stored = False
         self._covered.clear()
-        for index in self.outputs:
+        self.unreported(self.packaged)
+
+    def report(self, values: Iterable[tuple[int, Value]], now: float) -> None:
+        """The link that carries these outputs knows what they are."""
+        self.store_all(values, now)
+        self.find_unreadable()
+
+    def unreported(self, indices: Sequence[int]) -> None:
+        """Nobody knows what these outputs are: they show their fallbacks."""
+        for index in indices:
             self._show_fallback(index)
-        self._doubt(self.outputs)
+        self._doubt(indices)
         self.find_unreadable()
 
     def set_available(self, index: int, available: bool) -> None:

@@ -69,11 +69,15 @@ class Match:
         return self.same_robot and variable in self.variables and (lock is None or lock in self.locks)
 
     def inputs_without_successor(self) -> list[int]:
-        """Inputs whose register in this robot nobody would write any more, so that nobody could ever clear it."""
+        """Inputs whose register in this robot nobody would write any more, so that nobody could ever clear it.
+
+        A command has none: it has acted, and nothing of it stays.
+        """
         return [
             index
             for index, variable in enumerate(self.old.variables)
             if variable.direction is Direction.INPUT
+            and not variable.is_command
             and not (self.same_robot and _place(variable) in self.places)
         ]
 
@@ -89,4 +93,6 @@ def _identity(variable: Variable) -> tuple[object, ...]:
 
 
 def _place(variable: Variable) -> tuple[object, ...]:
-    return variable.field, variable.bit, variable.element
+    return (
+        (variable.via, variable.field) if variable.via else (variable.field, variable.bit, variable.element)
+    )

@@ -22,6 +22,8 @@ from gatewayd.core.ownership import LockTable
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import LOCAL_OPERATOR, Requester
 
+_ACTS_NOT = "a command acts only when its owner writes it"
+
 
 @dataclass(slots=True, eq=False)
 class Operator:
@@ -69,20 +71,23 @@ class Operator:
         """The local operator puts `value` in place of what the variable's source reports, at the latest until `until`.
 
         The robot gets a forced input as the operator's, who holds its lock so long; the fieldbus sees a forced output.
-        The other members of its lock take their release fallback, as `take_lock` says.
+        The other members of its lock take their release fallback, as `take_lock` says. Commands cannot be forced.
         Forcing it again changes value and `until`. Refused like any write: limits, robot, register.
         """
         self.release_expired(now)
         declared = self._image.variables[variable]
         lock = declared.lock
         is_input = declared.direction is Direction.INPUT
-        if is_input:
+        refusal: Refusal | None = None
+        if declared.is_command:
+            allowed, refusal = None, Refusal(Reason.NOT_WRITABLE, variable, hint=_ACTS_NOT)
+        elif is_input:
             verdict = self._admission.judge(
                 LOCAL_OPERATOR, [Change(variable, value)], adopted=self._delivery.ready
             )
             allowed, refusal = dict(verdict.values).get(variable), verdict.refusal
         else:
-            allowed, refusal = within(declared, value), None
+            allowed = within(declared, value)
         if allowed is None:
             refusal = refusal or Refusal(Reason.OUT_OF_LIMITS, variable)
             self._refuse(LOCAL_OPERATOR, refusal, now, value)

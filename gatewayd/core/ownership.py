@@ -79,6 +79,8 @@ class LockTable:
         """The connection by which the owner last wrote or requested it; 0: none, or nobody owns it."""
         self.changes = 0
         """How often a lock has changed hands: as long as it stands, every owner is who it was."""
+        self.tenures = [0] * len(locks)
+        """The same of each lock: as long as it stands, its owner has not changed."""
         self.orphans: dict[int, float] = {}
         """Locks whose connection has ended, and until when their owner may go on with them by another one."""
         self._ranks = [{writer: rank for rank, writer in enumerate(lock.owners)} for lock in locks]
@@ -108,7 +110,7 @@ class LockTable:
         """Carry out a move that `decide` returned; refusals and NOTHING change nothing."""
         if move <= Move.TAKE_OVER:
             if self.owners[lock] != writer:
-                self.changes += 1
+                self._change(lock)
             self.owners[lock] = writer
             lease = self.locks[lock].lease
             if lease is not None:
@@ -128,7 +130,7 @@ class LockTable:
     def hold(self, lock: int, until: float) -> int | None:
         """Give the lock to the local operator until that time, whatever its lease; returns the former owner."""
         former, self.owners[lock] = self.owners[lock], OPERATOR
-        self.changes += 1
+        self._change(lock)
         self.follow(lock, 0)
         self.expires[lock] = until
         self._next_expiry = min(self._next_expiry, until)
@@ -142,7 +144,7 @@ class LockTable:
     def free(self, lock: int) -> int | None:
         """Release unconditionally; returns the former owner."""
         owner, self.owners[lock] = self.owners[lock], None
-        self.changes += 1
+        self._change(lock)
         self.follow(lock, 0)
         self.expires[lock] = math.inf
         return owner
@@ -193,3 +195,7 @@ class LockTable:
                 self.expires[target] = math.inf if lease is None else now + lease
         self.orphans = {locks[lock]: end for lock, end in former.orphans.items() if lock in locks}
         self._next_expiry = min(self.expires, default=math.inf)
+
+    def _change(self, lock: int) -> None:
+        self.changes += 1
+        self.tenures[lock] += 1

@@ -25,7 +25,7 @@ class PreparedWrite:
     def __init__(
         self, cell: Cell, variables: Sequence[int], bounds: Sequence[tuple[float, float]] = ()
     ) -> None:
-        """ValueError for a variable that nobody may write, or that is named twice.
+        """ValueError for a variable that nobody may write, that is named twice, or that is a command.
 
         `bounds`: of the first variables, between which values the caller's are right; others are left to `Cell.write`.
         """
@@ -33,6 +33,8 @@ class PreparedWrite:
         locks = {variable.lock for variable in declared}
         if None in locks or len(set(variables)) < len(declared):
             raise ValueError("such a request is refused")
+        if any(variable.is_command for variable in declared):
+            raise ValueError("whether a command acts, only `Cell.write` knows")
         self._cell = cell
         self._variables = tuple(variables)
         self._locks = sorted(lock for lock in locks if lock is not None)

@@ -32,6 +32,7 @@ LEVELS = {
     EventKind.UNSERVED: logging.WARNING,
     EventKind.FORCED: logging.WARNING,
     EventKind.UNFORCED: logging.WARNING,
+    EventKind.COMMAND_REFUSED: logging.WARNING,
     EventKind.ACQUIRED: logging.DEBUG,
     EventKind.RELEASED: logging.DEBUG,
 }

@@ -85,11 +85,13 @@ class PlantRobot:
         # Without a timestamp of the controller: packages of one moment are news too.
         if not cell.package_arrived(None, now):
             return
-        for index in image.outputs:
+        for index in image.packaged:
             if image.available[index]:
                 image.values[index] = self._holds[index]
         cell.program(self._program)
         cell.outputs_written(now)
+        apart = [index for index in image.outputs if self._variables[index].via]
+        cell.carried.report({index: self._holds[index] for index in apart}, now)
         if not cell.accepts_writes:
             cell.adopt(self._inputs(image.inputs), now)
         for index in tuple(cell.delivery.under_way):
@@ -101,6 +103,7 @@ class PlantRobot:
             index: self._holds[index]
             for index in indices
             if variables[index].direction is Direction.INPUT and available[index]
+            if not variables[index].is_command
         }
 
     def _take(self, direction: Direction) -> None:

@@ -33,6 +33,7 @@ BAD = frozenset(
         EventKind.REFUSED,
         EventKind.UNSERVED,
         EventKind.FORCED,
+        EventKind.COMMAND_REFUSED,
     )
 )
 """What somebody should look at."""
@@ -52,6 +53,9 @@ _TEXTS = {
     EventKind.AVAILABLE.value: "{variable} {are} available",
     EventKind.READ_BACK_DIFFERS.value: "read-back of {variable} differs",
     EventKind.FOLLOWED.value: "{variable} {follow} the robot: {old} -> {new}",
+    EventKind.COMMANDED.value: "{writer} gave the command {variable}",
+    EventKind.COMMAND_DONE.value: "the command {variable} was carried out",
+    EventKind.COMMAND_REFUSED.value: "the command {variable} of {writer} was refused",
     EventKind.ADOPTION_ENDS.value: "{variable} {fall} back soon (adopted, but owned by nobody)",
 }
 """Of those kinds that name and detail alone do not say."""

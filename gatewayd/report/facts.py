@@ -93,6 +93,8 @@ def links(plan: Plan) -> dict[str, Facts]:
 
 def robot_name(variable: Variable) -> str:
     """What the variable is in the robot, field, element or bit, as the mapping file names it."""
+    if variable.via:
+        return f"{variable.via}.{variable.field.removeprefix(f'{variable.via}.')}"
     word = _BIT_WORD.fullmatch(variable.field)
     if word is not None and variable.bit is not None:
         return f"{word[1]}_bit_register_{int(word[2]) + variable.bit}"

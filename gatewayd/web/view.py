@@ -185,7 +185,7 @@ def _ages(cell: Cell, now: float) -> list[int | None]:
     """Milliseconds since each value came from its source; None: never."""
     image = cell.image
     shared = _milliseconds(now - image.output_time)
-    outputs = {index for index in image.outputs if not image.variables[index].valid_running}
+    outputs = {index for index in image.packaged if not image.variables[index].valid_running}
     current = (Quality.GOOD, Quality.STALE)
     return [
         shared if index in outputs and quality in current else _milliseconds(image.age(index, now))

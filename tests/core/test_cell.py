@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from gatewayd.core.admission import Change
-from gatewayd.core.cell import HEARTBEAT_PERIOD, Cell
+from gatewayd.core.cell import Cell
 from gatewayd.core.definition import (
     OPERATOR,
     CellDefinition,
@@ -19,6 +19,7 @@ from gatewayd.core.definition import (
 )
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
+from gatewayd.core.health import HEARTBEAT_PERIOD
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester

@@ -74,6 +74,14 @@ def cell() -> Cell:
             "operator forced limit to 3 N (by anna)",
         ),
         (
+            Event(0, EventKind.COMMANDED, LIMIT, writer=PLC, new=1.0, detail="play"),
+            "plc gave the command limit: play",
+        ),
+        (
+            Event(0, EventKind.COMMAND_REFUSED, LIMIT, writer=PLC, detail="in local control"),
+            "the command limit of plc was refused: in local control",
+        ),
+        (
             Event(0, EventKind.UNFORCED, CYCLES, writer=OPERATOR, old=3, detail="time limit"),
             "cycles is no longer forced: time limit",
         ),
@@ -182,6 +190,7 @@ def test_only_what_somebody_should_look_at_is_bad(cell: Cell) -> None:
         EventKind.REFUSED,
         EventKind.UNSERVED,
         EventKind.FORCED,
+        EventKind.COMMAND_REFUSED,
     }
     assert ACCEPTED not in BAD
 
