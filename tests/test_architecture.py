@@ -43,7 +43,7 @@ LAYERS: dict[str, set[str]] = {
     "rtde.testing": {"simulator"},
     "encoding": {"core.definition", "encoding"},
     "modbus": {"core.definition", "encoding", "modbus"},
-    "canopen": {"canopen", "core.definition", "loop"},
+    "canopen": {"canopen", "core.definition", "loop", "machine.netlink"},
     "simulator": {"report.format", "rtde", "simulator"},
     "mapping": {
         "core.definition",

@@ -6,21 +6,16 @@ import ipaddress
 import os
 import socket
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-# linux/netlink.h, linux/rtnetlink.h
-_HEADER = struct.Struct("=IHHII")
+from gatewayd.machine import netlink
+
+# linux/rtnetlink.h
 _ROUTE = struct.Struct("=BBBBBBBBI")
-_ATTRIBUTE = struct.Struct("=HH")
-_ERROR = struct.Struct("=i")
-_WORD = struct.Struct("=I")
-_NLMSG_ERROR, _RTM_NEWROUTE, _RTM_GETROUTE, _NLM_F_REQUEST = 2, 24, 26, 1
+_RTM_GETROUTE = 26
 _RTA_DST, _RTA_OIF, _RTA_GATEWAY, _RTA_PREFSRC = 1, 4, 5, 7
 _RTN_LOCAL = 2
-_TYPE_MASK = 0x3FFF
-_MAX_REPLY = 32768
 _INTERFACES = Path("/sys/class/net")
 
 
@@ -42,33 +37,29 @@ class Route:
 def route_to(address: str) -> Route:
     """The route to an IPv4 or IPv6 address. OSError if there is none, or the kernel cannot be asked."""
     target = ipaddress.ip_address(address.partition("%")[0])
-    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as kernel:
-        kernel.setblocking(False)  # the kernel has answered before sendto returns
+    with netlink.open_socket() as kernel:
         kernel.sendto(request(target.packed), (0, 0))
-        return parse(kernel.recv(_MAX_REPLY))
+        return parse(kernel.recv(netlink.MAX_REPLY))
 
 
 def request(packed: bytes) -> bytes:
     """What the kernel is asked for an address of four or sixteen bytes."""
     family = socket.AF_INET if len(packed) == 4 else socket.AF_INET6
-    attribute = _ATTRIBUTE.pack(_ATTRIBUTE.size + len(packed), _RTA_DST) + packed
-    body = _ROUTE.pack(family, 8 * len(packed), 0, 0, 0, 0, 0, 0, 0) + attribute
-    return _HEADER.pack(_HEADER.size + len(body), _RTM_GETROUTE, _NLM_F_REQUEST, 1, 0) + body
+    route = _ROUTE.pack(family, 8 * len(packed), 0, 0, 0, 0, 0, 0, 0)
+    return netlink.question(_RTM_GETROUTE, route + netlink.attribute(_RTA_DST, packed), 1)
 
 
 def parse(reply: bytes) -> Route:
     """The kernel's answer; OSError with its reason if it is a refusal, and for what cannot be read."""
     try:
-        _, kind, *_ = _HEADER.unpack_from(reply)
-        if kind == _NLMSG_ERROR:
-            number = -_ERROR.unpack_from(reply, _HEADER.size)[0]
-            raise OSError(number, os.strerror(number))
-        kind_of_route = _ROUTE.unpack_from(reply, _HEADER.size)[7]
-        found = dict(_attributes(reply[_HEADER.size + _ROUTE.size :]))
-        index = _WORD.unpack(found[_RTA_OIF])[0] if _RTA_OIF in found else 0
+        answer = netlink.answer(reply)
+        if answer.error:
+            raise OSError(answer.error, os.strerror(answer.error))
+        kind_of_route = _ROUTE.unpack_from(answer.body)[7]
     except struct.error as error:
         raise OSError(None, "the kernel's answer cannot be read") from error
-    name = _name(index)
+    found = dict(netlink.attributes(answer.body[_ROUTE.size :]))
+    name = _name(netlink.word(found.get(_RTA_OIF)) or 0)
     return Route(
         name,
         _address(found.get(_RTA_PREFSRC)),
@@ -86,16 +77,6 @@ def has_link(interface: str) -> bool:
         return True
     except (OSError, ValueError):  # the kernel refuses to read it of an interface that is down
         return False
-
-
-def _attributes(data: bytes) -> Iterator[tuple[int, bytes]]:
-    place = 0
-    while place + _ATTRIBUTE.size <= len(data):
-        length, kind = _ATTRIBUTE.unpack_from(data, place)
-        if length < _ATTRIBUTE.size:
-            return
-        yield kind & _TYPE_MASK, data[place + _ATTRIBUTE.size : place + length]
-        place += (length + 3) & ~3
 
 
 def _address(packed: bytes | None) -> str:
