@@ -37,7 +37,7 @@ LINK = {
 LAYERS: dict[str, set[str]] = {
     "gatewayd": set(),
     "loop": {"loop"},
-    "machine": {"loop", "machine"},
+    "machine": {"machine"},
     "core": {"core"},
     "rtde": {"loop", "report.format", "rtde"},
     "rtde.testing": {"simulator"},
@@ -268,7 +268,6 @@ IMPURE = {
     "rtde.client": "has the socket",
     "rtde.connection": "has the socket",
     "rtde.loss": "has the socket",
-    "rtde.resolve": "has the socket",
     "rtde.sending": "has the transport",
     "rtde.sync": "has a loop in a thread",
     "rtde.survey": "waits for a controller to notice that a client has gone",

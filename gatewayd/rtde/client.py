@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from gatewayd.loop.progress import wait_with_progress
+from gatewayd.loop.resolve import resolve
 from gatewayd.rtde.claims import InputRecipe
 from gatewayd.rtde.connection import Connection
 from gatewayd.rtde.handler import ClientHandler, ConnectionObserver
@@ -23,7 +24,6 @@ from gatewayd.rtde.loss import Loss, connect_failure
 from gatewayd.rtde.messages import PropertiesReply, TextMessage
 from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.recipe import Scalar
-from gatewayd.rtde.resolve import resolve
 from gatewayd.rtde.sending import StreamTap
 from gatewayd.rtde.session import ClientSettings, Session
 

@@ -17,7 +17,7 @@ from gatewayd.links.robot.companions import all_inputs, all_outputs
 from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.links.route import look_up_route
-from gatewayd.machine.addresses import resolved
+from gatewayd.loop.resolve import hosts, resolve
 from gatewayd.machine.ports import connect_error
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address, counted
@@ -30,6 +30,8 @@ from gatewayd.rtde.visit import visit
 
 LISTEN = 1.0
 """Seconds for which packages are counted."""
+RESOLVE = 5.0
+"""Seconds for the addresses of a name."""
 CONNECT = 3.0
 """Seconds for a connection."""
 
@@ -43,7 +45,7 @@ class RobotExamination(Examination):
         """See Examination."""
         assert isinstance(plan, RobotPlan)
         try:
-            addresses = await resolved(plan.host)
+            addresses = hosts(await resolve(plan.host, plan.port, RESOLVE))
         except OSError as error:
             yield _unresolved(plan, error)
             return
@@ -166,7 +168,7 @@ async def _is_same(host: str, other: str, addresses: Sequence[str]) -> bool:
     if host == other:
         return True
     try:
-        return bool(set(await resolved(host)) & set(addresses))
+        return not set(addresses).isdisjoint(hosts(await resolve(host, 0, RESOLVE)))
     except OSError:
         return False
 

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from gatewayd.rtde.resolve import resolve
+from gatewayd.loop.resolve import hosts, resolve
 
 
 @pytest.mark.parametrize("host, family", [("127.0.0.1", socket.AF_INET), ("::1", socket.AF_INET6)])
@@ -50,3 +50,26 @@ def test_a_name_server_that_does_not_answer_does_not_hold_up_the_end(monkeypatch
     asyncio.run(wait_a_little())
     assert time.monotonic() - start < 1.0
     release.set()
+
+
+async def test_no_more_is_waited_than_there_is_patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    release = threading.Event()
+
+    def slow(*_arguments: object, flags: int = 0, **_settings: object) -> object:
+        if flags != socket.AI_NUMERICHOST:
+            release.wait(10)
+        raise socket.gaierror(socket.EAI_NONAME, "nobody knows it")
+
+    monkeypatch.setattr(socket, "getaddrinfo", slow)
+    with pytest.raises(TimeoutError, match="timed out"):
+        await resolve("robot.example", 30004, patience=0.05)
+    release.set()
+
+
+async def test_each_host_is_named_once() -> None:
+    assert hosts(
+        [*await resolve("127.0.0.1", 1), *await resolve("::1", 1), *await resolve("127.0.0.1", 2)]
+    ) == [
+        "127.0.0.1",
+        "::1",
+    ]

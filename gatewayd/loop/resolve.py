@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+import errno
+import os
 import socket
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import partial
 
@@ -19,14 +23,23 @@ SocketAddress = tuple[
 _Found = list[SocketAddress]
 
 
-async def resolve(host: str, port: int) -> _Found:
+async def resolve(host: str, port: int, patience: float | None = None) -> _Found:
     """The TCP addresses of `host`, in the order to be tried; socket.gaierror if there is none.
 
-    A numeric address is answered at once, a name by a thread of its own.
+    A numeric address is answered at once, a name by a thread of its own; TimeoutError after `patience` seconds.
     """
     with suppress(socket.gaierror):
         return _lookup(host, port, socket.AI_NUMERICHOST)
-    return await in_daemon_thread(partial(_lookup, host, port), f"resolve {host}")
+    try:
+        async with asyncio.timeout(patience):
+            return await in_daemon_thread(partial(_lookup, host, port), f"resolve {host}")
+    except TimeoutError:
+        raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT)) from None
+
+
+def hosts(found: Iterable[SocketAddress]) -> list[str]:
+    """The numeric addresses as texts, each once."""
+    return list(dict.fromkeys(str(address[0]) for *_, address in found))
 
 
 def _lookup(host: str, port: int, flags: int = 0) -> _Found:
