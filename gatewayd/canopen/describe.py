@@ -44,7 +44,7 @@ ABORTS = {
     AbortCode.VALUE_TOO_HIGH: "value too high",
     AbortCode.VALUE_TOO_LOW: "value too low",
     AbortCode.MAXIMUM_BELOW_MINIMUM: "maximum below minimum",
-    AbortCode.NO_CONNECTION: "no SDO connection",
+    AbortCode.NO_RESOURCE: "resource not available",
     AbortCode.GENERAL: "general error",
     AbortCode.CANNOT_STORE: "cannot be stored",
     AbortCode.LOCAL_CONTROL: "held by another owner",

@@ -147,7 +147,7 @@ async def test_boot_values_emergencies_reboot_and_loss(channel: str, device: For
         device.do("boot")
         await until(lambda: "started" in diary.events, PATIENCE)
         assert diary.events[0] == "ended: the device has booted"
-        assert device.do("state") == "OPERATIONAL"
+        await until(lambda: device.do("state") == "OPERATIONAL", PATIENCE)
 
         # It stands still, and comes back.
         diary.events.clear()
@@ -180,6 +180,7 @@ async def test_wrong_vendor_and_missing_mandatory_device(channel: str, devices: 
 
 async def test_device_in_operation_is_kept(channel: str, device: Foreign) -> None:
     """L, by one manager after the other: the device is neither reset nor configured a second time."""
+    device.do("set", 0x6004, 0, 7)
     async with managing(channel) as manager:
         node, _ = care(manager, device)
         await until(lambda: node.running and device.do("state") == "OPERATIONAL", PATIENCE)
