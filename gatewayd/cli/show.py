@@ -85,7 +85,7 @@ def _print_table(loaded: Loaded, plan: Plan, *, every: bool) -> None:
     table, dropped = _table(entries, console.width)
     console.print(table)
     for link in tables():
-        further = link.screen_table(loaded.cell) if link.key in plan.links else None
+        further = link.screen_table(loaded.cell) if link.key in plan.kinds else None
         if further is not None:
             console.print(_further_table(further, console.width))
             for line in further.notes:
@@ -104,7 +104,7 @@ def _heading(plan: Plan) -> str:
     from gatewayd.report.format import counted
 
     parts = [f"{plan.cell.name}: {counted(len(plan.cell.variables), 'variable')}"]
-    here = (link.headline(plan) for link in tables() if link.key in plan.links)
+    here = (link.headline(plan) for link in tables() if link.key in plan.kinds)
     parts += [headline for headline in here if headline]
     parts.append(f"fingerprint {plan.cell.fingerprint:08X}")
     return ", ".join(parts)

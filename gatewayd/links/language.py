@@ -40,8 +40,13 @@ class LinkLanguage:
 
     key: ClassVar[str]
     """Of the kind: the key of its section, and of its places at variables and writers."""
+    section_key: ClassVar[str] = ""
+    """Of its section in the file, where that is another one than `key`; see `top_key`."""
     section: ClassVar[type[Section]]
-    """The table at the top of the file."""
+    """The table at the top of the file; of a kind with `several` links, each table in it."""
+    several: ClassVar[bool] = False
+    """Whether its section is a table of names, each with a table of its own. A valid one is no part in
+    `Document.sections`, but one of `Document.named`; each makes a link of that name (`compile_links`)."""
     meaning: ClassVar[str]
     """What the section is, for editors: `the Modbus TCP server`."""
     required: ClassVar[bool] = False
@@ -60,9 +65,14 @@ class LinkLanguage:
     tables: ClassVar[str] = ""
     """Module with `TABLES`, the kind's `LinkTables`, for `show`."""
 
+    @property
+    def top_key(self) -> str:
+        """The key of its section in the file."""
+        return self.section_key or self.key
+
     def concerns(self, document: Document) -> bool:
         """Whether the file says anything of this kind of link. Where it does not, none of the kind's rules is asked."""
-        if self.required or document.has(self.key):
+        if self.required or document.has(self.top_key):
             return True
         lines = (self._keys_of(self.variable_keys, self.variable_policies), document.variables)
         writers = (self._keys_of(self.writer_keys), document.writers)
@@ -128,6 +138,10 @@ class LinkLanguage:
         """Seconds without a sign of life of its own (not a request) after which the writer is lost by this kind."""
         return None
 
+    def supervises(self, writer: WriterSpec) -> bool:
+        """Whether the writer is noticed by this kind when it hangs."""
+        return self.silence(writer) is not None
+
     def ways_of_writer(self, writer: WriterSpec) -> frozenset[str]:
         """Services by which the writer writes, as people call them."""
         return frozenset({self.way or self.key} if self.knows(writer) else ())
@@ -172,6 +186,10 @@ class LinkLanguage:
     def compile(self, cell: ExpandedCell) -> LinkPlan:
         """The plan of a cell without errors that has the section."""
         raise NotImplementedError
+
+    def compile_links(self, cell: ExpandedCell) -> Mapping[str, LinkPlan]:
+        """The plans of a cell without errors by the names of their links; no other kind has links of these names."""
+        return {self.key: self.compile(cell)} if self.key in cell.document.sections else {}
 
 
 class DefiningLanguage(LinkLanguage):

@@ -20,6 +20,7 @@ LINK_KINDS = (
     "gatewayd.links.robot",
     "gatewayd.links.modbus_server",
     "gatewayd.links.canopen_node",
+    "gatewayd.links.devices",
 )
 """Packages, imported when they are used. Their order is that of sections in lists and tables."""
 

@@ -56,7 +56,7 @@ def compile_plan(cell: ExpandedCell) -> Plan:
         clear_on_connect=settings.clear_on_connect,
         adopt_for=settings.adopt_for,
     )
-    links = {kind.key: kind.compile(cell) for kind in languages() if kind.key in sections}
+    links = {name: link for kind in languages() for name, link in kind.compile_links(cell).items()}
     plan = Plan(document.source.name, definition, links)
     return dataclasses.replace(plan, cell=dataclasses.replace(definition, fingerprint=fingerprint(plan)))
 

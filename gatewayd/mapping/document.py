@@ -68,6 +68,8 @@ class Document:
     """Name of the cell; empty when it is missing or wrong."""
     sections: Mapping[str, Part[Section]] = field(default_factory=dict)
     """Those of the kinds of links, by key."""
+    named: Mapping[str, Mapping[str, Part[Section]]] = field(default_factory=dict)
+    """Of kinds whose section is a table of names (`LinkLanguage.several`), by key of the kind: its parts by name."""
     writers: Mapping[str, Part[WriterSpec]] = field(default_factory=dict)
     groups: Mapping[str, Part[Group]] = field(default_factory=dict)
     variables: Mapping[str, Part[VariableSpec]] = field(default_factory=dict)
@@ -78,6 +80,11 @@ class Document:
         """The section of that type; None where there is none, or a broken one."""
         found = (part.of(section) for part in self.sections.values())
         return next((part for part in found if part is not None), None)
+
+    def parts(self, section: type[Other]) -> Mapping[str, Part[Other]]:
+        """The sections of that type by name, of a kind that has several; without the broken ones."""
+        found = {name: part.of(section) for parts in self.named.values() for name, part in parts.items()}
+        return {name: part for name, part in found.items() if part is not None}
 
     def declared(self, section: str) -> frozenset[str]:
         """Return the keys that stand in a top-level table, the broken ones too."""

@@ -71,7 +71,11 @@ FILE: Final = _with(
         "gatewayd": Literal[1],
         "cell": CellName,
         **{
-            language.key: language.section if language.required else language.section | None
+            language.top_key: dict[Name, language.section]  # type: ignore[name-defined]
+            if language.several
+            else language.section
+            if language.required
+            else language.section | None
             for language in languages()
         },
         "writers": dict[Name, WRITER],  # type: ignore[valid-type]
@@ -82,7 +86,9 @@ FILE: Final = _with(
     gatewayd=Field(description="version of the mapping language"),
     cell=Field(description="name of the cell"),
     **{
-        language.key: Field(description=language.meaning)
+        language.top_key: Field(default_factory=dict, description=language.meaning)
+        if language.several
+        else Field(description=language.meaning)
         if language.required
         else Field(default=None, description=language.meaning)
         for language in languages()

@@ -41,6 +41,11 @@ class Plan:
     links: Mapping[str, LinkPlan] = field(default_factory=dict)
     """By name of the link; one that a section of its own declares has the key of that."""
 
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Keys of the kinds of its links."""
+        return frozenset(link.kind for link in self.links.values())
+
     def of(self, kind: type[_LinkPlan]) -> dict[str, _LinkPlan]:
         """The links of one kind by name."""
         return {name: plan for name, plan in self.links.items() if isinstance(plan, kind)}

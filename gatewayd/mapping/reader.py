@@ -63,7 +63,7 @@ _ARTICLE: Final[dict[type[Section], str]] = {
 }
 _ELSEWHERE: Final[dict[tuple[type[Section], str], str]] = {
     **{
-        (FILE, key): f"`{key}` belongs in the section `{language.key}`"
+        (FILE, key): f"`{key}` belongs in the section `{language.top_key}`"
         for language in languages()
         for key in language.telling_keys
     },
@@ -126,11 +126,15 @@ class _Reader:
             if described.is_required() and key != "gatewayd" and key not in root.entries:
                 hint = f"add `{key}:`, {described.description}"
                 self._find(syntax.MISSING_KEY, f"the key `{key}` is missing", self.source.position(), hint)
-        sections = {language.key: self._link(language, root) for language in languages()}
+        sections = {
+            language.key: self._link(language, root) for language in languages() if not language.several
+        }
+        named = {language.key: self._named(language, root) for language in languages() if language.several}
         return Document(
             self.source,
             self._cell(root.entries.get("cell")),
             {key: part for key, part in sections.items() if part is not None},
+            {key: parts for key, parts in named.items() if parts},
             self._sections(WRITER, root.entries.get("writers")),
             self._sections(Group, root.entries.get("groups")),
             self._sections(VARIABLE, root.entries.get("variables")),
@@ -207,10 +211,17 @@ class _Reader:
         return MappingTest(name, entry.key.position, tuple(step for step in steps if step is not None))
 
     def _link(self, language: LinkLanguage, root: Table) -> Part[Section] | None:
-        part = self._section(language.section, root.entries.get(language.key))
-        broken = list(language.broken(part)) if part is not None else []
+        part = self._section(language.section, root.entries.get(language.top_key))
+        return None if part is None or self._is_broken(language, part) else part
+
+    def _named(self, language: LinkLanguage, root: Table) -> dict[str, Part[Section]]:
+        parts = self._sections(language.section, root.entries.get(language.top_key))
+        return {name: part for name, part in parts.items() if not self._is_broken(language, part)}
+
+    def _is_broken(self, language: LinkLanguage, part: Part[Section]) -> bool:
+        broken = list(language.broken(part))
         self.findings += broken
-        return None if broken else part
+        return bool(broken)
 
     def _name(self, model: type[Section], entry: TableEntry) -> bool:
         if model is WRITER and entry.key.text == ANY:

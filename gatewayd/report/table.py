@@ -129,7 +129,7 @@ def as_json(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
         "cell": plan.cell.name,
         "fingerprint": f"{plan.cell.fingerprint:08X}",
         **{
-            link.key: link.document(plan, cell) if link.key in plan.links else None
+            link.key: link.document(plan, cell) if link.key in plan.kinds else None
             for link in tables()
             if link.key not in defining
         },
@@ -140,7 +140,7 @@ def as_json(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
 
 def as_markdown(plan: Plan, cell: ExpandedCell, table: Sequence[Row]) -> str:
     """A Markdown page with the columns that a PLC programmer needs; the tables of the links after it."""
-    here = [link for link in tables() if link.key in plan.links]
+    here = [link for link in tables() if link.key in plan.kinds]
     lines = [f"# Registers of {plan.cell.name}", ""]
     introductions = [text for link in here if (text := link.introduction(plan))]
     if introductions:

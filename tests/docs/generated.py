@@ -78,12 +78,14 @@ _SECTIONS = {
     "PdoDefaults": "`canopen: pdo:`",
     "CobIdPool": "`canopen: cob_ids:`",
     "PdoSpec": "`canopen: pdos:` NAME`:`",
+    "DeviceSpec": "`devices:` NAME`:`",
     "WriterSpec": "`writers:` NAME`:`",
     "Group": "`groups:` NAME`:`",
     "VariableSpec": "`variables:` NAME`:`",
     "RobotField": "`variables:` NAME`: robot:`",
     "PlacementSpec": "`variables:` NAME`: modbus:`",
     "CanopenPlace": "`variables:` NAME`: canopen:`",
+    "DevicePlaceSpec": "`variables:` NAME`: device:`",
     "StepSpec": "`tests:` NAME`:`, each step",
 }
 _DURATION = re.compile(r"ms\|s\|min\|h")

@@ -54,6 +54,7 @@ def test_every_kind_has_a_decoder_of_its_own() -> None:
         "robot": Medium.TCP_CLIENT,
         "modbus": Medium.TCP_SERVER,
         "canopen": Medium.CAN,
+        "device": Medium.OTHER,
     }
     assert decoder_of("modbus") is not decoder_of("modbus"), (
         "what one remembers is none of the other's business"

@@ -13,14 +13,15 @@ from gatewayd.mapping.typed import Invalid
 def test_keys_come_in_the_order_of_the_kinds() -> None:
     """Hints, the schema and the reference list them so."""
     assert list(FILE.model_fields) == [
-        "gatewayd", "cell", "robot", "modbus", "canopen", "writers", "groups", "variables", "tests",
+        "gatewayd", "cell", "robot", "modbus", "canopen", "devices", "writers", "groups", "variables", "tests",
     ]  # fmt: skip
     assert list(VARIABLE.model_fields) == [
-        "robot", "modbus", "canopen", "owner", "takeover", "lease", "group", "limits", "clamp", "on_release",
+        "robot", "modbus", "canopen", "device", "owner", "takeover", "lease", "group", "limits", "clamp", "on_release",
         "on_stale", "valid", "deadband", "unit", "comment",
     ]  # fmt: skip
     assert list(WRITER.model_fields) == [
-        "modbus", "canopen", "pdos", "node", "heartbeat", "guarding", "timeout", "timeout_counts", "grace",
+        "modbus", "canopen", "pdos", "node", "heartbeat", "guarding", "device", "timeout", "timeout_counts",
+        "grace",
     ]  # fmt: skip
 
 
@@ -36,6 +37,6 @@ def test_a_writer_needs_some_link() -> None:
     (mistake,) = caught.value.mistakes
     assert mistake.kind == "missing-key"
     assert mistake.context == {
-        "message": "a writer needs the key `modbus` or `canopen`, by which it is known",
-        "hint": "add for example `modbus: 192.168.1.20` or `canopen: rpdo`",
+        "message": "a writer needs the key `modbus`, `canopen` or `device`, by which it is known",
+        "hint": "add for example `modbus: 192.168.1.20`, `canopen: rpdo` or `device: island`",
     }

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.core.definition import Fallback, FallbackKind
-from gatewayd.links.modbus_server.scalars import Address
+from gatewayd.links.modbus_places.scalars import Address
 from gatewayd.links.robot.scalars import RobotReference, Version
 from gatewayd.mapping import scalars, tables
 from gatewayd.mapping.typed import Invalid

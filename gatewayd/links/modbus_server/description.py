@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from gatewayd.links.contract import Description, Place
+from gatewayd.links.modbus_places.describing import encoding_text, type_text
 from gatewayd.links.modbus_server.plan import ModbusPlan, Placement, network_text
 from gatewayd.modbus.areas import AREA_NAMES
-from gatewayd.modbus.codec import Codec, turns
-from gatewayd.report.format import address, exact, seconds
+from gatewayd.report.format import address, seconds
 
 
 def description(plan: ModbusPlan) -> Description:
@@ -42,25 +42,10 @@ def _place(placement: Placement) -> Place:
     """`holding 100 (400101) int32`, `holding 0.3 (400001.3)`, `coil 5 (000006)`."""
     area, notation, codec = AREA_NAMES[placement.area], placement.notation, placement.codec
     return Place(
-        text=f"{area} {placement.place} ({notation}){_encoding(placement)}",
+        text=f"{area} {placement.place} ({notation}){encoding_text(codec)}",
         fields={"area": area, "address": placement.address, "bit": placement.bit, "notation": notation},
         area=area,
         address=placement.place,
         notation=notation,
-        type="bit" if codec is None else f"{codec.type} {_order(codec)}".strip(),
+        type=type_text(codec),
     )
-
-
-def _order(codec: Codec) -> str:
-    return codec.order if turns(codec.order, codec.type) else ""
-
-
-def _encoding(placement: Placement) -> str:
-    """How the number is written, with what is not usual."""
-    codec = placement.codec
-    if codec is None:
-        return ""
-    order = "" if _order(codec) in ("", "ABCD") else f" {codec.order}"
-    scale = "" if codec.scale == 1 else f" * {exact(codec.scale)}"
-    offset = f" + {exact(codec.offset)}" if codec.offset else ""
-    return f" {codec.type}{order}{scale}{offset}"

@@ -3,48 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from fractions import Fraction
-from functools import lru_cache
 from typing import ClassVar, Final
 
 from gatewayd.links.language import LinkLanguage
+from gatewayd.links.modbus_places.placing import ExpandedPlacement
+from gatewayd.links.modbus_places.types import PLACE_RULES, TYPE_SYNONYMS, reach_of
 from gatewayd.links.modbus_server.declaration import KIND
-from gatewayd.links.modbus_server.expand import (
-    ExpandedModbus,
-    ExpandedPlacement,
-    expand_modbus,
-    placements_of,
-)
+from gatewayd.links.modbus_server.expand import ExpandedModbus, expand_modbus, placements_of
 from gatewayd.links.modbus_server.plan import ModbusPlan, Network, Placement, network_text
 from gatewayd.links.modbus_server.sections import Modbus, ModbusPlaces, ModbusWriter, PlacementSpec
 from gatewayd.mapping.diagnostics import Related
 from gatewayd.mapping.document import Document, Part
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
 from gatewayd.mapping.model import VariableSpec, WriterSpec
-from gatewayd.mapping.reach import Reach, scaled
+from gatewayd.mapping.reach import Reach
 from gatewayd.mapping.section import Section
 from gatewayd.modbus.areas import MAX_WRITE_BITS, MAX_WRITE_REGISTERS, Area
-from gatewayd.modbus.codec import TYPES, Codec
 from gatewayd.modbus.exceptions import ExceptionCode
 
 _MAX_WRITE: Final = {Area.HOLDING: MAX_WRITE_REGISTERS, Area.COIL: MAX_WRITE_BITS}
-_SYNONYMS: Final = {
-    ("type", "BOOL"): "bit",
-    ("type", "INT"): "int16",
-    ("type", "UINT"): "uint16",
-    ("type", "WORD"): "uint16",
-    ("type", "DINT"): "int32",
-    ("type", "UDINT"): "uint32",
-    ("type", "DWORD"): "uint32",
-    ("type", "LINT"): "int64",
-    ("type", "ULINT"): "uint64",
-    ("type", "LWORD"): "uint64",
-    ("type", "REAL"): "float32",
-    ("type", "LREAL"): "float64",
-    ("type", "FLOAT"): "float32",
-    ("type", "DOUBLE"): "float64",
-}
-"""What the types of IEC 61131-3, and those of C, are called here; to who asks for a float, it is a REAL."""
 
 
 class ModbusLanguage(LinkLanguage):
@@ -56,9 +33,12 @@ class ModbusLanguage(LinkLanguage):
     counts_absent = True
     variable_keys = ModbusPlaces
     writer_keys = ModbusWriter
-    rules = tuple(
-        f"gatewayd.links.modbus_server.rules.{name}"
-        for name in ("places", "listener", "peers", "sharing", "conversion")
+    rules = (
+        *PLACE_RULES,
+        *(
+            f"gatewayd.links.modbus_server.rules.{name}"
+            for name in ("places", "listener", "peers", "sharing")
+        ),
     )
     tables = "gatewayd.links.modbus_server.tables"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
@@ -77,7 +57,7 @@ class ModbusLanguage(LinkLanguage):
         },
         **{(Modbus, key): f"`{key}` belongs to the writer" for key in ("grace", "timeout", "timeout_counts")},
     }
-    synonyms: ClassVar[Mapping[tuple[str, str], str]] = _SYNONYMS
+    synonyms: ClassVar[Mapping[tuple[str, str], str]] = TYPE_SYNONYMS
     way = "Modbus"
     writer_example = "modbus: 192.168.1.20"
     place_example = "modbus: N"
@@ -118,7 +98,7 @@ class ModbusLanguage(LinkLanguage):
         """What the registers show. A packed bit, a coil and `bool` show of every number whether it is 0."""
         for placement in placements_of(cell):
             if placement.codec is not None:
-                yield placement.variable.index, _reach(placement.codec)
+                yield placement.variable.index, reach_of(placement.codec)
 
     def expand(self, document: Document, variables: Sequence[ExpandedVariable]) -> ExpandedModbus:
         """The placements, be there a section or not: rules look at them too."""
@@ -158,17 +138,6 @@ class ModbusLanguage(LinkLanguage):
 
 def _host_bits(network: Network) -> int:
     return network.max_prefixlen - network.prefixlen
-
-
-@lru_cache(maxsize=4096)
-def _reach(codec: Codec) -> Reach:
-    number = TYPES[codec.type]
-    is_truth = number.name == "bool" and codec.scale == 1 and codec.offset == 0
-    if is_truth or number.name == "float64":
-        return Reach(None, None, number.is_real)
-    return scaled(
-        number.low, number.high, Fraction(codec.scale), Fraction(codec.offset), is_real=number.is_real
-    )
 
 
 def _is_block(cell: ExpandedCell, variables: Sequence[ExpandedVariable], area: Area) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ipaddress import IPv4Network, IPv6Network
 from typing import TypeVar
 
+from gatewayd.links.modbus_places.located import Located
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.codec import Codec
@@ -18,51 +19,6 @@ Network = IPv4Network | IPv6Network
 def network_text(network: Network) -> str:
     """An address, or a network with its length."""
     return str(network.network_address) if network.num_addresses == 1 else str(network)
-
-
-def part_text(bit: int | None, *, is_byte: bool) -> str:
-    """The part of a register behind its address: `.3`, `.high`; empty for all of it."""
-    if bit is None:
-        return ""
-    return f".{bit}" if not is_byte else ".high" if bit else ".low"
-
-
-class Located:
-    """What lies in a Modbus area: the properties of everything with these fields."""
-
-    __slots__ = ()
-    area: Area
-    address: int
-    """Protocol address from 0: of the first register, or of the coil."""
-    bit: int | None
-    """Bit of the register (0 = least significant) for a bit packed into a register, the lowest one of a byte; else
-    None."""
-    codec: Codec | None
-    """Number encoding of bytes and whole registers; None for coils, discrete inputs and packed bits."""
-
-    @property
-    def words(self) -> int:
-        """Addresses covered: registers, or 1 for a coil, a discrete input or a packed bit."""
-        return self.codec.words if self.codec is not None else 1
-
-    @property
-    def addresses(self) -> range:
-        """Addresses covered."""
-        return range(self.address, self.address + self.words)
-
-    @property
-    def place(self) -> str:
-        """The address as the file counts: `100`, `100.3` or `100.high`."""
-        return f"{self.address}{self._part}"
-
-    @property
-    def notation(self) -> str:
-        """The 4xxxxx form, with the bit where there is one: `400001.3`."""
-        return f"{self.area.notation(self.address)}{self._part}"
-
-    @property
-    def _part(self) -> str:
-        return part_text(self.bit, is_byte=self.codec is not None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from gatewayd.links.modbus_places.located import part_text
+from gatewayd.links.modbus_places.placing import ExpandedPlacement
 from gatewayd.links.modbus_server.declaration import KIND
-from gatewayd.links.modbus_server.expand import ExpandedPlacement, placements_of
-from gatewayd.links.modbus_server.plan import ModbusPlan, part_text
+from gatewayd.links.modbus_server.expand import placements_of
+from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.tables import LinkTables
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.plan import Plan

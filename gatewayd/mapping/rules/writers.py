@@ -17,7 +17,7 @@ def is_supervised(writer: WriterSpec) -> bool:
     """Whether it is noticed when it hangs, be its connection open or not."""
     if writer.timeout is not None:
         return True
-    return all(language.silence(writer) is not None for language in known_by(writer))
+    return all(language.supervises(writer) for language in known_by(writer))
 
 
 def ways_of(writer: WriterSpec) -> frozenset[str]:

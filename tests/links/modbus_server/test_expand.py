@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProblem, placements_of
+from gatewayd.links.modbus_places.placing import ExpandedPlacement, PlacementProblem
+from gatewayd.links.modbus_server.expand import placements_of
 from gatewayd.mapping.loader import load
 
 HEAD = """gatewayd: 1

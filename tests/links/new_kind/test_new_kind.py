@@ -79,9 +79,9 @@ def test_check_finds_by_its_rule_with_place_and_remedy(tree: Path, tmp_path: Pat
     twice = file.read_text().replace("output_int_register_0..1", "output_int_register_0")
     file.write_text(twice)
     (finding,) = json.loads(run(tree, "check", "--format", "json", file, code=1))["findings"]
-    assert (finding["rule"], finding["line"], finding["hint"]) == ("GW801", 10, "give it another name")
+    assert (finding["rule"], finding["line"], finding["hint"]) == ("GW899", 10, "give it another name")
     assert finding["related"][0]["line"] == 9
-    assert "JSON keeps the last" in run(tree, "check", "--explain", "GW801")
+    assert "JSON keeps the last" in run(tree, "check", "--explain", "GW899")
 
 
 def test_check_knows_its_keys_and_their_types(tree: Path, tmp_path: Path) -> None:

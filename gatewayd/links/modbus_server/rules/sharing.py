@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from gatewayd.core.definition import Direction
-from gatewayd.links.modbus_server.expand import ExpandedPlacement, placements_of
-from gatewayd.links.modbus_server.rules.wording import where
+from gatewayd.links.modbus_places.placing import ExpandedPlacement
+from gatewayd.links.modbus_places.rules.wording import where
+from gatewayd.links.modbus_server.expand import placements_of
 from gatewayd.links.modbus_server.sections import ModbusWriter
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell

@@ -1,4 +1,4 @@
-"""Rule GW801."""
+"""Rule GW899."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gatewayd.mapping.rules.registry import cell_rule
 from ..language import ExpandedLines  # noqa: TID252 - the package is copied to another place
 
 
-@cell_rule("GW801")
+@cell_rule("GW899")
 def name_of_two(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Two variables with one name in lines."""
     lines = cell.link(ExpandedLines)

@@ -14,7 +14,7 @@ from gatewayd.mapping.scalars import refuse, scalar
 from gatewayd.mapping.typed import BeforeValidator, Field
 
 BAD_ADDRESS = declare(
-    "GW115", "bad-address", "a Modbus address that cannot be read", home="gatewayd.links.modbus_server.rules"
+    "GW115", "bad-address", "a Modbus address that cannot be read", home="gatewayd.links.modbus_places.rules"
 )
 Half = Literal["high", "low"]
 """A byte of a register. The high one comes first on the wire."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gatewayd.links.modbus_server.scalars import Address
+from gatewayd.links.modbus_places.scalars import Address
 from tests.mapping.values import read, refused
 
 

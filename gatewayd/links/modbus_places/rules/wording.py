@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProblem, placements_of
+from gatewayd.links.modbus_places.placing import ExpandedPlacement, PlacementProblem, all_placements
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.modbus.areas import Area
 
@@ -20,6 +20,9 @@ AREA_WORDS = {
 def where(placement: ExpandedPlacement) -> str:
     """Where it lies, both ways of counting: `holding registers 100 to 103 (400101 to 400104)`."""
     word = AREA_WORDS[placement.area]
+    if placement.width:
+        last = placement.bits[-1]
+        return f"bits {placement.bit} to {last} of {word} {placement.address} ({placement.notation})"
     if placement.bit is not None and placement.codec is not None:
         half = "high" if placement.bit else "low"
         return f"the {half} byte of {word} {placement.address} ({placement.notation})"
@@ -43,4 +46,4 @@ def first_of_each_line(placements: Iterable[ExpandedPlacement]) -> Iterator[Expa
 
 def wrong(cell: ExpandedCell, problem: PlacementProblem) -> Iterator[ExpandedPlacement]:
     """The first of each line that cannot lie where the file puts it, for this reason."""
-    return first_of_each_line(item for item in placements_of(cell) if item.problem is problem)
+    return first_of_each_line(item for item in all_placements(cell) if item.problem is problem)

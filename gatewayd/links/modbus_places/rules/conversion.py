@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from math import isclose, isfinite
 
 from gatewayd.core.definition import Direction, ValueKind
-from gatewayd.links.modbus_server.expand import ExpandedPlacement, PlacementProblem, placements_of
-from gatewayd.links.modbus_server.rules.wording import first_of_each_line, where, wrong
-from gatewayd.links.modbus_server.sections import ModbusPlaces
-from gatewayd.mapping.diagnostics import Diagnostic, Position, Rule, Severity
+from gatewayd.links.modbus_places.placing import ExpandedPlacement, PlacementProblem, all_placements
+from gatewayd.links.modbus_places.rules.wording import first_of_each_line, where, wrong
+from gatewayd.mapping.diagnostics import Diagnostic, Rule, Severity
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.modbus.codec import TYPES, Codec, turns
@@ -28,7 +27,7 @@ def time_in_float32(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if placement.type == "float32" and placement.variable.grows:
             name, place = placement.variable.name, where(placement)
             message = f"`{name}` grows without end, and float32 at {place} loses its last digits"
-            yield rule.at(_key(placement, "type"), message, hint="use `type: float64`")
+            yield rule.at(placement.key_position("type"), message, hint="use `type: float64`")
 
 
 @cell_rule("GW702", Severity.WARNING)
@@ -41,7 +40,7 @@ def fraction_lost(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 "shows whole numbers only"
             )
             hint = "add a scale such as `scale: 0.001`, or `scale: 1` if whole numbers are meant"
-            yield rule.at(_key(placement, "type"), message, hint=hint)
+            yield rule.at(placement.key_position("type"), message, hint=hint)
 
 
 @cell_rule("GW703", Severity.WARNING)
@@ -57,14 +56,14 @@ def narrow_integer(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 f"but {placement.type} at {where(placement)} shows {number(low)} to {number(high)}"
             )
             hint = "use a wider type, or state the range with `limits: [least, greatest]`"
-            yield rule.at(_key(placement, "type"), message, hint=hint)
+            yield rule.at(placement.key_position("type"), message, hint=hint)
 
 
 @cell_rule("GW713", Severity.WARNING)
 def field_not_shown(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A real in registers that can never show what its field holds."""
     reported: set[int] = set()
-    for placement in placements_of(cell):
+    for placement in all_placements(cell):
         variable, bounds = placement.variable, placement.variable.range
         if placement.codec is None or variable.kind is not ValueKind.FLOAT or not _is_integer(placement):
             continue
@@ -77,7 +76,7 @@ def field_not_shown(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             reported.add(id(placement.spec))
             low, high = map(number, bounds)
             message = f"`{variable.name}` ({variable.target}) goes from {low} to {high}, but {loss[0]}"
-            yield rule.at(_key(placement, "scale"), message, hint=loss[1])
+            yield rule.at(placement.key_position("scale"), message, hint=loss[1])
 
 
 def _loss(placement: ExpandedPlacement, bounds: tuple[float, float]) -> tuple[str, str] | None:
@@ -131,8 +130,8 @@ def limit_between_steps(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 
 def _within_type(raw: float, placement: ExpandedPlacement) -> bool:
-    form = TYPES[placement.type]
-    return form.low <= raw <= form.high
+    low, high = placement.ends
+    return low <= raw <= high
 
 
 @cell_rule("GW704", Severity.WARNING)
@@ -150,7 +149,7 @@ def coarse_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 f"`{placement.variable.name}` between {number(limits[0])} and {number(limits[1])}"
             )
             hint = f"robot value = raw * scale: use a finer scale such as {number(_fine(span))}"
-            yield rule.at(_key(placement, "scale"), message, hint=hint)
+            yield rule.at(placement.key_position("scale"), message, hint=hint)
 
 
 def _fine(span: float) -> float:
@@ -179,7 +178,7 @@ def limit_not_reachable(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 f"but {placement.type} with scale {number(placement.scale)} reaches {number(low)} to {number(high)}"
             )
             hint = "use a wider type or a coarser scale, or narrow the limits"
-            yield rule.at(_key(placement, "type"), message, hint=hint)
+            yield rule.at(placement.key_position("type"), message, hint=hint)
 
 
 @cell_rule("GW706")
@@ -187,20 +186,22 @@ def scale_of_zero(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """A scale of zero."""
     for placement in wrong(cell, PlacementProblem.SCALE_OF_ZERO):
         message = f"`{placement.variable.name}` has the scale 0"
-        yield rule.at(_key(placement, "scale"), message, hint="leave `scale` out, or write for example 0.1")
+        yield rule.at(
+            placement.key_position("scale"), message, hint="leave `scale` out, or write for example 0.1"
+        )
 
 
 @cell_rule("GW707")
 def scaled_bit(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     """Scale, offset or order at a bit."""
-    for placement in first_of_each_line(placements_of(cell)):
+    for placement in first_of_each_line(all_placements(cell)):
         spec = placement.spec
         keys = [key for key in ("scale", "offset") if getattr(spec, key) is not None]
         whole = placement.codec is not None and placement.variable.kind is ValueKind.BOOL and keys
         if placement.problem is PlacementProblem.SCALED_BIT or whole:
             key = keys[0] if keys else "order"
             message = f"`{placement.variable.name}` is a bit and has `{key}`"
-            yield rule.at(_key(placement, key), message, hint=f"remove `{key}`")
+            yield rule.at(placement.key_position(key), message, hint=f"remove `{key}`")
 
 
 @cell_rule("GW712", Severity.WARNING)
@@ -215,7 +216,7 @@ def order_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]
         hint = "remove `order`: a `bool` is 0 or 1"
         if placement.type != "bool":
             hint = "remove `order`, or write BADC to swap the two bytes"
-        yield rule.at(_key(placement, "order"), message, hint=hint)
+        yield rule.at(placement.key_position("order"), message, hint=hint)
 
 
 @cell_rule("GW708", Severity.WARNING)
@@ -238,7 +239,7 @@ def uneven_scale(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
             )
             key = "scale" if placement.spec.scale is not None else "offset"
             hint = "leave scale and offset out, or choose them so that every value comes out even"
-            yield rule.at(_key(placement, key), message, hint=hint)
+            yield rule.at(placement.key_position(key), message, hint=hint)
 
 
 def _whole(value: float) -> bool:
@@ -259,7 +260,7 @@ def integer_in_real(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 f"but {placement.type} is exact only up to {digits}"
             )
             hint = "use an integer type, or state the range with `limits: [least, greatest]`"
-            yield rule.at(_key(placement, "type"), message, hint=hint)
+            yield rule.at(placement.key_position("type"), message, hint=hint)
 
 
 @cell_rule("GW710", Severity.WARNING)
@@ -270,7 +271,7 @@ def number_as_bool(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if placement.type == "bool" and variable.kind is not ValueKind.BOOL:
             message = f"`{variable.name}` is a number ({variable.type}), but bool at {where(placement)} shows 0 or 1"
             hint = f"use a number type, or map one bit, `{variable.target}.N`"
-            yield rule.at(_key(placement, "type"), message, hint=hint)
+            yield rule.at(placement.key_position("type"), message, hint=hint)
 
 
 @cell_rule("GW711", Severity.WARNING)
@@ -298,7 +299,7 @@ def _round_trip(codec: Codec, value: float) -> float | None:
 
 def _numbers(cell: ExpandedCell, kind: ValueKind | None = None) -> Iterator[ExpandedPlacement]:
     """The first of each line that lies in whole registers and has a codec; of one kind, or of all."""
-    for placement in first_of_each_line(placements_of(cell)):
+    for placement in first_of_each_line(all_placements(cell)):
         if placement.codec is not None and kind in (None, placement.variable.kind):
             yield placement
 
@@ -310,16 +311,6 @@ def _is_integer(placement: ExpandedPlacement) -> bool:
 
 def _reach(placement: ExpandedPlacement) -> tuple[float, float]:
     """Least and greatest robot value that the register can express."""
-    form = TYPES[placement.type]
-    ends = (form.low * placement.scale + placement.offset, form.high * placement.scale + placement.offset)
+    low, high = placement.ends
+    ends = (low * placement.scale + placement.offset, high * placement.scale + placement.offset)
     return min(ends), max(ends)
-
-
-def _key(placement: ExpandedPlacement, key: str) -> Position:
-    """Place of a key of the placement where it was written, else of its address."""
-    if getattr(placement.spec, key) is None:
-        return placement.position
-    index = next(
-        i for i, spec in enumerate(placement.variable.spec.by(ModbusPlaces).modbus) if spec is placement.spec
-    )
-    return placement.variable.at("modbus", index, key)

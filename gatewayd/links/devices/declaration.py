@@ -1,0 +1,69 @@
+"""What everybody may know of this kind of link."""
+
+from __future__ import annotations
+
+from gatewayd.core.definition import CellDefinition
+from gatewayd.links.contract import Description, LinkKind, LinkMetric
+from gatewayd.links.devices.description import description
+from gatewayd.links.devices.plan import DevicePlan
+from gatewayd.mapping.plan import LinkPlan
+
+
+class DeviceKind(LinkKind):
+    """The kind with the section `devices`: a link for each of them, under its name."""
+
+    key = DevicePlan.kind
+    title = "device"
+    doctor = "gatewayd.links.devices.doctor"
+    fields = {  # noqa: RUF012 - never changed
+        "family": "how it is spoken to: `modbus`",
+        "address": "where it is reached: host:port, or serial port with its settings",
+        "unit": "unit id of a Modbus device, or null",
+        "state": "`starting`, `good`, `partial` (some values are lost), `lost`",
+        "reason": "why it is not good, or empty",
+        "round_trip": "seconds from request to answer, of the last one, or null",
+        "answers": "requests that were answered, exceptions as well",
+        "timeouts": "requests that were not answered in time",
+        "errors": "answers that could not be read, and connections that were lost or could not be had",
+        "exceptions": "requests that the device refused, by code",
+        "age": "seconds since its last answer, or null",
+    }
+    metrics = (
+        LinkMetric("gatewayd_device_up", "up", "1 while the device answers"),
+        LinkMetric(
+            "gatewayd_device_round_trip_seconds",
+            "round_trip",
+            "seconds from request to answer, of the last one",
+        ),
+        LinkMetric("gatewayd_device_answers_total", "answers", "requests that the device answered"),
+        LinkMetric(
+            "gatewayd_device_timeouts_total", "timeouts", "requests that the device did not answer in time"
+        ),
+        LinkMetric(
+            "gatewayd_device_errors_total",
+            "errors",
+            "answers of the device that could not be read, and connections that were lost or could not be had",
+        ),
+        LinkMetric(
+            "gatewayd_device_exceptions_total",
+            "exceptions",
+            "requests that the device refused",
+            label="code",
+        ),
+    )
+    place = "list of its places in the device"
+
+    def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:
+        """In the words of its family."""
+        assert isinstance(plan, DevicePlan)
+        return description(plan, cell)
+
+    def fits(self, old: LinkPlan, new: LinkPlan, before: CellDefinition, after: CellDefinition) -> bool:
+        """Where it means the same: only the indices of its variables differ."""
+        assert isinstance(old, DevicePlan)
+        assert isinstance(new, DevicePlan)
+        return old.family == new.family and old.identity(before) == new.identity(after)
+
+
+KIND = DeviceKind()
+"""What everybody may know of this kind of link."""

@@ -1,0 +1,1 @@
+"""Rules about registers, units and listeners."""

@@ -1,0 +1,84 @@
+"""Devices in the mapping language: what a file says, and the plans that it comes to."""
+
+from __future__ import annotations
+
+import pytest
+
+from gatewayd.links.devices.expand import devices_of
+from gatewayd.links.devices.plan import Sending
+from gatewayd.mapping.rules.writers import is_supervised
+from tests.links.devices.cells import HEAD, VARIABLES, device, loaded, planned
+
+ONE = HEAD.replace("  gripper: {serial: /dev/ttyUSB0, baudrate: 115200, unit: 9, watchdog: 1s}\n", "")
+FORCE = "  force: {robot: output_int_register_7, device: %s}\n"
+
+
+def test_every_device_is_a_link_of_its_own() -> None:
+    plan = planned()
+    assert list(plan.links) == ["robot", "modbus", "island", "gripper"]
+    assert plan.kinds == {"robot", "modbus", "device"}
+    assert (device(plan, "island").writer, device(plan, "gripper").writer) == (0, None)
+
+
+def test_what_is_written_of_an_output_says_when() -> None:
+    plan = planned()
+    names = [variable.name for variable in plan.cell.variables]
+    assert device(plan, "island").sendings == (Sending(names.index("clamp")),)
+    assert device(plan, "gripper").sendings == (
+        Sending(names.index("force"), brings_up_to_date=True, every=1.0),
+    )
+
+
+@pytest.mark.parametrize("place", ["100", "{holding: 100}", "{at: island, holding: 100}", "[100]"])
+def test_a_single_device_need_not_be_named(place: str) -> None:
+    found = devices_of(loaded(FORCE % place, ONE).cell).places
+    assert [(one.name, one.spec.selector, one.spec.address) for one in found] == [("island", "holding", 100)]
+
+
+def test_a_place_in_nothing_is_kept_for_the_rules() -> None:
+    cell = loaded(FORCE % "{at: valve, holding: 100}").cell
+    (place,) = devices_of(cell).places
+    assert (place.name, place.device, place.where) == ("valve", None, None)
+    assert not cell.is_complete
+
+
+@pytest.mark.parametrize(
+    "polls, lost_after",
+    [("poll: 20ms", 1.0), ("poll: 1s", 3.5), ("poll: 1s, timeout: 200ms", 3.2), ("lost_after: 400ms", 0.4)],
+)
+def test_a_device_is_lost_after_three_polls(polls: str, lost_after: float) -> None:
+    plan = planned(head=HEAD.replace("poll: 20ms", polls))
+    assert device(plan, "island").lost_after == pytest.approx(lost_after)
+
+
+def test_the_slowest_value_counts() -> None:
+    plan = planned(VARIABLES.replace("discrete: 3", "discrete: 3, poll: 5s"))
+    assert device(plan, "island").lost_after == 15.5
+
+
+def test_a_device_is_supervised_whatever_its_writer_says() -> None:
+    cell = loaded().cell
+    assert is_supervised(cell.document.writers["island"].spec)
+
+
+@pytest.mark.parametrize(
+    "section, rule",
+    [
+        ("island: {unit: 1}", "missing-key"),
+        ("island: {modbus: 127.0.0.1, serial: /dev/ttyS0}", "missing-key"),
+        ("island: {modbus: 127.0.0.1, pol: 20ms}", "unknown-key"),
+        ("island: {modbus: 127.0.0.1, unit: 256}", "out-of-range"),
+        ("island:", "wrong-type"),
+    ],
+)
+def test_findings_of_a_device_stand_at_its_place(section: str, rule: str) -> None:
+    text = f"gatewayd: 1\ncell: press\nrobot: {{host: 127.0.0.1}}\ndevices:\n  {section}\nvariables:\n"
+    found = loaded("  done: {robot: output_bit_register_0}\n", text).diagnostics
+    assert (rule, 5) in [(each.rule.slug, each.position.line) for each in found]
+
+
+def test_a_file_without_devices_is_not_judged_by_their_rules() -> None:
+    """And its fingerprint is what it was: tests/golden has those of all shipped mappings."""
+    text = "gatewayd: 1\ncell: press\nrobot: {host: 127.0.0.1}\nvariables:\n"
+    plan = planned("  done: {robot: output_bit_register_0}\n", text)
+    assert list(plan.links) == ["robot"]
