@@ -37,7 +37,8 @@ DEFAULT_UPTIME = 100.0
 INTERNAL = "the controller itself"
 """Owner of the inputs that were claimed with `hold`."""
 
-_CREEP = 1e-9  # seconds a cycle
+CREEP = 1e-9
+"""Seconds by which a timestamp that creeps goes on in a cycle."""
 _POSTURES = ("actual_q", "target_q")  # setting one of them moves the arm there
 
 
@@ -147,7 +148,7 @@ class Controller:
         self.enforce()
         if self.faults.creep:
             moment = self.store.moment
-            self.store.moment = moment._replace(time=moment.time + _CREEP)
+            self.store.moment = moment._replace(time=moment.time + CREEP)
         if self.faults.freeze or self.faults.creep:
             return
         if self._replayed is not None:

@@ -2,7 +2,8 @@
 
 It begins with the first client that starts, so that nobody misses the beginning. Each row is shown for one control
 cycle; where packages were lost when it was recorded, none is sent. Inputs and claims are those of any controller: a
-recorded input shows what was recorded until a client claims it. In a loop timestamps go on where the last round ended.
+recorded input shows what was recorded until a client claims it. While the timestamp is frozen the row is shown that was
+shown last, and the recording goes on behind it afterwards. In a loop timestamps go on where the last round ended.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from statistics import median
 from gatewayd.rtde.fields import INPUTS, Field
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.recording import RecordingError, RecordingReader, open_recording
+from gatewayd.simulator.controller import CREEP
 from gatewayd.simulator.server import SimulatedController
 
 MAX_RATE = 1000.0
@@ -87,6 +89,7 @@ class Replay:
             (name, recipe.slots[name], store.place(name)) for name in recipe.names if name in store
         ]
         self._own = [name for name in recipe.names if name in INPUTS]
+        self._clock_place = store.place("timestamp").start if recorded.clock is not None else None
         self._counter = recipe.slots["control_step"].start if "control_step" in recipe.slots else None
         self._reader: RecordingReader | None = None
         self._rows: Iterator[_Row] = iter(())
@@ -101,6 +104,8 @@ class Replay:
         self._shift = 0.0
         self._begin_round()
         self._due = 0
+        self._frozen = 0
+        self._followed = self._controller.cycle
         self._anchor = (0, math.nan)
         self._next = self._read()
         self._controller.quiet = True
@@ -112,6 +117,12 @@ class Replay:
         if self._over or (self._waiting and not self._simulator.streaming):
             self._controller.quiet = True
             return
+        passed, self._followed = cycle - self._followed, cycle
+        if self._stands_still():
+            self._frozen += passed
+            self._controller.quiet = False
+            return
+        cycle -= self._frozen
         if self._waiting:
             self._waiting = False
             self._due = cycle
@@ -126,6 +137,14 @@ class Replay:
             self.rows += 1
         elif self._next is None:
             self._end()
+
+    def _stands_still(self) -> bool:
+        """Whether the same row is shown again and again; by `creep` its timestamp goes on a little."""
+        faults, place = self._controller.faults, self._clock_place
+        if faults.creep and place is not None:
+            self._controller.store.cells[place] = float(self._controller.store.cells[place]) + CREEP
+            self._controller.store.edition += 1
+        return faults.freeze or faults.creep
 
     async def settle(self) -> None:
         """Nothing takes longer than its cycle."""

@@ -1,8 +1,8 @@
 """The simulated controller on a TCP port: sockets, the clock that drives its cycles, and nothing else.
 
 The cycle counter follows the clock, at its speed or another. A cycle that comes late is made up for by shortened ones,
-never by a burst; what is more than `MAKE_UP` cycles late is skipped, packages and all. A stepped controller has no
-clock: whoever tests with it says when a cycle passes.
+never by a burst; what is more than `MAKE_UP` cycles late is skipped, packages and all. The clock of a stepped
+controller stands still: whoever tests with it says when a cycle passes.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import socket
 from collections.abc import Callable
 from types import TracebackType
 from typing import Protocol, Self, cast
 
 from gatewayd.rtde.codec import ProtocolError
+from gatewayd.simulator.clock import EARLY, ScaledClock, SimulatorClock, SteppedClock
 from gatewayd.simulator.controller import Controller
 from gatewayd.simulator.faults import DroppedError, Faults, Mangler
 from gatewayd.simulator.line import OutgoingLine
@@ -35,7 +37,7 @@ _SHORTEST_TICK = 0.001  # seconds: shorter cycles, of a raised speed, are run se
 _IDLE = 0.01  # seconds between cycles while nobody is connected
 _SEND_BUFFER = 65536
 _MOST_UNSENT = 1 << 18  # replies that a client has not fetched
-_DOWN = 0.2  # seconds a restart takes
+_DOWN = 0.2  # seconds a restart takes, of the real clock: nobody can connect meanwhile, and nothing happens
 _log = logging.getLogger(__name__)
 
 
@@ -80,6 +82,9 @@ class SimulatedController:
         """Seconds of the controller for each of the clock."""
         self.stepped = stepped
         """Whether time passes by `step` alone."""
+        self._steps = SteppedClock(self.controller.rate) if stepped else None
+        self.clock: SimulatorClock = self._steps or ScaledClock(speed)
+        """By which delays, pauses and lingering claims count."""
         self.follower: CycleFollower | None = None
         """What happens by itself; to be set before the start."""
         self.ended: Callable[[], None] | None = None
@@ -98,7 +103,7 @@ class SimulatedController:
         self._boot_at: int | None = None
         self._restarting: asyncio.Task[None] | None = None
         self._next = 0.0
-        self._paused_until = 0.0
+        self._paused_until = -math.inf
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -167,14 +172,17 @@ class SimulatedController:
         """Let that many control cycles pass, one by one; RuntimeError unless it is stepped.
 
         Each begins when every client has room for its package, so that none is skipped: a client that does not read
-        is waited for as long as `overflow_close` says, and then closed.
+        is waited for as long as `overflow_close` says, in seconds of the real clock, and then closed. While the
+        controller is paused they pass without it.
         """
-        if not self.stepped:
+        if self._steps is None:
             raise RuntimeError(NOT_STEPPED)
         for _ in range(cycles):
             for connection in list(self._connections.values()):
                 await connection.drained()
-            self._run(1)
+            self._steps.step()
+            if not self.paused:
+                self._run(1)
             if self.follower is not None:
                 await self.follower.settle()
             await asyncio.sleep(0)  # lets what clients have sent come in
@@ -182,18 +190,17 @@ class SimulatedController:
     def pause(self, seconds: float) -> None:
         """Stand still for a while, as a halted virtual machine does: nothing is sent, read or counted.
 
-        The timestamp goes on where it stopped, and lags by that much from then on.
+        The timestamp goes on where it stopped, and lags by that much from then on. Seconds are those of the clock.
         """
-        loop = asyncio.get_running_loop()
-        self._paused_until = loop.time() + seconds
-        loop.call_at(self._paused_until, self._read_again)
+        self._paused_until = self.clock.now + seconds
+        self.clock.call_at(self._paused_until, self._read_again)
         for connection in self._connections.values():
             connection.read(on=False)
 
     @property
     def paused(self) -> bool:
         """Whether it stands still."""
-        return asyncio.get_running_loop().time() < self._paused_until
+        return self.clock.now + EARLY < self._paused_until
 
     def drop_clients(self) -> int:
         """Cut every connection; returns how many there were."""
@@ -314,7 +321,7 @@ class _Connection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.Transport", transport)
         self._socket = cast("socket.socket", transport.get_extra_info("socket"))
-        self._line = OutgoingLine(self._transport, self._server.faults)
+        self._line = OutgoingLine(self._transport, self._server.faults, self._server.clock)
         peer = transport.get_extra_info("peername") or ("?", 0)
         self._session = SimulatorSession(
             self._server.controller, f"client {self._number} ({peer[0]}:{peer[1]})"
@@ -357,7 +364,8 @@ class _Connection(asyncio.Protocol):
         self._line.close()
         linger = self._server.faults.linger
         if linger:
-            asyncio.get_running_loop().call_later(linger, self._session.close)
+            clock = self._server.clock
+            clock.call_at(clock.now + linger, self._session.close)
         else:
             self._session.close()
         _log.info("%s gone", self._session)

@@ -99,6 +99,38 @@ async def test_a_controller_that_was_started_anew_is_shown_without_a_pause(
         assert [(await one.package())[0] for _ in range(5)] == pytest.approx(recorded)
 
 
+@pytest.mark.parametrize("fault", ["freeze", "creep"])
+async def test_a_frozen_timestamp_holds_the_row(tmp_path: Path, client: type[Client], fault: str) -> None:
+    """Packages go on, and the recording behind the one that was shown again and again: no row is passed over."""
+    async with replayed(recording(tmp_path / "data", times(20))) as robot, client(robot.port) as one:
+        await one.stream("timestamp", "actual_q")
+        await robot.step(5)
+        setattr(robot.faults, fault, True)
+        await robot.step(10)
+        setattr(robot.faults, fault, False)
+        await robot.step(5)
+        found = [await one.package() for _ in range(20)]
+    assert [values[1] for values in found] == [*range(5), *[4] * 10, *range(5, 10)]
+    stamps = [float(values[0]) for values in found]
+    creep = 1e-9 if fault == "creep" else 0
+    assert stamps[4:15] == pytest.approx([50.008 + creep * number for number in range(11)], abs=1e-12)
+    assert stamps[15:] == pytest.approx([50.01 + 0.002 * number for number in range(5)])
+
+
+async def test_a_replay_that_is_frozen_from_the_start_shows_its_first_row(
+    tmp_path: Path, client: type[Client]
+) -> None:
+    async with replayed(recording(tmp_path / "data", times(20))) as robot, client(robot.port) as one:
+        robot.faults.freeze = True
+        await robot.step(7)
+        await one.stream("timestamp", "actual_q")
+        await robot.step(3)
+        robot.faults.freeze = False
+        await robot.step(3)
+        found = [await one.package() for _ in range(6)]
+    assert [values[1] for values in found] == [0, 0, 0, 0, 1, 2]
+
+
 async def test_fields_that_were_not_recorded_do_not_exist(tmp_path: Path, client: type[Client]) -> None:
     settings = RobotSettings(fields=(read_field("dexterity:DOUBLE"),))
     robot = replayed(recording(tmp_path / "data.csv", times(3)), settings=settings)
