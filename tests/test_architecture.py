@@ -157,7 +157,7 @@ LAYERS: dict[str, set[str]] = {
     "service.options": {"web.settings"},
     "service.garbage": set(),
     "service.signals": set(),
-    "web.settings": set(),
+    "web.settings": {"report.format"},
     "web": {
         "control",
         "core",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 
 from gatewayd.links.contract import Medium
+from gatewayd.report.format import parse_address
 
 _ETHERNET, _CAN = 1, 227
 """LINKTYPE_ETHERNET, LINKTYPE_CAN_SOCKETCAN."""
@@ -139,9 +140,9 @@ def _checksum(data: bytes) -> int:
 
 def _split(end: str) -> tuple[bytes, int]:
     """Address and port of `10.0.0.1:502`; an end that is none is 0.0.0.0, port 0."""
-    host, _, port = end.rpartition(":")
     try:
-        return ip_address(host.strip("[]").partition("%")[0]).packed, int(port) & 0xFFFF
+        host, port = parse_address(end)
+        return ip_address(host.partition("%")[0]).packed, port
     except ValueError:
         return bytes(4), 0
 

@@ -19,6 +19,7 @@ from gatewayd.mapping import syntax
 from gatewayd.mapping.diagnostics import Rule
 from gatewayd.mapping.source import RealNumber, WholeNumber
 from gatewayd.mapping.typed import AfterValidator, BeforeValidator, Field, InstanceOf, ValueRefused
+from gatewayd.report.format import MAX_PORT, split_address
 from gatewayd.report.format import address as address_text
 from gatewayd.report.wording import did_you_mean
 
@@ -34,9 +35,7 @@ _MAX_SECONDS: Final = 24 * 3600.0
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _CELL_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 _MAX_NAME: Final = 64
-_LISTEN = re.compile(r"(?:\[(?P<six>[0-9A-Fa-f:.%a-z]+)\]|(?P<four>[^:\[\]\s]+)):(?P<port>[0-9]{1,5})")
 _NUMBERS = re.compile(r"[0-9.]+")
-_MAX_PORT: Final = 65535
 _MAPPED_PREFIX: Final = 96
 """Bits in front of the IPv4 address in an IPv4-mapped one."""
 
@@ -172,19 +171,17 @@ def _listen(value: object) -> ListenAddress:
         return value
     hint = "write host:port, for example 127.0.0.1:1502, 0.0.0.0:502 or [::1]:502"
     text = scalar(value, "a listen address", hint)
-    match = _LISTEN.fullmatch(text)
-    if match is None:
+    host, port = split_address(text) or ("", None)
+    if port is None:
         refuse(syntax.BAD_NETWORK, f"`{text}` is not a listen address", hint)
-    host = match["six"] or match["four"]
     try:
         address = ip_address(host)
     except ValueError:
         refuse(syntax.BAD_NETWORK, f"`{host}` is not an IP address", "names are not resolved here; " + hint)
-    if (match["six"] is not None) != isinstance(address, IPv6Address):
+    if text.startswith("[") != isinstance(address, IPv6Address):
         refuse(syntax.BAD_NETWORK, f"`{text}` is not a listen address", hint)
     address = _unmapped(address)
-    port = int(match["port"])
-    if not 0 < port <= _MAX_PORT:
+    if not 0 < port <= MAX_PORT:
         refuse(syntax.OUT_OF_RANGE, f"port {port} is not between 1 and 65535", hint)
     return ListenAddress(str(address), port)
 

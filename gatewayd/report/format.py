@@ -1,4 +1,4 @@
-"""Values, times and counts in figures for people: the same in commands, texts of events, status page and demonstration.
+"""Values, times, counts and addresses for people: the same in commands, events, status page and demonstration.
 
 What programs read has every digit, and comes from elsewhere.
 """
@@ -6,6 +6,7 @@ What programs read has every digit, and comes from elsewhere.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 _DIGITS = 3
@@ -13,6 +14,12 @@ _JUST_NOW = 0.0005
 """Seconds below which an age has no figure."""
 YOU = "you"
 """Who takes part in the demonstration."""
+MAX_PORT = 0xFFFF
+_ADDRESS = re.compile(
+    r"(?:\[(?P<bracketed>[0-9A-Fa-f:.]+(?:%[\w.-]+)?)\]|(?P<name>[^\s:/\[\]]+))(?::(?P<port>[0-9]{1,5}))?"
+)
+_BARE = re.compile(r"[0-9A-Fa-f.]*:[0-9A-Fa-f.]*:[0-9A-Fa-f:.]*(?:%[\w.-]+)?")
+"""IPv6 without brackets, which no port can follow."""
 _PLURALS = {"be": "are"}
 _SINGULARS = {"be": "is", "have": "has", "do": "does", "go": "goes"}
 
@@ -100,6 +107,35 @@ def verb(base: str, subject: str = "", count: int = 1) -> str:
 def address(host: str, port: int) -> str:
     """`127.0.0.1:502`, `[::1]:502`."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def split_address(text: str) -> tuple[str, int | None] | None:
+    """Host, without brackets, and port of `127.0.0.1:502`, `[::1]:502`, `::1`; None: it is of no such form.
+
+    Neither is judged: the host may be unknown, the port have up to five digits.
+    """
+    if _BARE.fullmatch(text):
+        return text, None
+    found = _ADDRESS.fullmatch(text)
+    if found is None:
+        return None
+    return found["bracketed"] or found["name"], int(found["port"]) if found["port"] else None
+
+
+def parse_address(text: str, default: int | None = None) -> tuple[str, int]:
+    """Host and port as people type them; ValueError says what is expected.
+
+    Without `default` it is where to listen, at a free port if that is 0; with it where to connect to, and it may be
+    left away.
+    """
+    host, port = split_address(text) or ("", None)
+    port = default if port is None else port
+    least, form = 0, "HOST:PORT, say 127.0.0.1:9502 or [::1]:9502"
+    if default is not None:
+        least, form = 1, f"HOST or HOST:PORT, say 192.168.1.10 or robot.local:{default}"
+    if not host or port is None or not least <= port <= MAX_PORT:
+        raise ValueError(f"{text!r} is not {form}")
+    return host, port
 
 
 def listed(names: Sequence[str], most: int) -> str:

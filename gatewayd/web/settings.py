@@ -5,6 +5,8 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
+from gatewayd.report.format import parse_address
+
 MIN_TOKEN = 16
 """Characters that a token must have."""
 
@@ -17,20 +19,16 @@ class Settings:
     """Where to listen and what to ask for. Raises SettingsError."""
 
     def __init__(self, text: str, token_file: Path | None = None) -> None:
-        self.host, self.port = parse_address(text)
+        self.host, self.port = listen_address(text)
         self.token = read_token(token_file) if token_file is not None else None
 
 
-def parse_address(text: str) -> tuple[str, int]:
+def listen_address(text: str) -> tuple[str, int]:
     """`127.0.0.1:9502`, `[::1]:9502`, `gateway.plant:9502`; `:9502` alone is loopback."""
-    host, colon, port = text.rpartition(":")
-    bare = host.removeprefix("[").removesuffix("]")
-    bracketed = host.startswith("[") and host.endswith("]")
-    if not (colon and port.isascii() and port.isdigit() and int(port) <= 0xFFFF) or (
-        ":" in bare and not bracketed
-    ):
-        raise SettingsError(f"{text!r} is not an address: use HOST:PORT, say 127.0.0.1:9502 or [::1]:9502")
-    return bare or "127.0.0.1", int(port)
+    try:
+        return parse_address(f"127.0.0.1{text}" if text.startswith(":") else text)
+    except ValueError as error:
+        raise SettingsError(str(error)) from None
 
 
 def read_token(path: Path) -> str:

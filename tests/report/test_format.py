@@ -9,15 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.report.format import (
+    address,
     age,
     ago,
     counted,
     exact,
     interval,
     listed,
+    parse_address,
     plural,
     seconds,
     span,
+    split_address,
     value,
     verb,
 )
@@ -113,3 +116,37 @@ def test_numbers_of_mappings_keep_every_digit() -> None:
 def test_an_interval_has_every_digit() -> None:
     assert interval(0, 150.0) == "0..150"
     assert interval(-0.0505, 1234567.5) == "-0.0505..1234567.5"
+
+
+@given(
+    st.one_of(st.ip_addresses().map(str), st.from_regex(r"[a-z0-9.-]+", fullmatch=True)),
+    st.integers(0, 65535),
+)
+def test_an_address_is_read_as_it_is_written(host: str, port: int) -> None:
+    assert split_address(address(host, port)) == parse_address(address(host, port)) == (host, port)
+
+
+@pytest.mark.parametrize(
+    "text, found",
+    [
+        ("robot", ("robot", None)), ("::1", ("::1", None)), ("[::1]", ("::1", None)),
+        ("fe80::1%eth0", ("fe80::1%eth0", None)),
+        ("[fe80::1%eth0]:7", ("fe80::1%eth0", 7)), ("a:99999", ("a", 99999)), ("::1:9502", ("::1:9502", None)),
+        ("", None), ("a:", None), (":1", None), ("a:b", None), ("a:-1", None), ("a:\u0663", None), ("a:123456", None),
+        ("http://a", None), ("http://a:1", None), ("a b", None), ("[::1", None), ("[robot]:1", None), ("a:1\n", None),
+    ],
+)  # fmt: skip
+def test_host_and_port_are_found_where_they_are(text: str, found: tuple[str, int | None] | None) -> None:
+    assert split_address(text) == found
+
+
+@pytest.mark.parametrize(
+    "text, default", [("a", None), ("a:65536", None), ("a:65536", 502), ("a:0", 502), ("", 502)]
+)
+def test_what_is_no_address_is_answered_with_examples(text: str, default: int | None) -> None:
+    with pytest.raises(ValueError, match=r"is not HOST.*:PORT, say .* or .*"):
+        parse_address(text, default)
+
+
+def test_a_port_may_be_omitted_where_there_is_a_usual_one() -> None:
+    assert parse_address("a", 502) == ("a", 502)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gatewayd.web.settings import Settings, SettingsError, parse_address, read_token
+from gatewayd.web.settings import Settings, SettingsError, listen_address, read_token
 from tests.web.press import TOKEN
 
 
@@ -21,13 +21,13 @@ from tests.web.press import TOKEN
     ],
 )
 def test_addresses(text: str, address: tuple[str, int]) -> None:
-    assert parse_address(text) == address
+    assert listen_address(text) == address
 
 
 @pytest.mark.parametrize("text", ["", "9502", "127.0.0.1", "a:b", "a:70000", "::1:9502", "a:-1", "a:٣"])
 def test_what_is_no_address_is_said_with_an_example(text: str) -> None:
     with pytest.raises(SettingsError, match=r"127\.0\.0\.1:9502"):
-        parse_address(text)
+        listen_address(text)
 
 
 def test_a_token_is_one_word_that_nobody_else_may_read(token_file: Path, tmp_path: Path) -> None:

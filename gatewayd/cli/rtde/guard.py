@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
+from gatewayd.report.format import parse_address
 from gatewayd.rtde.enums import MEANINGS, ProgramState
 
 _QUIET = frozenset({ProgramState.STOPPED})
@@ -30,9 +31,7 @@ def gateway_in_the_way(host: str, port: int, named: Path | None = None) -> str:
     found = ask(tuple(dict.fromkeys(places)))
     wanted = _addresses(host, port)
     for cell in found.cells:
-        address = str(cell.status["robot"]["address"])
-        their_host, _, their_port = address.rpartition(":")
-        if _addresses(their_host.strip("[]"), int(their_port or 0)) & wanted:
+        if _addresses(*parse_address(cell.status["robot"]["address"])) & wanted:
             return (
                 f"the gateway at {cell.socket} serves this robot as cell {cell.status['name']}: "
                 "write by it, with gatewayd force"

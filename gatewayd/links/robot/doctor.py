@@ -20,7 +20,7 @@ from gatewayd.links.route import look_up_route
 from gatewayd.loop.resolve import hosts, resolve
 from gatewayd.machine.ports import connect_error
 from gatewayd.mapping.plan import LinkPlan
-from gatewayd.report.format import address, counted
+from gatewayd.report.format import address, counted, split_address
 from gatewayd.rtde.catalogue import bit_word
 from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.rtde.fields import OUTPUTS
@@ -158,8 +158,8 @@ async def _serving(
     found = []
     for cell in running:
         for link in cell.links(KIND.title):
-            host, _, port = str(link.get("address", "")).rpartition(":")
-            if port == str(plan.port) and await _is_same(host.strip("[]"), plan.host, addresses):
+            host, port = split_address(str(link.get("address", ""))) or ("", None)
+            if port == plan.port and await _is_same(host, plan.host, addresses):
                 found.append(cell)
     return found
 
