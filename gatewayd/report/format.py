@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 _DIGITS = 3
 _JUST_NOW = 0.0005
-"""Seconds below which an age has no figure."""
+"""Seconds up to which an age has no figure: half a millisecond is rounded to none."""
 YOU = "you"
 """Who takes part in the demonstration."""
 MAX_PORT = 0xFFFF
@@ -77,7 +77,7 @@ def ago(duration: float | None) -> str:
     """`12 ms ago`, `5 min ago`; `just now` where no figure would be left, `never` for None or infinity."""
     if duration is None or duration == math.inf:
         return "never"
-    return "just now" if duration < _JUST_NOW else f"{age(duration)} ago"
+    return "just now" if duration <= _JUST_NOW else f"{age(duration)} ago"
 
 
 def counted(count: int, noun: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gatewayd.report.format import (
@@ -97,6 +97,7 @@ def test_verbs_agree_with_names_and_counts(base: str, name: str, count: int) -> 
     assert verb(base, "you") == verb(base, name, 2)
 
 
+@example(0.0005)
 @given(st.floats(allow_nan=False) | st.none())
 def test_no_age_is_a_zero(duration: float | None) -> None:
     text = ago(duration)
