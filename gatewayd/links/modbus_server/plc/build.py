@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
@@ -76,6 +77,16 @@ def _host(wished: str | None, modbus: ModbusPlan) -> str:
             f"`{printable(wished)}` is no address: --host takes an IP address or the name of a host"
         )
     return wished
+
+
+def refuse_name(host: str, client: str) -> None:
+    """Raises ExportError where the client of a tool takes IPv4 addresses only, and the host is none."""
+    try:
+        ipaddress.IPv4Address(host)
+    except ValueError:
+        raise ExportError(
+            f"{client} takes an IPv4 address, and `{host}` is none: say with --host how the PLC reaches the gateway"
+        ) from None
 
 
 def _modbus_of(plan: Plan) -> ModbusPlan:

@@ -30,6 +30,7 @@ from gatewayd.modbus.codec import TYPES, make_codec
 from gatewayd.plc.model import Tag
 from gatewayd.plc.tags import PlcWishes
 from tests.links.modbus_server.plc.cells import complete_plan
+from tests.links.modbus_server.plc.logix_translation import header as logix
 from tests.links.modbus_server.plc.translation import header
 
 COMPILER = shutil.which("cc")
@@ -90,7 +91,7 @@ def source(model: PlcModel) -> str:
             for poll in model.reads
         ),
         "write": "".join(
-            f'for (int i = 0; i < {poll.count}; i++)\nprintf("%04x\\n", image.{poll.name}[i]);\n'
+            f'for (int i = 0; i < {poll.count}; i++)\nprintf("%04x\\n", (uint16_t)image.{poll.name}[i]);\n'
             for poll in model.writes
         ),
         "show": "".join(
@@ -108,7 +109,12 @@ def source(model: PlcModel) -> str:
 def program(folder: Path, model: PlcModel, target: str = "c") -> Path:
     """A compiled PLC: with an argument it decodes words, without one it encodes numbers."""
     (made,) = files_for("c", model)
-    (folder / "gw.h").write_text(made.content().decode() if target == "c" else header(model))
+    texts = {
+        "c": lambda: made.content().decode(),
+        "iec-st": lambda: header(model),
+        "studio5000": lambda: logix(model),
+    }
+    (folder / "gw.h").write_text(texts[target]())
     (folder / "main.c").write_text(source(model))
     binary = folder / "plc"
     warnings = ["-Wall", "-Werror", "-Wno-unused-but-set-variable", "-Wno-unused-function"]
@@ -223,7 +229,7 @@ def tags_of(model: PlcModel, direction: Direction) -> list[Tag]:
     return [tag for member in members for tag in member.tags]
 
 
-@pytest.mark.parametrize("target", ["c", "iec-st"])
+@pytest.mark.parametrize("target", ["c", "iec-st", "studio5000"])
 async def test_what_the_program_reads_is_what_the_gateway_means(
     gateway: Gateway, tmp_path: Path, target: str
 ) -> None:
@@ -245,7 +251,7 @@ async def test_what_the_program_reads_is_what_the_gateway_means(
             assert is_same(number_of(text, tag), shown_value, tag, digits), (tag, text, value)
 
 
-@pytest.mark.parametrize("target", ["c", "iec-st"])
+@pytest.mark.parametrize("target", ["c", "iec-st", "studio5000"])
 async def test_what_the_program_writes_is_what_the_robot_gets(
     gateway: Gateway, tmp_path: Path, target: str
 ) -> None:

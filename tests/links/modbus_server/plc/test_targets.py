@@ -49,6 +49,12 @@ def test_generated_files_know_that_they_are(target: str) -> None:
 
 
 @EVERY_TARGET
+def test_files_have_names_of_their_own(target: str) -> None:
+    names = [file.name for file in files_for(target, golden_model())]
+    assert len(set(names)) == len(names)
+
+
+@EVERY_TARGET
 def test_texts_of_the_mapping_never_leave_their_comment(target: str) -> None:
     """TIA Portal's comments end with the line: what follows would be code."""
     found = model(

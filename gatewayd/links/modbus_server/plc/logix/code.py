@@ -70,7 +70,7 @@ def _read(tag: RegisterTag, poll: Poll, prefix: str) -> Iterator[str]:
         yield f"{target} := {array}[{index}]{'' if poll.area.of_bits else f'.{tag.bit}'};"
         return
     number, wire = TYPES[tag.encoding.type], NUMBERS[tag.encoding.type].type
-    is_whole = tag.type == wire and tag.type != "BOOL"
+    is_whole = tag.type != "BOOL" and not tag.arithmetic
     raw = target if is_whole else f"{prefix}_{_raw_type(wire)}"
     if number.is_byte:
         yield f"COP({array}[{index}], {prefix}_Bytes[0], 2);"
@@ -99,7 +99,7 @@ def _write(tag: RegisterTag, array: str, index: int, prefix: str) -> Iterator[st
         return
     number, wire = TYPES[tag.encoding.type], NUMBERS[tag.encoding.type].type
     raw = source
-    if tag.type != wire or tag.type == "BOOL":
+    if tag.arithmetic or tag.type == "BOOL":
         raw = f"{prefix}_{_raw_type(wire)}"
         yield from _raw(tag, tag.encoding, source, raw, prefix)
     if number.is_byte:

@@ -1,18 +1,26 @@
-"""Studio 5000: data types and routines as L5X, tags as a table, and the transactions of the Modbus client to type in.
+"""Studio 5000: data types and routines as L5X, tags as a table.
 
-Logix controllers have no Modbus of their own. The client is an add-on instruction of Rockwell's sample code library,
-whose interface is not published in a form that could be relied on here: so its transactions are printed, and the
-routines work on the arrays of the image, into and from which its data are copied.
+Logix controllers have no Modbus of their own. The client is an add-on instruction of Rockwell's, which is imported as a
+rung with its tags; a routine tells these what to do. A cell that is too large for it has its transactions as comments.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from gatewayd.links.exports import ExportedFile
+from gatewayd.links.modbus_server.plc.build import refuse_name
+from gatewayd.links.modbus_server.plc.logix.client import (
+    TooMuch,
+    Transaction,
+    client,
+    client_tags,
+    transactions,
+)
 from gatewayd.links.modbus_server.plc.logix.code import pack, unpack, watch
-from gatewayd.links.modbus_server.plc.model import PlcModel
+from gatewayd.links.modbus_server.plc.logix.handshake import MEMBERS, handshake
+from gatewayd.links.modbus_server.plc.model import PlcModel, Poll
 from gatewayd.links.modbus_server.plc.polling import plan_lines
 from gatewayd.plc.header import beginning, header, overview
 from gatewayd.plc.keywords import LOGIX
@@ -29,7 +37,7 @@ _SCRATCH: Final = ("SINT", "INT", "DINT", "REAL")
 
 
 def files(model: PlcModel) -> Iterator[ExportedFile]:
-    """In the order in which they are imported: data types, tags, routines."""
+    """In the order in which they are imported: data types, tags, routines. Raises ExportError for a host by name."""
     prefix = model.prefix
     about = "\n".join(header(model, "Studio 5000"))
     kinds = {
@@ -37,20 +45,31 @@ def files(model: PlcModel) -> Iterator[ExportedFile]:
         "Outputs": [_member(family) for family in model.outputs],
         "Image": list(_image(model)),
         "Status": list(_status(model)),
+        "HandshakeType": list(MEMBERS) if model.inputs else [],
     }
     for name, members in kinds.items():
         if members:
             yield _file(f"{prefix}_{name}.L5X", data_type(f"{prefix}_{name}", about, members))
     present = [f"{prefix}_{name}" for name, members in kinds.items() if members]
-    controller_tags = [LogixMember(name, name) for name in present]
+    controller_tags = [LogixMember(name.removesuffix("Type"), name) for name in present]
+    plan, why_not = _plan(model)
+    if plan:
+        refuse_name(model.host, "Rockwell's Modbus client")
     remarks = (*header(model, "tags"), *overview(model), *plan_lines(model))
-    yield _file(f"{prefix}_Tags.csv", tags(remarks, (*controller_tags, *_scratch(model))))
+    yield _file(
+        f"{prefix}_Tags.csv", tags(remarks, (*controller_tags, *_scratch(model), *client_tags(model, plan)))
+    )
     routines = {"Watch": watch(model), "Unpack": unpack(model) if model.outputs else ()}
     if model.inputs:
         routines["Pack"] = pack(model)
+        routines["Handshake"] = handshake(model)
+    if plan:
+        routines["Client"] = client(model, plan)
     for name, lines in routines.items():
         yield _file(f"{prefix}_{name}.L5X", _routine(f"{prefix}_{name}", lines, about))
-    yield _file(f"{prefix}_Main.L5X", _routine(f"{prefix}_Main", _main(model), beginning(model)), once=True)
+    yield _file(
+        f"{prefix}_Main.L5X", _routine(f"{prefix}_Main", _main(model, why_not), beginning(model)), once=True
+    )
 
 
 def _file(name: str, text: str, *, once: bool = False) -> ExportedFile:
@@ -138,18 +157,34 @@ _WIRE_OF: Final = {
 }
 
 
-def _main(model: PlcModel) -> Iterator[str]:
+def _plan(model: PlcModel) -> tuple[Sequence[Transaction], str]:
+    """The transactions of the client; where it cannot hold them, none and the reason."""
+    try:
+        return transactions(model), ""
+    except TooMuch as error:
+        return (), str(error)
+
+
+def _main(model: PlcModel, why_not: str) -> Iterator[str]:
     prefix = model.prefix
-    yield "// Copy what the Modbus client has read into the arrays of the image, for instance:"
-    for poll in model.polls:
-        if not poll.writes:
-            yield f"// transaction {poll.name}: FC {poll.function}, address {poll.address}, count {poll.count}"
+    if why_not:
+        yield f"// Rockwell's client cannot hold this cell: {why_not}. Call another one here, for instance"
+        yield "// that of a module, and copy what it has read into the arrays of the image:"
+        yield from _listed(poll for poll in model.polls if not poll.writes)
+    else:
+        yield f"JSR({prefix}_Client);"
     yield f"JSR({prefix}_Watch);"
     if model.outputs:
         yield f"JSR({prefix}_Unpack);"
     yield "// your program: it reads the outputs, and writes the inputs"
     if model.inputs:
         yield f"JSR({prefix}_Pack);"
-        yield f"// Enable these transactions only while {prefix}_Status.trusted AND {prefix}_Write:"
-        for poll in model.writes:
-            yield f"// transaction {poll.name}: FC {poll.function}, address {poll.address}, count {poll.count}"
+        if why_not:
+            yield f"// Let it write only while {prefix}_Status.trusted AND {prefix}_Write; count in {prefix}_Written"
+            yield "// the rounds in which all writes were confirmed:"
+            yield from _listed(model.writes)
+
+
+def _listed(polls: Iterable[Poll]) -> Iterator[str]:
+    for poll in polls:
+        yield f"// {poll.name}: FC {poll.function}, address {poll.address}, count {poll.count}"

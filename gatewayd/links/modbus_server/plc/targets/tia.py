@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import ipaddress
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from gatewayd.links.exports import ExportedFile, ExportError
+from gatewayd.links.exports import ExportedFile
+from gatewayd.links.modbus_server.plc.build import refuse_name
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.polling import plan_lines
 from gatewayd.links.modbus_server.plc.st.exchange import sequence
@@ -27,7 +27,7 @@ DIALECT: Final = Dialect(CONVERSION, names_operands=True, quotes=True, enumerati
 
 def files(model: PlcModel) -> Iterator[ExportedFile]:
     """Data types first, then the data block, functions, blocks, and a block to begin with."""
-    _refuse_name(model.host)
+    refuse_name(model.host, "TCON_IP_v4")
     prefix = model.prefix
     head = header(model, "TIA Portal")
     about = (*head, *overview(model), *plan_lines(model))
@@ -36,15 +36,6 @@ def files(model: PlcModel) -> Iterator[ExportedFile]:
     units = [*functions(model, DIALECT), *blocks(model, DIALECT), sequence(model), client(model)]
     yield _file(f"{prefix}_3_Blocks.scl", head, map(unit_source, units))
     yield _file(f"{prefix}_4_Main.scl", (beginning(model),), [unit_source(_main(model))], once=True)
-
-
-def _refuse_name(host: str) -> None:
-    try:
-        ipaddress.IPv4Address(host)
-    except ValueError:
-        raise ExportError(
-            f"TCON_IP_v4 takes an IPv4 address, and `{host}` is none: say with --host how the PLC reaches the gateway"
-        ) from None
 
 
 def _main(model: PlcModel) -> ProgramUnit:
