@@ -322,7 +322,6 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "cli.importing.register_list.rows": "tests/cli/importing/register_list/test_proposal.py",
     "cli.importing.register_list.variables": "tests/cli/importing/register_list/test_proposal.py",
     "cli.rtde": "a table; tests/cli/test_main.py",
-    "cli.rtde.progress_lines": "tests/cli/rtde/test_record.py",
     "cli.rtde.record_options": "tests/cli/rtde/test_record.py tries every contradiction",
     "cli.rtde.recording_run": "tests/cli/rtde/test_record.py ends it in every way",
     "cli.rtde.robot_source": "tests/cli/rtde/test_record.py, with a simulator",

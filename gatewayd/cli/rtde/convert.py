@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from gatewayd.cli.rtde.progress import size_text
-from gatewayd.cli.rtde.recordings import Progress, delimiter_option, reported, typed
+from gatewayd.cli.rtde.recordings import delimiter_option, reading_progress, reported, typed
 from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
 
@@ -73,7 +73,7 @@ def command(
         raise click.UsageError(f"the name {out!r} stands for no format: choose one with --format")
     if wanted is not RecordingFormat.CSV and typed(context, "delimiter"):
         raise click.UsageError(f"--delimiter separates the columns of text, and {out} is to be {wanted.word}")
-    with Progress() as progress, reported(context, remedy="overwrite it with --force"):
+    with reading_progress() as progress, reported(context, remedy="overwrite it with --force"):
         done = convert(
             file, out, wanted, delimiters=(input_delimiter, delimiter), overwrite=force, progress=progress
         )

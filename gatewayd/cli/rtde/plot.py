@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from gatewayd.cli.output import refuse_existing, write_bytes
-from gatewayd.cli.rtde.recordings import FAILED, Progress, delimiter_option, reported
+from gatewayd.cli.rtde.recordings import FAILED, delimiter_option, reading_progress, reported
 from gatewayd.report.format import counted, listed
 from gatewayd.report.printable import printable
 
@@ -154,7 +154,7 @@ def _read(file: str, delimiter: str | None, panels: Sequence[Panel], *, running:
 
     wanted = {curve.column for panel in panels for curve in panel.curves}
     gaps = {gap.package for gap in read_gaps(file)}
-    with Progress() as progress, open_recording(file, delimiter=delimiter) as recording:
+    with reading_progress() as progress, open_recording(file, delimiter=delimiter) as recording:
         runs = program_runs(recording.recipe) if running else None
         if running and runs is None:
             raise click.UsageError(f"--running needs runtime_state or robot_status_bits, which {file} lacks")
@@ -164,7 +164,7 @@ def _read(file: str, delimiter: str | None, panels: Sequence[Panel], *, running:
     return found
 
 
-def _watched(recording: RecordingReader, progress: Progress) -> Iterator[Row]:
+def _watched(recording: RecordingReader, progress: Callable[[RecordingReader, int], None]) -> Iterator[Row]:
     """The packages, while progress is shown."""
     for number, row in enumerate(recording.rows()):
         if number % _TOGETHER == 0:

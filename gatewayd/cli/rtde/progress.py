@@ -1,4 +1,4 @@
-"""How a recording goes, in words: a line while it runs and one at its end. Pure."""
+"""How far recording and reading are, in words: a line meanwhile and one at the end. Pure."""
 
 from __future__ import annotations
 
@@ -42,6 +42,11 @@ def progress_line(tally: Tally) -> str:
         _missing(tally),
     ]
     return "   ".join([*parts, tally.waiting] if tally.waiting else parts)
+
+
+def reading_line(position: int, total: int, packages: int) -> str:
+    """` 42%, 6000 packages`: of the bytes of a file."""
+    return f"{position / total if total else 1:4.0%}, {counted(packages, 'package')}"
 
 
 def summary(path: str, tally: Tally, sidecar: str) -> str:

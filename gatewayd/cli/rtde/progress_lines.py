@@ -1,4 +1,4 @@
-"""The progress of a recording on standard error."""
+"""The progress of what takes long, on standard error."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Self
 
 import click
 
-from gatewayd.cli.rtde.progress import Tally, progress_line
 from gatewayd.report.printable import printable
 
 _TERMINAL_PERIOD, _LOG_PERIOD = 0.5, 10.0
@@ -25,12 +24,12 @@ class ProgressLines:
         self._next = 0.0 if self._terminal else time.monotonic() + _LOG_PERIOD
         self._drawn = False
 
-    def show(self, tally: Tally) -> None:
-        """Show how far a recording is, where it is time."""
+    def show(self, text: str) -> None:
+        """Show how far it is, where it is time."""
         now = time.monotonic()
         if self._quiet or now < self._next:
             return
-        line = printable(progress_line(tally))
+        line = printable(text)
         if self._terminal:
             click.echo(f"\r\033[K{line[: _columns() - 1]}", nl=False, err=True)
             self._drawn = True

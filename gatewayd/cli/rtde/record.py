@@ -221,13 +221,16 @@ def _run(
     import asyncio
 
     from gatewayd.cli.rtde.conditions import ConditionError
+    from gatewayd.cli.rtde.progress import progress_line
     from gatewayd.cli.rtde.progress_lines import ProgressLines
     from gatewayd.cli.rtde.recording_run import recorded
     from gatewayd.cli.rtde.sources import SourceRefusedError
     from gatewayd.control.client import Client
 
     async def record(progress: ProgressLines) -> RecordingEnd:
-        return await recorded(making(), order, progress.show, progress.note)
+        return await recorded(
+            making(), order, lambda tally: progress.show(progress_line(tally)), progress.note
+        )
 
     try:
         with (

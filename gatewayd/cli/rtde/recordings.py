@@ -5,13 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
 from gatewayd.cli.files import reason_of
-from gatewayd.report.format import counted
 from gatewayd.report.printable import printable
 
 if TYPE_CHECKING:
@@ -21,8 +20,6 @@ FAILED, WRONG = 1, 2
 """Exit codes: what was to be done failed; wrong usage, or a file that cannot be read."""
 
 _DELIMITERS = {"space": " ", "comma": ",", "semicolon": ";", "tab": "\t"}
-_STEP = 0.01
-"""Part of a file after which progress is shown anew."""
 
 
 def _delimiter(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
@@ -71,23 +68,13 @@ def reported(context: click.Context, *, remedy: str = "") -> Iterator[None]:
         context.exit(FAILED)
 
 
-class Progress:
-    """A line on a terminal that says how far the reading of a recording is; nothing elsewhere."""
+@contextmanager
+def reading_progress() -> Iterator[Callable[[RecordingReader, int], None]]:
+    """Shows on a terminal how far the reading of a recording is, with the number of packages; nothing elsewhere."""
+    from gatewayd.cli.rtde.progress import reading_line
+    from gatewayd.cli.rtde.progress_lines import ProgressLines
 
-    def __init__(self) -> None:
-        self._shown = 0.0
-        self._visible = sys.stderr.isatty()
-
-    def __call__(self, recording: RecordingReader, packages: int) -> None:
-        """Show it, where it is worth it."""
-        part = recording.position / recording.total if recording.total else 1.0
-        if self._visible and part >= self._shown + _STEP:
-            self._shown = part
-            click.echo(f"\r{part:4.0%}, {counted(packages, 'package')}", nl=False, err=True)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *problem: object) -> None:
-        if self._shown:
-            click.echo("\r\033[K", nl=False, err=True)
+    with ProgressLines(quiet=not sys.stderr.isatty()) as lines:
+        yield lambda recording, packages: lines.show(
+            reading_line(recording.position, recording.total, packages)
+        )

@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gatewayd.cli.rtde.progress import Tally, progress_line, size_text, summary
+from gatewayd.cli.rtde.progress import Tally, progress_line, reading_line, size_text, summary
 
 
 def test_a_recording_that_runs_well() -> None:
@@ -21,6 +21,11 @@ def test_what_is_missing_is_said() -> None:
     unknown = Tally(gaps=1)
     assert progress_line(unknown).endswith("1 gap")
     assert summary("a", unknown, "a.gaps").endswith("1 gap; see a.gaps")
+
+
+def test_how_far_the_reading_of_a_file_is() -> None:
+    assert reading_line(420, 1000, 6000) == " 42%, 6000 packages"
+    assert reading_line(0, 0, 0) == "100%, no packages"
 
 
 @given(st.integers(0, 10**18))
