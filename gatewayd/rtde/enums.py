@@ -121,6 +121,14 @@ class ProgramState(IntEnum):
     RETRACTING = 6
 
 
+# Whether a program runs is asked for three reasons, and each needs another answer. What a program wrote is meant from
+# RUNNING to RESUMING: `core.program` has that one, since a cell knows no bus; its test holds it against these.
+PROGRAM_ADVANCES: frozenset[int] = frozenset({ProgramState.RUNNING})
+"""The program goes through its lines: what the official reader's `filter_running_program` keeps of a recording."""
+PROGRAM_IDLE: frozenset[int] = frozenset({ProgramState.STOPPED})
+"""No program reads what it is given. A paused one goes on with what it finds then, and a stopping one still moves."""
+
+
 class TimeScaleSource(IntEnum):
     """`time_scale_source`: what slows the motion down."""
 

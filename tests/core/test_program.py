@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.core.program import STATES, is_running
-from gatewayd.rtde.enums import ProgramState
+from gatewayd.rtde.enums import PROGRAM_ADVANCES, PROGRAM_IDLE, ProgramState
 
 
 @pytest.mark.parametrize(
@@ -25,3 +25,9 @@ def test_what_nobody_knows_is_not_running(state: int | None) -> None:
 
 def test_the_states_are_those_of_rtde() -> None:
     assert set(STATES) == set(ProgramState)
+
+
+def test_a_program_that_advances_runs_and_an_idle_one_does_not() -> None:
+    running = {state for state in STATES if is_running(state)}
+    assert running > PROGRAM_ADVANCES
+    assert running.isdisjoint(PROGRAM_IDLE)

@@ -9,10 +9,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from gatewayd.report.format import parse_address
-from gatewayd.rtde.enums import MEANINGS, ProgramState
+from gatewayd.rtde.enums import MEANINGS, PROGRAM_IDLE
 
-_QUIET = frozenset({ProgramState.STOPPED})
-"""States in which no program reads what it is given. A paused one goes on with what it finds then."""
 _PATIENCE = 1.0
 _GATEWAY_COMMANDS = ("run", "demo")
 
@@ -50,7 +48,7 @@ def gateway_in_the_way(host: str, port: int, named: Path | None = None) -> str:
 
 def program_in_the_way(state: int | None) -> str:
     """Why the program's state (`runtime_state`; None: not known) forbids to write, in words; empty if it does not."""
-    if state in _QUIET:
+    if state in PROGRAM_IDLE:
         return ""
     if state is None:
         return "the controller does not say whether a program runs"

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from gatewayd.rtde.enums import PROGRAM_ADVANCES
 from gatewayd.rtde.recipe import Recipe, Scalar
 
-_PLAYING = 2
-"""`runtime_state` of a program that runs, as the official reader's filter takes it."""
 _PROGRAM_RUNNING = 1 << 1
 """Bit of `robot_status_bits`."""
 
@@ -19,7 +18,7 @@ def program_runs(recipe: Recipe) -> Callable[[Sequence[Scalar]], bool] | None:
     """
     if "runtime_state" in recipe.slots:
         state = recipe.slots["runtime_state"].start
-        return lambda row: row[state] == _PLAYING
+        return lambda row: row[state] in PROGRAM_ADVANCES
     if "robot_status_bits" in recipe.slots:
         bits = recipe.slots["robot_status_bits"].start
         return lambda row: bool(int(row[bits]) & _PROGRAM_RUNNING)
