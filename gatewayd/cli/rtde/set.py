@@ -54,7 +54,19 @@ Exit codes:
     envvar="GATEWAYD_CONTROL",
     help="Ask the gateway at this control socket, too, whether it serves the robot; all that are found here are asked.",
 )
-def command(host: Target, assignments: tuple[str, ...], *, while_running: bool, socket: Path | None) -> None:
+@click.option(
+    "--beside-unknown-gateway",
+    is_flag=True,
+    help="Write although a gateway runs here of which it cannot be found out whether it serves the robot.",
+)
+def command(
+    host: Target,
+    assignments: tuple[str, ...],
+    *,
+    while_running: bool,
+    socket: Path | None,
+    beside_unknown_gateway: bool,
+) -> None:
     """Write to inputs of the robot at HOST: claim them, write, wait until the robot shows it, and give them back.
 
     This can MOVE THE ROBOT, or what it works with. The values stay in the controller afterwards: nothing sets them
@@ -71,7 +83,7 @@ def command(host: Target, assignments: tuple[str, ...], *, while_running: bool, 
         wanted = parse_assignments(assignments)
     except AssignmentError as error:
         raise click.UsageError(str(error)) from error
-    refusal = gateway_in_the_way(*host, socket)
+    refusal = gateway_in_the_way(*host, socket, beside_unknown=beside_unknown_gateway)
     if refusal:
         raise RobotFailure(f"nothing was written: {refusal}")
     with failures():

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from gatewayd.cli.rtde import gateway_processes
+from gatewayd.cli.rtde import set as module
 from tests.cli.rtde.robot import place, rtde
 from tests.e2e.plant import Plant
 from tests.e2e.processes import HOST, Simulator, free_port, wait_for
@@ -15,6 +17,7 @@ from tests.e2e.processes import HOST, Simulator, free_port, wait_for
 def no_other_gateway(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Gateways of this machine are no matter of these tests."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr(gateway_processes, "gateway_processes", tuple)
 
 
 def stop_program(simulator: Simulator) -> Simulator:
@@ -72,7 +75,10 @@ def test_a_field_in_use_is_named_with_its_likely_holder(plant: Plant) -> None:
     assert simulator.integer("input_int_register_24") == 0
 
 
-def test_what_the_robot_does_not_take_over_is_no_success(plant: Plant) -> None:
+def test_what_the_robot_does_not_take_over_is_no_success(
+    plant: Plant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_PATIENCE", 0.2)
     simulator = stop_program(plant.simulator())
     simulator.do("overwrite input_int_register_24 3")
     result = rtde("set", place(simulator), "input_int_register_24=7")
@@ -118,8 +124,9 @@ def test_who_cannot_be_reached_is_said() -> None:
     assert "its RTDE service is off" in result.output
 
 
-def test_a_robot_that_sends_no_data_is_written_nothing(plant: Plant) -> None:
+def test_a_robot_that_sends_no_data_is_written_nothing(plant: Plant, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whether a program runs is not known then."""
+    monkeypatch.setattr(module, "_PATIENCE", 0.2)
     simulator = stop_program(plant.simulator("--silence"))
     result = rtde("set", place(simulator), "input_int_register_24=7")
     assert result.exit_code == 1

@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from gatewayd.cli import command
+from gatewayd.cli.rtde import gateway_processes as module
 from gatewayd.cli.rtde import set as set_command
 from gatewayd.rtde.fields import INPUTS, OUTPUTS, Series, SoftwareVersion
 from gatewayd.rtde.recording import open_recording
@@ -197,6 +198,9 @@ def test_set_verifies_what_it_writes(
 ) -> None:
     """`gatewayd rtde set`: registers 64, 24 and 24, as the C++ client's example of a round trip."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr(
+        module, "gateway_processes", tuple
+    )  # those of this machine are no matter of this test
     robot.overwrite("runtime_state", "STOPPED")
     assignments = ("input_bit_register_64=on", "input_int_register_24=5", "input_double_register_24=0.5")
     assert "input_double_register_24 = 0.5" in rtde("set", "HOST", *assignments).stdout
