@@ -44,6 +44,7 @@ LAYERS: dict[str, set[str]] = {
     "encoding": {"core.definition", "encoding"},
     "modbus": {"core.definition", "encoding", "modbus"},
     "canopen": {"canopen", "core.definition", "loop", "machine.netlink"},
+    "dashboard": {"dashboard", "loop"},
     "simulator": {"report.format", "rtde", "simulator"},
     "mapping": {
         "core.definition",
@@ -237,6 +238,7 @@ PURE = (
     "canopen",
     "control",
     "core",
+    "dashboard",
     "doctor",
     "links",
     "mapping",
@@ -258,6 +260,7 @@ IMPURE = {
     "control.client": "has the socket",
     "control.endpoint": "has the socket",
     "control.server": "speaks HTTP",
+    "dashboard.client": "has the socket",
     "links.canopen_node.doctor": "hears the bus",
     "links.canopen_node.runtime": "a link at work",
     "links.canopen_node.store": "has the file, and a task that waits for it",

@@ -95,6 +95,21 @@ Exit codes:
     "scenario.",
 )
 @click.option(
+    "--dashboard",
+    type=click.IntRange(0, 65535),
+    metavar="PORT",
+    help="A dashboard server on this TCP port (a controller has it on 29999); 0 takes a free one and prints it. Not "
+    "for PolyScope X, which has none. Default: none.",
+)
+@click.option(
+    "--dashboard-programs",
+    metavar="FILE,...",
+    help="Programs that can be loaded by it; the first one is. Default: pick.urp,place.urp.",
+)
+@click.option(
+    "--local-control", is_flag=True, help="With --dashboard: an e-Series robot in local control at first."
+)
+@click.option(
     "--scenario",
     type=click.Path(path_type=Path),
     metavar="FILE",
@@ -299,7 +314,10 @@ def _run(robots: Robots, *, control: bool) -> int:
 
 def _refused(robots: Robots) -> str:
     """The address that could not be had."""
-    return next(f"{robot.host}:{robot.port}" for robot in robots.values() if not robot.started)
+    robot = next(robot for robot in robots.values() if not robot.started)
+    is_dashboard = robot.dashboard is not None and robot.has_port
+    port = robot.dashboard.port if robot.dashboard is not None and is_dashboard else robot.port
+    return f"{robot.host}:{port}"
 
 
 def _reason(error: OSError) -> str:

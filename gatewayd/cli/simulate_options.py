@@ -11,12 +11,24 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from gatewayd.simulator.fleet import RobotHost, Robots
+    from gatewayd.simulator.fleet import DashboardHost, RobotHost, Robots
     from gatewayd.simulator.program import ProgramRule
     from gatewayd.simulator.settings import RobotSettings
 
 _ABOUT_THE_PROCESS = frozenset(
-    {"host", "ports", "connections", "control", "quiet", "speed", "stepped", "scenario"}
+    {
+        "host",
+        "ports",
+        "connections",
+        "control",
+        "quiet",
+        "speed",
+        "stepped",
+        "scenario",
+        "dashboard",
+        "dashboard_programs",
+        "local_control",
+    }
 )
 """Options beside --scenario: the others describe a robot, as the file does."""
 _NOT_REPLAYED = frozenset({"programs", "program_files", "model", "uptime", "boot_restart"})
@@ -41,6 +53,9 @@ def robots_of(
     connections: int,
     speed: float,
     stepped: bool,
+    dashboard: int | None,
+    dashboard_programs: str | None,
+    local_control: bool,
     scenario: Path | None,
     replay: Path | None,
     loop: bool,
@@ -54,7 +69,14 @@ def robots_of(
     from gatewayd.simulator.fleet import RobotHost, plain_robots
     from gatewayd.simulator.program import ProgramError
 
-    at = RobotHost(host, ports, connections, speed, stepped)
+    at = RobotHost(
+        host,
+        ports,
+        connections,
+        speed,
+        stepped,
+        _dashboard(dashboard, dashboard_programs, local=local_control),
+    )
     if scenario is not None:
         _refuse_beside(ctx, "--scenario", lambda name: name not in _ABOUT_THE_PROCESS, "write it in the file")
         return _of_scenario(scenario, at)
@@ -69,7 +91,18 @@ def robots_of(
     except ProgramError as error:
         raise MistakeInFileError(str(error)) from error
     except ValueError as error:
-        raise click.BadParameter(str(error), param_hint="--hold, --field") from error
+        raise click.BadParameter(str(error), param_hint="--hold, --field, --dashboard") from error
+
+
+def _dashboard(port: int | None, programs: str | None, *, local: bool) -> DashboardHost | None:
+    from gatewayd.simulator.dashboard import DEFAULT_PROGRAMS
+    from gatewayd.simulator.fleet import DashboardHost
+
+    if port is None:
+        if programs is not None or local:
+            raise click.UsageError("--dashboard-programs and --local-control need --dashboard PORT")
+        return None
+    return DashboardHost(port, DEFAULT_PROGRAMS if programs is None else _fields(programs), local)
 
 
 def _refuse_beside(ctx: click.Context, option: str, refused: Callable[[str], bool], remedy: str) -> None:

@@ -9,6 +9,8 @@
     program play|pause|stop      start, pause or end the robot program; the arm brakes
     safety CONDITION             normal, reduced, protective-stop, safeguard-stop, recovery, robot-emergency-stop,
                                  system-emergency-stop, violation or fault; program and power follow
+    remote on|off                remote or local control, as the pendant chooses it (e-Series with --dashboard)
+    load NAME|none               load a program, as the pendant does (--dashboard)
     freeze on|off                timestamp stands still, packages go on
     creep on|off                 as freeze, but the timestamp goes on by 1 ns a cycle
     silence on|off               no data packages
@@ -16,6 +18,7 @@
     delay SECONDS                packages and answers leave this late; 0: at once
     drop-at STEP[:NUMBER]|off    close the next connection that gets there, see --drop-at
     drop-clients                 cut every connection; ok COUNT
+    drop-dashboard               cut every connection of the dashboard server; ok COUNT
     text MESSAGE                 text message (warning) to every client
     raw HEX                      these bytes, whatever they are, to every client: `raw 000352`
     restart                      boot again: connections, registers and timestamp from the beginning
@@ -38,6 +41,7 @@ from functools import partial
 from gatewayd.rtde.catalogue import suggest
 from gatewayd.rtde.enums import STATES
 from gatewayd.rtde.types import INTEGER_RANGES
+from gatewayd.simulator.dashboard_server import DashboardServer
 from gatewayd.simulator.faults import DropAt
 from gatewayd.simulator.modes import POWER_COMMANDS, PROGRAM, SAFETY
 from gatewayd.simulator.server import NOT_STEPPED, SimulatedController
@@ -69,6 +73,8 @@ class Control:
             "power": self._power,
             "program": self._program,
             "safety": self._safety,
+            "remote": self._remote,
+            "load": self._load,
             "freeze": partial(self._switch, "freeze"),
             "creep": partial(self._switch, "creep"),
             "silence": partial(self._switch, "silence"),
@@ -76,6 +82,7 @@ class Control:
             "delay": self._delay,
             "drop-at": self._drop_at,
             "drop-clients": lambda _: lambda: str(simulator.drop_clients()),
+            "drop-dashboard": lambda _: lambda: str(self._dashboard().drop_clients()),
             "text": lambda text: lambda: simulator.say(text),
             "raw": self._raw,
             "restart": lambda _: simulator.restart,
@@ -141,6 +148,23 @@ class Control:
     def _safety(self, rest: str) -> Action:
         word = _choice(rest, SAFETY)
         return lambda: self._controller.modes.set_safety(word)
+
+    def _remote(self, text: str) -> Action:
+        polyscope = self._dashboard().polyscope
+        if not polyscope.knows_local_control:
+            raise ValueError("a CB3 controller knows no local control")
+        on = _choice(text, ("on", "off")) == "on"
+        return lambda: setattr(polyscope, "remote", on)
+
+    def _load(self, rest: str) -> Action:
+        polyscope = self._dashboard().polyscope
+        name = _choice(rest, ("none", *polyscope.programs))
+        return lambda: setattr(polyscope, "loaded", None if name == "none" else name)
+
+    def _dashboard(self) -> DashboardServer:
+        if self._simulator.dashboard is None:
+            raise ValueError("it has no dashboard server; start it with --dashboard")
+        return self._simulator.dashboard
 
     def _switch(self, fault: str, text: str) -> Action:
         if text not in ("on", "off"):

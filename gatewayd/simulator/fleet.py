@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gatewayd.report.format import counted
+from gatewayd.simulator.controller import Controller
+from gatewayd.simulator.dashboard import DEFAULT_PROGRAMS, PolyScope
+from gatewayd.simulator.dashboard_server import DashboardServer
 from gatewayd.simulator.program import ProgramError
 from gatewayd.simulator.replay import RecordedRobot, Replay
 from gatewayd.simulator.scenario import Scenario, ScenarioError
@@ -22,6 +25,23 @@ Robots = dict[str, SimulatedController]
 
 
 @dataclass(frozen=True, slots=True)
+class DashboardHost:
+    """Where the dashboard servers of robots are, and what they find."""
+
+    port: int = 0
+    """Of the first robot; others follow. 0 takes free ones."""
+    programs: tuple[str, ...] = DEFAULT_PROGRAMS
+    local: bool = False
+    """Whether e-Series controllers begin in local control."""
+
+    def server(self, controller: Controller, host: str, number: int) -> DashboardServer:
+        """The one of robot `number`, from 0. ValueError for a PolyScope X controller."""
+        polyscope = PolyScope(controller, self.programs)
+        polyscope.remote = not self.local
+        return DashboardServer(polyscope, host, self.port + number if self.port else 0)
+
+
+@dataclass(frozen=True, slots=True)
 class RobotHost:
     """Where robots are served, and how their time passes."""
 
@@ -31,10 +51,11 @@ class RobotHost:
     connections: int = MAX_CONNECTIONS
     speed: float = 1.0
     stepped: bool = False
+    dashboard: DashboardHost | None = None
 
-    def serve(self, settings: RobotSettings, port: int) -> SimulatedController:
-        """A robot on a port of this host. ProgramError and ValueError as `Controller` raises them."""
-        return SimulatedController(
+    def serve(self, settings: RobotSettings, port: int, number: int = 0) -> SimulatedController:
+        """Robot `number`, from 0, on a port of this host. ProgramError and ValueError as `Controller` raises them."""
+        simulator = SimulatedController(
             settings.controller(),
             host=self.host,
             port=port,
@@ -42,6 +63,9 @@ class RobotHost:
             speed=self.speed,
             stepped=self.stepped,
         )
+        if self.dashboard is not None:
+            simulator.dashboard = self.dashboard.server(simulator.controller, self.host, number)
+        return simulator
 
     def port(self, number: int, declared: int | None = None) -> int:
         """The port of robot `number`, from 0."""
@@ -54,7 +78,7 @@ class RobotHost:
 
 def plain_robots(settings: RobotSettings, at: RobotHost) -> Robots:
     """Equal robots, one for each port; the single one is `robot`, several are `robot1`, `robot2` and so on."""
-    return _each(lambda port: at.serve(settings, port), at)
+    return _each(lambda port, number: at.serve(settings, port, number), at)
 
 
 def scenario_robots(scenario: Scenario, at: RobotHost) -> Robots:
@@ -69,7 +93,7 @@ def scenario_robots(scenario: Scenario, at: RobotHost) -> Robots:
     robots: Robots = {}
     for number, robot in enumerate(scenario.robots):
         try:
-            simulator = at.serve(robot.settings, at.port(number, robot.port))
+            simulator = at.serve(robot.settings, at.port(number, robot.port), number)
         except ProgramError as error:
             message = str(error).split(": ", 1)[-1]
             raise ScenarioError(scenario.file, robot.program_line(error.line), message) from None
@@ -83,7 +107,7 @@ def scenario_robots(scenario: Scenario, at: RobotHost) -> Robots:
 def replayed_robots(path: str | Path, settings: RobotSettings, at: RobotHost, *, repeat: bool) -> Robots:
     """A recording on each port. RecordingError if it cannot be read, ValueError as `Controller` raises it."""
 
-    def recorded(port: int) -> SimulatedController:
+    def recorded(port: int, number: int) -> SimulatedController:
         recording = RecordedRobot(path)
         own = {field.name: field for field in (*settings.fields, *recording.fields)}
         simulator = at.serve(
@@ -94,6 +118,7 @@ def replayed_robots(path: str | Path, settings: RobotSettings, at: RobotHost, *,
                 replayed=recording.recipe.names,
             ),
             port,
+            number,
         )
         simulator.follower = Replay(simulator, recording, repeat=repeat)
         return simulator
@@ -101,8 +126,8 @@ def replayed_robots(path: str | Path, settings: RobotSettings, at: RobotHost, *,
     return _each(recorded, at)
 
 
-def _each(robot: Callable[[int], SimulatedController], at: RobotHost) -> Robots:
+def _each(robot: Callable[[int, int], SimulatedController], at: RobotHost) -> Robots:
     ports = at.ports or (DEFAULT_PORT,)
     if len(ports) == 1:
-        return {"robot": robot(ports[0])}
-    return {f"robot{number}": robot(port) for number, port in enumerate(ports, 1)}
+        return {"robot": robot(ports[0], 0)}
+    return {f"robot{number + 1}": robot(port, number) for number, port in enumerate(ports)}

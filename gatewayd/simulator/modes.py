@@ -59,22 +59,20 @@ _ON = frozenset(
 )
 _ACTIVE = frozenset({ProgramState.RUNNING, ProgramState.RESUMING})
 
+_SWITCHING_ON = (
+    _power(0.0, RobotMode.POWER_ON, JointMode.BOOTING),
+    _power(0.5, RobotMode.BOOTING, JointMode.BOOTING),
+    _power(1.5, RobotMode.IDLE, JointMode.IDLE),
+)
+_RELEASING = (
+    _power(0.0, RobotMode.IDLE, JointMode.MOTOR_INITIALISATION),
+    _power(1.0, RobotMode.RUNNING, JointMode.RUNNING),
+)
+
 POWER: Mapping[str, ModeSequence] = {
-    "on": ModeSequence(
-        frozenset({RobotMode.POWER_OFF}),
-        (
-            _power(0.0, RobotMode.POWER_ON, JointMode.BOOTING),
-            _power(0.5, RobotMode.BOOTING, JointMode.BOOTING),
-            _power(1.5, RobotMode.IDLE, JointMode.IDLE),
-        ),
-    ),
-    "release": ModeSequence(
-        frozenset({RobotMode.IDLE}),
-        (
-            _power(0.0, RobotMode.IDLE, JointMode.MOTOR_INITIALISATION),
-            _power(1.0, RobotMode.RUNNING, JointMode.RUNNING),
-        ),
-    ),
+    "on": ModeSequence(frozenset({RobotMode.POWER_OFF}), _SWITCHING_ON),
+    "release": ModeSequence(frozenset({RobotMode.IDLE}), _RELEASING),
+    "start": ModeSequence(frozenset({RobotMode.POWER_OFF}), (*_SWITCHING_ON, *_RELEASING)),
     "off": ModeSequence(
         _ON,
         (
@@ -84,7 +82,8 @@ POWER: Mapping[str, ModeSequence] = {
     ),
     "brake": ModeSequence(_ON, (_power(BRAKING, RobotMode.IDLE, JointMode.IDLE),)),
 }
-"""Commands of the arm's power; `brake` is what an emergency stop does."""
+"""Commands of the arm's power; `brake` is what an emergency stop does, `start` what releasing the brakes does by the
+dashboard server while the arm is off."""
 
 POWER_COMMANDS = ("on", "off", "release")
 """Those of them that a person gives."""
@@ -179,7 +178,7 @@ class RobotModes:
         return bool(self._power or self._program)
 
     def switch_power(self, command: str) -> None:
-        """`on`, `off` or `release` (the brakes). ModeError if the robot is not in the mode for it."""
+        """`on`, `off`, `release` (the brakes) or `start` (both). ModeError if the robot is not in the mode for it."""
         mode = self._get("robot_mode")
         if mode not in POWER[command].start:
             self._refuse(f"the robot is {_name(RobotMode, mode)}", RobotMode, POWER[command].start)

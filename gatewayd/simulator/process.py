@@ -21,7 +21,8 @@ async def serve(simulators: Mapping[str, SimulatedController], *, control: bool)
     """Run until SIGTERM, SIGINT, SIGHUP or, with `control`, `quit` or the end of standard input.
 
     Prints `listening on HOST:PORT` once connections are accepted, for each of several robots `NAME: listening on
-    HOST:PORT`. Ends as well when what drives the robots has come to its end. OSError if an address cannot be had.
+    HOST:PORT`, and `dashboard on HOST:PORT` likewise where it has a dashboard server. Ends as well when what drives the
+    robots has come to its end. OSError if an address cannot be had.
     """
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -35,6 +36,8 @@ async def serve(simulators: Mapping[str, SimulatedController], *, control: bool)
         for name, simulator in simulators.items():
             prefix = f"{name}: " if len(simulators) > 1 else ""
             _say(f"{prefix}listening on {address(simulator.host, simulator.port)}", stop)
+            if simulator.dashboard is not None:
+                _say(f"{prefix}dashboard on {address(simulator.host, simulator.dashboard.port)}", stop)
         await stop.wait()
         if reader is not None:
             reader.cancel()

@@ -19,6 +19,7 @@ from typing import Protocol, Self, cast
 from gatewayd.rtde.codec import ProtocolError
 from gatewayd.simulator.clock import EARLY, ScaledClock, SimulatorClock, SteppedClock
 from gatewayd.simulator.controller import Controller
+from gatewayd.simulator.dashboard_server import DashboardServer
 from gatewayd.simulator.faults import DroppedError, Faults, Mangler
 from gatewayd.simulator.line import OutgoingLine
 from gatewayd.simulator.session import SimulatorSession
@@ -87,6 +88,8 @@ class SimulatedController:
         """By which delays, pauses and lingering claims count."""
         self.follower: CycleFollower | None = None
         """What happens by itself; to be set before the start."""
+        self.dashboard: DashboardServer | None = None
+        """Its dashboard server; to be set before the start."""
         self.ended: Callable[[], None] | None = None
         """Called when there is nothing left to show: at the end of a recording."""
         self.refused = 0
@@ -106,7 +109,11 @@ class SimulatedController:
         self._paused_until = -math.inf
 
     async def __aenter__(self) -> Self:
-        await self.start()
+        try:
+            await self.start()
+        except OSError:
+            await self._close()
+            raise
         return self
 
     async def __aexit__(
@@ -116,7 +123,12 @@ class SimulatedController:
 
     @property
     def started(self) -> bool:
-        """Whether it has listened."""
+        """Whether it has listened, its dashboard server as well."""
+        return self._server is not None and (self.dashboard is None or self.dashboard.started)
+
+    @property
+    def has_port(self) -> bool:
+        """Whether it has listened for RTDE clients."""
         return self._server is not None
 
     @property
@@ -238,8 +250,12 @@ class SimulatedController:
         self._server = await loop.create_server(self._accept, self.host, self.port, start_serving=False)
         await self._server.start_serving()  # only now: `enter` asks it
         self.port = self._server.sockets[0].getsockname()[1]
+        if self.dashboard is not None:
+            await self.dashboard.start()
 
     async def _close(self) -> None:
+        if self.dashboard is not None:
+            await self.dashboard.stop()
         if self._server is not None:
             # asyncio (3.11) leaks a connection that it accepted and has not handed on when its server is closed.
             for listening in self._server.sockets:
