@@ -57,3 +57,22 @@ def test_a_file_with_errors_is_exit_code_2_and_listed() -> None:
     assert done.exit_code == 2
     assert "error GW214" in done.stderr
     assert done.stdout == ""
+
+
+def test_mistakes_in_tests_are_notes_as_a_reload_takes_the_file() -> None:
+    text = SMALL.read_text()
+    assert "\ntests:\n" in text
+    changed = text.replace("\ntests:\n", "\ntests:\n  wrong:\n    - {by: nobody, write: {start: true}}\n", 1)
+    done = diff(SMALL, "-", content=changed)
+    assert (done.exit_code, done.stdout) == (0, "small-cell: no difference\n")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("stdin:")
+    assert ": note: GW" in line
+    assert "in tests only: " in line
+
+
+def test_other_mistakes_beside_those_in_tests_are_errors() -> None:
+    changed = SMALL.read_text().replace("\ntests:\n", "\ntests:\n  wrong: 3\nmistaken: 1\n", 1)
+    done = diff(SMALL, "-", content=changed)
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "error GW" in done.stderr
