@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from gatewayd.links.exports import ExportError
 from gatewayd.plc.model import CellModel, TagFamily
+from gatewayd.plc.tags import split_name
 from gatewayd.report.format import counted
 
 _NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")
@@ -45,16 +46,20 @@ def _names(model: CellModel, holds: Holds) -> Iterator[str]:
     if not _NAME.fullmatch(model.prefix) or len(model.prefix) > _LONGEST_PREFIX:
         yield f"`{model.prefix}` is no prefix: --prefix takes a letter, then up to 5 letters, digits and single `_`"
     known: dict[str, str] = {}
-    for name in _once(member.name for member in (*model.inputs, *model.outputs)):
+    for name, family in {family.name: family for family in (*model.inputs, *model.outputs)}.items():
         problem = _problem(name, holds)
         if not problem and known.setdefault(name.lower(), name) != name:
             problem = f"differs from `{known[name.lower()]}` in capitals only"
         if problem:
-            yield f"`{name}` {problem}: rename it in the mapping, or call it otherwise here: --name {name}=NAME"
+            yield f"`{name}` {problem}: {_remedy(name, split_name(family.tags[0].name)[0])}"
 
 
-def _once(names: Iterable[str]) -> Iterable[str]:
-    return dict.fromkeys(names)
+def _remedy(name: str, original: str) -> str:
+    """A name of --name is not in the mapping: only another --name helps, for what it is called there."""
+    called = f"--name {original}=NAME"
+    if name != original:
+        return f"`{original}` of the mapping needs another name here: {called}"
+    return f"rename it in the mapping, or call it otherwise here: {called}"
 
 
 def _problem(name: str, holds: Holds) -> str:

@@ -75,3 +75,9 @@ def test_small_controllers_have_no_numbers_of_64_bits() -> None:
 def test_prefix(prefix: str) -> None:
     found = replace(model(variable("ready"), wishes=PlcWishes(writer="plc")), prefix=prefix)
     assert "is no prefix" in problem(found)
+
+
+def test_a_name_given_here_is_refused_by_what_the_mapping_calls_it() -> None:
+    """`--name step=NAME` would be refused again: the mapping has no `step`."""
+    found = model(variable("start"), wishes=PlcWishes(writer="plc", names={"start": "step"}))
+    assert problem(found).endswith("`start` of the mapping needs another name here: --name start=NAME")

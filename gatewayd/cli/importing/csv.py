@@ -17,7 +17,7 @@ from gatewayd.report.printable import printable
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from gatewayd.cli.importing.register_list.findings import ListFinding
+    from gatewayd.cli.importing.findings import ImportFinding
 
 FOUND, WRONG = 1, 2
 """Exit codes."""
@@ -91,7 +91,8 @@ def command(
 
     Columns are recognised by their names, English or German: name, address, type, access (R, W), area or function
     code, bit, length, byte order, scale, offset, unit, limits, comment, robot. Comma, semicolon, tab and bar separate
-    them, and decimals may have a comma. Addresses may be 100, 0x64, 100.3, 400101 or %MW100.
+    them, and decimals may have a comma. Addresses may be 100, 0x64, 100.3, 400101, %MW100, %MX100.3, %MD50, %QW100 or
+    %IW100; both limits may stand in one cell, 0..100.
 
     A list that names no field of the robot gets the next free registers of the robot program. Everything that was
     understood in one of several ways is listed with its line and column. With an error nothing is written. The result
@@ -148,10 +149,7 @@ def _content(context: click.Context, file: str) -> bytes:
     return content
 
 
-def _print_findings(file: str, findings: Sequence[ListFinding]) -> None:
+def _print_findings(file: str, findings: Sequence[ImportFinding]) -> None:
     for finding in findings:
-        kind = "error" if finding.is_error else "doubt"
-        place = f"{click.format_filename(file)}:{finding.line}:{finding.column}"
-        click.echo(printable(f"{place}: {kind}: {finding.text}"), err=True)
-        if finding.hint:
-            click.echo(printable(f"    hint: {finding.hint}"), err=True)
+        for line in finding.lines(str(click.format_filename(file))):
+            click.echo(printable(line), err=True)

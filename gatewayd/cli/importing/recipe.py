@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from gatewayd.cli.importing.findings import FindingKind, ImportFinding
 from gatewayd.rtde.companions import COMPANIONS
 from gatewayd.rtde.fields import INPUTS, OUTPUTS
 from gatewayd.rtde.recipes import DeclaredField, DeclaredRecipe
@@ -21,19 +22,6 @@ _SINGLE = 2
 _REGISTER = "_register"
 """In the names of general purpose registers, of which the catalogue has nothing to tell about this one."""
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_.-]*|[0-9]{1,3}(?:\.[0-9]{1,3}){3}(?::[0-9]+)?")
-
-
-@dataclass(frozen=True, slots=True)
-class ImportFinding:
-    """A field of a recipe that a mapping cannot carry, or carries otherwise."""
-
-    file: str
-    line: int
-    text: str
-    left_out: bool
-
-    def __str__(self) -> str:
-        return f"{self.file}:{self.line}: {'error' if self.left_out else 'note'}: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +62,13 @@ def imported(
         for field in recipe.fields:
             text = _objection(field, recipe, fields, as_input=as_input)
             if text:
-                findings.append(ImportFinding(recipe.file, field.line, text, left_out=True))
+                findings.append(ImportFinding(field.line, 0, text, file=recipe.file))
                 continue
             found = _field(field, as_input=as_input)
             if field.type is not None and found.in_guides and field.type is not found.type:
                 words = f"declared as {field.type.word}; the mapping takes {found.type.word}, as the guides"
                 note = f"{field.name} is {words}"
-                findings.append(ImportFinding(recipe.file, field.line, note, left_out=False))
+                findings.append(ImportFinding(field.line, 0, note, FindingKind.NOTE, file=recipe.file))
             fields.setdefault(field.name, found)
     ordered = sorted(fields.values(), key=lambda field: not field.is_input)
     return tuple(ordered), tuple(sorted(findings, key=lambda finding: finding.line))

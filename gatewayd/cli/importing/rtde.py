@@ -93,7 +93,7 @@ def command(
     fields, findings = imported(_recipes(context, file, keys))
     for finding in findings:
         click.echo(printable(str(finding)), err=True)
-    left = sum(finding.left_out for finding in findings)
+    left = sum(finding.is_error for finding in findings)
     if left and not leave_out:
         click.echo("nothing was written; --leave-out writes the rest", err=True)
         context.exit(FOUND)

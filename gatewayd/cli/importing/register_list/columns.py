@@ -14,10 +14,12 @@ MEANINGS: Final[Mapping[str, str]] = MappingProxyType(
         "number": "number", "name": "name", "direction": "direction", "access": "access", "robot": "robot's field",
         "area": "area", "function": "function code", "address": "address", "bit": "bit", "notation": "4xxxxx address",
         "words": "length", "type": "type", "order": "byte order", "scale": "scale", "offset": "offset",
-        "unit": "unit", "low": "least value", "high": "greatest value", "clamp": "clamping", "owner": "owner",
+        "unit": "unit", "low": "least value", "high": "greatest value",
+        "limits": "limits", "clamp": "clamping", "owner": "owner",
         "lease": "lease", "takeover": "takeover", "group": "group", "on_release": "value when the writer is lost",
         "on_stale": "value when the robot is lost", "comment": "comment", "whole": "whole takeover",
         "valid": "validity", "canopen": "CANopen object",
+        "device": "place on a device",
     }
 )  # fmt: skip
 """Column -> what it is called in a finding."""
@@ -45,6 +47,7 @@ _SPELLINGS: Final[Mapping[str, str]] = {
     "unit": "unit units einheit dimension engineeringunit",
     "low": "low min minimum lowerlimit minwert untergrenze minvalue",
     "high": "high max maximum upperlimit maxwert obergrenze maxvalue",
+    "limits": "limits limit range valuerange minmax lowhigh wertebereich grenzen grenzwerte messbereich minundmax",
     "clamp": "clamp",
     "owner": "owner writer schreiber",
     "lease": "lease",
@@ -57,18 +60,22 @@ _SPELLINGS: Final[Mapping[str, str]] = {
     "whole": "whole",
     "valid": "valid",
     "canopen": "object",
+    "device": "deviceplace",
 }
 """Column -> spellings of its name, folded."""
 
 DETAIL: Final = "detail"
 """Columns that say more of what another one says: they are passed over."""
 _KNOWN: Final = {spelling: column for column, names in _SPELLINGS.items() for spelling in names.split()}
-_OF_OBJECT: Final = frozenset({"cantype", "pdo", "cobid", "pdobit"})
-"""Columns of `gatewayd show` that say more of the CANopen object."""
+_OF_OTHERS: Final = frozenset(
+    {"cantype", "pdo", "cobid", "pdobit"}
+    | {"device", "devicetype", "devicescale", "deviceoffset", "devicepoll"}
+)
+"""Columns of `gatewayd show` that say more of the CANopen object, and of the place on a device."""
 
 
 def column_of(head: str) -> str:
     """The meaning of a column by its name, whatever its case, blanks and units in brackets; empty: not recognised."""
     folded = re.sub(r"[(\[].*?[)\]]", "", head.lower().translate(_FOLDED))
     folded = re.sub(r"[^a-z0-9]", "", folded)
-    return DETAIL if folded in _OF_OBJECT else _KNOWN.get(folded, "")
+    return DETAIL if folded in _OF_OTHERS else _KNOWN.get(folded, "")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 _PLAIN = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
@@ -15,7 +15,13 @@ _HEX = re.compile(
 )
 _DECIMAL = re.compile(r"\d{1,6}", re.ASCII)
 _PART = re.compile(r"(?P<address>[^.]+)(?:[.](?P<bit>\d{1,2}|high|low))?", re.ASCII)
-_WORD = re.compile(r"%?MW(\d{1,5})", re.ASCII | re.IGNORECASE)
+_IEC = re.compile(r"%?(?P<kind>MW|MX|MD|QW|IW)(?P<number>\d{1,5})", re.ASCII | re.IGNORECASE)
+_NUMBER = r"[-+]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][-+]?\d+)?"
+_LIMITS = re.compile(
+    rf"(?P<open>[\[(]?)\s*(?P<low>{_NUMBER})\s*(?P<sign>\.\.\.?|\u2026|\u2013|-|/|;|,|\bto\b|\bbis\b)\s*(?P<high>{_NUMBER})\s*"
+    r"(?P<close>[\])]?)",
+    re.ASCII,
+)
 MAX_ADDRESS: Final = 65535
 AREAS: Final = {"0": "coil", "1": "discrete", "3": "input", "4": "holding"}
 """First digit of the traditional form -> area of a mapping."""
@@ -65,6 +71,11 @@ class Address:
     doubtful: bool = False
     """It may be traditional or not: 40001 to 49999 and the like."""
     hexadecimal: bool = False
+    doubt: str = ""
+    """What was taken of several meanings of the notation, by an example: the same for all of its kind."""
+    hint: str = ""
+    written: bool | None = None
+    """Whether the notation says that the PLC writes it; None: it says nothing."""
 
 
 class NotReadable(Exception):
@@ -98,16 +109,45 @@ def address(text: str) -> Address:
     if match is None:
         raise NotReadable(_FORMS)
     head, part = match["address"].strip(), match["bit"] or ""
-    hexadecimal, word = _HEX.fullmatch(head), _WORD.fullmatch(head)
+    hexadecimal, iec = _HEX.fullmatch(head), _IEC.fullmatch(head)
     if hexadecimal is not None:
         return Address(int(hexadecimal["after"] or hexadecimal["before"], 16), None, part, hexadecimal=True)
-    digits = word[1] if word is not None else head
-    if not _DECIMAL.fullmatch(digits):
+    if iec is not None:
+        return _of_iec(iec["kind"].upper(), int(iec["number"]), part)
+    if not _DECIMAL.fullmatch(head):
         raise NotReadable(_FORMS)
-    return _decimal(digits, part) if word is None else _plain(int(digits), part)
+    return _decimal(head, part)
 
 
-_FORMS: Final = "write 100, 0x64, 100.3, 400101 or %MW100"
+_FORMS: Final = "write 100, 0x64, 100.3, 400101, %MW100, %MX100.3, %MD50, %QW100 or %IW100"
+
+
+def _of_iec(kind: str, number: int, part: str) -> Address:
+    """A located variable of IEC 61131-3 as a register; what its address counts, tools see differently."""
+    if kind == "MX":
+        if not part.isdecimal():
+            raise NotReadable("write %MX100.3, with the bit")
+        hint = "CODESYS counts bytes there: write 50.3 for its %MX100.3, and 50.11 for %MX101.3"
+        return replace(_plain(number, part), doubt="%MX100.3 is taken as bit 3 of %MW100", hint=hint)
+    if kind == "MD":
+        text = "%MD50 is taken as a double word, which begins at %MW100"
+        hint = "Schneider's controllers count words there: write %MW for their %MD"
+        return replace(_plain(2 * number, part), doubt=text, hint=hint)
+    if kind in ("QW", "IW"):
+        side, verb = ("outputs", "writes") if kind == "QW" else ("inputs", "reads")
+        text = f"%{kind} are {side} of the PLC: taken as registers of the same number, which it {verb}"
+        hint = "write the register of the gateway to which they are mapped, and R or W as access"
+        return replace(_plain(number, part), doubt=text, hint=hint, written=kind == "QW")
+    return _plain(number, part)
+
+
+def limits(text: str, *, comma: bool) -> tuple[float, float]:
+    """Both limits of one cell: `0..100`, `0-100`, `[0;100]`, `0/100`. Raises NotReadable."""
+    match = _LIMITS.fullmatch(text)
+    whole_brackets = match is not None and bool(match["open"]) == bool(match["close"])
+    if match is None or not whole_brackets or (match["sign"] == "," and (comma or not match["open"])):
+        raise NotReadable("write both limits, for example 0..100")
+    return real(match["low"], comma=comma), real(match["high"], comma=comma)
 
 
 def _decimal(digits: str, part: str) -> Address:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from gatewayd.cli.importing.register_list.findings import ListFinding, ListFindings
+from gatewayd.cli.importing.findings import ImportFinding
+from gatewayd.cli.importing.register_list.findings import ListFindings
 from gatewayd.cli.importing.register_list.mapping import ListSettings, MadeMapping, mapping_of
 from gatewayd.cli.importing.register_list.rows import Counting, ListedPlace, places
 from gatewayd.cli.importing.register_list.table import MAX_BYTES, decoded, table
@@ -22,7 +23,7 @@ class Proposal:
     text: str | None
     """The mapping; None where there are errors."""
     variables: int
-    findings: tuple[ListFinding, ...]
+    findings: tuple[ImportFinding, ...]
 
 
 def proposal(content: bytes, settings: ListSettings, counting: Counting, source: str) -> Proposal:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
 from gatewayd.cli.importing.register_list import numbers
@@ -81,11 +81,13 @@ class _RowReader:
 
     def place(self, row: ListRow) -> ListedPlace | None:
         """None with an error where a cell cannot be understood."""
-        if row.text("canopen"):
-            only = not row.text("address") and not row.text("notation")
-            hint = "delete the row: it has no register" if only else "delete the columns for CANopen"
-            self._error(row, "canopen", "CANopen objects are not imported", hint)
-            return None
+        for column, what in (("canopen", "CANopen objects"), ("device", "places on devices")):
+            if row.text(column):
+                only = not row.text("address") and not row.text("notation")
+                name = "CANopen" if column == "canopen" else "devices"
+                hint = "delete the row: it has no register" if only else f"delete the columns for {name}"
+                self._error(row, column, f"{what} are not imported", hint)
+                return None
         before = self._findings.errors
         name, found = self._name(row), self._address(row)
         area = self._area(row, found)
@@ -94,7 +96,7 @@ class _RowReader:
         place = ListedPlace(
             row=row,
             name=name,
-            is_input=self._is_input(row, area),
+            is_input=self._is_input(row, area, found),
             robot=row.text("robot"),
             area=area,
             address=found.number if found is not None else 0,
@@ -150,6 +152,8 @@ class _RowReader:
     def _counted(self, row: ListRow, column: str, found: Address) -> Address:
         """The address from 0."""
         text, place = row.text(column), row.place(column)
+        if found.doubt:
+            self._findings.repeated_doubt(place, found.doubt, found.hint)
         if found.doubtful:
             plain = int(text.partition(".")[0])
             if self._counting in (FROM_0, FROM_1):
@@ -176,7 +180,7 @@ class _RowReader:
             self._error(
                 row, column, "the address 0 in a list that counts from 1", "leave --addresses from-1 out"
             )
-        return Address(found.number - 1, None, found.part)
+        return replace(found, number=found.number - 1)
 
     def _compare(self, row: ListRow, found: Address) -> None:
         """The two forms of one address in one row."""
@@ -254,8 +258,8 @@ class _RowReader:
             return "high" if number else "low"
         return "" if number is None else str(number)
 
-    def _is_input(self, row: ListRow, area: str) -> bool:
-        """Whether it goes to the robot: the robot's field says it, else the access, else the area."""
+    def _is_input(self, row: ListRow, area: str, found: Address | None) -> bool:
+        """Whether it goes to the robot: the robot's field says it, else the access, the area, or the address."""
         robot = row.text("robot")
         if robot:
             return self._checked(row, robot)
@@ -272,10 +276,11 @@ class _RowReader:
             return row.text("direction") == "input"
         if area in ("input", "discrete"):
             return False
+        if found is not None and found.written is not None:
+            return found.written
         if not written:
-            self._error(
-                row,
-                "access",
+            self._findings.repeated_error(
+                row.place("access"),
                 "not said whether the PLC writes or reads it",
                 "add a column `access`: R, W or RW",
             )
@@ -299,13 +304,19 @@ class _RowReader:
 
     def _limits(self, row: ListRow) -> tuple[float, float] | None:
         low, high = self._number(row, "low"), self._number(row, "high")
+        both = self._read(row, "limits", lambda text: numbers.limits(text, comma=self._comma))
+        if both is not None and (low is not None or high is not None):
+            self._error(row, "limits", "limits here, and in a column of their own", "give them once")
+            return None
+        column = "limits" if both is not None else "low"
+        low, high = both or (low, high)
         if low is None or high is None:
             if low is not None or high is not None:
                 self._error(row, "low" if low is not None else "high", "one limit only", "give both or none")
             return None
         if "robot" not in self._columns:
             self._findings.repeated_doubt(
-                row.place("low"),
+                row.place(column),
                 "limits are taken as of the value, not of the raw number",
                 "multiply them if not",
             )

@@ -175,7 +175,7 @@ def _refuse_doubles(image: PdoImage) -> None:
         if other != tag.name:
             raise ExportError(
                 f"{image.name}: `{tag.name}` and `{other}` would be the same member `{tag.object_name}`: "
-                f"call one of them otherwise here: --name {tag.member}=NAME"
+                f"call one of them otherwise here: --name {split_name(tag.name)[0]}=NAME"
             )
 
 

@@ -272,3 +272,43 @@ def test_any_text_stays_a_text(text: str) -> None:
         loaded = load(found.text.encode(), "made.yaml")
         assert loaded.plan is not None
         assert loaded.plan.cell.variables[0].comment == " ".join(text.split())
+
+
+def test_what_every_row_lacks_is_said_once_with_its_lines() -> None:
+    text = "name,address,type\n" + "".join(f"a{number},{number},int16\n" for number in range(14))
+    (found,) = made(text, "from-0").findings
+    assert found.text == (
+        "not said whether the PLC writes or reads it (14 rows: lines 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 4 more)"
+    )
+    assert (found.place, found.hint) == ((2, 1), "add a column `access`: R, W or RW")
+
+
+@pytest.mark.parametrize("cell", ["0..100", "0-100", "[0;100]", "0/100", "0 to 100", "0 bis 100"])
+def test_both_limits_in_one_cell(cell: str) -> None:
+    found = made(f"name,address,type,access,range\nspeed,10,uint16,W,{cell}\n", "from-0")
+    assert "limits: [0, 100]" in lines(found)["speed"]
+
+
+def test_limits_twice_are_an_error() -> None:
+    found = made("name,address,type,access,limits,min,max\nspeed,10,uint16,W,0..5,0,5\n", "from-0")
+    assert [text for *_, text in errors(found)] == ["limits here, and in a column of their own"]
+
+
+@pytest.mark.parametrize(
+    "address, place, doubt",
+    [
+        ("%MX10.3", "10.3", "%MX100.3 is taken as bit 3 of %MW100"),
+        ("%MD5", "{holding: 10, type: int32, order: ABCD}", "%MD50 is taken as a double word"),
+        ("%QW7", "{holding: 7, type: int32, order: ABCD}", "%QW are outputs of the PLC"),
+        ("%IW7", "{holding: 7, type: int32, order: ABCD}", "%IW are inputs of the PLC"),
+    ],
+)
+def test_located_variables_of_the_standard(address: str, place: str, doubt: str) -> None:
+    """What their numbers count differs from tool to tool: each kind is a doubt."""
+    kind = "bit" if "MX" in address else "int32"
+    access = "" if address[1] in "QI" else "R"
+    found = made(f"name,address,type,access,order\na,{address},{kind},{access},ABCD\n", "from-0")
+    assert f"modbus: {place}" in lines(found)["a"]
+    assert any(doubt in text for *_, text in doubts(found))
+    side = "input" if address.startswith("%QW") else "output"
+    assert f"robot: {side}_" in lines(found)["a"]

@@ -87,3 +87,14 @@ def complete_plan() -> Plan:
         writers=((ip_network("127.0.0.1"), 0),),
     )
     return Plan("complete.yaml", cell, {"modbus": plan})
+
+
+def greatest_plan() -> Plan:
+    """As many variables as a cell may have: scaled reals from the robot."""
+    count = range(1024)
+    variables = tuple(Variable(n + 1, f"v{n}", Direction.OUTPUT, ValueKind.FLOAT, "field") for n in count)
+    codec = make_codec("float32", "ABCD", kind=ValueKind.FLOAT, scale=0.1, offset=0.0)
+    places = tuple(Placement(n, Area.HOLDING, 2 * n, None, codec) for n in count)
+    cell = CellDefinition("greatest", 0x12345678, variables, (), (Writer("plc"),), 0.1)
+    modbus = ModbusPlan("127.0.0.1", 1502, 1, (), 8, None, fill_gaps=False, placements=places, writers=())
+    return Plan("greatest.yaml", cell, {"modbus": modbus})

@@ -18,12 +18,14 @@ from gatewayd.links.modbus_server.plc.build import model_of
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.registry import files_for
 from gatewayd.plc.tags import PlcWishes
-from tests.links.modbus_server.plc.cells import complete_plan
+from tests.links.modbus_server.plc.cells import complete_plan, greatest_plan
 from tests.plc_golden import golden_model
 
 EVERY_CELL = pytest.mark.parametrize(
     "model", [golden_model(), model_of(complete_plan(), PlcWishes())], ids=["golden", "complete"]
 )
+GREATEST = model_of(greatest_plan(), PlcWishes(writer="none"))
+"""1,024 variables, and a program that only reads."""
 GRAMMAR = Parser(Language(tree_sitter_iec61131_3_st.language()))
 
 
@@ -46,6 +48,16 @@ def wrong(node: Node) -> Iterator[str]:
 def test_structured_text_is_that_of_the_standard(model: PlcModel) -> None:
     for name, text in texts("iec-st", model).items():
         assert list(wrong(GRAMMAR.parse(text.encode()).root_node)) == [], name
+
+
+def test_a_program_of_the_greatest_cell_is_read() -> None:
+    """By the grammar of structured text, and by the classes of the exchange format."""
+    for name, text in texts("iec-st", GREATEST).items():
+        assert list(wrong(GRAMMAR.parse(text.encode()).root_node)) == [], name
+    parser = XmlParser(config=ParserConfig(fail_on_unknown_properties=True, fail_on_converter_warnings=True))
+    project = parser.from_string(texts("codesys", GREATEST)["GW_Import.xml"], Project)
+    outputs = next(kind for kind in project.types.data_types.data_type if kind.name == "GW_Outputs")
+    assert len(outputs.base_type.struct.variable) == 1024
 
 
 def test_the_grammar_finds_mistakes() -> None:

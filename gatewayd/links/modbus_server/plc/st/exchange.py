@@ -143,15 +143,23 @@ def _next(polls: tuple[Poll, ...], last_fast: int, slow: list[int]) -> Iterator[
     yield f"ELSIF current > {last_fast + 1} THEN"
     yield "  current := 0;"
     yield "END_IF;"
+    yield from _wanted(polls)
+    yield "due := (current > 0) AND NOT request;"
+
+
+def _wanted(polls: tuple[Poll, ...]) -> Iterator[str]:
+    """Whether the request of a step is to be sent: one that reads always is. A CASE needs a case."""
+    writes = {step: poll for step, poll in enumerate(polls, 1) if poll.writes}
+    if not writes:
+        yield "request := current > 0;"
+        return
     yield "CASE current OF"
-    for step, poll in enumerate(polls, 1):
-        if poll.writes:
-            wanted = f"trusted AND write{f' AND demand_{poll.name}' if poll.shared else ''}"
-            yield f"  {step}: request := {wanted};"
+    for step, poll in writes.items():
+        demand = f" AND demand_{poll.name}" if poll.shared else ""
+        yield f"  {step}: request := trusted AND write{demand};"
     yield "ELSE"
     yield "  request := current > 0;"
     yield "END_CASE;"
-    yield "due := (current > 0) AND NOT request;"
 
 
 def handshake(model: PlcModel) -> ProgramUnit:
@@ -160,71 +168,56 @@ def handshake(model: PlcModel) -> ProgramUnit:
         "FUNCTION_BLOCK",
         f"{model.prefix}_Handshake",
         (
-            VariableSection(
-                "VAR_INPUT",
-                (
-                    PlcVariable("send", elementary("BOOL"), "rises when the data stand in the inputs"),
-                    PlcVariable(
-                        "written",
-                        elementary("UDINT"),
-                        "of the sequence: rounds of writes that were confirmed",
-                    ),
-                    PlcVariable(
-                        "acknowledge",
-                        elementary("BOOL"),
-                        "bit of the robot: it repeats the toggle when it has the data",
-                    ),
-                    PlcVariable("trusted", elementary("BOOL"), "the acknowledge may be used"),
-                    PlcVariable("time_out", elementary("TIME"), "for the whole handshake", "T#5s"),
-                ),
-            ),
-            VariableSection(
-                "VAR_OUTPUT",
-                (
-                    PlcVariable(
-                        "toggle", elementary("BOOL"), "bit for the robot: changes when the data are there"
-                    ),
-                    PlcVariable("busy", elementary("BOOL")),
-                    PlcVariable("done", elementary("BOOL"), "acknowledged; until the next begins"),
-                    PlcVariable(
-                        "failed", elementary("BOOL"), "not acknowledged in time, or not trusted any more"
-                    ),
-                ),
-            ),
-            VariableSection(
-                "VAR",
-                (
-                    PlcVariable("expiry", elementary("TON")),
-                    PlcVariable(
-                        "state", elementary("INT"), "0 idle, 1 data on their way, 2 waiting for the robot"
-                    ),
-                    PlcVariable("sent", elementary("BOOL")),
-                    PlcVariable("since", elementary("UDINT")),
-                ),
-            ),
+            VariableSection("VAR_INPUT", _HANDSHAKE_INPUTS),
+            VariableSection("VAR_OUTPUT", _HANDSHAKE_OUTPUTS),
+            VariableSection("VAR", _HANDSHAKE_STATE),
         ),
-        (
-            "expiry(IN := state > 0, PT := time_out);",
-            "IF state > 0 THEN",
-            "  IF expiry.Q OR NOT trusted THEN",
-            "    state := 0;",
-            "    failed := TRUE;",
-            "  ELSIF (state = 1) AND (written - since >= 2) THEN",
-            "    toggle := NOT toggle;",
-            "    state := 2;",
-            "  ELSIF (state = 2) AND (acknowledge = toggle) THEN",
-            "    state := 0;",
-            "    done := TRUE;",
-            "  END_IF;",
-            "ELSIF send AND NOT sent AND trusted THEN",
-            "  toggle := acknowledge;",
-            "  since := written;",
-            "  state := 1;",
-            "  done := FALSE;",
-            "  failed := FALSE;",
-            "END_IF;",
-            "sent := send;",
-            "busy := state > 0;",
-        ),
+        _HANDSHAKE,
         comment="data, then toggle, then acknowledge",
     )
+
+
+_HANDSHAKE_INPUTS: Final = (
+    PlcVariable("send", elementary("BOOL"), "rises when the data stand in the inputs"),
+    PlcVariable("written", elementary("UDINT"), "of the sequence: rounds of writes that were confirmed"),
+    PlcVariable(
+        "acknowledge", elementary("BOOL"), "bit of the robot: it repeats the toggle when it has the data"
+    ),
+    PlcVariable("trusted", elementary("BOOL"), "the acknowledge may be used"),
+    PlcVariable("time_out", elementary("TIME"), "for the whole handshake", "T#5s"),
+)
+_HANDSHAKE_OUTPUTS: Final = (
+    PlcVariable("toggle", elementary("BOOL"), "bit for the robot: changes when the data are there"),
+    PlcVariable("busy", elementary("BOOL")),
+    PlcVariable("done", elementary("BOOL"), "acknowledged; until the next begins"),
+    PlcVariable("failed", elementary("BOOL"), "not acknowledged in time, or not trusted any more"),
+)
+_HANDSHAKE_STATE: Final = (
+    PlcVariable("expiry", elementary("TON")),
+    PlcVariable("state", elementary("INT"), "0 idle, 1 data on their way, 2 waiting for the robot"),
+    PlcVariable("sent", elementary("BOOL")),
+    PlcVariable("since", elementary("UDINT")),
+)
+_HANDSHAKE: Final = (
+    "expiry(IN := state > 0, PT := time_out);",
+    "IF state > 0 THEN",
+    "  IF expiry.Q OR NOT trusted THEN",
+    "    state := 0;",
+    "    failed := TRUE;",
+    "  ELSIF (state = 1) AND (written - since >= 2) THEN",
+    "    toggle := NOT toggle;",
+    "    state := 2;",
+    "  ELSIF (state = 2) AND (acknowledge = toggle) THEN",
+    "    state := 0;",
+    "    done := TRUE;",
+    "  END_IF;",
+    "ELSIF send AND NOT sent AND trusted THEN",
+    "  toggle := acknowledge;",
+    "  since := written;",
+    "  state := 1;",
+    "  done := FALSE;",
+    "  failed := FALSE;",
+    "END_IF;",
+    "sent := send;",
+    "busy := state > 0;",
+)
