@@ -333,6 +333,8 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "canopen.manager.letters": "words; tests/canopen/manager/test_boot.py",
     "canopen.manager.plan": "records; tests/canopen/manager/test_configuration.py",
     "canopen.product": "two numbers; tests/canopen/test_identity.py",
+    "core.reception": "what a cell makes of packages; tests/core/test_cell.py, test_cell_properties.py",
+    "core.refused": "what a cell counts; tests/core/test_cell.py, test_unserved.py",
     "core.requester": "a record; tests/core/test_cell.py pins what its parts mean",
     "links.canopen_node.compile": "tests/mapping/test_compile.py compiles it",
     "links.canopen_node.exports": "tests/cli/test_export.py",

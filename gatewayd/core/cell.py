@@ -6,8 +6,6 @@ Links call it; it calls its `listeners` after values or qualities changed. Every
 
 from __future__ import annotations
 
-import math
-from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -18,7 +16,7 @@ from gatewayd.core.carried import Carried
 from gatewayd.core.commands import Commands
 from gatewayd.core.definition import CellDefinition, Direction, Value
 from gatewayd.core.delivery import Delivery
-from gatewayd.core.events import Event, EventKind, EventRing, translated
+from gatewayd.core.events import Event, EventKind, EventRing
 from gatewayd.core.fallbacks import Fallbacks
 from gatewayd.core.forcing import Forcing
 from gatewayd.core.freshness import Freshness, Source
@@ -30,8 +28,10 @@ from gatewayd.core.match import Match
 from gatewayd.core.operator import Operator
 from gatewayd.core.ownership import Act, LockTable, Move
 from gatewayd.core.program import is_running
+from gatewayd.core.reception import Reception
 from gatewayd.core.refusal import Reason, Refusal
-from gatewayd.core.refusal_log import LastRefusal, RefusalLog
+from gatewayd.core.refusal_log import LastRefusal
+from gatewayd.core.refused import Refused
 from gatewayd.core.requester import Requester
 from gatewayd.core.supervision import WriterTable
 from gatewayd.core.unserved import Unserved
@@ -65,9 +65,6 @@ class Cell:
         self.listeners: list[Callable[[Direction], None]] = []
         self.write_listeners: list[Callable[[int, Written, float], None]] = []
         """Called with every accepted write that changes something: writer, changes, time. They must not raise."""
-        self.last_refusal: LastRefusal | None = None
-        self.last_unserved: Event | None = None
-        """The last request that nothing here serves, reported or only counted."""
         self._admission = Admission(definition.variables, definition.writers, self.ownership, self.image)
         inputs_changed = partial(self._notify, Direction.INPUT)
         self._locking = Locking(
@@ -80,8 +77,11 @@ class Cell:
         self.carried = Carried(
             self.image, self.commands, self.forcing, self.set_availability, self._adopt_late, self._notify
         )
-        self._refusals = RefusalLog(record)
-        self._unserved = RefusalLog(record)
+        self._refused = Refused(self.image, self.health, record)
+        outputs_changed = partial(self._notify, Direction.OUTPUT)
+        self._reception = Reception(
+            self.health, self.freshness, self.lag, self.image, self.forcing, record, outputs_changed
+        )
 
     @property
     def accepts_writes(self) -> bool:
@@ -92,6 +92,16 @@ class Cell:
     def unreadable(self) -> frozenset[int]:
         """Outputs whose policy is `exception` and whose value is not good now."""
         return self.image.unreadable
+
+    @property
+    def last_refusal(self) -> LastRefusal | None:
+        """The last refused request."""
+        return self._refused.last
+
+    @property
+    def last_unserved(self) -> Event | None:
+        """The last request that nothing here serves, reported or only counted."""
+        return self._refused.last_unserved
 
     # -- fieldbus side -------------------------------------------------------------------------------------------
 
@@ -129,39 +139,14 @@ class Cell:
 
     def refuse(self, requester: Requester, refusal: Refusal, now: float, value: Value | None = None) -> None:
         """Count and record a refusal; equal ones are reported once in a while (`RefusalLog`)."""
-        self.health.writes_refused += 1
-        peer = requester.peer if requester.writer is None else ""
-        self.last_refusal = LastRefusal(refusal, requester.writer, now, peer)
-        index = refusal.variable
-        self._refusals.add(
-            Event(
-                now,
-                EventKind.REFUSED,
-                variable=index,
-                lock=self.definition.variables[index].lock if index is not None else None,
-                writer=requester.writer,
-                other=refusal.holder,
-                reason=refusal.reason,
-                old=self.image.values[index] if index is not None else None,
-                new=value,
-                detail=refusal.hint,
-                peer=peer,
-                request=refusal.request,
-            )
-        )
+        self._refused.refuse(requester, refusal, now, value)
 
     def unserved(self, requester: Requester, reason: Unserved, request: str, now: float) -> None:
         """Count and record a request that nothing here serves; those of one peer and reason are reported together.
 
         `request`: what was asked and what is here, in words of the link: `asked unit 7; units here: 1`.
         """
-        self.health.unserved[reason] += 1
-        peer = requester.peer if requester.writer is None else ""
-        event = Event(
-            now, EventKind.UNSERVED, writer=requester.writer, reason=reason, peer=peer, request=request
-        )
-        self.last_unserved = event
-        self._unserved.add(event)
+        self._refused.unserved(requester, reason, request, now)
 
     def request(self, requester: Requester, variable: int, now: float) -> Refusal | None:
         """Take the lock that guards `variable` (and with it its whole group) without writing a value.
@@ -222,16 +207,7 @@ class Cell:
 
     def following(self, requesters: Collection[Requester]) -> set[int]:
         """The locks that would end at once with all these connections."""
-        found: set[int] = set()
-        ending = Counter(requester.writer for requester in requesters)
-        for requester in requesters:
-            writer = requester.writer
-            if writer is None:
-                continue
-            whole = self.writers.alive[writer] and ending[writer] >= self.writers.connections[writer]
-            held = self.ownership.held_by(writer)
-            found.update(held if whole else self.ownership.held_through(writer, requester.connection))
-        return found
+        return self._locking.following(requesters)
 
     def holds(self, connection: int) -> bool:
         """Whether some lock follows this connection."""
@@ -265,7 +241,7 @@ class Cell:
         self.commands.disarm()
         self.image.inputs_lost()
         if was_fresh:
-            self._outputs_lost()
+            self._reception.lost()
         self._notify(Direction.INPUT)
 
     def package_arrived(self, timestamp: float | None, now: float, raw: float | None = None) -> bool:
@@ -274,24 +250,7 @@ class Cell:
         It is not if it reports nothing new, or came later than `stale_after`; `freshness` knows which. `raw` is the
         time by a clock that no time service adjusts.
         """
-        if self.freshness.state is Source.LOST:
-            return False
-        self.health.packages += 1
-        was_fresh = self.freshness.state is Source.FRESH
-        shown = self.freshness.package(
-            timestamp, now, self._measure_lag(timestamp, now if raw is None else raw)
-        )
-        if shown:
-            if not was_fresh:
-                self.lag.in_time()
-                self.events.append(Event(now, EventKind.FRESH))
-            self.forcing.lift()
-            self.image.uncover()
-        elif self.freshness.state is Source.LATE:
-            self.lag.stays_late(now)
-            if was_fresh:
-                self._source_stale(now)
-        return shown
+        return self._reception.package(timestamp, now, now if raw is None else raw)
 
     def program(self, state: int | None) -> None:
         """The `runtime_state` of a package, before its `outputs_written`; None: the controller does not report it."""
@@ -310,7 +269,7 @@ class Cell:
 
         At most once a second. What is asked has to be answered behind the packages that the controller had sent before.
         """
-        return self.freshness.state is Source.LATE and self.lag.doubtful(now)
+        return self._reception.doubtful(now)
 
     def backlog_probed(self, delay: float, now: float) -> bool:
         """The controller answered `delay` seconds after the question.
@@ -318,11 +277,7 @@ class Cell:
         True: so quickly that there is no backlog; its clock stood still for a while. What it sends now counts as in
         time, and the link begins one new session, so that nothing is left of what may have queued. False: no change.
         """
-        if self.freshness.state is not Source.LATE or not self.lag.probed(delay):
-            return False
-        self.health.lag = self.lag.seconds
-        self.lag.in_time()
-        return True
+        return self._reception.probed(delay)
 
     def adopt(self, values: Mapping[int, Value], now: float) -> None:
         """Take over what the controller's inputs hold, then apply the fallbacks that are owed.
@@ -401,13 +356,9 @@ class Cell:
         """Notice what only time brings: ended leases, silent writers, a silent or frozen robot."""
         self.operator.release_expired(now)
         self._locking.silence(now)
-        was_fresh = self.freshness.state is Source.FRESH
-        self.freshness.tick(now)
-        if was_fresh and self.freshness.state is not Source.FRESH:
-            self._source_stale(now)
+        self._reception.tick(now)
         self._count_adoption(now)
-        self._refusals.tick(now)
-        self._unserved.tick(now)
+        self._refused.tick(now)
         self.health.beat(now)
 
     def gap(self, since: float, now: float) -> None:
@@ -432,12 +383,8 @@ class Cell:
             self.adoption.succeed(former.adoption)
         self.health = replace(former.health, words={})
         self.events.succeed(former.events, match)
-        last = former.last_refusal
-        self.last_refusal = last.translated(match) if last is not None else None
-        self._refusals.succeed(former._refusals, match)
-        unserved = former.last_unserved
-        self.last_unserved = translated(unserved, match) if unserved is not None else None
-        self._unserved.succeed(former._unserved, match)
+        self._reception.health = self.health
+        self._refused.succeed(former._refused, match, self.health)
         self.forcing.succeed(former.forcing, match.values, match.locks)
         self.delivery.succeed(former.delivery, self.health, match.values, match.due)
 
@@ -477,22 +424,6 @@ class Cell:
     def _changed(self, values: Sequence[tuple[int, Value]]) -> Written:
         present = self.image.values
         return [(index, present[index], value) for index, value in values if present[index] != value]
-
-    def _measure_lag(self, timestamp: float | None, raw: float) -> float:
-        if timestamp is None or not math.isfinite(timestamp):
-            return 0.0
-        self.health.lag = self.lag.package(timestamp, raw)
-        return self.health.lag
-
-    def _source_stale(self, now: float) -> None:
-        """The robot is connected and was fresh until now."""
-        self.events.append(Event(now, EventKind.STALE, detail=self.freshness.state.name.lower()))
-        self._outputs_lost()
-
-    def _outputs_lost(self) -> None:
-        self.forcing.lift()
-        self.image.outputs_lost()
-        self._notify(Direction.OUTPUT)
 
     def _notify(self, direction: Direction) -> None:
         self.forcing.lay()

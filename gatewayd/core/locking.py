@@ -7,7 +7,8 @@ same to members that were only adopted: another of them may have left those. Eve
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gatewayd.core.definition import Value
@@ -107,6 +108,19 @@ class Locking:
             self._ownership.orphans.update(dict.fromkeys(ended, now + grace))
         else:
             self.free(ended, now, f"its connection ended: {reason}")
+
+    def following(self, requesters: Collection[Requester]) -> set[int]:
+        """The locks that would end at once with all these connections."""
+        found: set[int] = set()
+        ending = Counter(requester.writer for requester in requesters)
+        for requester in requesters:
+            writer = requester.writer
+            if writer is None:
+                continue
+            whole = self._writers.alive[writer] and ending[writer] >= self._writers.connections[writer]
+            held = self._ownership.held_by(writer)
+            found.update(held if whole else self._ownership.held_through(writer, requester.connection))
+        return found
 
     def expire(self, now: float) -> None:
         """Release what time has ended: leases, and what nobody went on with after its connection was gone."""
