@@ -36,6 +36,10 @@ HEAD = """\
 #include <string.h>
 struct timer { int32_t PRE, ACC; uint8_t TimerEnable, DN; };
 #define REVERSE 0
+/* One call in 10 ms. */
+static inline void tonr(struct timer *timer)
+{ timer->ACC = timer->TimerEnable ? timer->ACC + 10 : 0; timer->DN = timer->ACC > timer->PRE; }
+#define TONR(timer) tonr(&(timer))
 #define COP(from, to, count) memmove(&(to), &(from), (count) * sizeof(to))
 #define SWPB(from, how, to) ((to) = (int16_t)__builtin_bswap16((uint16_t)(from)))
 #define WHOLE(x) _Generic((x), float: rint(x), double: rint(x), default: (x))
@@ -48,7 +52,7 @@ STATEMENTS = (
     (r"^FOR (\w+) := (\w+) TO (\w+) DO$", r"for (\1 = \2; \1 <= \3; \1++) {"),
     (r"^ELSE$", "} else {"),
     (r"^END_(IF|FOR);$", "}"),
-    (r"^(COP|SWPB)\((.*)\);$", r"\1(\2);"),
+    (r"^(COP|SWPB|TONR)\((.*)\);$", r"\1(\2);"),
     (r"^(.*\])\.(\d+) := (.*);$", r"SET_BIT(\1, \2, (\3));"),
     (r"^(\S+) := (.*);$", r"SET(\1, (\2));"),
 )
@@ -67,16 +71,26 @@ def header(model: PlcModel) -> str:
     return "\n".join(_lines(model)) + "\n"
 
 
-def _lines(model: PlcModel) -> Iterator[str]:
-    files = {
+def _texts(model: PlcModel) -> dict[str, str]:
+    return {
         file.name: file.content().decode().replace("\r\n", "\n") for file in files_for("studio5000", model)
     }
+
+
+def _declared(files: Mapping[str, str]) -> Iterator[str]:
+    """Data types and tags."""
     yield HEAD
     for name in ("Inputs", "Outputs", "Image", "Status"):
-        yield f"struct gw_{name.lower()} {{"
-        yield from (f"    {line};" for line in _members(files[f"GW_{name}.L5X"]))
-        yield "};"
+        if f"GW_{name}.L5X" in files:
+            yield f"struct gw_{name.lower()} {{"
+            yield from (f"    {line};" for line in _members(files[f"GW_{name}.L5X"]))
+            yield "};"
     yield from (f"{line};" for line in _tags(files["GW_Tags.csv"]))
+
+
+def _lines(model: PlcModel) -> Iterator[str]:
+    files = _texts(model)
+    yield from _declared(files)
     for name in ("Unpack", "Pack"):
         yield f"static void routine_{name.lower()}(void)"
         yield "{"
@@ -86,6 +100,31 @@ def _lines(model: PlcModel) -> Iterator[str]:
     yield "{ GW_Image = *image; GW_Status.trusted = 1; routine_unpack(); *outputs = GW_Outputs; }"
     yield "static void gw_pack(const struct gw_inputs *inputs, struct gw_image *image)"
     yield "{ GW_Inputs = *inputs; routine_pack(); *image = GW_Image; }"
+
+
+SHOWN = ("alive", "right_mapping", "trusted", "values_fresh", "robot_writable", "refused_now", "robot_state",
+         "program_state", "refusal", "refusal_variable", "fingerprint", "refusals")  # fmt: skip
+TABLES = ("good", "quality", "owner")
+
+
+def watching(model: PlcModel) -> str:
+    """A program that reads cycles, 1 with the words of the status block and 0 without, and prints the status."""
+    yielded = [*_declared(_texts(model)), "static void routine_watch(void)", "{"]
+    yielded += _statements(routine(_texts(model), "GW_Watch"))
+    yielded += ["}", "#include <stdio.h>", "int main(void)", "{", "int reads; unsigned word;"]
+    yielded += ['while (scanf("%d", &reads) == 1) {', "if (reads) {"]
+    for poll in model.status:
+        place = f"GW_Image.{poll.name}[i] = (int16_t)word"
+        yielded.append(
+            f'for (int i = 0; i < {poll.count}; i++) {{ if (scanf("%x", &word) != 1) return 1; {place}; }}'
+        )
+    yielded += ["}", "routine_watch();"]
+    yielded += [f'printf("%d ", (int)GW_Status.{name});' for name in SHOWN]
+    for name in TABLES:
+        count = len(model.variables)
+        yielded.append(f'for (int i = 1; i <= {count}; i++) printf("%d ", (int)GW_Status.{name}[i]);')
+    yielded += ['printf("\\n");', "}", "return 0;", "}"]
+    return "\n".join(yielded) + "\n"
 
 
 def _members(text: str) -> Iterator[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +12,8 @@ from gatewayd.plc.st.program import ProgramUnit
 CYCLE = 10
 """Milliseconds from call to call."""
 WORDS = (
+    (r" / ", " // "),
+    (r"\bMOD\b", "%"),
     (r"\b(?:WORD|DWORD)#16#([0-9A-F]+)", r"0x\1"),
     (r"\bUDINT#", ""),
     (r"\bAND (?=0x)", "& "),
@@ -61,10 +63,13 @@ def _lines(unit: ProgramUnit, names: re.Pattern[str]) -> list[str]:
         depth = sum(kind != "CASE" for kind in open_blocks)
         lines.append("  " * (depth - less) + text)
 
-    for statement in (line.strip().rstrip(";") for line in unit.body):
+    for statement in _statements(unit.body):
         if match := re.match(r"(IF|WHILE) (.*) (?:THEN|DO)$", statement):
             put(f"{match[1].lower()} {_expression(match[2], names)}:")
             open_blocks.append(match[1])
+        elif match := re.match(r"FOR (\w+) := (\d+) TO (\d+) DO$", statement):
+            put(f"for own.{match[1]} in range({match[2]}, {match[3]} + 1):")
+            open_blocks.append("FOR")
         elif match := re.match(r"ELSIF (.*) THEN$", statement):
             put(f"elif {_expression(match[1], names)}:", 1)
         elif match := re.match(r"CASE (.*) OF$", statement):
@@ -72,9 +77,7 @@ def _lines(unit: ProgramUnit, names: re.Pattern[str]) -> list[str]:
             put("if False: pass")
             open_blocks.append("CASE")
         elif match := re.match(r"(\d+): ([\w.\[\]]+) := (.*)$", statement):
-            put(
-                f"elif case == {match[1]}: {_expression(f'{match[2]} := {match[3]}', names).replace(':=', '=')}"
-            )
+            put(f"elif case == {match[1]}: {_expression(f'{match[2]} := {match[3]}', names)}")
         elif statement == "ELSE":
             is_case = open_blocks[-1] == "CASE"
             put("else:", 0 if is_case else 1)
@@ -90,11 +93,23 @@ def _simple(statement: str, names: re.Pattern[str]) -> str:
     """A call of a timer, or an assignment."""
     if match := re.match(r"(\w+)\(IN := (.*), PT := (.*)\)$", statement):
         return f"own.{match[1]}.tick({_expression(match[2], names)}, {_expression(match[3], names)})"
-    target, value = statement.split(" := ")
+    target, _, value = statement.partition(" := ")
     return f"{_expression(target, names)} = {_expression(value, names)}"
+
+
+def _statements(lines: Iterable[str]) -> list[str]:
+    """Without their ends; one that goes on in the next line is one."""
+    found: list[str] = []
+    for line in (line.strip().rstrip(";") for line in lines):
+        if line.startswith("AND "):
+            found[-1] += f" {line}"
+        else:
+            found.append(line)
+    return found
 
 
 def _expression(text: str, names: re.Pattern[str]) -> str:
     for pattern, replacement in WORDS:
         text = re.sub(pattern, replacement, text)
-    return names.sub(r"own.\1", text)
+    # Operands by name, and assignments.
+    return names.sub(r"own.\1", text).replace(" := ", "=")
