@@ -11,7 +11,6 @@ import logging
 import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import asdict
 from datetime import datetime
 
 from gatewayd.canopen.bus import BusError, BusState
@@ -25,13 +24,13 @@ from gatewayd.canopen.supervised import SupervisedBus
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.core.requester import Requester
-from gatewayd.links.canopen_node.declaration import BUS_STATES, NMT_STATES
+from gatewayd.links.canopen_node.health import health_of, other_bit_rate
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.store import BackgroundStore, Store
 from gatewayd.links.canopen_node.traffic import packed
-from gatewayd.links.contract import Context, Level, Link, LinkHealth, LinkRuntime, Passage, Tap
+from gatewayd.links.contract import Context, Link, LinkHealth, LinkRuntime, Passage, Tap
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.loop.progress import wait_with_progress
@@ -105,42 +104,8 @@ class CanLink(Link, Observer):
         return self.node.bus.carries
 
     def health(self) -> LinkHealth:
-        """How the bus is, and what the node on it is up to.
-
-        An active bus alone is not well: before NMT start no PDO goes either way. A node-ID above 127 is none (LSS).
-        """
-        bus, nmt = self.node.bus, NMT_STATES[self.node.nmt.state]
-        level, words = _BUS_WORDS[bus]
-        problems = [] if bus is BusState.ACTIVE else [f"CAN bus {BUS_STATES[bus + 1]}"]
-        reason = self.reason
-        if reason:
-            problems = [f"{problem}: {reason}" for problem in problems] or [reason]
-            words = f"{BUS_STATES[bus + 1]}: {reason}"
-        if self.node.errors.is_doubled:
-            problems.append(
-                f"another node on the bus has node-ID {self.node.node_id} too: give one of them another"
-            )
-        if problems and level is Level.GOOD:
-            level = Level.WARN
-        elif level is Level.GOOD and nmt != "operational":
-            level, words = Level.WARN, f"{words}, but {nmt}: no PDOs until a master starts the node"
-        number = self.node.node_id
-        return LinkHealth(
-            f"CAN {self.plan.channel}",
-            level,
-            words,
-            f"node {number if number <= 127 else 'without id'}, {nmt}",
-            tuple(problems),
-            {
-                "channel": f"{self.plan.interface}:{self.plan.channel}",
-                "node": self.plan.node,
-                "bus": BUS_STATES[bus + 1],
-                "bus_state": bus + 1,
-                "reason": reason,
-                "nmt_state": nmt,
-                "counters": asdict(self.node.counters),
-            },
-        )
+        """How the bus is, and what the node on it is up to."""
+        return health_of(self.node, self.plan, self.reason)
 
     @property
     def reason(self) -> str:
@@ -149,12 +114,7 @@ class CanLink(Link, Observer):
             return self._unusable
         if self.node.bus is not BusState.ACTIVE:
             return self._bus.reason if self._bus is not None else ""
-        if self._other_bit_rate in (None, self.plan.bitrate):
-            return ""
-        return (
-            f"{self.plan.channel} runs at {self._other_bit_rate} bit/s, but the mapping says {self.plan.bitrate}: "
-            "set up the interface again, or correct the mapping"
-        )
+        return other_bit_rate(self.plan, self._other_bit_rate)
 
     async def run(self) -> None:
         """Stay on the bus until cancelled. May be run again: for the node the bus was away meanwhile."""
@@ -475,16 +435,6 @@ class CanLink(Link, Observer):
             "bus": f"{self.plan.interface}:{self.plan.channel}",
             "node": self.plan.node,
         }
-
-
-_BUS_WORDS = {
-    BusState.ABSENT: (Level.BAD, "absent: no such interface"),
-    BusState.DOWN: (Level.BAD, "down: the interface is not configured"),
-    BusState.BUS_OFF: (Level.BAD, "bus-off: cut off after too many errors"),
-    BusState.PASSIVE: (Level.WARN, "error-passive: look at cable, termination and bit rate"),
-    BusState.WARNING: (Level.WARN, "many errors: look at cable, termination and bit rate"),
-    BusState.ACTIVE: (Level.GOOD, "active"),
-}
 
 
 class CanopenRuntime(LinkRuntime):
