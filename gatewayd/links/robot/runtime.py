@@ -8,7 +8,6 @@ before the controller's own inputs were adopted; from then on writes always are,
 from __future__ import annotations
 
 import asyncio
-import logging
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -16,7 +15,6 @@ from dataclasses import replace
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, FallbackKind, Value
-from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.links.contract import (
     Context,
@@ -37,26 +35,21 @@ from gatewayd.links.robot.outputs import SessionOutputs
 from gatewayd.links.robot.plan import RobotPlan
 from gatewayd.links.robot.readback import Package
 from gatewayd.links.robot.recording import RecordedPackages
-from gatewayd.logs.records import fields
+from gatewayd.links.robot.reports import ConnectionReports, report_kept, report_strange, report_text
+from gatewayd.links.robot.watchdog import WatchdogFeed
 from gatewayd.loop import clock
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.report.format import address
-from gatewayd.rtde.claims import WATCHDOG_KEY
 from gatewayd.rtde.client import RtdeClient
 from gatewayd.rtde.loss import Loss, LossReason
 from gatewayd.rtde.messages import TextMessage
 from gatewayd.rtde.session import ClientSettings, Session
 from gatewayd.rtde.strange import StrangePackage
 
-LOSS_INTERVAL = 60.0
-"""Seconds after which a connection that still fails for the same reason is reported again."""
 LAST_WORDS = 0.4
 """Seconds for which the end of the link waits until what is due has been sent."""
 _LOOK = 0.005
 _CYCLE_UNKNOWN = 0.002
-_FEED_LIMIT = 1 << 31
-
-log = logging.getLogger("gatewayd.robot")
 
 
 class RobotLink(SourceLink):
@@ -100,9 +93,8 @@ class RobotLink(SourceLink):
         self._next_send = -math.inf
         self._pending: asyncio.TimerHandle | None = None
         self._stage: asyncio.TimerHandle | None = None
-        self._feeds = 0
-        self._loss_reported: tuple[str, float] = ("", -math.inf)
-        self._closing = False
+        self._watchdog = WatchdogFeed(self._client)
+        self._connection = ConnectionReports()
         self._recorded = RecordedPackages(address(plan.host, plan.port))
         self.sent_listeners = []
         cell.listeners.append(self._on_change)
@@ -110,7 +102,7 @@ class RobotLink(SourceLink):
     def health(self) -> LinkHealth:
         """The session; how fresh what it brings is, the cell knows."""
         where = address(self.plan.host, self.plan.port)
-        trouble = self._loss_reported[0].removeprefix(f"{where}: ")
+        trouble = self._connection.trouble.removeprefix(f"{where}: ")
         statistics = self._client.statistics
         figures: dict[str, object] = {
             "address": where,
@@ -159,16 +151,17 @@ class RobotLink(SourceLink):
             await asyncio.gather(work, return_exceptions=True)
 
     async def _work(self) -> None:
-        if self.plan.watchdog is None:
+        watchdog = self.plan.watchdog
+        if watchdog is None:
             await self._client.run()
             return
         async with asyncio.TaskGroup() as group:
             group.create_task(self._client.run())
-            group.create_task(self._feed_watchdog(1 / self.plan.watchdog.frequency))
+            group.create_task(self._feed_watchdog(1 / watchdog.frequency))
 
     async def close(self) -> None:
         """Send what is still due. Cancelling `run` afterwards ends the connection; what was sent is delivered."""
-        self._closing = True
+        self._watchdog.ends = True
         end = clock.now() + LAST_WORDS
         while self._owed() and clock.now() < end:  # noqa: ASYNC110 - a session that is being set up may take it
             await asyncio.sleep(_LOOK)
@@ -176,10 +169,7 @@ class RobotLink(SourceLink):
         owed = self._owed()
         if owed:
             names = ", ".join(self._cell.definition.variables[index].name for index in owed)
-            log.warning(
-                "the robot keeps what it holds",
-                extra=fields(cell=self._cell.definition.name, variables=names),
-            )
+            report_kept(self._cell.definition.name, names)
 
     async def _finish(self) -> None:
         """Send what is due, and wait for the control cycles that it needs."""
@@ -271,7 +261,7 @@ class RobotLink(SourceLink):
         self._cycle = 1 / session.series.base_rate if session.series is not None else _CYCLE_UNKNOWN
         self._inputs = ClaimedInputs(variables, session, self._driven, self._cycle)
         self._session = self._agreed = session
-        self._loss_reported = ("", -math.inf)
+        self._connection.connected()
         self._notes.agreed(session)
         rate = f"{1 / session.period:g} Hz"
         self._cell.robot_connected(
@@ -324,13 +314,9 @@ class RobotLink(SourceLink):
         if loss.started:
             self._cell.robot_lost(loss.text, now)
             self._recorded.lost(loss.text)
-        reported, at = self._loss_reported
-        if not loss.started and (loss.text != reported or now - at >= LOSS_INTERVAL):
-            self._loss_reported = (loss.text, now)
+        else:
             where = address(self.plan.host, self.plan.port)
-            log.warning(
-                "no robot", extra=fields(cell=self._cell.definition.name, robot=where, reason=loss.text)
-            )
+            self._connection.failed(self._cell.definition.name, where, loss.text, now)
 
     def probed(self, delay: float) -> None:
         """The controller answered behind all that it had sent before."""
@@ -340,26 +326,11 @@ class RobotLink(SourceLink):
     def text(self, message: TextMessage) -> None:
         """The controller says something; it goes to the log, and the last one to the status."""
         self._notes.said(message, clock.now())
-        log.warning(
-            "the controller says",
-            extra=fields(
-                cell=self._cell.definition.name,
-                text=message.message,
-                source=message.source or None,
-                level=message.level,
-            ),
-        )
+        report_text(self._cell.definition.name, message)
 
     def strange(self, package: StrangePackage) -> None:
         """A package could not be taken as it came; the session goes on, and further ones like it are only counted."""
-        log.warning(
-            "strange package",
-            extra=fields(
-                cell=self._cell.definition.name,
-                kind=package.oddity.value,
-                reason=str(package),
-            ),
-        )
+        report_strange(self._cell.definition.name, package)
 
     # -- robot -> cell -----------------------------------------------------------------------------------------------
 
@@ -458,21 +429,8 @@ class RobotLink(SourceLink):
     async def _feed_watchdog(self, period: float) -> None:
         while True:
             await asyncio.sleep(period)
-            health = self._cell.health
-            health.watchdog_fed = self._is_healthy() and self._feed()
-            self._feeds = (self._feeds + 1) % _FEED_LIMIT
-
-    def _feed(self) -> bool:
-        session = self._client.session
-        recipe = session.inputs.get(WATCHDOG_KEY) if session is not None else None
-        return recipe is not None and self._client.send(recipe, (self._feeds,))
-
-    def _is_healthy(self) -> bool:
-        """Whether the robot is heard, and every writer that the watchdog stands for is alive."""
-        watchdog, cell = self.plan.watchdog, self._cell
-        if watchdog is None or self._closing or cell.freshness.state is not Source.FRESH:
-            return False
-        return all(cell.writers.alive[writer] for writer in watchdog.requires)
+            if self.plan.watchdog is not None:
+                self._watchdog.feed(self.plan.watchdog, self._cell)
 
 
 class RobotRuntime(LinkRuntime):
