@@ -8,9 +8,9 @@ from typing import Any
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
-from gatewayd.links.canopen_node.plc.blocks import watch
 from gatewayd.links.canopen_node.plc.content import Objects
 from gatewayd.links.canopen_node.plc.model import PdoModel
+from gatewayd.links.canopen_node.plc.watch import watch
 from gatewayd.plc.st.cast import POINTER
 from gatewayd.plc.st.dialect import Dialect
 from gatewayd.plc.st.types import meanings

@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from gatewayd.links.canopen_node.plc.blocks import blocks, data, data_types, main
+from gatewayd.links.canopen_node.plc.blocks import blocks, data_types, main
 from gatewayd.links.canopen_node.plc.content import Objects
+from gatewayd.links.canopen_node.plc.data import data
 from gatewayd.links.canopen_node.plc.model import PdoImage, PdoModel, PdoTag, PdoWord
 from gatewayd.links.canopen_node.plc.pdo_text import object_table, pdo_lines
 from gatewayd.links.exports import ExportedFile

@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
-from gatewayd.links.canopen_node.plc.blocks import blocks, data, data_types, main
+from gatewayd.links.canopen_node.plc.blocks import blocks, data_types, main
 from gatewayd.links.canopen_node.plc.content import Objects
+from gatewayd.links.canopen_node.plc.data import data
 from gatewayd.links.canopen_node.plc.model import PdoImage, PdoModel, PdoTag, PdoWord
 from gatewayd.links.canopen_node.plc.pdo_text import object_table, pdo_lines
 from gatewayd.links.exports import ExportedFile
