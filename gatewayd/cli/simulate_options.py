@@ -69,6 +69,10 @@ def robots_of(
     from gatewayd.simulator.fleet import RobotHost, plain_robots
     from gatewayd.simulator.program import ProgramError
 
+    if stepped:
+        _refuse_beside(
+            ctx, "--stepped", lambda name: name == "speed", "time passes by the command `step` alone"
+        )
     at = RobotHost(
         host,
         ports,

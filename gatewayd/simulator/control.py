@@ -37,6 +37,7 @@ import math
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from enum import IntEnum
 from functools import partial
+from typing import TypeVar
 
 from gatewayd.rtde.catalogue import suggest
 from gatewayd.rtde.enums import STATES
@@ -53,6 +54,7 @@ Action = Callable[[], str | Awaitable[str | None] | None]
 MAX_STEPS = 1_000_000
 """Cycles of one `step`."""
 
+_Number = TypeVar("_Number", int, float)
 _WORDS = {"true": True, "false": False, "on": True, "off": False}
 
 
@@ -190,15 +192,19 @@ class Control:
         return act
 
     def _raw(self, rest: str) -> Action:
-        data = bytes.fromhex(rest)
+        try:
+            data = bytes.fromhex(rest)
+        except ValueError:
+            message = f"{rest!r} is not bytes as pairs of hexadecimal digits"
+            raise ValueError(message) from None
         return lambda: self._simulator.raw(data)
 
     def _step(self, rest: str) -> Action:
         if not self._simulator.stepped:
             raise ValueError(NOT_STEPPED)
-        cycles = int(rest or "1")
+        cycles = int(rest or "1") if (rest or "1").isdecimal() else 0
         if not 0 < cycles <= MAX_STEPS:
-            message = f"{cycles} is not within 1..{MAX_STEPS}"
+            message = f"{rest!r} is not a number of cycles within 1..{MAX_STEPS}"
             raise ValueError(message)
 
         async def act() -> str:
@@ -268,11 +274,24 @@ def _fields(text: str) -> list[str]:
 
 
 def _seconds(text: str) -> float:
-    seconds = float(text)
+    seconds = _number(text, float)
     if not 0 <= seconds < math.inf:
         message = f"{text!r} is not a number of seconds"
         raise ValueError(message)
     return seconds
+
+
+def _whole(text: str) -> int:
+    """A whole number, also `0x1f`, `0b1`."""
+    return int(text, 0)
+
+
+def _number(text: str, kind: Callable[[str], _Number]) -> _Number:
+    try:
+        return kind(text)
+    except ValueError:
+        message = f"{text!r} is not a number"
+        raise ValueError(message) from None
 
 
 def _choice(text: str, words: Iterable[str]) -> str:
@@ -289,11 +308,11 @@ def _value(text: str, code: str, names: type[IntEnum] | None) -> Scalar:
     if names is not None and text in names.__members__:
         return names[text]
     if code == "d":
-        return float(text)
+        return _number(text, float)
     if names is not None and not text.lstrip("-").isdecimal():
         message = f"{text!r} is neither a number nor one of {', '.join(names.__members__)}"
         raise ValueError(message)
-    value = int(text, 0)
+    value = _number(text, _whole)
     low, high = INTEGER_RANGES.get(code, (0, 1))
     if not low <= value <= high:
         message = f"{value} is not within {low}..{high}"

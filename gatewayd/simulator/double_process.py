@@ -29,13 +29,14 @@ class ProcessBackend:
         file = Path(self._folder.name, "scenario.toml")
         file.write_text(scenario, "utf-8")
         source = ["--scenario", str(file)] if replay is None else ["--replay", str(replay)]
-        options = [*source, *["--loop"][: replay is not None and repeat], *["--stepped"][: at.stepped]]
+        time = ["--stepped"] if at.stepped else ["--speed", str(at.speed)]
+        options = [*source, *["--loop"][: replay is not None and repeat], *time]
         self._errors = Path(self._folder.name, "stderr")
         with self._errors.open("wb") as errors:
             self._process = subprocess.Popen(  # noqa: S603 - this program, with options of the test's author
                 [
                     *(sys.executable, "-m", "gatewayd", "simulate", "--control", "stdin", "--quiet"),
-                    *("--host", at.host, "--port", str(at.ports[0]), "--speed", str(at.speed), *options),
+                    *("--host", at.host, "--port", str(at.ports[0]), *options),
                 ],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,

@@ -62,7 +62,7 @@ class SimulatedController:
     """Serves one `Controller`; an asynchronous context manager, or `start` and `stop`.
 
     `port` 0 takes a free one, which is kept over `stop` and `start`. OSError if the address cannot be had. `speed` is
-    the share of the clock's speed at which its time passes; `stepped`: it passes only by `step`.
+    the share of the clock's speed at which its time passes; `stepped`: it passes only by `step`. ValueError for both.
     """
 
     def __init__(
@@ -75,6 +75,9 @@ class SimulatedController:
         speed: float = 1.0,
         stepped: bool = False,
     ) -> None:
+        if not 0 < speed < math.inf or (stepped and speed != 1.0):
+            message = f"a speed of {speed!r}: it has to be more than 0, and a stepped controller has none"
+            raise ValueError(message)
         self.controller = controller or Controller()
         self.host = host
         self.port = port
@@ -192,8 +195,9 @@ class SimulatedController:
         for _ in range(cycles):
             for connection in list(self._connections.values()):
                 await connection.drained()
+            paused = self.paused
             self._steps.step()
-            if not self.paused:
+            if not paused:
                 self._run(1)
             if self.follower is not None:
                 await self.follower.settle()

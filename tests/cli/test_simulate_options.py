@@ -32,6 +32,10 @@ def test_a_port_each_makes_a_robot_each() -> None:
         ),
         (["--replay", "a.csv", "--program", "demo"], "--program has no meaning beside --replay"),
         (["--drop-at", "nowhere"], "nowhere"),
+        (
+            ["--stepped", "--speed", "2"],
+            "--speed has no meaning beside --stepped: time passes by the command",
+        ),
     ],
 )
 def test_options_that_contradict_themselves_are_named(arguments: list[str], reason: str) -> None:

@@ -28,7 +28,7 @@ def control(simulator: SimulatedController) -> Control:
         ("  drop-clients  ", "ok 0"),
         ("text hello there", "ok"),
         ("raw 00 03 52", "ok"),
-        ("raw 0x52", "error non-hexadecimal number found in fromhex() arg at position 1"),
+        ("raw 0x52", "error '0x52' is not bytes as pairs of hexadecimal digits"),
         ("freeze on", "ok"),
         ("creep on", "ok"),
         ("delay 0.5", "ok"),
@@ -41,7 +41,9 @@ def control(simulator: SimulatedController) -> Control:
         ("freeze maybe", "error on or off, not 'maybe'"),
         ("set timestamp 1", "error timestamp follows the controller's cycles; use freeze to stop it"),
         ("set output_int_register_0 2147483648", "error 2147483648 is not within -2147483648..2147483647"),
-        ("set output_int_register_0 x", "error invalid literal for int() with base 0: 'x'"),
+        ("set output_int_register_0 x", "error 'x' is not a number"),
+        ("set payload_cog 1,x,2", "error 'x' is not a number"),
+        ("delay soon", "error 'soon' is not a number"),
         ("set payload_cog 1", "error payload_cog takes 3 values, not 1"),
         ("get robot_mod", "error no field 'robot_mod'; did you mean robot_mode?"),
         ("hold", "error which field?"),
@@ -125,6 +127,12 @@ async def test_what_is_overwritten_stays_until_it_is_switched_off(
 async def test_an_unknown_command_names_the_known_ones(control: Control) -> None:
     answer = await control.execute("jump")
     assert answer.startswith("error unknown command 'jump'; there are: get, set, overwrite, hold")
+
+
+@pytest.mark.parametrize("cycles", ["0", "-1", "x", "1.5", "10 20", "1000001"])
+async def test_steps_are_counted_in_whole_cycles(cycles: str) -> None:
+    answer = await Control(SimulatedController(stepped=True)).execute(f"step {cycles}")
+    assert answer == f"error {cycles!r} is not a number of cycles within 1..1000000"
 
 
 async def test_quit(control: Control) -> None:

@@ -340,6 +340,12 @@ async def test_only_a_stepped_controller_has_steps(simulator: SimulatedControlle
         await simulator.step()
 
 
+@pytest.mark.parametrize("speed, stepped", [(0, False), (-1.0, False), (math.nan, False), (2.0, True)])
+def test_a_speed_that_cannot_be_meant_is_refused(speed: float, stepped: bool) -> None:
+    with pytest.raises(ValueError, match="a speed of"):
+        SimulatedController(speed=speed, stepped=stepped)
+
+
 @pytest.mark.parametrize("speed", [0.1, 20.0])
 async def test_another_speed_leaves_each_cycle_as_it_is(client: type[Client], speed: float) -> None:
     async with SimulatedController(speed=speed) as served, client(served.port) as one:
