@@ -122,12 +122,16 @@ def _survey(host: Target, further: Sequence[str], *, inputs: bool) -> Survey:
     from gatewayd.rtde.session import ClientSettings
     from gatewayd.rtde.survey import survey
 
-    outputs = (*OUTPUTS, *sorted(UNTYPED), *further)
+    outputs = tuple(dict.fromkeys((*OUTPUTS, *sorted(UNTYPED), *further)))
     settings = ClientSettings(host=host[0], port=host[1])
     try:
-        return asyncio.run(survey(settings, outputs, tuple(INPUTS) if inputs else ()))
+        found = asyncio.run(survey(settings, outputs, tuple(INPUTS) if inputs else ()))
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="'--ask'") from error
+    # They were asked for in lists that fill up to their limit, out of order: families would not be together.
+    found.outputs = {name: found.outputs[name] for name in outputs if name in found.outputs}
+    found.inputs = {name: found.inputs[name] for name in INPUTS if name in found.inputs}
+    return found
 
 
 def _print_answers(form: str, found: Survey, *, with_inputs: bool) -> None:
