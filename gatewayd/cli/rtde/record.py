@@ -88,8 +88,18 @@ Exit codes:
     metavar="HZ",
     help="Packages per second. [default: the controller's own rate]",
 )
-@click.option("--samples", type=click.IntRange(1), metavar="N", help="End after so many packages.")
-@click.option("--duration", type=DURATION, metavar="TIME", help="End after this time: 30s, 10min, 8h.")
+@click.option(
+    "--samples",
+    type=click.IntRange(1),
+    metavar="N",
+    help="End after so many packages, those of --before among them.",
+)
+@click.option(
+    "--duration",
+    type=DURATION,
+    metavar="TIME",
+    help="End after this time: 30s, 10min, 8h; with a condition, from when it held.",
+)
 @_condition_option("--while", "during", "Record while this holds, each time that it does.")
 @click.option("--once", is_flag=True, help="With --while: end when it does not hold any more.")
 @_condition_option("--start", "start", "Begin at the first package at which this holds.")

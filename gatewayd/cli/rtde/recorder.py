@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Self
 
+from gatewayd.cli.rtde.conditions import ConditionError
 from gatewayd.cli.rtde.progress import Tally
-from gatewayd.cli.rtde.windows import Always, StreamClock, Trigger, Windows
-from gatewayd.report.format import listed
+from gatewayd.cli.rtde.windows import Always, StreamClock, Trigger, Windows, most_before
+from gatewayd.report.format import counted, listed, span
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.recording.errors import RecordingError
 from gatewayd.rtde.recording.gaps import GapWatch, GapWriter, RecordedGap
@@ -50,7 +51,7 @@ class RecordingOrder:
     samples: int | None = None
     """Packages at most."""
     duration: float | None = None
-    """Seconds at most, from the first recorded package."""
+    """Seconds at most, from the first package that is recorded for its own sake: what was before it comes on top."""
     trigger: Callable[[Recipe], Trigger] = lambda _recipe: Always()
     """Makes what says which packages are wanted; may raise ConditionError."""
     before: float = 0.0
@@ -65,6 +66,7 @@ class Recorder:
         """Create the file. RecordingError, ConditionError."""
         recipe = layout.recipe
         columns = _columns(order.fields, recipe)
+        most = _most_before(order.before, layout)
         self.over = False
         """Nothing more is wanted."""
         self.lost_packages = 0
@@ -74,7 +76,9 @@ class Recorder:
         self._trigger = order.trigger(recipe)
         # Half a period more: packages are a whole number of periods apart, and their times are rounded.
         spare = layout.period / 2
-        self._windows: Windows[tuple[Values, float]] = Windows(order.before + spare, order.after + spare)
+        self._windows: Windows[tuple[Values, float]] = Windows(
+            order.before + spare, order.after + spare, most
+        )
         self._clock = StreamClock(layout.period)
         slot = recipe.slots.get(TIMESTAMP)
         self._timestamp = slot.start if slot is not None else None
@@ -191,6 +195,17 @@ class Recorder:
             self._found.append(gap)
         self._file.write(self._pick(values), host_time)
         self._packages += 1
+
+
+def _most_before(before: float, layout: SourceLayout) -> int:
+    """How many packages can be kept; ConditionError if the time before a condition has more."""
+    most, wanted = most_before(layout.recipe.count), before / layout.period
+    if wanted > most:
+        raise ConditionError(
+            f"--before: {span(before)} are {wanted:.0f} packages of {counted(layout.recipe.count, 'value')}, and "
+            f"{most} can be kept, {span(most * layout.period)}; record fewer fields, or at a lower --frequency"
+        )
+    return most
 
 
 def _columns(wanted: tuple[str, ...], recipe: Recipe) -> tuple[str, ...]:

@@ -17,7 +17,13 @@ from gatewayd.rtde.recipe import Scalar
 _Item = TypeVar("_Item")
 
 MAX_BEFORE = 200_000
-"""Packages that are kept for the time before a condition holds; the oldest go first."""
+"""Packages that are kept at most for the time before a condition holds; the oldest go first."""
+_MAX_VALUES = 10_000_000  # of those packages together: some 300 MB
+
+
+def most_before(values: int) -> int:
+    """How many packages of so many values each can be kept."""
+    return min(MAX_BEFORE, _MAX_VALUES // max(1, values))
 
 
 class StreamClock:

@@ -89,7 +89,9 @@ def test_the_table_says_who_answered_and_what_was_not_asked(plant: Plant) -> Non
     lines = result.output.splitlines()
     assert lines[0].startswith("controller 3.")
     names = [line.split()[0] for line in lines[2:-2]]
-    assert "input_bit_register_64..127" in names, "families are together, in whatever lists they were asked for"
+    assert "input_bit_register_64..127" in names, (
+        "families are together, in whatever lists they were asked for"
+    )
     assert names.index("input_double_register_24..47") + 1 == names.index("output_bit_registers0_to_31")
     assert lines[0].endswith("series cb3, protocol 1")
     assert lines[-1] == "inputs were not asked for: only claiming shows them, which --probe-claims does"

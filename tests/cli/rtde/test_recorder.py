@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from gatewayd.cli.rtde.conditions import parse_condition
+from gatewayd.cli.rtde.conditions import ConditionError, parse_condition
 from gatewayd.cli.rtde.recorder import LEFT_OUT, Recorder, RecordingOrder, SourceLayout
 from gatewayd.cli.rtde.triggers import Conditions
 from gatewayd.rtde.recipe import Recipe
@@ -51,6 +51,37 @@ def test_columns_in_the_order_that_was_asked_for(tmp_path: Path) -> None:
     ):
         recorded(RecordingOrder(path=str(tmp_path / "c.csv"), fields=("off",)), [])
     assert not (tmp_path / "c.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "seconds, fields, refused",
+    [(99_999, 5, ""), (100_001, 5, "200000 can be kept, 1 d 3 h"), (6000, 1001, "9990")],
+)
+def test_a_time_before_that_cannot_be_kept_is_refused_and_leaves_no_file(
+    tmp_path: Path, seconds: float, fields: int, refused: str
+) -> None:
+    """A package each half second; of many fields fewer are kept."""
+    path = tmp_path / "a.csv"
+    names = ["timestamp", *(f"f{number}" for number in range(1, fields))]
+    layout = SourceLayout(Recipe(names, [DataType.DOUBLE] * fields), 0.5)
+    order = RecordingOrder(path=str(path), before=seconds)
+    if not refused:
+        Recorder(order, layout).close()
+        return
+    with pytest.raises(ConditionError, match=refused):
+        Recorder(order, layout)
+    assert not path.exists()
+
+
+def test_the_duration_counts_from_when_the_condition_held(tmp_path: Path) -> None:
+    """What was before comes on top; a number of packages counts it."""
+    packages = [package(number, int(number >= 6)) for number in range(30)]
+    trigger = Conditions(None, parse_condition("io == 1"), None, once=False).trigger
+    timed, counted = tmp_path / "a.csv", tmp_path / "b.csv"
+    recorded(RecordingOrder(path=str(timed), before=2, duration=3, trigger=trigger), packages)
+    assert stamps(timed) == list(range(2, 12))
+    recorded(RecordingOrder(path=str(counted), before=2, samples=6, trigger=trigger), packages)
+    assert stamps(counted) == list(range(2, 8))
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
