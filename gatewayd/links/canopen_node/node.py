@@ -19,16 +19,16 @@ from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.gap import Waiting
 from gatewayd.canopen.guarding import NodeGuarding
 from gatewayd.canopen.heartbeat import HeartbeatConsumer, HeartbeatProducer
-from gatewayd.canopen.identity import identity_objects, revision_of
+from gatewayd.canopen.identity import revision_of
 from gatewayd.canopen.lss import LssSlave
-from gatewayd.canopen.nmt import ALLOWED, UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
-from gatewayd.canopen.sdo.server import SdoServer, server_parameter
+from gatewayd.canopen.nmt import UNCONFIGURED, NmtCommand, NmtSlave, NmtState, Service
+from gatewayd.canopen.sdo.server import SdoServer
 from gatewayd.canopen.sync import SyncService
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction
 from gatewayd.core.requester import Requester
-from gatewayd.core.status import StatusBlock
 from gatewayd.links.canopen_node.communication_errors import CommunicationErrors
+from gatewayd.links.canopen_node.objects import cell_objects, identification_objects, service_objects
 from gatewayd.links.canopen_node.observer import NodeCounters, Observer, Timed
 from gatewayd.links.canopen_node.pdo.parameters import Configuration, PdoTable
 from gatewayd.links.canopen_node.pdo.receive import ReceiveEngine
@@ -37,14 +37,10 @@ from gatewayd.links.canopen_node.peers import Peers
 from gatewayd.links.canopen_node.plan import GUARDING, CanopenPlan
 from gatewayd.links.canopen_node.promise import Promises
 from gatewayd.links.canopen_node.robot_errors import RobotErrors
-from gatewayd.links.canopen_node.status_objects import StatusObjects
+from gatewayd.links.canopen_node.routes import Handler, Routes
 from gatewayd.links.canopen_node.storage import Parameters
 from gatewayd.links.canopen_node.store import Store
 from gatewayd.links.canopen_node.unserved import UnservedFrames
-from gatewayd.links.canopen_node.variables import VariableObjects
-from gatewayd.links.registry import status_fields
-
-Handler = Callable[[Frame, float], None]
 
 
 class Node:
@@ -75,8 +71,7 @@ class Node:
         self._now = 0.0
         self._started = False
         self._store_damaged = False
-        self._routes: dict[int, tuple[Service, Handler]] = {}
-        self._handlers: dict[int, Handler] = {}
+        self._routes = Routes()
         self.parameters = Parameters(
             store,
             plan.node,
@@ -163,7 +158,9 @@ class Node:
             store=self._store_lss,
             activate=self._observer.switch_bit_rate,
         )
-        self.dictionary = Dictionary((*objects, *self._identity_objects()), self._waiting.permit)
+        self.dictionary = Dictionary(
+            (*objects, *identification_objects(self.identity, cell, self._clock)), self._waiting.permit
+        )
         self.parameters.bind(self.dictionary)
         self.sdo = SdoServer(self.dictionary, aborted=self._unserved.sdo)
         self._timed: tuple[Timed, ...] = (
@@ -194,7 +191,7 @@ class Node:
 
     def cob_ids(self) -> frozenset[int]:
         """The COB-IDs of all data frames that mean anything to the node, in any NMT state."""
-        return frozenset(self._routes)
+        return self._routes.cob_ids
 
     def remote_ids(self) -> frozenset[int]:
         """The COB-IDs of all remote frames that it answers: node guarding."""
@@ -250,7 +247,7 @@ class Node:
         """A frame from the bus."""
         self._now = now
         self.counters.received += 1
-        handler = self._handlers.get(frame.can_id)
+        handler = self._routes.handlers.get(frame.can_id)
         if handler is None:
             self.counters.ignored += 1
             return
@@ -329,18 +326,8 @@ class Node:
             routes[Function.ERROR_CONTROL + self.node_id] = (Service.ERROR_CONTROL, self._receive_guarding)
             routes[Function.SDO_REQUEST + self.node_id] = (Service.SDO, self._receive_sdo)
             routes[Function.NMT] = (Service.NODE_CONTROL, self.nmt.receive)
-        changed = routes.keys() != self._routes.keys()
-        self._routes = routes
-        self._gate()
-        if changed:
+        if self._routes.replace(routes, self.nmt.state):
             self._observer.cob_ids_changed()
-
-    def _gate(self) -> None:
-        """Who of them runs in the present NMT state."""
-        allowed = ALLOWED[self.nmt.state]
-        self._handlers = {
-            can_id: handler for can_id, (service, handler) in self._routes.items() if service in allowed
-        }
 
     def _receive_pdo(self, frame: Frame, now: float) -> None:
         if frame.remote:
@@ -374,7 +361,7 @@ class Node:
 
     def _nmt_changed(self, old: NmtState, new: NmtState, now: float) -> None:
         operational = new is NmtState.OPERATIONAL
-        self._gate()
+        self._routes.gate(self.nmt.state)
         if old is NmtState.INITIALISING:
             self.producer.restart(now)
         if new is NmtState.STOPPED:
@@ -445,23 +432,9 @@ class Node:
 
     # -- assembly ------------------------------------------------------------------------------------------------
 
-    def _identity_objects(self) -> Iterable[Object]:
-        status = StatusBlock(self.cell, status_fields())
-        return identity_objects(
-            self.identity,
-            f"gatewayd {self.cell.definition.name}",
-            lambda: int.from_bytes(status.read(1, 1, self._now), "big"),
-        )
-
     def _objects(self) -> Iterable[Object]:
         """All of them but those that say who the node is."""
-        requester = partial(self._peers.requester, self.plan.sdo_writer)
-
-        def asking() -> Requester:
-            return self._peers.asking(self.plan.sdo_writer, self._now)
-
-        yield server_parameter(self.parameters.node)
-        for service in (
+        services = (
             self.emergency,
             self.sync,
             self.guarding,
@@ -471,10 +444,9 @@ class Node:
             self.producer,
             self.errors.behaviour,
             self.pdos,
-            VariableObjects(self.plan, self.cell, self._clock, asking),
-            StatusObjects(self.cell, self._clock, requester, asking),
-        ):
-            yield from service.objects()
+        )
+        yield from service_objects(self.parameters.node, services)
+        yield from cell_objects(self.plan, self.cell, self._peers, self._clock)
 
     def _find(self, index: int, subindex: int) -> Entry:
         return self.dictionary.entry(index, subindex)

@@ -274,7 +274,7 @@ async def test_what_waited_through_a_gap_is_read_before_anything_else_and_only_t
             waited.append(node._waiting.seconds)
             receive(frame, now)
 
-        node._handlers[0] = observed
+        node._routes.handlers[0] = observed
         now = clock.now()
         for _ in range(200):
             station.send(0x000, b"\x80\5")
@@ -296,7 +296,7 @@ async def test_more_than_is_read_in_one_go_has_waited_all_the_same(
     async with running(station):
         await until(lambda: station.frames(HEARTBEAT))
         node = station.link.node
-        node._handlers[0] = lambda _frame, _now: waited.append(node._waiting.seconds)
+        node._routes.handlers[0] = lambda _frame, _now: waited.append(node._waiting.seconds)
         for _ in range(1000):
             station.send(0x000, b"\x80\5")
         now = clock.now()
