@@ -29,7 +29,8 @@ MASTERS = tuple(target for target in TARGETS if target not in canopen_registry.R
 """Targets whose controllers can be a CANopen master."""
 
 
-def _plan(path: Path) -> Plan:
+def plan_from(path: Path) -> Plan:
+    """The plan of a mapping file without errors."""
     loaded = load(path.read_bytes(), path.name)
     assert loaded.plan is not None, loaded.diagnostics
     return loaded.plan
@@ -37,12 +38,12 @@ def _plan(path: Path) -> Plan:
 
 def golden_model() -> PlcModel:
     """The cell of the golden files, for its PLC on Modbus."""
-    return model_of(_plan(MAPPING), PlcWishes(writer="plc"))
+    return model_of(plan_from(MAPPING), PlcWishes(writer="plc"))
 
 
 def canopen_model() -> PdoModel:
     """The cell of the golden files for a CANopen master."""
-    return canopen_build.model_of(_plan(CANOPEN_MAPPING), PlcWishes())
+    return canopen_build.model_of(plan_from(CANOPEN_MAPPING), PlcWishes())
 
 
 def made() -> Mapping[Path, bytes]:
