@@ -55,6 +55,9 @@ def looked_at(found: Interface, plan: CanopenPlan) -> Iterator[Observation]:
         yield Observation(INTERFACE, Outcome.PROBLEM, text, "it is one of another kind", remedy)
         return
     yield Observation.well(INTERFACE, f"{channel} is there")
+    if found.controller is not None and found.bitrate is None:
+        yield _never_set_up(plan)
+        return
     if not found.up:
         cause, remedy = (
             "nobody has brought it up since the start of this machine",
@@ -74,6 +77,17 @@ def looked_at(found: Interface, plan: CanopenPlan) -> Iterator[Observation]:
         )
 
 
+def _never_set_up(plan: CanopenPlan) -> Observation:
+    """A controller without a bit rate cannot be brought up: the kernel refuses (drivers/net/can/dev)."""
+    return Observation(
+        STATE,
+        Outcome.PROBLEM,
+        f"{plan.channel} is down, and no bit rate is set",
+        "nobody has set it up since the start of this machine, or since the adapter was plugged in",
+        f"`ip link set {plan.channel} up type can bitrate {plan.bitrate} restart-ms 100`; {_SET_UP} makes it permanent",
+    )
+
+
 def _state(found: Interface, channel: str) -> Observation:
     errors = ""
     if found.tx_errors is not None:
@@ -89,7 +103,8 @@ def _state(found: Interface, channel: str) -> Observation:
 
 def _bit_rate(found: Interface, plan: CanopenPlan) -> Observation:
     if found.bitrate is None:
-        return Observation(BIT_RATE, Outcome.NOTE, f"{plan.channel} has none (a virtual bus)")
+        text = f"{plan.channel} reports none: a virtual bus, or an adapter at a serial line, where slcand sets it"
+        return Observation(BIT_RATE, Outcome.NOTE, text)
     if found.bitrate == plan.bitrate:
         return Observation.well(BIT_RATE, f"{found.bitrate} bit/s, as the mapping says")
     return Observation(
@@ -97,7 +112,8 @@ def _bit_rate(found: Interface, plan: CanopenPlan) -> Observation:
         Outcome.PROBLEM,
         f"{plan.channel} runs at {found.bitrate} bit/s, the mapping says {plan.bitrate}",
         "the interface was set up for another bus, or the mapping was copied",
-        f"`ip link set {plan.channel} down`, then `type can bitrate {plan.bitrate}`, or correct `canopen: bitrate:`",
+        f"`ip link set {plan.channel} down`, then `ip link set {plan.channel} up type can bitrate {plan.bitrate}`, "
+        "or correct `canopen: bitrate:`",
     )
 
 

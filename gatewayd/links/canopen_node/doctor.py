@@ -6,6 +6,8 @@ Nothing is sent, and nothing configured.
 from __future__ import annotations
 
 import asyncio
+import errno
+import os
 import socket
 import struct
 from collections.abc import AsyncIterator
@@ -87,11 +89,15 @@ async def listen(channel: str, seconds: float) -> diagnosis.Heard:
 
 
 def _look(channel: str) -> Interface | None:
-    """The interface; None if there is none of that name. OSError without SocketCAN, BusError in a sandbox."""
+    """The interface; None if there is none of that name. OSError without SocketCAN, BusError if the kernel refuses."""
     socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
     reader = InterfaceReader()
     try:
         return reader.read(channel)
+    except OSError as error:
+        if error.errno in (errno.ERANGE, errno.EINVAL):
+            return None  # no interface can have such a name
+        raise BusError(f"cannot look at {channel}: {os.strerror(error.errno or 0)}") from error
     finally:
         reader.close()
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from gatewayd.canopen.interface import ControllerState, Interface
@@ -29,8 +31,6 @@ WELL = Interface(
 
 
 def looked(**changes: object) -> dict[str, tuple[Outcome, str]]:
-    from dataclasses import replace
-
     found = looked_at(replace(WELL, **changes), plan())  # type: ignore[arg-type]
     return {seen.check: (seen.outcome, seen.text) for seen in found}
 
@@ -64,7 +64,12 @@ def test_an_interface_as_it_should_be() -> None:
             Outcome.PROBLEM,
             "can0 runs at 250000 bit/s, the mapping says 500000",
         ),
-        ({"bitrate": None}, "bit rate", Outcome.NOTE, "can0 has none (a virtual bus)"),
+        (
+            {"bitrate": None, "controller": None},
+            "bit rate",
+            Outcome.NOTE,
+            "can0 reports none: a virtual bus, or an adapter at a serial line, where slcand sets it",
+        ),
         ({"restart_ms": 0}, "restart", Outcome.WARNING, "can0 stays off the bus after a bus-off"),
     ],
 )
@@ -72,6 +77,23 @@ def test_each_fault_of_an_interface(
     changes: dict[str, object], check: str, outcome: Outcome, text: str
 ) -> None:
     assert looked(**changes)[check] == (outcome, text)
+
+
+def test_an_adapter_that_was_never_set_up_is_one_finding_with_one_remedy() -> None:
+    """As it is when it was plugged in: it has no bit rate, and cannot be brought up without one."""
+    fresh = {
+        "up": False,
+        "carrier": False,
+        "controller": ControllerState.STOPPED,
+        "bitrate": None,
+        "restart_ms": 0,
+    }
+    assert looked(**fresh) == {
+        "interface": (Outcome.OK, "can0 is there"),
+        "bus state": (Outcome.PROBLEM, "can0 is down, and no bit rate is set"),
+    }
+    (found,) = [seen for seen in looked_at(replace(WELL, **fresh), plan()) if seen.outcome.is_finding]  # type: ignore[arg-type]
+    assert found.remedy.startswith("`ip link set can0 up type can bitrate 500000 restart-ms 100`")
 
 
 def test_a_driver_that_does_not_say_when_it_restarts_is_no_finding() -> None:

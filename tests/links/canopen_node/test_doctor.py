@@ -67,6 +67,30 @@ async def test_a_sandbox_says_what_to_allow(bus: pytest.MonkeyPatch) -> None:
     assert (found.text, found.remedy) == ("cannot ask the kernel", "allow AF_NETLINK")
 
 
+@pytest.mark.parametrize(
+    "number, text",
+    [
+        (errno.ERANGE, "there is no interface can0"),
+        (errno.ENOMEM, "cannot look at can0: Cannot allocate memory"),
+    ],
+)
+async def test_what_the_kernel_says_of_a_name_is_no_lack_of_can(
+    monkeypatch: pytest.MonkeyPatch, number: int, text: str
+) -> None:
+    """A name of more than 15 bytes is ERANGE."""
+
+    class Refusing:
+        def read(self, _channel: str) -> Interface:
+            raise OSError(number, "the kernel does not describe the interface")
+
+        def close(self) -> None: ...
+
+    monkeypatch.setattr(doctor, "InterfaceReader", Refusing)
+    monkeypatch.setattr("socket.socket", lambda *_: Refusing())
+    (found,) = await look()
+    assert found.text == text
+
+
 async def test_an_absent_interface_ends_the_look(bus: pytest.MonkeyPatch) -> None:
     bus.setattr(doctor, "_look", lambda _channel: None)
     (found,) = await look()
