@@ -1,0 +1,201 @@
+"""The requests that are underway on one connection. Pure; seconds of any one clock.
+
+On TCP the transaction id says which request an answer belongs to: one that comes after its time-out is dropped and
+counted. On a serial line only the unit says so, and the length: a unit that was given up is not asked again before its
+late answer has had as much time again (`Line`), and what comes meanwhile is thrown away.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import NamedTuple, Protocol
+
+from gatewayd.modbus.client.framing import RTU_OVERHEAD, RtuFraming, TcpFraming
+from gatewayd.modbus.client.polling import NEVER
+from gatewayd.modbus.client.requests import BadAnswer, Failure, TimedOut, parse_answer
+from gatewayd.modbus.client.station import Job
+from gatewayd.modbus.client.timing import RtuTiming
+from gatewayd.modbus.frames import FramingError
+
+MAX_LATE = 256
+"""Requests that were given up and whose late answers are still known for what they are."""
+_BROADCAST = 0
+
+
+class Finished(NamedTuple):
+    """A request and what became of it."""
+
+    job: Job
+    outcome: bytes | Failure
+
+
+class Conversation(Protocol):
+    """One connection's worth. Made anew for each connection."""
+
+    jobs: list[Job]
+    """Underway, in the order in which they were sent."""
+    is_ambiguous: bool
+    """Whether a late answer could be taken for that of another request to the same unit."""
+
+    def ready_at(self) -> float:
+        """From when another request may be sent; NEVER while as many as allowed are underway."""
+
+    def begin(self, job: Job, now: float) -> bytes:
+        """The frame of the request, to be sent now."""
+
+    def deadline(self) -> float:
+        """When the first request underway times out; NEVER while there is none."""
+
+    def received(self, data: bytes, now: float) -> list[Finished]:
+        """What is finished by it. Raises `Broken` where the connection is of no use any more."""
+
+    def expired(self, now: float) -> list[Finished]:
+        """What has timed out. Raises `Broken` as well."""
+
+
+class Broken(Exception):
+    """The connection must be closed: what comes in cannot be told apart any more."""
+
+    def __init__(self, reason: str, finished: list[Finished]) -> None:
+        super().__init__(reason)
+        self.finished = finished
+        """What was finished before."""
+
+
+class TcpConversation:
+    """Modbus TCP, up to `most` requests underway (Messaging Guide V1.0b, 4.2.1: up to 16 are usual)."""
+
+    __slots__ = ("_framing", "_late", "_most", "_underway", "is_ambiguous", "jobs")
+
+    def __init__(self, most: int = 1, transaction: int = 0) -> None:
+        self._most = most
+        self._framing = TcpFraming(transaction)
+        self._underway: dict[int, Job] = {}
+        self._late: OrderedDict[int, Job] = OrderedDict()
+        self.is_ambiguous = False
+        self.jobs: list[Job] = []
+
+    def ready_at(self) -> float:
+        """See Conversation."""
+        return float("-inf") if len(self.jobs) < self._most else NEVER
+
+    def begin(self, job: Job, now: float) -> bytes:
+        """See Conversation."""
+        job.sent_at = now
+        transaction, frame = self._framing.request(job.unit, job.request.pdu)
+        while transaction in self._underway:  # after 65,536 others: not while anything times out
+            transaction, frame = self._framing.request(job.unit, job.request.pdu)
+        self._late.pop(transaction, None)
+        self._underway[transaction] = job
+        self.jobs.append(job)
+        return frame
+
+    def deadline(self) -> float:
+        """See Conversation."""
+        return min([job.sent_at + job.timeout for job in self.jobs], default=NEVER)
+
+    def received(self, data: bytes, now: float) -> list[Finished]:
+        """See Conversation."""
+        finished: list[Finished] = []
+        try:
+            for frame in self._framing.feed(data):
+                job = self._underway.pop(frame.transaction, None)
+                if job is None:
+                    self._count_late(frame.transaction)
+                    continue
+                self.jobs.remove(job)
+                if frame.unit != job.unit:
+                    outcome: bytes | Failure = BadAnswer(
+                        f"an answer of unit {frame.unit} instead of {job.unit}"
+                    )
+                else:
+                    outcome = parse_answer(job.request, frame.pdu)
+                finished.append(Finished(job, outcome))
+        except FramingError as error:
+            raise Broken(f"bytes that are no Modbus: {error}", finished) from error
+        return finished
+
+    def expired(self, now: float) -> list[Finished]:
+        """See Conversation. A frame that has begun and does not end leaves nothing to tell the next one by."""
+        finished = []
+        for transaction, job in list(self._underway.items()):
+            if job.sent_at + job.timeout <= now:
+                del self._underway[transaction]
+                self.jobs.remove(job)
+                self._late[transaction] = job
+                if len(self._late) > MAX_LATE:
+                    self._late.popitem(last=False)
+                finished.append(Finished(job, TimedOut(job.timeout)))
+        if finished and self._framing.is_within_frame:
+            raise Broken("an answer that does not end", finished)
+        return finished
+
+    def _count_late(self, transaction: int) -> None:
+        late = self._late.pop(transaction, None)
+        if late is not None and late.station is not None:
+            late.station.counters.late_answers += 1
+
+
+class RtuConversation:
+    """RTU: one request at a time, and the silences between frames."""
+
+    __slots__ = ("_framing", "_quiet_from", "_timing", "is_ambiguous", "jobs")
+
+    def __init__(self, timing: RtuTiming) -> None:
+        self._timing = timing
+        self._framing = RtuFraming()
+        self._quiet_from = float("-inf")
+        self.is_ambiguous = True
+        self.jobs: list[Job] = []
+
+    @property
+    def noise(self) -> int:
+        """Bytes that belonged to no answer, so far."""
+        return self._framing.noise
+
+    def ready_at(self) -> float:
+        """See Conversation."""
+        return NEVER if self.jobs else self._quiet_from
+
+    def begin(self, job: Job, now: float) -> bytes:
+        """See Conversation."""
+        job.sent_at = now
+        self.jobs.append(job)
+        return self._framing.request(job.unit, job.request)
+
+    def deadline(self) -> float:
+        """See Conversation. What the line itself takes is added to the time-out."""
+        if not self.jobs:
+            return NEVER
+        job = self.jobs[0]
+        sent = job.sent_at + self._timing.transmission(len(job.request.pdu) + RTU_OVERHEAD)
+        if job.unit == _BROADCAST:
+            return sent + self._timing.turnaround
+        return sent + job.timeout + self._timing.transmission(job.request.answer_size + RTU_OVERHEAD)
+
+    def received(self, data: bytes, now: float) -> list[Finished]:
+        """See Conversation."""
+        self._quiet_from = now + self._timing.gap
+        try:
+            frame = self._framing.feed(data)
+        except FramingError as error:
+            self._framing.reset()
+            return [Finished(self.jobs.pop(), BadAnswer(str(error)))]
+        if frame is None:
+            return []
+        job = self.jobs.pop()
+        return [Finished(job, parse_answer(job.request, frame.pdu))]
+
+    def expired(self, now: float) -> list[Finished]:
+        """See Conversation. A broadcast has no answer: it is done."""
+        if not self.jobs or now < self.deadline():
+            return []
+        job = self.jobs.pop()
+        had_part = self._framing.is_within_frame
+        self._framing.reset()
+        if job.unit == _BROADCAST:
+            return [Finished(job, b"")]
+        self._quiet_from = max(self._quiet_from, now + self._timing.gap)
+        if had_part:
+            return [Finished(job, BadAnswer(f"no whole answer within {job.timeout:g} s"))]
+        return [Finished(job, TimedOut(job.timeout))]

@@ -1,0 +1,279 @@
+"""One unit: what is read from it and when, what is written to it, whether it is there, what is counted. Pure.
+
+Times are seconds of any one clock that never goes back. A `Line` takes the jobs of its stations in turn.
+
+A unit is online from its first answer on, be it an exception, until its breaker opens: after so many failures in a row,
+or when nothing came for `lost_after` seconds though something was wanted, whatever the reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+
+from gatewayd.modbus.areas import Area
+from gatewayd.modbus.client.breaker import Breaker, BreakerState
+from gatewayd.modbus.client.counters import UnitCounters
+from gatewayd.modbus.client.grouping import GroupMember, PollClass, ReadGroup
+from gatewayd.modbus.client.identity import IdentityReader, UnitIdentity
+from gatewayd.modbus.client.polling import AT_ONCE, NEVER, PollCycle
+from gatewayd.modbus.client.requests import (
+    BadAnswer,
+    ConnectionLost,
+    ExceptionAnswer,
+    Failure,
+    ModbusRequest,
+    TimedOut,
+    read,
+)
+from gatewayd.modbus.client.unit import StationListener, StationSettings, UnitState
+from gatewayd.modbus.client.writer import UnitWriter
+from gatewayd.modbus.client.writes import WriteOrder
+
+_KEEPALIVE = ReadGroup(Area.HOLDING, 0, 1, (GroupMember(0, 0, 1),), (read(Area.HOLDING, 0, 1),))
+"""Any answer shows that a unit is there, an exception too."""
+
+
+@dataclass(eq=False, slots=True)
+class Job:
+    """A request on its way, and who hears what became of it."""
+
+    unit: int
+    request: ModbusRequest
+    timeout: float
+    sent_at: float
+    done: Callable[[Job, bytes | Failure, float], None]
+    """Called once, with the data or the failure, and the time."""
+    station: Station | None = None
+    """Whose it is; None for a broadcast."""
+    is_probe: bool = False
+    is_blamed: bool = True
+    """Whether the end of the connection counts against the unit: it does where its request was the first underway."""
+    read: tuple[PollCycle, ReadGroup, int] | None = None
+    """Where the data belong, for a poll."""
+
+
+class Station:
+    """A unit at work."""
+
+    def __init__(self, settings: StationSettings, listener: StationListener) -> None:
+        self.settings = settings
+        self.listener = listener
+        self.state = UnitState.CONNECTING
+        self.reason = ""
+        """Why it is lost; empty while it is not."""
+        self.counters = UnitCounters()
+        self.breaker = Breaker(settings.breaker)
+        self.identity: UnitIdentity | None = None
+        """The last one; None before the first, and where nobody asks."""
+        self.deadline = NEVER
+        """When it counts as lost unless it answers before."""
+        self.write_due = NEVER
+        """From when it has something to write."""
+        self.read_due = AT_ONCE
+        """From when it has something to read, or is to be probed."""
+        self.served = 0
+        """The line's turn in which it was served last."""
+        self.in_flight = 0
+        """Its requests underway."""
+        self.wake: Callable[[], None] = _nothing
+        """Called when there is something to write; set by who runs the line."""
+        self._is_polled = bool(settings.polls)
+        polls = settings.polls or (PollClass(settings.keepalive, (_KEEPALIVE,)),)
+        self._cycles = [PollCycle(poll) for poll in polls]
+        self._writer = UnitWriter(has_mask_write=settings.has_mask_write)
+        self._reader = IdentityReader(settings.is_identified, settings.serial)
+        self._is_identifying = False
+        self._hold_until = AT_ONCE
+
+    def write(self, key: Hashable, order: WriteOrder, now: float, *, repeat: float | None = None) -> bool:
+        """Write as soon as the line is free; the newest wins for each key (`writes`).
+
+        With `repeat` it is written again every so many seconds until another write, or `cancel`, has the key. Returns
+        False, and forgets it, while the unit is not online: whoever asks decides on `state_changed` what to write then.
+        """
+        if self.state is not UnitState.ONLINE:
+            self.counters.dropped_writes += 1
+            return False
+        if self._writer.put(key, order, repeat, now):
+            self.counters.dropped_writes += 1
+        self._refresh()
+        self.wake()
+        return True
+
+    def cancel(self, key: Hashable) -> None:
+        """Neither write nor repeat what has this key any more."""
+        self._writer.cancel(key)
+        self._refresh()
+
+    def take_write(self, now: float) -> Job:
+        """The next request of a write, to be sent now. Only when `write_due` has come."""
+        return self._job(self._writer.take(now), self._write_done, now)
+
+    def take_read(self, now: float) -> Job:
+        """The next request that reads, to be sent now. Only when `read_due` has come."""
+        is_probe = not self.breaker.is_closed
+        if is_probe:
+            self.breaker.probe()
+        elif (request := self._reader.request) is not None:
+            self._is_identifying = True
+            return self._job(request, self._identity_done, now)
+        cycle = min(self._cycles, key=_due) if len(self._cycles) > 1 else self._cycles[0]
+        group, part, request = cycle.take(now)
+        job = self._job(request, self._read_done, now)
+        job.read, job.is_probe = (cycle, group, part), is_probe
+        return job
+
+    def connected(self, now: float) -> None:
+        """The line's connection is there (again): what is behind it may be another device."""
+        self._reader.begin()
+        if self.breaker.state is BreakerState.OPEN:
+            self.breaker.probe_at = min(self.breaker.probe_at, now)
+        self._refresh()
+
+    def hold(self, until: float) -> None:
+        """Do not ask it before: a late answer could be taken for another's."""
+        self._hold_until = until
+        self._refresh()
+
+    def check(self, now: float, trouble: str) -> None:
+        """Count it as lost if its deadline has passed, or if it was not there yet and the line has `trouble`."""
+        if now >= self.deadline:
+            self.breaker.give_up(now)
+            self._lose(trouble or f"no answer for {self.settings.breaker.lost_after:g} s", now)
+        elif trouble and self.state is not UnitState.ONLINE:
+            self._lose(trouble, now)
+
+    def close(self, reason: str, now: float) -> None:
+        """It leaves the line."""
+        self.breaker.give_up(now)
+        self._lose(reason, now)
+
+    def _refresh(self) -> None:
+        """Work out when it has something to say: the line looks at that far more often than it changes."""
+        hold = self._hold_until
+        if not self.breaker.is_closed:
+            is_free = self.breaker.state is BreakerState.OPEN and not self.in_flight
+            self.write_due = NEVER
+            self.read_due = max(self.breaker.probe_at, hold) if is_free else NEVER
+            return
+        self.write_due = max(self._writer.due, hold)
+        if self.in_flight >= self.settings.in_flight:
+            self.read_due = NEVER
+        elif self._reader.request is not None:
+            self.read_due = NEVER if self._is_identifying else hold
+        elif len(self._cycles) == 1:
+            self.read_due = max(self._cycles[0].due, hold)
+        else:
+            self.read_due = max(min([cycle.due for cycle in self._cycles]), hold)
+
+    def _job(
+        self, request: ModbusRequest, done: Callable[[Job, bytes | Failure, float], None], now: float
+    ) -> Job:
+        self.in_flight += 1
+        self.counters.requests += 1
+        self._refresh()
+        return Job(self.settings.unit, request, self.settings.timeout, now, done, self)
+
+    def _read_done(self, job: Job, outcome: bytes | Failure, now: float) -> None:
+        assert job.read is not None
+        cycle, group, part = job.read
+        if not isinstance(outcome, bytes):
+            is_first = cycle.failed(group)
+            self._judge(job, outcome, now)
+            if is_first and self._is_polled:
+                self.listener.read_failed(group, outcome, now)
+            return
+        data = cycle.answered(group, part, outcome)
+        self._judge(job, outcome, now)
+        # Values of a unit that was just found wait until it is known which device it is.
+        if data is not None and self._is_polled and not (job.is_probe and self._reader.request is not None):
+            self.listener.values_read(group, data, now)
+
+    def _write_done(self, job: Job, outcome: bytes | Failure, now: float) -> None:
+        if isinstance(outcome, ConnectionLost) and not job.is_blamed:
+            self._writer.put_back()
+            result = None
+        else:
+            result = self._writer.done(outcome, now)
+        self._judge(job, outcome, now)
+        if result is not None:
+            if result.failure is None:
+                self.counters.writes += 1
+            else:
+                self.counters.dropped_writes += 1
+            self.listener.write_done(result.key, result.failure, now)
+
+    def _identity_done(self, job: Job, outcome: bytes | Failure, now: float) -> None:
+        self._is_identifying = False
+        identity = None
+        # A request that was lost is asked again with the next connection, which begins from the start.
+        if self._reader.request is job.request and not isinstance(outcome, ConnectionLost):
+            identity = self._reader.answered(outcome if isinstance(outcome, bytes) else None)
+        self._judge(job, outcome, now)
+        if identity is not None:
+            former, self.identity = self.identity, identity
+            self.listener.identified(identity, former, now)
+
+    def _judge(self, job: Job, outcome: bytes | Failure, now: float) -> None:
+        """Count the outcome of a request, and have the breaker hear of it."""
+        self.in_flight -= 1
+        counters = self.counters
+        if isinstance(outcome, bytes):
+            counters.answers += 1
+        elif isinstance(outcome, ExceptionAnswer):
+            counters.exceptions[outcome.code] += 1
+        elif isinstance(outcome, TimedOut):
+            counters.time_outs += 1
+        elif isinstance(outcome, BadAnswer):
+            counters.bad_answers += 1
+        else:
+            counters.lost_requests += 1
+        if isinstance(outcome, (bytes, ExceptionAnswer)):
+            counters.round_trip.add(now - job.sent_at)
+        if isinstance(outcome, bytes) or (isinstance(outcome, ExceptionAnswer) and not outcome.is_no_answer):
+            self._answered(now)
+        else:
+            self._failed(job, outcome, now)
+        self._refresh()
+
+    def _answered(self, now: float) -> None:
+        self.breaker.answered()
+        wanted = min([cycle.next_due for cycle in self._cycles])
+        self.deadline = max(now, wanted) + self.settings.breaker.lost_after
+        if self.state is not UnitState.ONLINE:
+            self._reader.begin()
+            for cycle in self._cycles:
+                cycle.restart(now)
+            self.state, self.reason = UnitState.ONLINE, ""
+            self._refresh()
+            self.listener.state_changed(self.state, "", now)
+
+    def _failed(self, job: Job, failure: Failure, now: float) -> None:
+        if isinstance(failure, ConnectionLost) and not job.is_blamed:
+            if job.is_probe:
+                self.breaker.probe_lost(now)
+            return
+        self.breaker.failed(now)
+        if not self.breaker.is_closed:
+            self._lose(failure.text, now)
+
+    def _lose(self, reason: str, now: float) -> None:
+        self.deadline = NEVER
+        self.reason = reason
+        if self.state is UnitState.LOST:
+            self._refresh()
+            return
+        self.counters.losses += self.state is UnitState.ONLINE
+        self.counters.dropped_writes += self._writer.clear()
+        self._refresh()
+        self.state = UnitState.LOST
+        self.listener.state_changed(self.state, reason, now)
+
+
+def _due(cycle: PollCycle) -> float:
+    return cycle.due
+
+
+def _nothing() -> None:
+    """Nobody runs the line yet."""
