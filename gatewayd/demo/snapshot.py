@@ -65,7 +65,7 @@ _STATES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class TableLine:
     """One row of the table."""
 
     row: Row
@@ -105,7 +105,7 @@ class Snapshot:
     operational: bool
     pdo_rate: int
     """PDOs per second from the node."""
-    lines: tuple[Line, ...]
+    lines: tuple[TableLine, ...]
     events: tuple[ShownEvent, ...]
     """The latest last."""
 
@@ -157,7 +157,7 @@ def _answer(reason: Reason, writer: int | None, can_writer: int | None) -> str:
     return f"exception {_EXCEPTIONS[reason]}"
 
 
-def _line(cell: Cell, row: Row, can_writer: int | None, now: float) -> Line:
+def _line(cell: Cell, row: Row, can_writer: int | None, now: float) -> TableLine:
     index = row.number - 1
     variable = cell.definition.variables[index]
     owner, lease = ROBOT if variable.direction is Direction.OUTPUT else "", ""
@@ -167,7 +167,7 @@ def _line(cell: Cell, row: Row, can_writer: int | None, now: float) -> Line:
             owner = cell.definition.writer_name(holder)
             left = cell.ownership.remaining(variable.lock, now)
             lease = f"{left:.1f} s" if left < math.inf else ""
-    return Line(
+    return TableLine(
         row=row,
         address=f"{row['address']}" if row["bit"] is None else f"{row['address']}.{row['bit']}",
         value=value(cell.image.values[index], row.unit),

@@ -10,7 +10,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from gatewayd.demo.snapshot import Line, Snapshot
+from gatewayd.demo.snapshot import TableLine, Snapshot
 from gatewayd.report.format import counted
 from gatewayd.report.screen import wrapped
 from gatewayd.report.words import QUALITY_COLOURS
@@ -151,7 +151,7 @@ _NEEDED: Mapping[str, int] = {
 """Columns for which a terminal has to be so wide."""
 
 
-def _table(lines: Sequence[Line], old: dict[int, str], width: int) -> Table:
+def _table(lines: Sequence[TableLine], old: dict[int, str], width: int) -> Table:
     spacious = width >= _SPACIOUS
     table = Table(
         box=box.SIMPLE_HEAD, padding=(0, int(spacious), 0, 0), pad_edge=False, show_edge=width >= _NARROW
@@ -172,7 +172,7 @@ def _table(lines: Sequence[Line], old: dict[int, str], width: int) -> Table:
     return table
 
 
-def _cells(line: Line, *, changed: bool, width: int) -> Iterator[tuple[str, Text]]:
+def _cells(line: TableLine, *, changed: bool, width: int) -> Iterator[tuple[str, Text]]:
     """By name of the column."""
     towards = line.row.direction == "input"
     colour = "cyan" if towards else "green"
@@ -198,7 +198,7 @@ def _cells(line: Line, *, changed: bool, width: int) -> Iterator[tuple[str, Text
         yield "owner", Text(owner, "yellow" if line.lease else "" if towards else "dim")
 
 
-def _owner(line: Line) -> str:
+def _owner(line: TableLine) -> str:
     if line.refused:
         return f"{line.owner or 'free'} ({line.refused})"
     return f"{line.owner}, {line.lease} left" if line.lease else line.owner or "free"

@@ -108,7 +108,7 @@ def identification(data: bytes) -> tuple[dict[int, bytes], int | None]:
     ValueError for what is no such answer.
     """
     if len(data) < _IDENTIFICATION_HEAD:
-        raise ValueError(f"an identification of {len(data)} bytes")
+        raise ValueError(f"an identification of length {len(data)}")
     answer = ReadDeviceInformationResponse()
     try:
         answer.decode(_MEI_TYPE + data)

@@ -179,7 +179,7 @@ def parse_answer(request: ModbusRequest, pdu: bytes) -> bytes | Failure:
     if pdu[0] != function:
         return _parse_exception(function, pdu)
     if len(pdu) != request.answer_size and request.answer_size:
-        return BadAnswer(f"an answer of {len(pdu)} bytes instead of {request.answer_size}")
+        return BadAnswer(f"an answer of length {len(pdu)} instead of {request.answer_size}")
     head = request.head
     if not pdu.startswith(head):
         return BadAnswer(f"an answer that begins with {pdu[: len(head)].hex()} instead of {head.hex()}")
@@ -190,7 +190,7 @@ def _parse_exception(function: int, pdu: bytes) -> Failure:
     if pdu[0] != function | _ERROR_BIT:
         return BadAnswer(f"an answer to function {pdu[0] & ~_ERROR_BIT} instead of {function}")
     if len(pdu) != 2:
-        return BadAnswer(f"an exception of {len(pdu)} bytes instead of 2")
+        return BadAnswer(f"an exception of length {len(pdu)} instead of 2")
     return ExceptionAnswer(pdu[1])
 
 
@@ -202,11 +202,11 @@ def _echoed(pdu: bytes, size: int | None = None) -> ModbusRequest:
 
 def _check_range(address: int, count: int) -> None:
     if count < 1:
-        raise ValueError(f"{count} elements: a request has 1 at least")
+        raise ValueError(f"a request for {count} instead of 1 at least")
     if not 0 <= address <= address + count - 1 <= _MAX_ADDRESS:
         raise ValueError(f"addresses {address} to {address + count - 1} are not within 0..{_MAX_ADDRESS}")
 
 
 def _check_registers(data: bytes, most: int) -> None:
     if len(data) % 2 or not 1 <= len(data) // 2 <= most:
-        raise ValueError(f"{len(data)} bytes are not 1 to {most} registers of 2 bytes")
+        raise ValueError(f"registers of length {len(data)} instead of 2 to {2 * most}, even")
