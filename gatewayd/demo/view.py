@@ -10,7 +10,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from gatewayd.demo.snapshot import TableLine, Snapshot
+from gatewayd.demo.snapshot import Snapshot, TableLine
 from gatewayd.report.format import counted
 from gatewayd.report.screen import wrapped
 from gatewayd.report.words import QUALITY_COLOURS
