@@ -2,7 +2,7 @@
 
 An error is active from `raise_error` until `clear`; raising it again says nothing new. The first message of an error
 has its code, the message 0000h says that the last active error has gone. Messages wait while the NMT state forbids
-EMCY, while the inhibit time runs, and after more of them than `BURST` and `RATE` allow: whoever makes an error come
+EMCY, while the inhibit time runs, and after more of them than `BURST` and `RATE` allow: a peer that makes an error come
 and go cannot fill the bus with it. Up to `IN_ORDER` wait as they came; of more than these only the newest of each
 error, and if more wait than `CAPACITY`, the oldest are lost, because the last ones say how things stand.
 """

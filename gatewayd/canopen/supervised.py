@@ -112,7 +112,7 @@ class SupervisedBus(ABC):
     def _hand_over(self, frames: list[Frame], errors: list[ErrorFrame], now: float) -> None:
         """Give the handler what was read: data frames, then each error frame and the state that follows from it.
 
-        If the process was stopped while it read, the frames have waited since the time was judged last: whoever has to
+        If the process was stopped while it read, the frames have waited since the time was judged last: what has to
         know of the gap is called before.
         """
         if frames:

@@ -117,8 +117,8 @@ def _check(files: tuple[str, ...], *, separately: bool) -> CheckOutcome:
     loaded = tuple(load(data, name) for name, data in readable) if separately else load_together(readable)
     findings = tuple(finding for mapping in loaded for finding in mapping.diagnostics)
     sound = [mapping for mapping in loaded if mapping.plan is not None]
-    said = tuple((mapping.name, remark) for mapping in sound for remark in remarks(mapping.cell))
-    return CheckOutcome(tuple(name for name, _ in readable), findings, tuple(unreadable), said)
+    noted = tuple((mapping.name, remark) for mapping in sound for remark in remarks(mapping.cell))
+    return CheckOutcome(tuple(name for name, _ in readable), findings, tuple(unreadable), noted)
 
 
 def _written(outcome: CheckOutcome, form: str) -> str:

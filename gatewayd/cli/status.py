@@ -177,9 +177,9 @@ def _controller(robot: Answer, problems: list[str]) -> Iterator[str]:
         yield f"software {robot['controller']}{series}, RTDE protocol {robot['protocol']}"
     if robot.get("contradiction") is not None and robot["contradiction"] not in problems:
         yield click.style(robot["contradiction"], fg="yellow")
-    said = robot.get("last_text")
-    if said is not None:
-        yield f"last text {ago(said['age'])}, {said['level']}: {said['text']}"
+    text = robot.get("last_text")
+    if text is not None:
+        yield f"last text {ago(text['age'])}, {text['level']}: {text['text']}"
 
 
 def _writer(writer: Answer, locks: int) -> str:

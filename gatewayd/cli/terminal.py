@@ -1,4 +1,4 @@
-"""A terminal that shows one thing until it is told to stop: its keys, and the signals that end it."""
+"""A terminal that shows one thing until it is to stop: its keys, and the signals that end it."""
 
 from __future__ import annotations
 

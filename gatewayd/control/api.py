@@ -240,7 +240,7 @@ class Api:
         return lock_view(runtime.cell, lock, moment.now)
 
     def release(self, name: str, body: Mapping[str, Any], who: str, moment: Moment) -> LockStatus:
-        """Release a lock, whoever holds it. The lock as it is then."""
+        """Release a lock of any owner. The lock as it is then."""
         runtime, lock = self._lock(name, body)
         if not runtime.cell.operator.free_lock(lock, moment.now, who):
             raise ApiError(409, "not_owned", f"nobody owns {name}")

@@ -44,7 +44,7 @@ class Reloaded(Protocol):
         """0 if what runs now is what the files say."""
 
     def as_object(self) -> Mapping[str, Any]:
-        """What whoever asked for it reads."""
+        """What the client that asked for it reads."""
 
 
 Reload = Callable[[frozenset[ObjectionKind]], Awaitable[Reloaded]]

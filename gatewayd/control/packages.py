@@ -52,7 +52,7 @@ class PackageFeed(PackageTap):
         self._unread: deque[_Kept | str] = deque()
         self._values = 0
         self._layout: PackageLayout | None = None
-        self._told: PackageLayout | None = None
+        self._reported: PackageLayout | None = None
 
     def begin(self, layout: PackageLayout) -> None:
         """See `PackageTap`."""
@@ -80,7 +80,7 @@ class PackageFeed(PackageTap):
         """The next of what was not read yet; it pauses after each package. The wall clock is `ahead` of ours."""
         found: list[Row] = []
         packages: list[tuple[float, str]] = []
-        if self._told is None and self._layout is not None and not self._unread:
+        if self._reported is None and self._layout is not None and not self._unread:
             found.append(self._head(self._layout))
         left = MAX_READ
         while self._unread and left > 0:
@@ -91,7 +91,7 @@ class PackageFeed(PackageTap):
                 continue
             left -= len(kept.values)
             self._values -= len(kept.values)
-            if kept.layout is not self._told:
+            if kept.layout is not self._reported:
                 packages = []
                 found.append(self._head(kept.layout))
             if not packages or len(packages) >= _IN_ROW:
@@ -102,7 +102,7 @@ class PackageFeed(PackageTap):
         return found
 
     def _head(self, layout: PackageLayout) -> Row:
-        self._told = layout
+        self._reported = layout
         return {
             "layout": {
                 "cell": self.cell,

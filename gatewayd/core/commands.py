@@ -2,7 +2,7 @@
 
 A command acts where its owner writes a value other than 0 after it wrote 0, both explicitly, by one connection, and
 without having lost the lock in between; nothing else makes it act. What is held at 1 does nothing; what rises otherwise
-is reported with the obstacle, so that nobody waits for a robot that was never told.
+is reported with the obstacle, so that nobody waits for a robot that never got it.
 
 | written | nobody has written 0 | its 0 stands | it is held |
 |---|---|---|---|

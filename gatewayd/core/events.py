@@ -1,4 +1,4 @@
-"""What happened, kept in a ring and passed to whoever listens."""
+"""What happened, kept in a ring and passed to listeners."""
 
 from __future__ import annotations
 

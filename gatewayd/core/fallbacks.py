@@ -78,7 +78,7 @@ class Fallbacks:
         """The members of a free group whose values are not from this session: adopted, or not even read.
 
         Another writer may have left them, unless nobody but `writer` can own the lock. A variable that is guarded alone
-        is no command that is composed of what two writers meant: whoever claims it may keep it.
+        is no command that is composed of what two writers meant: a writer that claims it may keep it.
         """
         declared = self._ownership.locks[lock]
         if len(declared.members) == 1 or declared.owners == (writer,):

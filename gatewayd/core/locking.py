@@ -80,7 +80,7 @@ class Locking:
         self.move(requester, {lock: move for lock, move in moves.items() if move is Move.RENEW}, now)
 
     def free(self, locks: Sequence[int], now: float, detail: str) -> None:
-        """Release these locks, whoever owns them; release fallbacks apply."""
+        """Release these locks of any owner; release fallbacks apply."""
         for lock in locks:
             owner = self._ownership.free(lock)
             self._record(Event(now, EventKind.RELEASED, lock=lock, writer=owner, detail=detail))

@@ -41,7 +41,7 @@ class Operator:
     _notify: Callable[[Direction], None]
 
     def take_lock(self, lock: int, now: float, until: float = math.inf, detail: str = "") -> None:
-        """The local operator takes a lock from whoever holds it; nobody else gets it until `until` or `free_lock`.
+        """The local operator takes a lock from its owner; nobody else gets it until `until` or `free_lock`.
 
         Taken from a writer, all its members take their release fallback, as with any takeover; of a free group
         those do that were only adopted. Taking it again changes `until`.
@@ -52,7 +52,7 @@ class Operator:
             self._notify(Direction.INPUT)
 
     def free_lock(self, lock: int, now: float, detail: str = "") -> bool:
-        """The local operator releases a lock, whoever holds it; release fallbacks apply. Whether there was an owner."""
+        """The local operator releases a lock of any owner; release fallbacks apply. Whether there was an owner."""
         self.release_expired(now)
         owner = self._ownership.owners[lock]
         if owner is None:
@@ -114,7 +114,7 @@ class Operator:
         return True
 
     def end(self, variables: Iterable[int], locks: Sequence[int], now: float, detail: str) -> None:
-        """End these forces and release these locks, whoever owns them; release fallbacks apply."""
+        """End these forces and release these locks of any owner; release fallbacks apply."""
         for lock in locks:
             self.forcing.holds.pop(lock, None)
         self._end_forces(list(variables), now, detail)

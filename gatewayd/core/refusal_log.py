@@ -13,7 +13,7 @@ from gatewayd.core.requester import host_of
 from gatewayd.core.unserved import Unserved
 
 MAX_PEERS = 64
-"""Hosts without a writer whose refusals are told apart."""
+"""Hosts without a writer whose refusals are counted apart."""
 REFUSAL_INTERVAL = 10.0
 """Seconds in which equal refusals are counted instead of reported again: a PLC may retry a hundred times a second."""
 _SHOWN = 0.05

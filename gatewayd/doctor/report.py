@@ -90,8 +90,8 @@ def _summary(report: DoctorReport, advice: Sequence[Advice]) -> str:
     made = counted(len(report.lines) - skipped, "check")
     parts = [made, *([f"{skipped} not made"] if skipped else [])]
     found = {outcome: sum(item.observation.outcome is outcome for item in advice) for outcome in _ORDER}
-    said = ", ".join(counted(number, outcome.value) for outcome, number in found.items() if number)
-    return f"{', '.join(parts)}: {said or 'nothing to do'}"
+    todo = ", ".join(counted(number, outcome.value) for outcome, number in found.items() if number)
+    return f"{', '.join(parts)}: {todo or 'nothing to do'}"
 
 
 def as_json(report: DoctorReport) -> str:

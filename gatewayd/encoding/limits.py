@@ -101,7 +101,7 @@ def _pin(value: float, code: str, meaning: Meaning, scale: float, offset: float)
 
 
 def _nearest(value: float, code: str, scale: float, offset: float) -> Iterator[float]:
-    """The nearest raw number, or the ends of those that cannot be told apart from it; none beyond the type."""
+    """The nearest raw number, or the ends of those that cannot be distinguished from it; none beyond the type."""
     is_plain = scale == 1 and offset == 0
     exact = value if is_plain else (value - offset) / scale  # integers of 64 bits keep every digit
     if not math.isfinite(exact):

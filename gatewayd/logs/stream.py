@@ -1,4 +1,4 @@
-"""Where the log goes, by a thread of its own: whoever reads it may stop reading, and the robot does not wait for that.
+"""Where the log goes, by a thread of its own: its reader may stop reading, and the robot does not wait for that.
 
 A pipe that is full makes its writer wait. Lines wait in a bounded queue instead; what does not fit is dropped, counted,
 and reported as soon as there is room.

@@ -6,7 +6,7 @@ import math
 from collections.abc import Hashable
 
 MAX_SUBJECTS = 4096
-"""Subjects that are told apart at one time; further ones share a quota, so that nobody escapes it by many names."""
+"""Subjects that are counted apart at one time; further ones share a quota, so that nobody escapes it by many names."""
 
 
 class Quota:

@@ -68,17 +68,17 @@ class _Definitions:
 
     def _key(self, key: Key) -> Schema:
         default = key.value_without() if not key.is_required() and key.default_factory is None else None
-        said = (
+        facts = (
             {} if default is None else {"default": list(default) if isinstance(default, tuple) else default}
         )
-        said |= {"description": key.description} | dict(key.extra or {})
-        return _ordered(self._type(key.annotation, key.bounds) | said)
+        facts |= {"description": key.description} | dict(key.extra or {})
+        return _ordered(self._type(key.annotation, key.bounds) | facts)
 
     def _type(self, kind: Any, bounds: Mapping[str, Any]) -> Schema:
         arguments = get_args(kind)
         if kind in _PLAIN:
-            said = {_BOUNDS[name]: bound for name, bound in bounds.items() if name in _BOUNDS}
-            return _ordered({"type": _PLAIN[kind], **said})
+            limits = {_BOUNDS[name]: bound for name, bound in bounds.items() if name in _BOUNDS}
+            return _ordered({"type": _PLAIN[kind], **limits})
         make = self._makers.get(get_origin(kind))
         return make(self, arguments, bounds) if make is not None else self._reference(kind)
 

@@ -250,14 +250,14 @@ def _union(members: tuple[Any, ...], bounds: Mapping[str, Any]) -> Reader:
     def first(value: Any, path: Path, mistakes: list[Mistake]) -> Any:
         if value is None and optional:
             return None
-        told: list[Mistake] = []
+        reported: list[Mistake] = []
         for reader in readers:
             attempt: list[Mistake] = []
             result = reader(value, path, attempt)
             if not attempt:
                 return result
-            told = told or attempt
-        mistakes += told
+            reported = reported or attempt
+        mistakes += reported
         return _BAD
 
     return first

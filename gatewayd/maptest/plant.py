@@ -91,7 +91,7 @@ class Plant:
             self.cell.operator.take_lock(lock, self.now)
 
     def free_as_operator(self, locks: Iterable[int]) -> None:
-        """The local operator releases these locks, whoever owns them."""
+        """The local operator releases these locks of any owner."""
         for lock in locks:
             self.cell.operator.free_lock(lock, self.now)
 

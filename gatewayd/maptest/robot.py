@@ -14,7 +14,7 @@ _PROGRAM_FIELD = "runtime_state"
 
 
 class PlantRobot:
-    """Takes what the cell gives it at once, and reports what it was told to show. Times are simulated seconds."""
+    """Takes what the cell gives it at once, and reports what it is to show. Times are simulated seconds."""
 
     def __init__(self, cell: Cell) -> None:
         self._cell = cell

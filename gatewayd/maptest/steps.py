@@ -81,14 +81,12 @@ def _answers(
         message = f"expected the request to be refused ({step.refused}), but it was accepted"
         yield _Found(part.at("refused"), message, _after(plant, names, step))
         return
-    said = plant.explanation.refusal(refusal)
+    why = plant.explanation.refusal(refusal)
     if step.refused is None:
-        place, message = part.key_at(action_of(step) or ""), f"the request was refused: {said}"
+        place, message = part.key_at(action_of(step) or ""), f"the request was refused: {why}"
     else:
         place = part.at("refused")
-        message = (
-            f"expected the request to be refused ({step.refused}), but it was for another reason: {said}"
-        )
+        message = f"expected the request to be refused ({step.refused}), but it was for another reason: {why}"
     yield _Found(place, message, f"if that is meant, write `refused: {reason}`")
 
 

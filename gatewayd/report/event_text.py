@@ -200,7 +200,7 @@ class EventRecord:
 
 
 def _limits(event: Event, definition: CellDefinition) -> str:
-    """The declared limits that a refused value was out of: whoever reads it need not look for the mapping."""
+    """The declared limits that a refused value was out of: a reader need not look for the mapping."""
     limits = None if event.variable is None else definition.variables[event.variable].limits
     if limits is None or event.reason is not Reason.OUT_OF_LIMITS:
         return ""

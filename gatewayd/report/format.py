@@ -97,7 +97,7 @@ def plural(noun: str) -> str:
 def verb(base: str, subject: str = "", count: int = 1) -> str:
     """The present tense that agrees: `holds` for `plc`, `hold` for `you` and for several; of `be` `is` and `are`.
 
-    A writer may be called `you`, as whoever takes part in the demonstration is.
+    A writer may be called `you`, as the participant in the demonstration is.
     """
     if count != 1 or subject.casefold() == YOU:
         return _PLURALS.get(base, base)

@@ -112,7 +112,7 @@ def judge(cell: Cell, source: LinkHealth, links: Mapping[str, LinkHealth], now: 
     writers = range(len(cell.writers.alive))
     unserved, held = (
         list(_unserved(cell, source, now)),
-        [*_held_by_robot(cell), *_said_by_source(cell, source)],
+        [*_held_by_robot(cell), *_reported_by_source(cell, source)],
     )
     of_gateway = list(_of_gateway(cell, now))
     lost = {index: finding for index in writers for finding in _lost(cell, index, now)}
@@ -177,7 +177,7 @@ def _held_by_robot(cell: Cell) -> Iterator[_Finding]:
     yield from _with_quality(cell, Quality.DIFFERS, Level.BAD, "different in the robot")
 
 
-def _said_by_source(cell: Cell, source: LinkHealth) -> Iterator[_Finding]:
+def _reported_by_source(cell: Cell, source: LinkHealth) -> Iterator[_Finding]:
     """Why something is as it is, as far as the link knows; the causes of a loss are said with it."""
     if cell.freshness.state is not Source.LOST:
         yield from (_Finding(Level.WARN, problem) for problem in source.problems)

@@ -12,7 +12,7 @@ from gatewayd.rtde.strange import StrangePackage
 
 
 class ConnectionObserver:
-    """What else happens to the connections of a client, for whoever wants to know; does nothing by itself.
+    """What else happens to the connections of a client, for all that want to know; does nothing by itself.
 
     Called as `ClientHandler` is. Addresses are as the socket has them: host and port first.
     """

@@ -60,7 +60,7 @@ class PropertyQuestions:
         return True
 
     def answer(self, reply: PropertiesReply) -> str:
-        """Hand an answer to whoever asked; in words what is odd about it, if anything is."""
+        """Hand an answer to the caller that asked; in words what is odd about it, if anything is."""
         if not self._open:
             return "properties that were not asked for"
         count, answered = self._open.popleft()

@@ -34,7 +34,7 @@ class PackageSender:
         self.peer = transport.get_extra_info("peername")
 
     def received(self, data: bytes) -> None:
-        """Show what came to whoever traces."""
+        """Show what came to the trace."""
         if self.tap is not None:
             self.tap(data, False, self.own)
 

@@ -58,7 +58,7 @@ class Compilation:
     """
 
     def __init__(self, names: Iterable[Path] | None = None) -> None:
-        """Where there can be no such process, `result` says so: whoever starts early has no log yet."""
+        """Where there can be no such process, `result` says so: at an early start there is no log yet."""
         self._process: subprocess.Popen[bytes] | None = None
         self._failure: Exception | None = None
         self._asked = self._ended = False
@@ -101,9 +101,9 @@ class Compilation:
         if process is None:
             text = f"the process that reads the mapping files cannot be started: {self._failure}"
             raise CompilationError(text) from self._failure
-        answer, said = _communicate(process, given_up)
+        answer, errors = _communicate(process, given_up)
         if process.returncode:
-            last = said.decode("utf-8", "replace").strip().rpartition("\n")[2]
+            last = errors.decode("utf-8", "replace").strip().rpartition("\n")[2]
             raise CompilationError(
                 f"the process that reads the mapping files ended with {_ending(process.returncode)}"
                 f"{f': {last}' if last else ''}; try `gatewayd check`"

@@ -293,6 +293,6 @@ def _reasons(compiled: Compiled) -> Iterator[str]:
 
 
 def _line(finding: Diagnostic) -> str:
-    """With the remedy: whoever reloads looks at no log."""
+    """With the remedy: a person who reloads looks at no log."""
     hint = f"; {finding.hint}" if finding.hint else ""
     return f"{finding.position}: {finding.rule.id} {finding.rule.slug}: {finding.message}{hint}"

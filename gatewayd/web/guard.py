@@ -1,4 +1,4 @@
-"""What stands between the status listener and whoever reaches its port: bounds, headers, host check, token.
+"""What stands between the status listener and all that reach its port: bounds, headers, host check, token.
 
 Reading is free; everything else needs the token. No answer ever carries a traceback.
 """

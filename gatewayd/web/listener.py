@@ -71,7 +71,7 @@ class StatusListener:
         self._probes = probes
         self._exposition = Exposition(probes, __version__)
         self._acts = token is not None and api is not None
-        """Whether whoever has the token can change anything."""
+        """Whether a client with the token can change anything."""
         self._doors: Doors | None = None
         self._share = api[0].share if api is not None else LoopShare()
         self._layouts: dict[str, tuple[Plan, bytes]] = {}

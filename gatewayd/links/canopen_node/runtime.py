@@ -84,7 +84,7 @@ class CanLink(Link, Observer):
         self._switch = (0, 0.0)
         self._switching = asyncio.Event()
         self._progress = 0
-        # The kernel's interfaces are set by whoever administers them; python-can opens its own with a bit rate.
+        # The kernel's interfaces are set up by the administrator; python-can opens its own with a bit rate.
         self._bit_rates = (
             () if plan.interface == "socketcan" else tuple(rate for rate in BIT_RATES if rate is not None)
         )
@@ -136,7 +136,7 @@ class CanLink(Link, Observer):
             self._leave()
 
     def departing(self, plan: LinkPlan | None, after: CellDefinition) -> Mapping[Requester, str]:
-        """Where another node takes the place of this one, whoever writes by it; the same node keeps its writers."""
+        """Where another node takes the place of this one, all that write by it; the same node keeps its writers."""
         return (
             {}
             if plan is not None

@@ -238,7 +238,7 @@ class PeerConnection(asyncio.BufferedProtocol):
         self.wire.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """See asyncio; called after the connection has ended, whoever ended it."""
+        """See asyncio; called after the connection has ended, from either side."""
         if exc is not None:
             self.reason = str(exc)
         self.poller.remove(self.descriptor)

@@ -52,7 +52,7 @@ class ModbusUnit(Link):
         for connection, requester in self.listener.writers(self.cell):
             assert requester.writer is not None
             name = self.cell.definition.writers[requester.writer].name
-            why = self._moved(plan) or _stranger(connection.address, name, plan, after)
+            why = self._moved(plan) or _undeclared(connection.address, name, plan, after)
             if why:
                 yield connection, requester, why
 
@@ -90,7 +90,7 @@ class ModbusUnit(Link):
         return LinkHealth(f"Modbus {where}", level, words, figures=figures)
 
 
-def _stranger(peer: Address | None, name: str, plan: ModbusPlan | None, after: CellDefinition) -> str:
+def _undeclared(peer: Address | None, name: str, plan: ModbusPlan | None, after: CellDefinition) -> str:
     """Why the peer would be the writer of this name no more; empty: it would."""
     if plan is None or peer is None or not may_connect(peer, plan):
         return f"the new mapping does not let {peer} connect"

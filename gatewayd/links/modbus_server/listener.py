@@ -42,8 +42,8 @@ _SWEEP = 0.25
 """Seconds between two looks for connections that are idle or stalled."""
 
 _ACCEPTED_AT_ONCE = 8
-"""Connections, in one turn of the loop: whoever floods the listener with them waits in the kernel, not in the way of
-requests. asyncio takes as many at once as it asks the kernel to queue."""
+"""Connections, in one turn of the loop: those of a flood wait in the kernel, not in the way of requests.
+asyncio takes as many at once as it asks the kernel to queue."""
 _BACKLOG = 128
 """Connections that the kernel keeps until they are accepted; of further ones the peer tries again after a second."""
 _GAPS_WRITTEN = (

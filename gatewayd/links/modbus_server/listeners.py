@@ -186,10 +186,9 @@ def _log_peer(event: PeerEvent) -> None:
         "reason": event.reason,
         "repeats": event.repeats,
     }
-    said = fields(**{key: value for key, value in found.items() if value})
     log.log(
         logging.WARNING if event.kind.refused else logging.INFO,
         "Modbus client %s",
         event.kind.value,
-        extra=said,
+        extra=fields(**{key: value for key, value in found.items() if value}),
     )

@@ -152,7 +152,7 @@ class RegisterTable(_Table):
         self, placements: Sequence[Placement], cell: Cell, *, fill_gaps: bool, ignore_gaps: bool
     ) -> None:
         """`fill_gaps` for reading, `ignore_gaps` for writing: registers and bits with nothing mapped are let pass."""
-        # In both tables, whatever the mapping has there: clients are told to read the status block in either.
+        # In both tables, whatever the mapping has there: clients are advised to read the status block in either.
         super().__init__(placements, MAX_READ_REGISTERS, GAPS if fill_gaps else _NO_GAPS)
         self._ignored = GAPS if ignore_gaps else _NO_GAPS
         self.image = bytearray(2 * ADDRESSES)

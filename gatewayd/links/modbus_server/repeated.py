@@ -37,23 +37,25 @@ class Repeated:
         for variable, values in given.items():
             if all(value == values[0] for value in values):
                 continue
-            meant = next((value for value in values if self._is_said(variable, value, address, data)), None)
+            meant = next(
+                (value for value in values if self._is_in_all_places(variable, value, address, data)), None
+            )
             if meant is None:
                 return Refusal(Reason.CONTRADICTED, variable)
             changes = [replace(item, value=meant) if item.variable == variable else item for item in changes]
         return changes
 
-    def _is_said(self, variable: int, value: Value, address: int, data: bytes) -> bool:
-        """Whether every place that the request covers says `value`."""
+    def _is_in_all_places(self, variable: int, value: Value, address: int, data: bytes) -> bool:
+        """Whether every place that the request covers holds `value`."""
         for place in self._places[variable]:
             start = 2 * (place.address - address)
             raw = data[start : start + 2 * place.words] if start >= 0 else b""
-            if raw and not _says(place, raw, value):
+            if raw and not _holds(place, raw, value):
                 return False
         return True
 
 
-def _says(place: Placement, raw: bytes, value: Value) -> bool:
+def _holds(place: Placement, raw: bytes, value: Value) -> bool:
     if place.bit is not None and place.codec is not None:
         raw = raw[:1] if place.bit else raw[1:]
     if place.codec is None:

@@ -1,7 +1,7 @@
 """Fair shares: who gets a connection where there are not enough for everybody.
 
 Each address under `writers:` has a place of its own, kept free while nobody from there is connected, so that no reader
-ever keeps a declared writer out. What is left is for whoever comes first, up to a limit for each peer (an address).
+ever keeps a declared writer out. What is left is for the first that come, up to a limit for each peer (an address).
 When all is taken a newcomer may take the place of another one. Readers, longest unused first, make room for a writer
 at any time; among themselves, readers and writers alike, only who was unused for a while, or has two connections more
 than the newcomer's peer, so that nobody can take a place back from whom he gave it to. A writer never makes room for a

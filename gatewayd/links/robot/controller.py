@@ -36,7 +36,7 @@ class ControllerNotes:
             "protocol": session.protocol,
         }
 
-    def said(self, message: TextMessage, now: float) -> None:
+    def text(self, message: TextMessage, now: float) -> None:
         """The controller has sent a text."""
         self._text = message, now
 
@@ -74,7 +74,7 @@ class ControllerNotes:
             f"another client holds {listed(fields, _LISTED)}: probably {who}"
             for who, fields in holders.items()
         )
-        # What others hold is said above, together.
+        # What others hold is reported above, together.
         reasons = (
             f"{missing['field']}: {missing['reason']}"
             for missing in self._unavailable

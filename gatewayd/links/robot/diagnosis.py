@@ -208,14 +208,14 @@ def rate(visited: Visit, session: Session) -> Observation:
     agreed = 1 / session.period
     measured = visited.rate
     if measured is None:
-        said = (
+        text = (
             visited.loss.text if visited.loss is not None else f"{counted(visited.packages, 'package')} came"
         )
         cause = (
             "the robot is not powered, its safety set-up is not confirmed, or its program stops the output"
         )
         return Observation(
-            "data", Outcome.PROBLEM, said, cause, "switch the robot on and confirm its safety set-up"
+            "data", Outcome.PROBLEM, text, cause, "switch the robot on and confirm its safety set-up"
         )
     if visited.advance <= 0:
         text = f"packages come, but the controller's clock stands still ({measured:.0f} Hz)"

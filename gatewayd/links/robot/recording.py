@@ -1,4 +1,4 @@
-"""Packages of a robot on their way to whoever records them."""
+"""Packages of a robot on their way to what records them."""
 
 from __future__ import annotations
 

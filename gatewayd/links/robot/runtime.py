@@ -325,7 +325,7 @@ class RobotLink(SourceLink):
 
     def text(self, message: TextMessage) -> None:
         """The controller says something; it goes to the log, and the last one to the status."""
-        self._notes.said(message, clock.now())
+        self._notes.text(message, clock.now())
         report_text(self._cell.definition.name, message)
 
     def strange(self, package: StrangePackage) -> None:

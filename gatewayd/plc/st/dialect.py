@@ -18,7 +18,7 @@ class Primitives:
     units: Callable[[str], tuple[ProgramUnit, ...]]
     """Functions by the prefix: `ToReal`, `FromReal`, `ToLreal`, `FromLreal`."""
     only_finite: bool = False
-    """NaN and the infinities cannot be made: whoever reads them is told instead."""
+    """NaN and the infinities cannot be made: a reader is informed instead."""
 
 
 @dataclass(frozen=True, slots=True)

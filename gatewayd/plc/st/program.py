@@ -1,4 +1,4 @@
-"""The parts of a program in a language of IEC 61131-3, as data: whoever writes files decides on their form."""
+"""The parts of a program in a language of IEC 61131-3, as data: the module that writes files decides on their form."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from gatewayd.rtde.properties import PropertyValue, sort_properties
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Properties(Mapping[str, PropertyValue]):
-    """What a controller has told of itself: a mapping of the names that have a value."""
+    """What a controller has reported of itself: a mapping of the names that have a value."""
 
     answered: bool
     """False: no answer came in time, as from every controller before 5.26 and 10.15."""

@@ -1,4 +1,4 @@
-"""Reading recordings of either format, whoever wrote them."""
+"""Reading recordings of either format and any writer."""
 
 from __future__ import annotations
 

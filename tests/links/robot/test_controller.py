@@ -107,15 +107,15 @@ def test_nothing_is_said_of_a_controller_that_was_never_there() -> None:
 
 def test_the_last_text_is_kept_with_its_age() -> None:
     notes = ControllerNotes()
-    notes.said(TextMessage("first", "URControl", 3), 1.0)
-    notes.said(TextMessage("SafetySetup has not been confirmed yet", "URControl", 2), 2.0)
+    notes.text(TextMessage("first", "URControl", 3), 1.0)
+    notes.text(TextMessage("SafetySetup has not been confirmed yet", "URControl", 2), 2.0)
     assert notes.figures(plan(), 4.5)["last_text"] == {
         "text": "SafetySetup has not been confirmed yet",
         "source": "URControl",
         "level": "warning",
         "age": 2.5,
     }
-    notes.said(TextMessage("odd", "", 77), 5.0)
+    notes.text(TextMessage("odd", "", 77), 5.0)
     last: Any = notes.figures(plan(), 5.0)["last_text"]
     assert last["level"] == "77"
 

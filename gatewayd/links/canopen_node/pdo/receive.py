@@ -83,8 +83,8 @@ class ReceivePdo:
         self.spared = False
         """The process stood still since the last frame."""
         self.data: bytes | None = None
-        """What `said` was made of. Masters repeat themselves, so that it is worth keeping."""
-        self.said: list[Value] | Refusal = []
+        """What `decoded` was made of. Masters repeat themselves, so that it is worth keeping."""
+        self.decoded: list[Value] | Refusal = []
         self._cell = cell
         self._prepared: PreparedWrite | None = None
         with suppress(ValueError):  # it maps a variable twice
@@ -93,12 +93,12 @@ class ReceivePdo:
     def write(self, requester: Requester, data: bytes, now: float) -> Refusal | None:
         """Write what the bytes say, or return why not."""
         if data != self.data:
-            self.said = self.configuration.layout.values(data)
+            self.decoded = self.configuration.layout.values(data)
             self.data = data
-        said, prepared = self.said, self._prepared
-        if prepared is not None and isinstance(said, list) and prepared.write(requester, said, now):
+        decoded, prepared = self.decoded, self._prepared
+        if prepared is not None and isinstance(decoded, list) and prepared.write(requester, decoded, now):
             return None
-        changes = said if isinstance(said, Refusal) else self.configuration.layout.meant(said)
+        changes = decoded if isinstance(decoded, Refusal) else self.configuration.layout.meant(decoded)
         if isinstance(changes, Refusal):
             self._cell.refuse(requester, changes, now)
             return changes

@@ -109,8 +109,8 @@ def field_of_two_types(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for variable in cell.variables:
         field = field_of(variable)
         kind = type_of(variable) or (field.type if field is not None else None)
-        said, first = known.setdefault(variable.field, ((kind, variable.direction), variable))
-        if said != (kind, variable.direction) and variable.part.name not in reported:
+        declared, first = known.setdefault(variable.field, ((kind, variable.direction), variable))
+        if declared != (kind, variable.direction) and variable.part.name not in reported:
             reported.add(variable.part.name)
             message = f"`{variable.field}` is declared differently by `{first.name}`"
             related = (Related(first.at("robot"), "declared here"),)

@@ -18,8 +18,8 @@ from gatewayd.report.printable import printable
 _LONGEST: Final = 110
 _FIRST: Final = ("unit", "limits")
 """What a comment says of a variable before everything else."""
-_NOT_SAID: Final = frozenset({"direction", "robot", "type"})
-_SAID: Final = {"limits": "limits ", "owner": "written by ", "group": "group ", "on_release": "on_release ",
+_OMITTED: Final = frozenset({"direction", "robot", "type"})
+_PREFIXES: Final = {"limits": "limits ", "owner": "written by ", "group": "group ", "on_release": "on_release ",
                 "on_stale": "on_stale ", "lease": "lease ", "valid": "good while the program is "}  # fmt: skip
 
 
@@ -83,9 +83,9 @@ def index_check(prefix: str) -> tuple[str, ...]:
 
 
 def _comment(register: ScriptRegister, facts: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
-    said = facts[register.first.name]
-    order = [*_FIRST, *(fact for fact in said if fact not in _FIRST and fact not in _NOT_SAID)]
-    texts = [f"{_SAID.get(fact, '')}{said[fact]}" for fact in order if fact in said]
+    known = facts[register.first.name]
+    order = [*_FIRST, *(fact for fact in known if fact not in _FIRST and fact not in _OMITTED)]
+    texts = [f"{_PREFIXES.get(fact, '')}{known[fact]}" for fact in order if fact in known]
     many = f"[0..{len(register.variables) - 1}]" if register.indexed else ""
     yield from wrapped(f"{register.name}{many}: {'; '.join(texts)}{' (of the first)' if many else ''}")
 

@@ -73,10 +73,10 @@ def functions(pair: Handshake, prefix: str) -> Iterator[str]:
 
 
 def _receiving(pair: Handshake, prefix: str, toggle: str, acknowledge: str) -> Iterator[str]:
-    name, said = pair.name, f"{pair.toggle_bit.name} and {pair.acknowledge_bit.name}"
+    name, bits = pair.name, f"{pair.toggle_bit.name} and {pair.acknowledge_bit.name}"
     yield from (
         "",
-        f"# handshake to the robot by {said}: the sender writes data, then changes {pair.toggle_bit.name}",
+        f"# handshake to the robot by {bits}: the sender writes data, then changes {pair.toggle_bit.name}",
         f"def {prefix}_pending_{name}():",
         f"  return {toggle} != {acknowledge}",
         "end",
@@ -96,10 +96,10 @@ def _receiving(pair: Handshake, prefix: str, toggle: str, acknowledge: str) -> I
 
 
 def _sending(pair: Handshake, prefix: str, toggle: str, acknowledge: str) -> Iterator[str]:
-    name, said = pair.name, f"{pair.toggle_bit.name} and {pair.acknowledge_bit.name}"
+    name, bits = pair.name, f"{pair.toggle_bit.name} and {pair.acknowledge_bit.name}"
     yield from (
         "",
-        f"# handshake from the robot by {said}: whether the receiver has taken what was sent",
+        f"# handshake from the robot by {bits}: whether the receiver has taken what was sent",
         f"def {prefix}_taken_{name}():",
         f"  return {toggle} == {acknowledge}",
         "end",
