@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import pytest
@@ -54,12 +53,13 @@ def test_what_is_due_already_is_called_in_the_next_step() -> None:
 @pytest.mark.parametrize("speed", [0.5, 1.0, 50.0])
 async def test_a_scaled_clock_is_that_much_faster(speed: float) -> None:
     clock, loop = ScaledClock(speed), asyncio.get_running_loop()
-    start, begun = clock.now, loop.time()
+    before, start, after = loop.time(), clock.now, loop.time()
     done = asyncio.Event()
     clock.call_at(start + 0.01 * speed, done.set)
     await done.wait()
-    assert loop.time() - begun >= 0.0099
-    assert clock.now - start == pytest.approx((loop.time() - begun) * speed, rel=0.2)
+    least, passed, most = loop.time() - after, clock.now - start, loop.time() - before
+    assert passed >= 0.0099 * speed
+    assert least * speed <= passed <= most * speed
 
 
 def stepped(faults: Faults | None = None) -> SimulatedController:
@@ -144,12 +144,3 @@ async def test_a_raised_speed_shortens_lingering(client: type[Client]) -> None:
             await one.inputs(INT)
         while (await other.inputs(INT)).types == ("IN_USE",):
             pass
-
-
-async def test_a_pause_does_not_make_up_for_its_cycles(client: type[Client]) -> None:
-    async with SimulatedController(speed=10) as robot, client(robot.port) as one:
-        await one.stream("timestamp")
-        await one.package()
-        robot.pause(0.5)
-        stamps = [float((await one.package())[0]) for _ in range(100)]
-    assert max(after - before for before, after in pairwise(stamps)) < 0.3

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import AsyncIterator, Callable
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -307,7 +308,8 @@ async def test_each_wait_has_its_limit(
                     await connect(**limit).open()
             case "data_timeout":
                 async with connect(outputs=["robot_mode"], reconnect=None, **limit) as robot:
-                    await robot.newer()
+                    with suppress(rtde.ConnectionLostError):  # on a busy machine it may be over already
+                        await robot.newer()
                     simulator.faults.silence = True
                     assert "no data from the controller" in str(await event(robot, rtde.LostEvent))
 
