@@ -37,7 +37,7 @@ LINK = {
 LAYERS: dict[str, set[str]] = {
     "gatewayd": set(),
     "loop": {"loop"},
-    "machine": {"machine"},
+    "machine": {"loop.resolve", "machine"},
     "core": {"core"},
     "rtde": {"loop", "report.format", "rtde"},
     "rtde.testing": {"simulator"},

@@ -18,6 +18,10 @@ registers hold is what it left behind; a robot that retracts is not on the progr
 """
 
 
+NUMBERS: dict[str, int] = {name: state for state, (name, _running) in STATES.items()}
+"""The `runtime_state` of each name."""
+
+
 def is_running(state: int | None) -> bool:
     """Whether what the program wrote is still meant.
 

@@ -20,19 +20,26 @@ SocketAddress = tuple[
 ]
 """Family, kind, protocol and address, as `socket.socket` and `connect` take them."""
 
-_Found = list[SocketAddress]
+
+def look_up(host: str | None, port: int, flags: int = 0) -> list[SocketAddress]:
+    """The TCP addresses of `host`, which may take long. `flags`: of getaddrinfo(3); AI_PASSIVE allows None."""
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=flags)
+    except UnicodeError as error:
+        raise socket.gaierror(socket.EAI_NONAME, "not a host name") from error
+    return [(family, kind, protocol, address) for family, kind, protocol, _, address in found]
 
 
-async def resolve(host: str, port: int, patience: float | None = None) -> _Found:
+async def resolve(host: str, port: int, patience: float | None = None) -> list[SocketAddress]:
     """The TCP addresses of `host`, in the order to be tried; socket.gaierror if there is none.
 
     A numeric address is answered at once, a name by a thread of its own; TimeoutError after `patience` seconds.
     """
     with suppress(socket.gaierror):
-        return _lookup(host, port, socket.AI_NUMERICHOST)
+        return look_up(host, port, socket.AI_NUMERICHOST)
     try:
         async with asyncio.timeout(patience):
-            return await in_daemon_thread(partial(_lookup, host, port), f"resolve {host}")
+            return await in_daemon_thread(partial(look_up, host, port), f"resolve {host}")
     except TimeoutError:
         raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT)) from None
 
@@ -40,11 +47,3 @@ async def resolve(host: str, port: int, patience: float | None = None) -> _Found
 def hosts(found: Iterable[SocketAddress]) -> list[str]:
     """The numeric addresses as texts, each once."""
     return list(dict.fromkeys(str(address[0]) for *_, address in found))
-
-
-def _lookup(host: str, port: int, flags: int = 0) -> _Found:
-    try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=flags)
-    except UnicodeError as error:
-        raise socket.gaierror(socket.EAI_NONAME, "not a host name") from error
-    return [(family, kind, protocol, address) for family, kind, protocol, _, address in found]

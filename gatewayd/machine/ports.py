@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from gatewayd.loop.resolve import look_up
+
 _PROC = Path("/proc")
 _LISTENING = "0A"
 """State of a socket in /proc/net/tcp that accepts connections."""
@@ -23,12 +25,10 @@ def bind_failure(host: str, port: int) -> OSError | None:
     They are bound for an instant, and not listened on: nobody can connect meanwhile.
     """
     try:
-        addresses = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-    except UnicodeError:
-        return socket.gaierror(socket.EAI_NONAME, "not a host name")
+        addresses = look_up(host or None, port, socket.AI_PASSIVE)
     except OSError as error:
         return error
-    for family, kind, protocol, _, address in addresses:
+    for family, kind, protocol, address in addresses:
         with socket.socket(family, kind, protocol) as attempt:
             attempt.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             if family == socket.AF_INET6:

@@ -6,12 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final, TypeAlias
 
 from gatewayd.core.definition import CellDefinition, Value
-from gatewayd.core.program import STATES
+from gatewayd.core.program import NUMBERS
 from gatewayd.core.refusal import Refusal
 from gatewayd.mapping.testing import OPERATOR_NAME, StepSpec, action_of
 from gatewayd.maptest.plant import REPEAT, Plant
-
-_PROGRAMS: Final = {name: state for state, (name, _running) in STATES.items()}
 
 
 class CellNames:
@@ -103,7 +101,7 @@ _ROBOT: Final[dict[str, Callable[[Plant], None]]] = {
 
 
 def _program(plant: Plant, _names: CellNames, step: StepSpec) -> None:
-    plant.robot.run_program(_PROGRAMS[step.program or ""])
+    plant.robot.run_program(NUMBERS[step.program or ""])
     plant.robot.report(plant.now)
 
 

@@ -7,9 +7,8 @@ from typing import Final
 
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Value, ValueKind, Variable
+from gatewayd.core.program import NUMBERS
 
-PLAYING = 2
-"""RTDE's `runtime_state` of a program that runs."""
 _PROGRAM_FIELD = "runtime_state"
 
 
@@ -21,9 +20,9 @@ class PlantRobot:
         self._variables = cell.definition.variables
         self._holds: list[Value] = [variable.kind.zero for variable in self._variables]
         """What its registers hold, by variable: inputs as given, outputs as shown."""
-        self._program = PLAYING
+        self._program = NUMBERS["playing"]
         self._connected = self._reports = False
-        self.run_program(PLAYING)
+        self.run_program(NUMBERS["playing"])
         cell.listeners.append(self._take)
 
     def connect(self, now: float) -> None:
@@ -46,7 +45,7 @@ class PlantRobot:
         """The controller starts anew: its registers are zero, no program runs, and it connects."""
         self.lose(now)
         self._holds = [variable.kind.zero for variable in self._variables]
-        self.run_program(1)
+        self.run_program(NUMBERS["stopped"])
         self.connect(now)
 
     def show(self, values: Mapping[int, Value], now: float) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gatewayd.loop.resolve import hosts, look_up
 from gatewayd.report.format import parse_address
 from gatewayd.rtde.enums import MEANINGS, PROGRAM_IDLE
 
@@ -108,10 +109,9 @@ def program_in_the_way(state: int | None) -> str:
 def _addresses(host: str, port: int) -> set[tuple[str, int]]:
     """Where a name leads to; the name itself where it leads nowhere."""
     try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-    except (OSError, UnicodeError):
+        return {(address, port) for address in hosts(look_up(host, port))}
+    except OSError:
         return {(host, port)}
-    return {(str(address[0]), port) for *_, address in found}
 
 
 def _is_dead(place: str) -> bool:
