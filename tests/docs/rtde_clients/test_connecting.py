@@ -363,7 +363,8 @@ async def test_a_loss_is_followed_by_a_new_connection_with_all_recipes(
     async with connect(outputs=["robot_mode"], inputs=IN, reconnect=retry, claim_timeout=PATIENCE) as robot:
         await robot.newer(PATIENCE)
         simulator.drop_clients()
-        assert not (await event(robot, rtde.LostEvent)).final
+        lost = await event(robot, rtde.LostEvent)
+        assert (lost.final, lost.loss.retry_in) == (False, pytest.approx(0.001))
         await event(robot, rtde.StartedEvent)
         assert (await robot.newer(PATIENCE)).robot_mode == 7
         await robot.write("in", input_int_register_24=8, verify=True)
