@@ -34,7 +34,7 @@ from gatewayd.core.requester import Requester
 from gatewayd.core.status import StatusBlock
 from gatewayd.core.status_layout import BASE, HEADER_WORDS, LENGTH, TABLES
 from gatewayd.links.canopen_node.status_objects import StatusObjects
-from gatewayd.links.registry import status_fields
+from gatewayd.links.registry import status_fields, status_tables
 from gatewayd.logs.events import EventLog
 from gatewayd.logs.records import Format, configure
 from gatewayd.mapping.diagnostics import Diagnostic, Rule
@@ -271,7 +271,7 @@ def status_block() -> object:
     return [
         f"{BASE}, {LENGTH} words",
         *([field.offset, field.words, field.name, field.meaning] for field in status_fields()),
-        *([table.offset, table.words, table.name, table.meaning] for table in TABLES),
+        *([table.offset, table.words, table.name, table.meaning] for table in (*TABLES, *status_tables())),
         *(header[at : at + 16].hex(" ", 2) for at in range(0, len(header), 16)),
     ]
 

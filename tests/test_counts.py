@@ -47,6 +47,7 @@ NEVER_ONE = {
     "links.canopen_node.rules.node: names": "not a number, and writes is a verb",
     "links.canopen_node.rules.pdos: len(pdos)": "more than the four predefined ones",
     "links.canopen_node.rules.pdos: pdo.bits": "more than 64",
+    "links.devices.declaration: len(STATUS_WORDS)": "16 of them",
     "links.modbus_server.rules.places: limit": "the greatest block of a request",
     "links.robot.rules.fields: size": "more than 2048",
     "links.robot.rules.fields: len(names)": "as many as take more than 2048 bytes",

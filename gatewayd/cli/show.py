@@ -118,7 +118,9 @@ def _notes(loaded: Loaded, plan: Plan, *, shortened: bool) -> list[str]:
         known = [name for language in languages() for name in language.names(part.spec)]
         silences = [writer.timeout, *(language.silence(part.spec) for language in languages())]
         silence = next((silence for silence in silences if silence is not None), None)
-        watch = "no timeout" if silence is None else f"lost after {silence:.6g}s of silence"
+        ends = [language.lost_by for language in languages() if language.supervises(part.spec)]
+        watch = next(filter(None, ends), "no timeout")
+        watch = watch if silence is None else f"lost after {silence:.6g}s of silence"
         watch += " (only writes count)" if writer.counts_writes else ""
         watch += f", keeps what it owns for {writer.grace:.6g}s without a connection" if writer.grace else ""
         notes.append(f"writer {writer.name}: {', '.join(known)}, {watch}")

@@ -381,7 +381,7 @@ class Cell:
         if match.same_robot:
             self.lag.succeed(former.lag)
             self.adoption.succeed(former.adoption)
-        self.health = replace(former.health, words={})
+        self.health = replace(former.health, words={}, tables={})
         self.events.succeed(former.events, match)
         self._reception.health = self.health
         self._refused.succeed(former._refused, match, self.health)

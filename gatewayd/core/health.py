@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from gatewayd.core.unserved import Unserved
@@ -51,6 +52,8 @@ class Health:
     """Requests that nothing here serves, by reason."""
     words: dict[str, int] = field(default_factory=dict)
     """Numbers of the status block that links report, by name (`LinkKind.status_fields`)."""
+    tables: dict[str, dict[int, Sequence[int]]] = field(default_factory=dict)
+    """Entries of tables of the status block that links report, by name of the table (`LinkKind.status_tables`)."""
 
     def beat(self, now: float) -> None:
         """Count the heartbeat, if it is time."""

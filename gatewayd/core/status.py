@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from operator import itemgetter
 
 from gatewayd.core.cell import Cell
@@ -26,6 +27,7 @@ from gatewayd.core.status_layout import (
     RELEASE_ALL,
     REQUEST,
     TABLES,
+    LinkTable,
     StatusField,
 )
 
@@ -42,9 +44,14 @@ _Entries = Callable[[range, float], Iterable[int]]
 
 
 class StatusBlock:
-    """The status block of one cell. `fields` are the core's and those whose numbers are in `Cell.health.words`."""
+    """The status block of one cell. `fields` are the core's and those whose numbers are in `Cell.health.words`.
 
-    def __init__(self, cell: Cell, fields: Sequence[StatusField] = FIELDS) -> None:
+    `tables` are those whose entries are in `Cell.health.tables`.
+    """
+
+    def __init__(
+        self, cell: Cell, fields: Sequence[StatusField] = FIELDS, tables: Sequence[LinkTable] = ()
+    ) -> None:
         self._cell = cell
         self._words = [field for field in fields if field not in FIELDS]
         numbers = {field.name: number for number, field in enumerate((*FIELDS, *self._words))}
@@ -60,6 +67,7 @@ class StatusBlock:
             (lease.offset, variables, self._lease),
             (age.offset, variables, self._age),
             (quality.offset, variables, self._quality),
+            *((table.offset, table.words, partial(self._reported, table)) for table in tables),
         )
 
     def read(self, first: int, count: int, now: float) -> bytes:
@@ -189,6 +197,11 @@ class StatusBlock:
 
     def _quality(self, entries: range, _now: float) -> Iterable[int]:
         return map(self._cell.image.quality.__getitem__, entries)
+
+    def _reported(self, table: LinkTable, entries: range, _now: float) -> Iterable[int]:
+        found, width = self._cell.health.tables.get(table.name, {}), len(table.entry)
+        nothing = (0,) * width
+        return (min(_U16, found.get(word // width, nothing)[word % width]) for word in entries)
 
     def _locks(self, entries: range) -> Iterable[int | None]:
         variables = self._cell.definition.variables

@@ -47,6 +47,14 @@ class StatusTable(StatusField):
     """A table with one entry for each variable or writer, `offset` words after `BASE`."""
 
 
+@dataclass(frozen=True, slots=True)
+class LinkTable(StatusTable):
+    """A table that links report (`Cell.health.tables`), each its own entries: by number from 0, several words each."""
+
+    entry: tuple[tuple[str, str], ...]
+    """Name and meaning of each word of an entry."""
+
+
 FIELDS = (
     StatusField(0, 1, "layout", "version of this layout, 1"),
     StatusField(
@@ -125,7 +133,9 @@ TABLES = (
     StatusTable(2240, MAX_VARIABLES, "age", "one word for each variable: age of its value in milliseconds"),
     StatusTable(3264, MAX_VARIABLES, "quality", f"one word for each variable: {_numbered(Quality)}"),
 )
-LENGTH = 4288
+LINK_TABLES = 4288
+"""Offset of the first table of links."""
+LENGTH = 4800
 """Words of the whole block."""
 _END = BASE + LENGTH
 

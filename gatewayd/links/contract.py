@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from gatewayd.core.definition import CellDefinition, Value
     from gatewayd.core.objection import Objection
     from gatewayd.core.requester import Requester
-    from gatewayd.core.status_layout import StatusField
+    from gatewayd.core.status_layout import LinkTable, StatusField
     from gatewayd.mapping.plan import LinkPlan, Plan
 
 # -- declaration -------------------------------------------------------------------------------------------------
@@ -110,6 +110,8 @@ class LinkKind:
     """A variable has one place at most: the interface has that or null, not a list."""
     status_fields: ClassVar[tuple[StatusField, ...]] = ()
     """Words of the status block that its links report (`Cell.health.words`), at addresses that nobody else has."""
+    status_tables: ClassVar[tuple[LinkTable, ...]] = ()
+    """Tables of the status block that its links report (`Cell.health.tables`), behind those of the core."""
     metrics: ClassVar[tuple[LinkMetric, ...]] = ()
     traffic: ClassVar[str] = ""
     """Module whose `DECODER` makes what puts its links' traffic into words (`links.traffic`); empty: there is none."""

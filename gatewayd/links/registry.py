@@ -7,7 +7,7 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
-from gatewayd.core.status_layout import FIELDS, StatusField
+from gatewayd.core.status_layout import FIELDS, LinkTable, StatusField
 from gatewayd.links.contract import LinkKind, LinkRuntime, TrafficDecoder
 
 if TYPE_CHECKING:
@@ -43,6 +43,13 @@ def status_fields() -> tuple[StatusField, ...]:
     """All numbers of the status block's header, the core's and those of all kinds, by address."""
     fields = (*FIELDS, *(field for kind in kinds() for field in kind.status_fields))
     return tuple(sorted(fields, key=lambda field: field.offset))
+
+
+@cache
+def status_tables() -> tuple[LinkTable, ...]:
+    """All tables of the status block that links report, by address."""
+    tables = (table for kind in kinds() for table in kind.status_tables)
+    return tuple(sorted(tables, key=lambda table: table.offset))
 
 
 def kind_of(key: str) -> LinkKind:

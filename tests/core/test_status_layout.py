@@ -10,10 +10,12 @@ from gatewayd.core.status_layout import (
     HEADER_WORDS,
     LAYOUT_VERSION,
     LENGTH,
+    LINK_TABLES,
     TABLES,
     StatusField,
     StatusTable,
 )
+from gatewayd.links.registry import status_tables
 
 ENTRIES: list[StatusField | StatusTable] = [*FIELDS, *TABLES]
 
@@ -65,7 +67,7 @@ BLOCKS = (
 
 
 def test_the_layout_is_a_contract() -> None:
-    assert (BASE, LAYOUT_VERSION, LENGTH) == (60000, 1, 4288)
+    assert (BASE, LAYOUT_VERSION, LENGTH) == (60000, 1, 4800)
     assert tuple((field.offset, field.words, field.name) for field in FIELDS) == HEADER
     assert tuple((table.offset, table.words, table.name) for table in TABLES) == BLOCKS
 
@@ -73,4 +75,6 @@ def test_the_layout_is_a_contract() -> None:
 def test_fields_and_tables_lie_one_after_the_other() -> None:
     assert all(one.offset + one.words <= next_one.offset for one, next_one in pairwise(ENTRIES))
     assert FIELDS[-1].offset < HEADER_WORDS == TABLES[0].offset
-    assert TABLES[-1].offset + TABLES[-1].words == LENGTH
+    assert TABLES[-1].offset + TABLES[-1].words == LINK_TABLES
+    links = status_tables()
+    assert (links[0].offset, links[-1].offset + links[-1].words) == (LINK_TABLES, LENGTH)

@@ -32,6 +32,7 @@ from gatewayd.core.refusal import PRECEDENCE, Reason
 from gatewayd.core.status_layout import BASE, TABLES
 from gatewayd.links.modbus_server.functions import EXCEPTION_OF
 from gatewayd.links.registry import kinds, status_fields
+from gatewayd.links.registry import status_tables as link_tables
 from gatewayd.logs.events import LEVELS
 from gatewayd.logs.records import LEVELS as LEVEL_NAMES
 from gatewayd.mapping.schema import mapping_schema
@@ -252,9 +253,16 @@ def status_tables() -> str:
     """The tables of the status block."""
     rows = [
         (*_places(status_table.offset, status_table.words), f"`{status_table.name}`", status_table.meaning)
-        for status_table in TABLES
+        for status_table in (*TABLES, *link_tables())
     ]
     return table(("address", "4xxxxx", "name", "meaning"), rows)
+
+
+def status_entries() -> str:
+    """The words of one entry of each table that links report."""
+    (devices,) = link_tables()
+    rows = [(f"+{number}", f"`{name}`", meaning) for number, (name, meaning) in enumerate(devices.entry)]
+    return table(("word", "name", "meaning"), rows)
 
 
 _QUALITIES = {
@@ -503,6 +511,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "exit-codes": exit_codes,
     "status-header": status_header,
     "status-tables": status_tables,
+    "status-devices": status_entries,
     "qualities": qualities,
     "robot-states": sources,
     "programs": programs,

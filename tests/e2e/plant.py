@@ -5,9 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from tests.e2e.plc import PLC, Plc
 from tests.e2e.processes import HOST, Daemon, Process, Simulator, free_port, wait_for
+
+_Process = TypeVar("_Process", bound=Process)
 
 HEAD = """\
 gatewayd: 1
@@ -100,6 +103,11 @@ class Plant:
     def program(self, command: Sequence[str], name: str) -> Process:
         """Any other program."""
         process = Process(command, self._log(name))
+        self._processes.append(process)
+        return process
+
+    def add(self, process: _Process) -> _Process:
+        """One that the test has started itself: it ends with the plant."""
         self._processes.append(process)
         return process
 

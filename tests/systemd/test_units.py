@@ -59,7 +59,8 @@ def exposure(unit: Path) -> float:
 
 @needs_systemd
 @pytest.mark.parametrize(
-    "drop_in", [None, "addresses.conf", "unprivileged-ports.conf", "reload-by-signal.conf"]
+    "drop_in",
+    [None, "addresses.conf", "unprivileged-ports.conf", "reload-by-signal.conf", "serial-ports.conf"],
 )
 @pytest.mark.parametrize("unit", UNITS)
 def test_systemd_finds_no_mistake(unit: str, drop_in: str | None, tmp_path: Path) -> None:
@@ -89,6 +90,12 @@ def test_exposure_is_less_without_it(tmp_path: Path) -> None:
 @needs_systemd
 def test_the_address_list_costs_nothing(tmp_path: Path) -> None:
     assert exposure(tree(tmp_path, "addresses.conf") / UNITS[0]) <= MOST_EXPOSURE
+
+
+@needs_systemd
+def test_serial_ports_cost_little(tmp_path: Path) -> None:
+    """Docs say how much."""
+    assert exposure(tree(tmp_path, "serial-ports.conf") / UNITS[0]) <= MOST_EXPOSURE + 0.3
 
 
 def test_the_template_differs_in_what_it_must() -> None:

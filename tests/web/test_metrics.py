@@ -24,6 +24,7 @@ from tests.works import finished
 Samples = dict[str, dict[tuple[tuple[str, str], ...], float]]
 
 ONLY_WITH_CAN = {"gatewayd_can_bus_state", "gatewayd_can_total"}
+ONLY_WITH_DEVICES = {info.name for info in METRICS if info.name.startswith("gatewayd_device_")}
 
 
 def read(probes: Probes) -> Samples:
@@ -46,7 +47,7 @@ def test_everything_that_is_listed_is_told_and_nothing_else(probes: Probes) -> N
             if info.kind is MetricKind.HISTOGRAM
             else {info.name}
         )
-    assert set(read(probes)) == names - ONLY_WITH_CAN | set(PROCESS_METRICS)
+    assert set(read(probes)) == names - ONLY_WITH_CAN - ONLY_WITH_DEVICES | set(PROCESS_METRICS)
 
 
 def test_labels_are_those_that_are_listed(probes: Probes) -> None:

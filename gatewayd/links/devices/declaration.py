@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from gatewayd.core.definition import CellDefinition
+from gatewayd.core.status_layout import LINK_TABLES, LinkTable
 from gatewayd.links.contract import Description, LinkKind, LinkMetric
 from gatewayd.links.devices.description import description
 from gatewayd.links.devices.plan import DevicePlan
+from gatewayd.links.devices.status_words import MAX_DEVICES, STATUS_WORDS
 from gatewayd.mapping.plan import LinkPlan
 
 
@@ -14,6 +16,7 @@ class DeviceKind(LinkKind):
 
     key = DevicePlan.kind
     title = "device"
+    traffic = "gatewayd.links.devices.traffic"
     doctor = "gatewayd.links.devices.doctor"
     fields = {  # noqa: RUF012 - never changed
         "family": "how it is spoken to: `modbus`",
@@ -27,6 +30,7 @@ class DeviceKind(LinkKind):
         "errors": "answers that could not be read, and connections that were lost or could not be had",
         "exceptions": "requests that the device refused, by code",
         "age": "seconds since its last answer, or null",
+        "losses": "how often it was lost",
     }
     metrics = (
         LinkMetric("gatewayd_device_up", "up", "1 while the device answers"),
@@ -44,11 +48,21 @@ class DeviceKind(LinkKind):
             "errors",
             "answers of the device that could not be read, and connections that were lost or could not be had",
         ),
+        LinkMetric("gatewayd_device_losses_total", "losses", "times that the device was lost"),
         LinkMetric(
             "gatewayd_device_exceptions_total",
             "exceptions",
             "requests that the device refused",
             label="code",
+        ),
+    )
+    status_tables = (
+        LinkTable(
+            LINK_TABLES,
+            MAX_DEVICES * len(STATUS_WORDS),
+            "devices",
+            f"{len(STATUS_WORDS)} words for each of {MAX_DEVICES} devices, in the order of the file",
+            STATUS_WORDS,
         ),
     )
     place = "list of its places in the device"

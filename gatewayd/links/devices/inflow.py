@@ -59,6 +59,16 @@ class Inflow:
                 self._locks[index] = lock
                 self._members.setdefault(lock, []).append(index)
 
+    def gap(self, length: float) -> None:
+        """The process stood still: nothing could be read meanwhile, and what is read now may have waited."""
+        self._times = {index: time + length for index, time in self._times.items()}
+        self.requester = replace(self.requester, waited=length)
+
+    def caught_up(self) -> None:
+        """What waited has been read."""
+        if self.requester.waited:
+            self.requester = replace(self.requester, waited=0.0)
+
     @property
     def lacking(self) -> list[int]:
         """Variables of which there is no young value."""

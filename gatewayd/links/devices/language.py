@@ -97,18 +97,20 @@ class DevicesLanguage(LinkLanguage):
     def compile_links(self, cell: ExpandedCell) -> Mapping[str, DevicePlan]:
         """A plan for each device."""
         devices = cell.document.parts(DeviceSpec)
-        return {name: _compile(cell, name, device) for name, device in devices.items()}
+        return {name: _compile(cell, number, device) for number, (name, device) in enumerate(devices.items())}
 
     @staticmethod
     def _of(variable: ExpandedVariable, cell: ExpandedCell) -> Iterable[ExpandedPlace]:
         return (place for place in devices_of(cell).places if place.variable.index == variable.index)
 
 
-def _compile(cell: ExpandedCell, name: str, device: Part[DeviceSpec]) -> DevicePlan:
+def _compile(cell: ExpandedCell, number: int, device: Part[DeviceSpec]) -> DevicePlan:
+    name = device.name
     places = devices_of(cell).of(name)
     writers = (part.spec.by(DeviceWriter).device for part in cell.document.writers.values())
     common: dict[str, Any] = {
         "name": name,
+        "number": number,
         "writer": next((index for index, its in enumerate(writers) if its == name), None),
         "lost_after": lost_after(device.spec, places),
         "watchdog": device.spec.watchdog,

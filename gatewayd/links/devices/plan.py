@@ -31,6 +31,8 @@ class DevicePlan(LinkPlan):
 
     name: str = field(metadata=NO_MEANING)
     """Its name in the file, which its link has too."""
+    number: int
+    """Which of the devices of the file it is, from 0: its place in the status block."""
     writer: int | None
     """The writer that it is; None: it writes nothing."""
     lost_after: float

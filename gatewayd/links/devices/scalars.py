@@ -20,6 +20,9 @@ _MODBUS_PORT: Final = 502
 _TARGET = re.compile(r"(?:\[(?P<six>[0-9A-Fa-f:.%a-z]+)\]|(?P<host>[^:\[\]\s/]+))(?::(?P<port>[0-9]{1,5}))?")
 _PORT_PATH = re.compile(r"/[A-Za-z0-9_./+:@-]+")
 _BITS = re.compile(r"(0|[1-9][0-9]?)\.\.(0|[1-9][0-9]?)")
+_REGISTERS = re.compile(r"(0|[1-9][0-9]{0,4})(?:\.\.(0|[1-9][0-9]{0,4}))?")
+_MAX_REGISTER: Final = 0xFFFF
+_MAX_REGISTERS: Final = 125
 _MAX_PORT: Final = 65535
 _MAX_BIT: Final = 15
 
@@ -106,6 +109,30 @@ Bits = Annotated[
     ),
 ]
 """Bits of a register, both ends included."""
+
+
+def _registers(value: object) -> range:
+    if isinstance(value, range):
+        return value
+    hint = "write the first and the last register, for example 100..103"
+    text = scalar(value, "registers", hint)
+    match = _REGISTERS.fullmatch(text)
+    if match is None:
+        refuse(BAD_ADDRESS, f"`{text}` are not registers", hint)
+    first, last = int(match[1]), int(match[2] or match[1])
+    if not first <= last <= _MAX_REGISTER or last - first >= _MAX_REGISTERS:
+        refuse(syntax.OUT_OF_RANGE, f"`{text}` are not 1 to {_MAX_REGISTERS} registers", hint)
+    return range(first, last + 1)
+
+
+Registers = Annotated[
+    InstanceOf[range],
+    BeforeValidator(
+        _registers,
+        json_schema_input_type=Annotated[str, Field(pattern=r"^[0-9]+(\.\.[0-9]+)?$", examples=["100..103"])],
+    ),
+]
+"""Some registers, both ends included."""
 
 RestPolicy = Literal["keep", "zero"]
 """What a write gives the bits of a register that nothing is mapped to."""

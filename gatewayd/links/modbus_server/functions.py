@@ -22,7 +22,7 @@ from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.registers import BitTable, RegisterImage, RegisterTable
 from gatewayd.links.modbus_server.unserved import Places, named, unserved
 from gatewayd.links.modbus_server.usual import UsualWrites
-from gatewayd.links.registry import status_fields
+from gatewayd.links.registry import status_fields, status_tables
 from gatewayd.modbus import identification
 from gatewayd.modbus.areas import (
     MAX_READ_BITS,
@@ -61,7 +61,7 @@ class Unit:
         self.usual_registers = UsualWrites(cell, self.image.holding.usual)
         self.usual_coils = UsualWrites(cell, self.image.coils.usual)
         self.places = Places(plan, cell.definition)
-        self.status = StatusBlock(cell, status_fields())
+        self.status = StatusBlock(cell, status_fields(), status_tables())
         self.identification = Identification(cell.definition.name, cell.definition.fingerprint)
         self.exception_of = {**EXCEPTION_OF, Reason.ROBOT_LOST: plan.robot_away}
         goes_on = former is not None and former.cell.definition.name == cell.definition.name

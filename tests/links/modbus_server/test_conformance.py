@@ -46,8 +46,8 @@ READS = [
     ("04 0000 007e", "84 03", "126 input registers"),
     ("03 ea60 0001", "03 02 00 01", "the status block among the holding registers"),
     ("04 ea60 0001", "04 02 00 01", "the status block among the input registers"),
-    ("03 fb1f 0001", "03 02 00 00", "the last word of the status block"),
-    ("03 fb1f 0002", "83 02", "registers that go over the end of the status block"),
+    ("03 fd1f 0001", "03 02 00 00", "the last word of the status block"),
+    ("03 fd1f 0002", "83 02", "registers that go over the end of the status block"),
     ("03 ea5f 0002", "83 02", "registers that go into the status block"),
 ]
 

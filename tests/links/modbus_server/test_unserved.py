@@ -62,9 +62,9 @@ def texts(cell: Cell) -> list[str]:
             "plc read holding 59999-60000: 59999 is not mapped; nearest: bit_16 501.0",
         ),
         (
-            "03 fb1f 0002",
+            "03 fd1f 0002",
             Unserved.NO_SUCH_ADDRESS,
-            "plc read holding 64287-64288: the status block, 60000-64287, needs a request of its own",
+            "plc read holding 64799-64800: the status block, 60000-64799, needs a request of its own",
         ),
         (
             "03 ffff 0002",

@@ -28,19 +28,25 @@ def describe(plan: DevicePlan, _cell: CellDefinition) -> Description:
             "reached by": plan.line.text,
             "unit": str(plan.unit),
             "timeout": seconds(plan.timeout) or "",
-            "retries": str(plan.retries) if plan.retries else "",
+            "failures": str(plan.failures),
             "gap": str(plan.gap) if plan.gap else "",
             "single": "true" if plan.single else "",
             "connect": "per_request" if plan.per_request else "",
             "in_flight": str(plan.in_flight) if plan.in_flight > 1 else "",
             "write": "" if plan.write == "auto" else plan.write,
-            "mask_write": "true" if plan.mask_write else "",
-            "read_write": "true" if plan.read_write else "",
+            "mask_write": "" if plan.mask_write else "false",
+            "poll": "" if any(placed.poll for placed in plan.placements) else seconds(plan.poll),
+            "identify": "true" if plan.identify else "",
+            "serial_number": _registers(plan.serial_number),
         },
         places=places,
         address=where,
         fields={"address": plan.line.text, "unit": plan.unit},
     )
+
+
+def _registers(found: tuple[int, int] | None) -> str:
+    return "" if found is None else f"{found[0]}..{found[0] + found[1] - 1}"
 
 
 def _place(device: str, placed: DevicePlacement, sending: Sending | None) -> Place:

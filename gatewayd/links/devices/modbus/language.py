@@ -82,14 +82,18 @@ class ModbusFamily(FamilyLanguage):
             line=line_of(spec),
             unit=spec.unit,
             timeout=spec.timeout,
-            retries=spec.retries,
+            failures=spec.failures,
             gap=spec.gap,
             single=spec.single,
             per_request=spec.connect == "per_request",
             in_flight=spec.in_flight,
             write=spec.write,
             mask_write=spec.mask_write,
-            read_write=spec.read_write,
+            poll=spec.poll,
+            identify=spec.identify,
+            serial_number=None
+            if spec.serial_number is None
+            else (spec.serial_number[0], len(spec.serial_number)),
             placements=tuple(map(_placement, places)),
         )
 

@@ -1,63 +1,268 @@
-"""The link to one Modbus device."""
+"""The link to one Modbus device: a station of a line on one side, a writer and outputs of a cell on the other."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping, Sequence
+import logging
+from collections.abc import Hashable, Mapping
 from typing import Final
 
 from gatewayd.core.cell import Cell
-from gatewayd.links.contract import Context, Level, Link, LinkHealth, Prepared, SharedPart
+from gatewayd.core.definition import CellDefinition, Direction, Value
+from gatewayd.core.requester import Requester
+from gatewayd.links.contract import Context, Link, LinkHealth
 from gatewayd.links.devices.family import FamilyRuntime
+from gatewayd.links.devices.inflow import Inflow
+from gatewayd.links.devices.modbus.lines import ModbusLines
+from gatewayd.links.devices.modbus.orders import OrderMaker
 from gatewayd.links.devices.modbus.plan import ModbusDevicePlan
+from gatewayd.links.devices.modbus.polls import AnswerReader, polls_of
+from gatewayd.links.devices.outflow import Outflow
 from gatewayd.links.devices.plan import DevicePlan
-from gatewayd.mapping.plan import LinkPlan, Plan
+from gatewayd.links.devices.status_words import DeviceFigures, DeviceState
+from gatewayd.logs.records import fields
+from gatewayd.loop import clock
+from gatewayd.mapping.plan import LinkPlan
+from gatewayd.modbus.areas import Area
+from gatewayd.modbus.client.breaker import BreakerSettings
+from gatewayd.modbus.client.grouping import ReadGroup, WantedItem
+from gatewayd.modbus.client.identity import UnitIdentity
+from gatewayd.modbus.client.requests import Failure
+from gatewayd.modbus.client.station import Station
+from gatewayd.modbus.client.unit import StationSettings, UnitState
+from gatewayd.report.wording import names_and_more
+
+PERIOD = 0.05
+"""Seconds between two looks at what only time brings."""
+
+log = logging.getLogger("gatewayd.devices")
 
 
 class ModbusDeviceLink(Link):
-    """Joins one device to a cell."""
+    """Joins one device to a cell. Its line has the connection, and calls it as the listener of its station."""
 
     title = "device"
     plan: ModbusDevicePlan
 
     def __init__(self, plan: ModbusDevicePlan, cell: Cell) -> None:
-        self.plan = plan
-        self.cell = cell
+        self._progress = self._answers = 0
+        self._heard: float | None = None
+        self._bind(plan, cell)
+        inputs = [placed.variable for placed in plan.inputs(cell.definition)]
+        peer = f"{plan.name} ({plan.line.text} unit {plan.unit})"
+        self._inflow = Inflow(cell, plan.writer, peer, inputs, plan.lost_after)
+        self._outflow = Outflow(cell, plan.sendings, self._send)
+        self._unread: dict[tuple[Area, int], str] = {}
+        """Groups that the device refuses to be read, or that cannot be read, by area and address; and why."""
+        self._unwritten: dict[Hashable, str] = {}
+        """Writes that the device did not take, and why."""
+        self._ended = False
+        self.station = self._new_station()
 
-    def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
-        """Go on with the same device in the successor of the cell."""
-        assert isinstance(plan, ModbusDevicePlan)
-        self.plan, self.cell = plan, cell
+    def begin_anew(self) -> None:
+        """Its station was on a line that is no more: another one takes its place."""
+        if self.station.state is not UnitState.CONNECTING:
+            self.station = self._new_station()
 
-    def health(self) -> LinkHealth:
-        """Nobody speaks to it yet."""
-        reason = f"device {self.plan.name}: this gateway does not speak to Modbus devices yet"
-        return LinkHealth(self.plan.name, Level.BAD, "not spoken to", problems=(reason,))
+    def _new_station(self) -> Station:
+        return Station(settings_of(self.plan, self._cell.definition), self)
 
+    def _bind(self, plan: ModbusDevicePlan, cell: Cell) -> None:
+        self.plan, self._cell = plan, cell
+        self._reader = AnswerReader(plan.inputs(cell.definition))
+        self._orders = OrderMaker(plan.outputs(cell.definition), plan.write)
+        cell.listeners.append(self._on_image)
 
-class ModbusLines(SharedPart):
-    """The connections that Modbus devices are reached by."""
+    @property
+    def progress(self) -> int:
+        """Counts while the link's task goes on, whatever the device does."""
+        return self._progress
+
+    @property
+    def reachable(self) -> bool | None:
+        """While the device answers, if it is a writer."""
+        return None if self.plan.writer is None else self.station.state is UnitState.ONLINE
+
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still: answers that are read now may have waited."""
+        self._inflow.gap(now - since)
 
     async def run(self) -> None:
-        """Work until cancelled."""
-        await asyncio.get_running_loop().create_future()
+        """Look at the time until cancelled; everything else is called by the line."""
+        while True:
+            self._progress += 1
+            self._tick(clock.now())
+            await asyncio.sleep(PERIOD)
 
-    async def prepare(self, plans: Sequence[Plan]) -> Prepared:
-        """Nothing is needed beforehand: what cannot be reached is tried again."""
-        return NothingPrepared()
+    def departing(self, plan: LinkPlan | None, after: CellDefinition) -> Mapping[Requester, str]:
+        """The device as a writer, where another link takes this one's place."""
+        gone = plan is None and self._inflow.connected and self._inflow.requester.writer is not None
+        return {self._inflow.requester: "the device changes in the new mapping, or ends"} if gone else {}
 
-    def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
-        """Have a connection for each line."""
+    def release(self, plan: LinkPlan | None, after: CellDefinition, now: float) -> None:
+        """Another link takes the place of this one: what the device owns is released."""
+        if plan is None:
+            self._ended = True
+            self._inflow.lose("the new mapping changes the device", now)
+            self._outflow.lose()
+
+    def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
+        """Go on, unnoticed by the device, with the cell that succeeded the present one."""
+        assert isinstance(plan, ModbusDevicePlan)
+        before = self._cell.definition
+        places = {variable.name: index for index, variable in enumerate(cell.definition.variables)}
+        indices = {
+            index: places[variable.name]
+            for index, variable in enumerate(before.variables)
+            if variable.name in places
+        }
+        self._bind(plan, cell)
+        inputs = {placed.variable for placed in plan.inputs(cell.definition)}
+        self._inflow.rebind(cell, plan.writer, {old: new for old, new in indices.items() if new in inputs})
+        self._outflow.rebind(cell, plan.sendings, indices)
+        self._publish(now)
+
+    def flush(self, now: float) -> None:
+        """Have what changed last ready to be sent."""
+        self._outflow.update(now)
+
+    def health(self) -> LinkHealth:
+        """Whether it answers, and to everything."""
+        figures = {"family": self.plan.family, "address": self.plan.line.text, "unit": self.plan.unit}
+        return self._figures(clock.now()).health(self.plan.name, figures)
+
+    def _figures(self, now: float) -> DeviceFigures:
+        state, reason = self._state()
+        counters = self.station.counters
+        return DeviceFigures(
+            state=state,
+            reason=reason,
+            round_trip=counters.round_trip.last if counters.round_trip.count else None,
+            age=None if self._heard is None else now - self._heard,
+            answers=counters.answers + counters.exceptions.total(),
+            timeouts=counters.time_outs,
+            errors=counters.bad_answers + counters.lost_requests,
+            refused=counters.exceptions,
+            losses=counters.losses,
+        )
+
+    def _state(self) -> tuple[DeviceState, str]:
+        station = self.station
+        if station.state is UnitState.CONNECTING:
+            return DeviceState.STARTING, "it has not answered yet"
+        if station.state is UnitState.LOST:
+            return DeviceState.LOST, f"{station.reason}: look at its power, its cable and its unit id"
+        reason = next(iter((*self._unread.values(), *self._unwritten.values())), "")
+        return (DeviceState.PARTIAL if reason else DeviceState.GOOD), reason
+
+    # -- called by the station ------------------------------------------------------------------------------------
+
+    def values_read(self, group: ReadGroup, data: bytes, now: float) -> None:
+        """An answer has come."""
+        if self._unread.pop((group.area, group.address), None) is not None:
+            log.info("device is read again", extra=fields(**self._names(), values=self._variables(group)))
+        self._inflow.receive(self._reader.values(group, data), now)
+
+    def read_failed(self, group: ReadGroup, failure: Failure, now: float) -> None:
+        """Some values were not read this time; they are lost once that lasts."""
+        key, reason = (group.area, group.address), f"{self._variables(group)} cannot be read: {failure.text}"
+        if self.station.state is UnitState.ONLINE and self._unread.get(key) != reason:
+            self._unread[key] = reason
+            values = self._variables(group)
+            log.warning(
+                "device is not read", extra=fields(**self._names(), values=values, reason=failure.text)
+            )
+
+    def write_done(self, key: Hashable, failure: Failure | None, now: float) -> None:
+        """A write was confirmed or given up."""
+        if failure is None:
+            self._unwritten.pop(key, None)
+            return
+        variable = self._orders.variable_of(key)
+        name = "" if variable is None else self._cell.definition.variables[variable].name
+        reason = f"`{name}` was not written: {failure.text}"
+        if self._unwritten.get(key) != reason:
+            self._unwritten[key] = reason
+            log.warning(
+                "device did not take a value",
+                extra=fields(**self._names(), variable=name, reason=failure.text),
+            )
+
+    def state_changed(self, state: UnitState, reason: str, now: float) -> None:
+        """The device is there, or lost."""
+        if self._ended:
+            return
+        self._unread.clear()
+        self._unwritten.clear()
+        if state is UnitState.ONLINE:
+            log.info("device answers", extra=fields(**self._names()))
+            self._outflow.connect(now)
+        else:
+            log.warning("device lost", extra=fields(**self._names(), reason=reason))
+            self._inflow.lose(reason, now)
+            self._outflow.lose()
+        self._publish(now)
+
+    def identified(self, identity: UnitIdentity, former: UnitIdentity | None, now: float) -> None:
+        """It has said which device it is."""
+        if former is not None and former != identity:
+            log.warning(
+                "another device has taken its place", extra=fields(**self._names(), now=str(identity))
+            )
+
+    # -- inside --------------------------------------------------------------------------------------------------
+
+    def _tick(self, now: float) -> None:
+        # Timers come after sockets: whatever waited there has been read by now.
+        self._inflow.caught_up()
+        late = self._inflow.expire(now)
+        if late and self.station.state is UnitState.ONLINE:
+            variables = self._cell.definition.variables
+            values = names_and_more([variables[index].name for index in late])
+            log.warning("values of a device are lost", extra=fields(**self._names(), values=values))
+        self._outflow.tick(now)
+        heard = self.station.counters.answers + self.station.counters.exceptions.total()
+        if heard != self._answers:
+            self._answers, self._heard = heard, now
+        self._publish(now)
+
+    def _publish(self, now: float) -> None:
+        """Put what the status block has of the device where it takes it from."""
+        self._cell.health.tables.setdefault("devices", {})[self.plan.number] = self._figures(now).words
+
+    def _on_image(self, direction: Direction) -> None:
+        if direction is Direction.OUTPUT:
+            self._outflow.update(clock.now())
+
+    def _send(self, variable: int, _value: Value) -> None:
+        now = clock.now()
+        for key, order in self._orders.orders(variable, self._cell.image.values):
+            self.station.write(key, order, now)
+
+    def _variables(self, group: ReadGroup) -> str:
+        variables = self._cell.definition.variables
+        return names_and_more([variables[index].name for index in self._reader.variables(group)])
+
+    def _names(self) -> dict[str, object]:
+        return {"cell": self._cell.definition.name, "device": self.plan.name}
 
 
-class NothingPrepared:
-    """There is nothing to take back."""
-
-    def commit(self) -> None:
-        """See Prepared."""
-
-    async def abort(self) -> None:
-        """See Prepared."""
+def settings_of(plan: ModbusDevicePlan, cell: CellDefinition) -> StationSettings:
+    """What its station is."""
+    serial = None
+    if plan.serial_number is not None:
+        serial = WantedItem(Area.HOLDING, *plan.serial_number)
+    return StationSettings(
+        unit=plan.unit,
+        polls=polls_of(plan.inputs(cell), plan.gap, single=plan.single),
+        timeout=plan.timeout,
+        breaker=BreakerSettings(failures=plan.failures, lost_after=plan.lost_after),
+        in_flight=plan.in_flight,
+        has_mask_write=plan.mask_write,
+        is_identified=plan.identify,
+        serial=serial,
+        keepalive=plan.poll,
+    )
 
 
 class ModbusDeviceRuntime(FamilyRuntime):
@@ -68,7 +273,7 @@ class ModbusDeviceRuntime(FamilyRuntime):
         return ModbusLines()
 
     def make(self, plan: DevicePlan, cell: Cell, context: Context) -> ModbusDeviceLink:
-        """A link without a connection."""
+        """A link without a connection: `ModbusLines.serve` puts its station on a line."""
         assert isinstance(plan, ModbusDevicePlan)
         return ModbusDeviceLink(plan, cell)
 

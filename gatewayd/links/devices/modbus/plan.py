@@ -81,7 +81,8 @@ class ModbusDevicePlan(DevicePlan):
     timeout: float
     """Seconds within which a request is answered."""
     placements: tuple[DevicePlacement, ...]
-    retries: int = 0
+    failures: int = 3
+    """Requests in a row without an answer that make it lost at once."""
     gap: int = 0
     """Addresses with nothing mapped that one request may read along."""
     single: bool = False
@@ -90,11 +91,15 @@ class ModbusDevicePlan(DevicePlan):
     """Whether each request has a connection of its own."""
     in_flight: int = 1
     write: str = "auto"
-    """Function codes of writes: `auto`, `single` (5, 6) or `multiple` (15, 16)."""
-    mask_write: bool = False
+    """Function codes of writes: `auto`, `single` (5, 6), `multiple` (15, 16) or `read_write` (23)."""
+    mask_write: bool = True
     """Whether function code 22 is used where some bits of a register are written."""
-    read_write: bool = False
-    """Whether function code 23 is used."""
+    poll: float = 0.1
+    """Seconds between two requests to a device of which nothing is read."""
+    identify: bool = False
+    """Whether it is asked which device it is whenever it is found."""
+    serial_number: tuple[int, int] | None = None
+    """First holding register with a serial number, and how many."""
 
     def identity(self, cell: CellDefinition) -> object:
         """Everything; variables and writer by name."""
@@ -111,7 +116,7 @@ class ModbusDevicePlan(DevicePlan):
             (cell.variables[each.variable].name, each.brings_up_to_date, each.every) for each in self.sendings
         )
         writer = cell.writers[self.writer].name if self.writer is not None else None
-        return placements, sendings, writer, replace(self, writer=None, placements=(), sendings=())
+        return placements, sendings, writer, replace(self, writer=None, number=0, placements=(), sendings=())
 
     def inputs(self, cell: CellDefinition) -> tuple[DevicePlacement, ...]:
         """What is read: inputs of the robot."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Final, Literal
 
-from gatewayd.links.devices.scalars import Bits, PortPath, Rest, Target
+from gatewayd.links.devices.scalars import Bits, PortPath, Registers, Rest, Target
 from gatewayd.links.modbus_places.scalars import BAD_ADDRESS
 from gatewayd.links.modbus_places.sections import AREA_KEYS, RegisterSpec, WordOrder
 from gatewayd.mapping.scalars import Whole, refuse
@@ -33,11 +33,11 @@ class ModbusDeviceKeys(Section):
         "through (rtu)",
     )
     unit: Whole = Field(default=1, ge=0, le=255, description="unit identifier, the address on a serial line")
-    retries: Whole = Field(
-        default=0,
-        ge=0,
-        le=5,
-        description="how often a request that was not answered is sent again before it counts",
+    failures: Whole = Field(
+        default=3,
+        ge=1,
+        le=20,
+        description="how many requests in a row without an answer make it lost at once",
     )
     gap: Whole = Field(
         default=0,
@@ -55,15 +55,23 @@ class ModbusDeviceKeys(Section):
         le=16,
         description="how many requests may wait for their answers at a time, by Modbus TCP",
     )
-    write: Literal["auto", "single", "multiple"] = Field(
+    write: Literal["auto", "single", "multiple", "read_write"] = Field(
         default="auto",
-        description="function codes of writes: the shortest (auto), one value each (5, 6), or always 15 and 16",
+        description="function codes of writes: 5, 6 or 16 as the value needs it (auto), one coil or register each "
+        "(5, 6), always 15 and 16, or 23 for registers",
     )
     mask_write: bool = Field(
-        default=False, description="whether it knows function code 22, which writes some bits of a register"
+        default=True,
+        description="write some bits of a register by function code 22, unless the device refuses it; else they are "
+        "read, changed and written back",
     )
-    read_write: bool = Field(
-        default=False, description="whether registers are written and read in one request, function code 23"
+    identify: bool = Field(
+        default=False,
+        description="ask which device it is whenever it is found (function code 43), and report another one",
+    )
+    serial_number: Registers | None = Field(
+        default=None,
+        description="holding registers that differ between two devices, read for the same purpose",
     )
     order: WordOrder = Field(
         default="ABCD",

@@ -8,6 +8,7 @@ from typing import Final
 from gatewayd.links.devices.expand import devices_of
 from gatewayd.links.devices.language import lost_after, slowest_poll
 from gatewayd.links.devices.sections import DeviceSpec, DeviceWriter
+from gatewayd.links.devices.status_words import MAX_DEVICES
 from gatewayd.links.registry import kinds
 from gatewayd.mapping.diagnostics import Diagnostic, Related, Rule, Severity
 from gatewayd.mapping.document import Part
@@ -16,8 +17,6 @@ from gatewayd.mapping.rules.registry import cell_rule
 from gatewayd.report.schema import taken_names
 from gatewayd.report.wording import seconds
 
-MAX_DEVICES: Final = 32
-"""Devices of a cell: so many have words in the status block."""
 _OF_SERIAL: Final = ("baudrate", "parity", "stop_bits")
 _OF_TCP: Final = ("framing", "connect", "in_flight")
 

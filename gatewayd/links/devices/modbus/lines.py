@@ -1,0 +1,192 @@
+"""The connections that Modbus devices are reached by: one for each address, whatever cells its devices belong to.
+
+A device comes and goes without the others on its line noticing. Only where what they share changes (requests at the
+same time, a connection for each request), the line begins anew with all of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol, cast
+
+from gatewayd.core.cell import Cell
+from gatewayd.links.contract import Link, Prepared, SharedPart, Tap
+from gatewayd.links.devices.modbus.plan import LineAddress, ModbusDevicePlan
+from gatewayd.links.devices.modbus.tapped import TappedRunner, TappedTcpLine
+from gatewayd.logs.records import fields
+from gatewayd.loop.retry import keep_running
+from gatewayd.mapping.plan import Plan
+from gatewayd.modbus.client.line import ConnectionUse, Line, LineSettings
+from gatewayd.modbus.client.station import Station
+from gatewayd.modbus.client.tcp import TcpAddress, TcpFrames
+
+RETRY_PERIOD = 2.0
+"""Seconds after which a line that failed by a defect is started again."""
+
+log = logging.getLogger("gatewayd.devices")
+
+
+class DeviceOnLine(Protocol):
+    """As much of a link as its line knows."""
+
+    @property
+    def plan(self) -> ModbusDevicePlan:
+        """Where it is."""
+
+    @property
+    def station(self) -> Station:
+        """What the line asks."""
+
+    def begin_anew(self) -> None:
+        """Have a station that was on no line yet."""
+
+
+@dataclass(eq=False, slots=True)
+class _LineAtWork:
+    """One connection with its devices."""
+
+    address: LineAddress
+    runner: TappedRunner
+    rests: int = 0
+    """Progress while it waits after a defect."""
+    task: asyncio.Task[None] | None = field(default=None)
+
+    @property
+    def stations(self) -> list[Station]:
+        """The devices on it."""
+        return self.runner.line.stations
+
+
+class ModbusLines(SharedPart):
+    """All lines of the daemon."""
+
+    def __init__(self) -> None:
+        self.lines: dict[LineAddress, _LineAtWork] = {}
+        self._group: asyncio.TaskGroup | None = None
+        self._tap: Tap | None = None
+
+    async def run(self) -> None:
+        """Keep all lines at work until cancelled."""
+        async with asyncio.TaskGroup() as group:
+            self._group = group
+            try:
+                for line in self.lines.values():
+                    self._begin(line)
+                await asyncio.get_running_loop().create_future()
+            finally:
+                self._group = None
+
+    def progress(self) -> Mapping[str, int]:
+        """Of each line, whatever its devices do."""
+        return {
+            f"line {address.text}": line.runner.progress + line.rests for address, line in self.lines.items()
+        }
+
+    def trace(self, tap: Tap | None) -> None:
+        """All frames of all lines."""
+        self._tap = tap
+        for line in self.lines.values():
+            line.runner.tap = tap
+
+    async def prepare(self, plans: Sequence[Plan]) -> Prepared:
+        """Nothing: a device that cannot be reached keeps no mapping from being served."""
+        return _NothingPrepared()
+
+    def serve(self, links: Sequence[Link], successors: Mapping[Cell, Cell]) -> None:
+        """Have a line for every address of these devices, and no other; each with its devices and no others."""
+        wanted: dict[LineAddress, list[DeviceOnLine]] = {}
+        for link in links:
+            device = cast("DeviceOnLine", link)
+            wanted.setdefault(device.plan.line, []).append(device)
+        for address, line in list(self.lines.items()):
+            if address not in wanted or line.runner.line.settings != settings_of(wanted[address]):
+                self._end(line)
+                del self.lines[address]
+        for address, devices in wanted.items():
+            if address not in self.lines:
+                self.lines[address] = line = self._line(address, settings_of(devices))
+                self._begin(line)
+                for device in devices:
+                    device.begin_anew()
+            self._put(self.lines[address], [device.station for device in devices])
+
+    async def close(self) -> None:
+        """Ask nobody any more."""
+        tasks = [line.task for line in self.lines.values() if line.task is not None]
+        for line in self.lines.values():
+            self._end(line)
+        self.lines.clear()
+        if tasks:
+            await asyncio.wait(tasks)
+
+    def _line(self, address: LineAddress, settings: LineSettings) -> _LineAtWork:
+        def report(reason: str) -> None:
+            if reason:
+                log.warning("no connection to devices", extra=fields(line=address.text, reason=reason))
+            else:
+                log.info("connected to devices", extra=fields(line=address.text))
+
+        runner = make_runner(address, Line(settings), report)
+        runner.tap, runner.peer = self._tap, address.text
+        return _LineAtWork(address, runner)
+
+    def _begin(self, line: _LineAtWork) -> None:
+        if self._group is None or line.task is not None:
+            return
+
+        def progress() -> None:
+            line.rests += 1
+
+        work = keep_running(line.runner.run, log, RETRY_PERIOD, progress)
+        line.task = self._group.create_task(work, name=f"line {line.address.text}")
+
+    @staticmethod
+    def _end(line: _LineAtWork) -> None:
+        for station in list(line.stations):
+            line.runner.remove(station)
+        if line.task is not None:
+            line.task.cancel()
+            line.task = None
+
+    @staticmethod
+    def _put(line: _LineAtWork, stations: Sequence[Station]) -> None:
+        present = list(line.stations)
+        for station in present:
+            if station not in stations:
+                line.runner.remove(station)
+        for station in stations:
+            if station not in present:
+                line.runner.add(station)
+
+
+def make_runner(address: LineAddress, line: Line, report: Callable[[str], object]) -> TappedRunner:
+    """What keeps a line at work. What serial ports need is imported where there is one."""
+    if address.serial is not None:
+        from gatewayd.links.devices.modbus.serial_line import serial_runner  # noqa: PLC0415
+
+        return serial_runner(address, line, report)
+    frames = TcpFrames.RTU if address.framing == "rtu" else TcpFrames.MODBUS_TCP
+    return TappedTcpLine(TcpAddress(address.path, address.port, frames), line, report)
+
+
+def settings_of(devices: Sequence[DeviceOnLine]) -> LineSettings:
+    """What the devices of a line share: as many requests at a time as one of them may have, and so on."""
+    plans = [device.plan for device in devices]
+    per_request = any(plan.per_request for plan in plans)
+    return LineSettings(
+        in_flight=1 if per_request else max(plan.in_flight for plan in plans),
+        use=ConnectionUse.PER_REQUEST if per_request else ConnectionUse.KEPT,
+    )
+
+
+class _NothingPrepared:
+    """There is nothing to take back."""
+
+    def commit(self) -> None:
+        """See Prepared."""
+
+    async def abort(self) -> None:
+        """See Prepared."""

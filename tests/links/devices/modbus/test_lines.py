@@ -1,0 +1,184 @@
+"""Connections that devices share: they come and go with the devices, and one device's with no other."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+
+import pytest
+
+from gatewayd.core.cell import Cell
+from gatewayd.links.contract import Passage
+from gatewayd.links.devices.modbus.lines import ModbusLines, settings_of
+from gatewayd.links.devices.modbus.link import ModbusDeviceLink
+from gatewayd.modbus.client.line import ConnectionUse
+from gatewayd.modbus.client.unit import UnitState
+from tests.links.devices.cells import FakeRobot, device, planned
+
+HEAD = """\
+gatewayd: 1
+cell: press
+robot: {{host: 127.0.0.1}}
+devices:
+  one: {{modbus: '127.0.0.1:{port}', unit: 1, poll: 10ms, watchdog: none}}
+  two: {{modbus: '127.0.0.1:{port}', unit: 2, poll: 10ms, watchdog: none{more}}}
+writers:
+  one: {{device: one}}
+  two: {{device: two}}
+variables:
+"""
+LINES = "".join(
+    f"  {name}: {{robot: input_int_register_{n}, device: {{at: {name}, holding: 0, type: uint16}}, owner: {name}}}\n"
+    for n, name in enumerate(("one", "two"))
+)
+
+
+class Units:
+    """A server that says the unit's number for each register; counts connections and units."""
+
+    def __init__(self) -> None:
+        self.connections = 0
+        self.asked: list[int] = []
+
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.connections += 1
+        with suppress(asyncio.IncompleteReadError, ConnectionError):
+            while True:
+                transaction, _, length, unit = struct.unpack(">HHHB", await reader.readexactly(7))
+                await reader.readexactly(length - 1)
+                self.asked.append(unit)
+                writer.write(struct.pack(">HHHBBBH", transaction, 0, 5, unit, 3, 2, unit))
+        writer.close()
+
+
+class Rig:
+    def __init__(self, port: int, more: str = "") -> None:
+        self.plan = planned(LINES, HEAD.format(port=port, more=more))
+        self.robot = FakeRobot(self.plan)
+        self.robot.fresh()
+        self.links = {name: self.link(name) for name in ("one", "two")}
+
+    def link(self, name: str) -> ModbusDeviceLink:
+        return ModbusDeviceLink(device(self.plan, name), self.robot.cell)
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    async with asyncio.timeout(5):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.002)
+
+
+def played(scenario: Callable[[Units, Rig, ModbusLines], Awaitable[None]], more: str = "") -> None:
+    """Run a scenario with a server and lines at work."""
+
+    async def play() -> None:
+        units = Units()
+        server = await asyncio.start_server(units.serve, "127.0.0.1", 0)
+        async with server:
+            rig, lines = Rig(server.sockets[0].getsockname()[1], more), ModbusLines()
+            lines.serve(list(rig.links.values()), {})
+            running = asyncio.create_task(lines.run())
+            try:
+                await scenario(units, rig, lines)
+            finally:
+                await lines.close()
+                running.cancel()
+                with suppress(asyncio.CancelledError):
+                    await running
+
+    asyncio.run(play())
+
+
+def test_devices_at_one_address_share_a_connection() -> None:
+    async def scenario(units: Units, rig: Rig, lines: ModbusLines) -> None:
+        await until(lambda: (rig.robot.value("one"), rig.robot.value("two")) == (1, 2))
+        assert units.connections == 1
+        assert [count > 0 for count in lines.progress().values()] == [True]
+
+    played(scenario)
+
+
+def test_a_device_that_goes_leaves_the_other_as_it_is() -> None:
+    async def scenario(units: Units, rig: Rig, lines: ModbusLines) -> None:
+        await until(lambda: rig.robot.value("two") == 2)
+        lines.serve([rig.links["one"]], {})
+        assert rig.links["two"].station.state is UnitState.LOST
+        asked = len(units.asked)
+        await until(lambda: len(units.asked) > asked + 3)
+        assert set(units.asked[asked + 1 :]) == {1}
+        assert (units.connections, rig.links["one"].station.state) == (1, UnitState.ONLINE)
+        # The other one comes back as another link.
+        lines.serve([rig.links["one"], rig.link("two")], {})
+        await until(lambda: units.asked[-1] == 2)
+        assert (units.connections, rig.links["one"].station.counters.losses) == (1, 0)
+
+    played(scenario)
+
+
+def test_no_device_no_connection() -> None:
+    async def scenario(units: Units, rig: Rig, lines: ModbusLines) -> None:
+        await until(lambda: rig.robot.value("one") == 1)
+        lines.serve([], {})
+        assert lines.progress() == {}
+        asked = len(units.asked)
+        await asyncio.sleep(0.03)
+        assert len(units.asked) <= asked + 1
+
+    played(scenario)
+
+
+def test_what_they_share_changes_for_all() -> None:
+    async def scenario(units: Units, rig: Rig, lines: ModbusLines) -> None:
+        await until(lambda: rig.robot.value("two") == 2)
+        lines.serve([rig.links["one"]], {})
+        await until(lambda: units.connections == 2 and rig.links["one"].station.state is UnitState.ONLINE)
+
+    played(scenario, ", in_flight: 4")
+
+
+def test_frames_can_be_traced() -> None:
+    async def scenario(_units: Units, rig: Rig, lines: ModbusLines) -> None:
+        passed: list[Passage] = []
+        lines.trace(passed.append)
+        await until(lambda: len(passed) > 4)
+        lines.trace(None)
+        assert {passage.peer for passage in passed} == {rig.links["one"].plan.line.text}
+        assert {passage.outgoing for passage in passed} == {True, False}
+        assert all(len(passage.data) in (11, 12) for passage in passed)
+
+    played(scenario)
+
+
+@pytest.mark.parametrize(
+    "more, in_flight, use",
+    [
+        ("", 1, ConnectionUse.KEPT),
+        (", in_flight: 4", 4, ConnectionUse.KEPT),
+        (", connect: per_request", 1, ConnectionUse.PER_REQUEST),
+    ],
+)
+def test_the_most_demanding_device_decides(more: str, in_flight: int, use: ConnectionUse) -> None:
+    found = settings_of(list(Rig(1, more).links.values()))
+    assert (found.in_flight, found.use) == (in_flight, use)
+
+
+def test_nothing_is_opened_beforehand() -> None:
+    async def scenario() -> None:
+        lines = ModbusLines()
+        prepared = await lines.prepare([])
+        prepared.commit()
+        await prepared.abort()
+        assert lines.lines == {}
+
+    asyncio.run(scenario())
+
+
+def test_a_cell_of_its_own_is_no_matter() -> None:
+    """Two cells with a device each at one address have one line."""
+    rig, other = Rig(1), Rig(1)
+    lines = ModbusLines()
+    lines.serve([rig.links["one"], other.links["two"]], {})
+    assert len(lines.lines) == 1
+    assert isinstance(rig.robot.cell, Cell)
