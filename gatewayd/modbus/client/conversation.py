@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import NamedTuple, Protocol
 
-from gatewayd.modbus.client.framing import RTU_OVERHEAD, RtuFraming, TcpFraming
+from gatewayd.modbus.client.framing import RTU_OVERHEAD, AnswerFrame, RtuFraming, TcpFraming
 from gatewayd.modbus.client.polling import NEVER
 from gatewayd.modbus.client.requests import BadAnswer, Failure, TimedOut, parse_answer
 from gatewayd.modbus.client.station import Job
@@ -56,10 +56,12 @@ class Conversation(Protocol):
 class Broken(Exception):
     """The connection must be closed: what comes in cannot be told apart any more."""
 
-    def __init__(self, reason: str, finished: list[Finished]) -> None:
+    def __init__(self, reason: str, finished: list[Finished], culprit: Job | None) -> None:
         super().__init__(reason)
         self.finished = finished
         """What was finished before."""
+        self.culprit = culprit
+        """Underway still, and most likely what broke it; None: it is among those that are finished."""
 
 
 class TcpConversation:
@@ -102,38 +104,60 @@ class TcpConversation:
                 job = self._underway.pop(frame.transaction, None)
                 if job is None:
                     self._count_late(frame.transaction)
-                    continue
-                self.jobs.remove(job)
-                if frame.unit != job.unit:
-                    outcome: bytes | Failure = BadAnswer(
-                        f"an answer of unit {frame.unit} instead of {job.unit}"
-                    )
+                elif frame.unit != job.unit and any(frame.unit == other.unit for other in self.jobs):
+                    self._underway[frame.transaction] = job  # more likely it is the transaction that is wrong
                 else:
-                    outcome = parse_answer(job.request, frame.pdu)
-                finished.append(Finished(job, outcome))
+                    self.jobs.remove(job)
+                    finished.append(Finished(job, _outcome(job, frame)))
         except FramingError as error:
-            raise Broken(f"bytes that are no Modbus: {error}", finished) from error
+            culprit = None if _bad(finished) else self._culprit()
+            raise Broken(f"bytes that are no Modbus: {error}", finished, culprit) from error
+        if self._framing.is_within_frame and _bad(finished):
+            raise Broken("a bad answer, and bytes behind it", finished, None)
         return finished
 
     def expired(self, now: float) -> list[Finished]:
         """See Conversation. A frame that has begun and does not end leaves nothing to tell the next one by."""
         finished = []
-        for transaction, job in list(self._underway.items()):
-            if job.sent_at + job.timeout <= now:
-                del self._underway[transaction]
-                self.jobs.remove(job)
-                self._late[transaction] = job
-                if len(self._late) > MAX_LATE:
-                    self._late.popitem(last=False)
-                finished.append(Finished(job, TimedOut(job.timeout)))
-        if finished and self._framing.is_within_frame:
-            raise Broken("an answer that does not end", finished)
+        overdue = [(key, job) for key, job in self._underway.items() if job.sent_at + job.timeout <= now]
+        if overdue and self._framing.is_within_frame:
+            # The answers of the others may have been taken for the rest of it.
+            raise Broken("an answer that does not end", [], self._culprit())
+        for transaction, job in overdue:
+            del self._underway[transaction]
+            self.jobs.remove(job)
+            self._late[transaction] = job
+            if len(self._late) > MAX_LATE:
+                self._late.popitem(last=False)
+            finished.append(Finished(job, TimedOut(job.timeout)))
         return finished
+
+    def _culprit(self) -> Job | None:
+        """Whose answer it most likely is that cannot be told apart; the oldest request where nothing says so."""
+        front = self._framing.front
+        if front is not None:
+            transaction, unit = front
+            if transaction in self._underway:
+                return self._underway[transaction]
+            for job in self.jobs:
+                if job.unit == unit:
+                    return job
+        return self.jobs[0] if self.jobs else None
 
     def _count_late(self, transaction: int) -> None:
         late = self._late.pop(transaction, None)
         if late is not None and late.station is not None:
             late.station.counters.late_answers += 1
+
+
+def _outcome(job: Job, frame: AnswerFrame) -> bytes | Failure:
+    if frame.unit != job.unit:
+        return BadAnswer(f"an answer of unit {frame.unit} instead of {job.unit}")
+    return parse_answer(job.request, frame.pdu)
+
+
+def _bad(finished: list[Finished]) -> bool:
+    return any(isinstance(outcome, BadAnswer) for _, outcome in finished)
 
 
 class RtuConversation:

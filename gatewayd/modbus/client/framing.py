@@ -47,6 +47,12 @@ class TcpFraming:
         """Whether a frame has begun to come in and not ended."""
         return bool(self._buffer)
 
+    @property
+    def front(self) -> tuple[int, int] | None:
+        """Transaction and unit of what has begun to come in, as far as they are right; None: too little has."""
+        buffer = self._buffer
+        return (buffer[0] << 8 | buffer[1], buffer[6]) if len(buffer) >= HEADER_SIZE else None
+
     def request(self, unit: int, pdu: bytes) -> tuple[int, bytes]:
         """The transaction id of a request, and its frame. An id comes again after 65,536 requests."""
         self._transaction = transaction = (self._transaction + 1) % _TRANSACTIONS
@@ -57,10 +63,12 @@ class TcpFraming:
         buffer = self._buffer
         buffer += data
         start, end = 0, len(buffer)
-        while (frame := split(buffer, start, end)) is not None:
-            start = frame.end
-            yield AnswerFrame(frame.transaction, frame.unit, frame.pdu)
-        del buffer[:start]
+        try:
+            while (frame := split(buffer, start, end)) is not None:
+                start = frame.end
+                yield AnswerFrame(frame.transaction, frame.unit, frame.pdu)
+        finally:
+            del buffer[:start]
 
 
 class RtuFraming:

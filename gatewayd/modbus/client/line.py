@@ -15,12 +15,10 @@ from gatewayd.modbus.client.conversation import Broken, Conversation, Finished
 from gatewayd.modbus.client.polling import NEVER
 from gatewayd.modbus.client.probes import DEFAULT_SHARE, ProbeBudget
 from gatewayd.modbus.client.requests import (
-    BadAnswer,
     ConnectionLost,
     ExceptionAnswer,
     Failure,
     ModbusRequest,
-    TimedOut,
 )
 from gatewayd.modbus.client.station import Job, Station
 
@@ -74,7 +72,9 @@ class Line:
         self._probe: Job | None = None
         self._broadcasts: deque[ModbusRequest] = deque()
         self._has_finished = False
-        self._has_blamed = False
+        self._culprit: Job | None = None
+        self._is_culprit_known = False
+        self._is_nobodys_fault = True
         for station in stations:
             self.add(station)
 
@@ -120,26 +120,31 @@ class Line:
 
     def connected(self, conversation: Conversation, now: float) -> None:
         """The connection is open."""
-        is_back = self.settings.use is ConnectionUse.KEPT or bool(self.trouble) or not self.connections
+        is_new = self.settings.use is ConnectionUse.KEPT or bool(self.trouble) or not self.connections
         self._conversation = conversation
-        self._has_finished = self._has_blamed = self.was_of_use = False
+        self._has_finished = self._is_culprit_known = self.was_of_use = False
         self.trouble = ""
         self.connections += 1
-        if is_back:
-            for station in self.stations:
-                station.connected(now)
+        for station in self.stations if is_new else ():
+            station.connected(now, may_be_back=self._is_nobodys_fault)
+            if self._is_nobodys_fault:
                 self._free_probes.add(station)
 
     def disconnected(self, reason: str, now: float) -> None:
-        """It has ended, or could not be opened: what was underway is lost. The first of it is blamed.
+        """It has ended, or could not be opened: what was underway is lost.
+
+        Who has broken it is blamed, or the first of those underway where that is not known.
 
         Without a reason it was closed because it is spent, which is no trouble.
         """
         jobs = self._conversation.jobs if self._conversation is not None else []
+        # A unit whose answers break the connection must not be probed again as often as that is opened again.
+        self._is_nobodys_fault = self._conversation is None or not (jobs or self._is_culprit_known)
         self._conversation = None
         self.trouble = reason
-        for number, job in enumerate(jobs):
-            job.is_blamed = number == 0 and not self._has_blamed
+        culprit = self._culprit if self._is_culprit_known else next(iter(jobs), None)
+        for job in jobs:
+            job.is_blamed = job is culprit
             self._finish(Finished(job, ConnectionLost(reason)), now)
         self.check(now)
 
@@ -261,7 +266,7 @@ class Line:
             finished, reason = take(data, now), ""
         except Broken as error:
             finished, reason = error.finished, str(error)
-            self._has_blamed = any(isinstance(outcome, TimedOut | BadAnswer) for _, outcome in finished)
+            self._culprit, self._is_culprit_known = error.culprit, True
         for one in finished:
             self._finish(one, now)
         return reason
@@ -280,7 +285,10 @@ class Line:
         was_protected = self._is_protected
         job.done(job, outcome, now)
         if job.is_probe and job.station is not None and not job.station.breaker.is_closed:
-            self._budget.spend(now - job.sent_at, now)
+            cost = now - job.sent_at
+            if not is_answered:
+                cost = max(cost, job.timeout)  # bytes that are no answer may cost others theirs
+            self._budget.spend(cost, now)
         if not was_protected and self._is_protected:
             # What was off altogether comes back together: nobody waits for those that stay away.
             self._free_probes.update(self.stations)

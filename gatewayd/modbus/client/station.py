@@ -124,10 +124,10 @@ class Station:
         job.read, job.is_probe = (cycle, group, part), is_probe
         return job
 
-    def connected(self, now: float) -> None:
-        """The line's connection is there (again): what is behind it may be another device."""
+    def connected(self, now: float, *, may_be_back: bool) -> None:
+        """The line's connection is there (again): what is behind it may be another device, or one that was away."""
         self._reader.begin()
-        if self.breaker.state is BreakerState.OPEN:
+        if may_be_back and self.breaker.state is BreakerState.OPEN:
             self.breaker.probe_at = min(self.breaker.probe_at, now)
         self._refresh()
 

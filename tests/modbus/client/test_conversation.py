@@ -91,7 +91,54 @@ def test_half_an_answer_at_the_time_out_breaks_the_connection() -> None:
     tcp.received(encode(1, 1, ANSWER)[:-1], 0.1)
     with pytest.raises(Broken, match="does not end") as broken:
         tcp.expired(0.3)
-    assert [one.outcome for one in broken.value.finished] == [TimedOut(0.3)]
+    assert broken.value.finished == []
+    assert broken.value.culprit is tcp.jobs[0]
+
+
+def test_answer_that_does_not_end_is_blamed_on_its_own_request() -> None:
+    tcp = TcpConversation(3)
+    for unit in (1, 2, 3):
+        tcp.begin(job(unit), 0)
+    tcp.received(encode(2, 2, ANSWER)[:-1], 0.1)
+    with pytest.raises(Broken) as broken:
+        tcp.expired(0.3)
+    assert broken.value.culprit is tcp.jobs[1]
+    assert len(tcp.jobs) == 3
+
+
+def test_bytes_that_are_no_modbus_are_blamed_on_the_unit_they_name() -> None:
+    tcp = TcpConversation(3)
+    for unit in (1, 2, 3):
+        tcp.begin(job(unit), 0)
+    garbled = bytearray(encode(77, 3, ANSWER))
+    garbled[2] = 1
+    with pytest.raises(Broken) as broken:
+        tcp.received(bytes(garbled), 0.1)
+    assert broken.value.culprit is tcp.jobs[2]
+
+
+def test_bad_answer_with_bytes_behind_it_breaks_the_connection() -> None:
+    """An answer that was cut off, and the beginning of the next taken for its end."""
+    tcp = TcpConversation(2)
+    tcp.begin(job(1), 0)
+    tcp.begin(job(2), 0)
+    stream = encode(1, 1, ANSWER)[:-4] + encode(2, 2, ANSWER)
+    with pytest.raises(Broken) as broken:
+        tcp.received(stream, 0.1)
+    (finished,) = broken.value.finished
+    assert isinstance(finished.outcome, BadAnswer)
+    assert broken.value.culprit is None
+
+
+def test_answer_with_the_transaction_of_another_is_not_blamed_on_that() -> None:
+    tcp = TcpConversation(2)
+    first, second = job(1), job(2)
+    tcp.begin(first, 0)
+    tcp.begin(second, 0)
+    assert tcp.received(encode(1, 2, ANSWER), 0.1) == []
+    (finished,) = tcp.received(encode(1, 1, ANSWER), 0.1)
+    assert (finished.job, finished.outcome) == (first, DATA)
+    assert tcp.jobs == [second]
 
 
 def test_rtu_answer_and_the_gap_after_it() -> None:
