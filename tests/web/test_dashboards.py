@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from gatewayd.core.freshness import Source
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
-from gatewayd.web.metrics import METRICS, PROCESS_METRICS, MetricKind
+from gatewayd.web.metrics import LINK_LABEL, METRICS, PROCESS_METRICS, MetricKind
 
 DOCS = Path(__file__).parents[2] / "docs"
 OF_PROMETHEUS = {"instance", "job", "le"}
@@ -76,6 +76,8 @@ def test_an_alert_says_where_it_is_and_how_bad(rule: dict[str, Any]) -> None:
     assert rule["labels"]["severity"] in {"page", "ticket"}
     asked = {found[1] for found in ASKED.finditer(rule["expr"])}
     there = OF_PROMETHEUS.union(*(KNOWN[name] for name in asked))
+    if any(name.startswith("gatewayd_device_") for name in asked):
+        there |= {LINK_LABEL}  # a device is a link that is not named as its kind
     shown = set(re.findall(r"\$labels\.(\w+)", rule["annotations"]["summary"]))
     assert shown <= there
     assert shown or "$value" in rule["annotations"]["summary"]
