@@ -6,6 +6,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -160,3 +161,19 @@ def test_a_reload_that_brings_or_takes_a_device_disturbs_no_other(cell: Cell) ->
     assert plc.read(STATE) == [GOOD]
     assert simulator.integer("input_int_register_1") == 1234
     assert plc.owner(LEVEL) == THE_ISLAND
+
+
+@pytest.mark.slow
+def test_a_gateway_that_stood_still_does_not_take_its_devices_for_lost(cell: Cell) -> None:
+    cell.island.do("set input 4 1234")
+    wait_for(
+        lambda: cell.simulator.integer("input_int_register_1") == 1234, "the island's value in the robot"
+    )
+    cell.daemon.signal(signal.SIGSTOP)
+    stopped = time.monotonic()
+    wait_for(lambda: time.monotonic() - stopped > 1.0, "a time longer than `lost_after`")
+    cell.island.do("set input 4 4321")
+    cell.daemon.signal(signal.SIGCONT)
+    wait_for(lambda: cell.simulator.integer("input_int_register_1") == 4321, "the island's next value")
+    cell.daemon.wait_for_line("gateway stood still")
+    assert cell.daemon.lines("device lost") == []

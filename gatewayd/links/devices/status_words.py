@@ -102,7 +102,8 @@ class DeviceFigures:
     def health(self, name: str, figures: Mapping[str, object]) -> LinkHealth:
         """For verdict, picture and page; `figures`: what the family says besides."""
         level = _LEVELS[self.state]
-        problems = (f"device {name} {_WORDS[self.state]}: {self.reason}",) if self.reason else ()
+        remedy = _REMEDIES.get(self.state, "")
+        problems = (f"device {name} {_WORDS[self.state]}: {self.reason}{remedy}",) if self.reason else ()
         detail = "" if self.round_trip is None else f"{1000 * self.round_trip:.1f} ms"
         found = {**figures, **self.fields}
         return LinkHealth(f"device {name}", level, self.reason or "answers", detail, problems, found)
@@ -115,6 +116,7 @@ _LEVELS: Final = {
     DeviceState.PARTIAL: Level.WARN,
     DeviceState.LOST: Level.BAD,
 }
+_REMEDIES: Final = {DeviceState.LOST: "; look at its power, its cable and its address"}
 _WORDS: Final = {
     DeviceState.NONE: "is none",
     DeviceState.STARTING: "is not there yet",

@@ -144,6 +144,10 @@ class Station:
         elif trouble and self.state is not UnitState.ONLINE:
             self._lose(trouble, now)
 
+    def gap(self, length: float) -> None:
+        """The process stood still for so many seconds, in which no answer could be heard: they are no silence."""
+        self.deadline += length
+
     def close(self, reason: str, now: float) -> None:
         """It leaves the line."""
         self.breaker.give_up(now)

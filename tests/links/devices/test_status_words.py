@@ -42,7 +42,10 @@ def test_ages_saturate(age: float | None, word: int) -> None:
 
 def test_a_device_that_is_not_good_is_a_problem() -> None:
     found = figures(DeviceState.LOST, "no answer for 1 s").health("island", {"unit": 3})
-    assert (found.level, found.problems) == (Level.BAD, ("device island is lost: no answer for 1 s",))
+    assert (found.level, found.problems) == (
+        Level.BAD,
+        ("device island is lost: no answer for 1 s; look at its power, its cable and its address",),
+    )
     assert (found.figures["unit"], found.figures["up"], found.figures["exceptions"]) == (
         3, 0, {"02": 4, "0B": 1, "63": 7},
     )  # fmt: skip

@@ -85,6 +85,12 @@ class ModbusLines(SharedPart):
             f"line {address.text}": line.runner.progress + line.rests for address, line in self.lines.items()
         }
 
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still: that is no silence of any device."""
+        for line in self.lines.values():
+            for station in line.stations:
+                station.gap(now - since)
+
     def trace(self, tap: Tap | None) -> None:
         """All frames of all lines."""
         self._tap = tap

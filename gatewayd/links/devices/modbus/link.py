@@ -151,7 +151,7 @@ class ModbusDeviceLink(Link):
         if station.state is UnitState.CONNECTING:
             return DeviceState.STARTING, "it has not answered yet"
         if station.state is UnitState.LOST:
-            return DeviceState.LOST, f"{station.reason}: look at its power, its cable and its unit id"
+            return DeviceState.LOST, station.reason
         reason = next(iter((*self._unread.values(), *self._unwritten.values())), "")
         return (DeviceState.PARTIAL if reason else DeviceState.GOOD), reason
 

@@ -117,6 +117,17 @@ def test_a_device_that_goes_leaves_the_other_as_it_is() -> None:
     played(scenario)
 
 
+def test_a_time_in_which_the_process_stood_still_is_no_silence_of_a_device() -> None:
+    async def scenario(_units: Units, rig: Rig, lines: ModbusLines) -> None:
+        station = rig.links["one"].station
+        await until(lambda: station.state is UnitState.ONLINE)
+        before = station.deadline
+        lines.gap(100.0, 105.0)
+        assert station.deadline == before + 5
+
+    played(scenario)
+
+
 def test_no_device_no_connection() -> None:
     async def scenario(units: Units, rig: Rig, lines: ModbusLines) -> None:
         await until(lambda: rig.robot.value("one") == 1)
