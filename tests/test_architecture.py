@@ -82,8 +82,16 @@ LAYERS: dict[str, set[str]] = {
         "report.wording",
     },
     "links.modbus_server": {*LINK, "links.modbus_places", "links.modbus_server", "modbus", "plc"},
-    "links.canopen_node": {*LINK, "canopen", "encoding", "links.canopen_node", "plc"},
-    "links.devices": {*LINK, "links.devices", "links.modbus_places", "modbus"},
+    "links.canopen_values": {"canopen", "core.definition", "encoding", "mapping.reach"},
+    "links.canopen_node": {*LINK, "canopen", "encoding", "links.canopen_node", "links.canopen_values", "plc"},
+    "links.devices": {
+        *LINK,
+        "canopen",
+        "links.canopen_values",
+        "links.devices",
+        "links.modbus_places",
+        "modbus",
+    },
     "plc": {"core", "links.exports", "mapping.plan", "plc", "report.format", "report.wording"},
     "report": {"core", "links.contract", "links.registry", "mapping", "report"},
     "maptest": {

@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
-from fractions import Fraction
-from functools import lru_cache
 from itertools import chain
 from typing import Final
 
@@ -38,7 +36,6 @@ from gatewayd.links.canopen_node.status_words import StatusWord, field_word, qua
 from gatewayd.mapping.diagnostics import Position
 from gatewayd.mapping.document import Part
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedLink, ExpandedVariable
-from gatewayd.mapping.reach import Reach, scaled
 
 _INTEGERS: Final = (
     CanType.UNSIGNED8,
@@ -51,7 +48,6 @@ _INTEGERS: Final = (
     CanType.INTEGER64,
 )
 """Types that a whole number gets where the file names none: the first that holds the robot's."""
-_MAX_REAL32: Final = float.fromhex("0x1.fffffep+127")
 _MANY: Final = 2048
 """So many variables that a PDO does not get are enough to be reported."""
 
@@ -243,17 +239,6 @@ def scale_problem(variable: ExpandedVariable, linear: Linear | None) -> str | No
     if variable.kind is ValueKind.BOOL:
         return "is a bit and has a scale or offset"
     return "has the scale 0" if linear[0] == 0 else None
-
-
-@lru_cache
-def reach_of(can_type: CanType, linear: Linear | None) -> Reach:
-    """What an object can show, in the robot's unit."""
-    if can_type is CanType.REAL64:
-        return Reach(None, None, is_real=True)
-    scale, offset = (Fraction(part) for part in linear or (1, 0))
-    if can_type is CanType.REAL32:
-        return scaled(-_MAX_REAL32, _MAX_REAL32, scale, offset, is_real=True)
-    return scaled(*can_type.bounds, scale, offset, is_real=False)
 
 
 def expand_canopen(part: Part[Canopen], variables: Sequence[ExpandedVariable]) -> CanopenCell:

@@ -148,7 +148,7 @@ class CanopenLanguage(LinkLanguage):
         if node is None:
             return
         from gatewayd.canopen.datatypes import CanType  # noqa: PLC0415 - see above
-        from gatewayd.links.canopen_node.expand import reach_of  # noqa: PLC0415
+        from gatewayd.links.canopen_values import reach_of  # noqa: PLC0415
 
         for placed in node.objects:
             if placed.plan.type is not CanType.BOOLEAN:

@@ -23,8 +23,8 @@ from gatewayd.core.definition import Direction, Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.core.requester import Requester
 from gatewayd.encoding.limits import LimitReader, Meaning
-from gatewayd.links.canopen_node.pdo.codec import fit, limits_of, meaning
 from gatewayd.links.canopen_node.plan import CanopenPlan, ObjectPlan
+from gatewayd.links.canopen_values import fit, limits_of, meaning
 
 ABORT_OF: Final = {
     Reason.NO_SUCH_ADDRESS: AbortCode.NO_OBJECT,

@@ -5,8 +5,7 @@ Entries follow each other bit by bit, least significant bit of the first byte fi
 numbers go through one `struct`, each run of bits through one integer.
 
 A scaled variable goes as raw number: value = raw * scale + offset, as in a register. A number that the type cannot
-hold becomes the nearest one that it can (`fit`): integers saturate, halves round to even, NaN becomes 0 in an integer,
-and a real beyond REAL32 becomes infinite.
+hold becomes the nearest one that it can (`gatewayd.links.canopen_values.fit`).
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, Final
@@ -26,8 +24,7 @@ from gatewayd.core.admission import Change, contradiction
 from gatewayd.core.definition import Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
 from gatewayd.encoding.bits import unpacked
-from gatewayd.encoding.limits import LimitReader, Meaning, ends_of, read_limits
-from gatewayd.encoding.linear import meaning_of, saturated, whole
+from gatewayd.links.canopen_values import fit, limits_of, meaning
 
 MAX_BITS: Final = 64
 """What one CAN frame carries."""
@@ -53,50 +50,6 @@ class Mapped:
     def is_dummy(self) -> bool:
         """Whether it holds nothing."""
         return self.variable is None and self.offset is None
-
-
-def fit(value: Value, can_type: CanType, linear: tuple[float, float] | None = None) -> Value:
-    """The raw number of a value, or the nearest one that `can_type` can hold; see the module's docstring."""
-    if linear is not None:
-        value = (value - linear[1]) / linear[0]
-    if can_type is CanType.BOOLEAN:
-        return bool(value)
-    if can_type.is_real:
-        return _fit_real(value, can_type)
-    return saturated(value, *can_type.bounds)
-
-
-def _fit_real(value: Value, can_type: CanType) -> float:
-    try:
-        can_type.pack(value)
-    except OverflowError:
-        return math.inf if value > 0 else -math.inf
-    return float(value)
-
-
-def native(raw: Value, kind: ValueKind) -> Value | None:
-    """A received number as a value of a variable of `kind`; None if there is none (NaN or infinity as an integer)."""
-    if kind is ValueKind.BOOL:
-        return bool(raw)
-    if kind is ValueKind.FLOAT:
-        return float(raw)
-    return whole(raw)
-
-
-def meaning(kind: ValueKind, linear: tuple[float, float] | None) -> Meaning:
-    """What received numbers are as values of a variable of `kind`."""
-    return partial(native, kind=kind) if linear is None else meaning_of(kind, *linear)
-
-
-def limits_of(
-    declared: Variable, can_type: CanType, linear: tuple[float, float] | None = None
-) -> LimitReader | None:
-    """What reads received numbers, so that the one nearest to a limit is the limit; None where `meaning` does alone."""
-    limits = (declared.limits.low, declared.limits.high) if declared.limits is not None else None
-    ends = ends_of(declared.kind, limits, declared.low, declared.high)
-    if can_type is CanType.BOOLEAN:
-        return None
-    return read_limits(ends, can_type.char, meaning(declared.kind, linear), *(linear or (1.0, 0.0)))
 
 
 def is_aligned(types: Iterable[CanType]) -> bool:

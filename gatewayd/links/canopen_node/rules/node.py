@@ -12,13 +12,13 @@ from gatewayd.links.canopen_node.expand import (
     MappedObject,
     linear_of,
     place_of,
-    reach_of,
     scale_problem,
     writes_by,
 )
 from gatewayd.links.canopen_node.plan import ObjectPlan
 from gatewayd.links.canopen_node.rules.registry import first_at_each_place, node_rule
 from gatewayd.links.canopen_node.sections import CanopenPlaces, CanopenWriter
+from gatewayd.links.canopen_values import reach_of
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related, Rule, Severity
 from gatewayd.mapping.document import Part
 from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable

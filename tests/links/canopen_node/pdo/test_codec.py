@@ -15,7 +15,8 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.admission import Change
 from gatewayd.core.definition import Direction, Limits, Value, ValueKind, Variable
 from gatewayd.core.refusal import Reason, Refusal
-from gatewayd.links.canopen_node.pdo.codec import Layout, Mapped, fit, is_aligned, native
+from gatewayd.links.canopen_node.pdo.codec import Layout, Mapped, is_aligned
+from gatewayd.links.canopen_values import fit, native
 
 NUMBERS = [one for one in CanType if one.bits > 1]
 INTEGERS = [one for one in NUMBERS if not one.is_real]
@@ -178,41 +179,9 @@ def test_every_bit_of_a_pdo_is_meant() -> None:
     assert both.changes(b"\x02") == [Change(0, False), Change(1, True)]
 
 
-@pytest.mark.parametrize(
-    "value, can_type, expected",
-    [
-        (40000, CanType.INTEGER16, 32767),
-        (-40000, CanType.INTEGER16, -32768),
-        (-1, CanType.UNSIGNED32, 0),
-        (math.inf, CanType.UNSIGNED8, 255),
-        (-math.inf, CanType.INTEGER8, -128),
-        (math.nan, CanType.INTEGER32, 0),
-        (2.5, CanType.INTEGER8, 2),
-        (3.5, CanType.INTEGER8, 4),
-        (True, CanType.UNSIGNED8, 1),
-        (2**64, CanType.UNSIGNED64, 2**64 - 1),
-        (1e39, CanType.REAL32, math.inf),
-        (-1e39, CanType.REAL32, -math.inf),
-        (-math.inf, CanType.REAL32, -math.inf),
-        (3, CanType.REAL64, 3.0),
-        (7, CanType.BOOLEAN, True),
-        (0.0, CanType.BOOLEAN, False),
-    ],
-)
-def test_value_beyond_its_type_becomes_the_nearest(value: Value, can_type: CanType, expected: Value) -> None:
-    fitted = fit(value, can_type)
-    assert fitted == expected
-    assert type(fitted) is type(expected)
-
-
 def test_nan_stays_nan_in_a_real() -> None:
     layout = Layout([Mapped(0, CanType.REAL32)], [variable(0, ValueKind.FLOAT)])
     assert math.isnan(struct.unpack("<f", layout.pack([math.nan]))[0])
-
-
-@given(st.integers() | st.floats(), st.sampled_from(INTEGERS))
-def test_fitted_integers_can_always_be_packed(value: Value, can_type: CanType) -> None:
-    can_type.pack(fit(value, can_type))
 
 
 def test_nan_is_no_integer() -> None:

@@ -22,7 +22,6 @@ from gatewayd.canopen.frame import Frame
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import Direction, Value, ValueKind
 from gatewayd.links.canopen_node.node import Node
-from gatewayd.links.canopen_node.pdo.codec import fit, meaning
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.plc.blocks import data_types, pack, unpack
 from gatewayd.links.canopen_node.plc.build import model_of
@@ -30,6 +29,7 @@ from gatewayd.links.canopen_node.plc.model import PdoModel, PdoTag
 from gatewayd.links.canopen_node.plc.registry import files_for
 from gatewayd.links.canopen_node.plc.targets.iec_st import CONTENT, DIALECT
 from gatewayd.links.canopen_node.store import Store
+from gatewayd.links.canopen_values import fit, meaning
 from gatewayd.plc.model import TagFamily
 from gatewayd.plc.st.convert import functions
 from gatewayd.plc.tags import PlcWishes
