@@ -74,7 +74,9 @@ def findings() -> object:
 
 def _check_bad(rule: Rule) -> Iterator[Diagnostic]:
     paths = sorted(rule_home(rule).glob("bad*.yaml"), key=lambda path: path.stem)
-    for loaded in load_together([(path.name, path.read_bytes()) for path in paths]):
+    with chdir(rule_home(rule)):  # files beside a mapping are found from where it is
+        checked = load_together([(path.name, path.read_bytes()) for path in paths])
+    for loaded in checked:
         yield from loaded.diagnostics
 
 

@@ -41,6 +41,8 @@ _COUNTED = re.compile(r"counted\(|[A-Z_]+$|_HEADER\.size$")
 
 NEVER_ONE = {
     "canopen.manager.configuration: count": "more than the limit",
+    "links.devices.canopen.link: self.plan.name": "not a number",
+    "links.devices.rules.objects: bits": "more than 64",
     "canopen.manager.pdo_content: shift": "more than 64",
     "control.names: len(text)": "longer than any pattern may be",
     "links.canopen_node.rules.bus: len(bus)": "where there are several cells",

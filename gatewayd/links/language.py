@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from gatewayd.mapping.diagnostics import Diagnostic, Position, Related
 from gatewayd.mapping.document import Document, Part
@@ -17,6 +17,9 @@ from gatewayd.mapping.model import VariableSpec, WriterSpec
 from gatewayd.mapping.plan import LinkPlan
 from gatewayd.mapping.reach import Reach
 from gatewayd.mapping.section import Section
+
+if TYPE_CHECKING:
+    from gatewayd.links.can_buses import BusUse
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +178,12 @@ class LinkLanguage:
 
     def reaches(self, cell: ExpandedCell) -> Iterable[tuple[int, Reach]]:
         """Which values its places show, by index of the variable; places that show all need not be named."""
+        return ()
+
+    # -- what it shares with other kinds -------------------------------------------------------------------------
+
+    def bus_uses(self, cell: ExpandedCell) -> Iterable[BusUse]:
+        """What it puts on CAN buses on which other kinds of links may be as well."""
         return ()
 
     # -- from the file to the plan -----------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import pytest
 
 from gatewayd.canopen.frame import Frame
 from gatewayd.cli.capture import Captured, PcapWriter, candump_line
-from gatewayd.links.canopen_node.traffic import packed
+from gatewayd.links.can_frames import packed
 from gatewayd.links.contract import Medium
 from gatewayd.modbus.frames import encode
 

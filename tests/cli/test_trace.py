@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gatewayd.canopen.frame import Frame
-from gatewayd.links.canopen_node.traffic import packed
+from gatewayd.links.can_frames import packed
 from gatewayd.links.contract import Passage
 from gatewayd.loop import clock
 from gatewayd.modbus.frames import encode

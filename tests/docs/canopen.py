@@ -13,11 +13,12 @@ from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.dictionary import Entry, Object, Pdo
 from gatewayd.canopen.emergency import ErrorCode, register_of
 from gatewayd.canopen.identity import REACTIONS
+from gatewayd.canopen.load import frame_bits
 from gatewayd.canopen.lss import Command
 from gatewayd.canopen.nmt import ALLOWED, NmtState, Service
 from gatewayd.core.refusal import Reason
 from gatewayd.core.status_layout import TABLES
-from gatewayd.links.canopen_node.bus_load import BIT_RATES, frame_bits
+from gatewayd.links.canopen_node.bus_load import BIT_RATES
 from gatewayd.links.canopen_node.communication_errors import DOUBLED_TIME, OVERRUN_TIME
 from gatewayd.links.canopen_node.eds import objects_of
 from gatewayd.links.canopen_node.pdo_table import load_by_bit_rate, pdo_rows

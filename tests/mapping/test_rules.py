@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Sequence
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -42,7 +43,8 @@ def home(rule: Rule) -> Path:
 
 
 def check(paths: Sequence[Path]) -> list[Diagnostic]:
-    loaded = load_together([(path.name, path.read_bytes()) for path in paths])
+    with chdir(paths[0].parent):  # files beside a mapping are found from where it is
+        loaded = load_together([(path.name, path.read_bytes()) for path in paths])
     return [finding for one in loaded for finding in one.diagnostics]
 
 

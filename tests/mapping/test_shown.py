@@ -9,7 +9,7 @@ import pytest
 
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.core.definition import Variable
-from gatewayd.links.canopen_node.pdo.codec import fit
+from gatewayd.links.canopen_values import fit
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.mapping.loader import load
 

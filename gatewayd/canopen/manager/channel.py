@@ -6,9 +6,9 @@ takes the place of an older one of its object that waits: the device gets the ne
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gatewayd.canopen.cob_ids import Function
 from gatewayd.canopen.describe import abort_text, object_text
@@ -16,6 +16,8 @@ from gatewayd.canopen.dictionary import AbortCode
 from gatewayd.canopen.frame import Frame, Priority, Send
 from gatewayd.canopen.sdo.client import SdoClient, SdoResult
 
+MAX_CODES = 32
+"""Abort codes that are counted apart: a device may send whatever it likes."""
 CAPACITY = 256
 """Transfers that may wait for one device."""
 
@@ -43,6 +45,8 @@ class SdoCounters:
     """Ended by an abort code, of the device or of the client."""
     overflow: int = 0
     """Found no room to wait in."""
+    codes: Counter[int] = field(default_factory=Counter)
+    """Aborts by code; of more codes than `MAX_CODES` the others count as 08000000h (general error)."""
 
 
 class SdoChannel:
@@ -52,7 +56,10 @@ class SdoChannel:
         self.counters = SdoCounters()
         self.last_abort = ""
         """The last abort in words: `06020000h no such object, read 2010h:00`."""
+        self.round_trip: float | None = None
+        """Seconds that the last transfer took that was answered."""
         self._client = SdoClient(timeout)
+        self._begun = 0.0
         self._request = Function.SDO_REQUEST + node
         self._send = send
         self._waiting: deque[SdoJob] = deque()
@@ -113,6 +120,8 @@ class SdoChannel:
                 job, self._running = self._running, None
                 assert job is not None
                 self._count(result, writing=job.data is not None)
+                if not result.silent:
+                    self.round_trip = now - self._begun
                 job.done(result, now)
             elif self._running is None and self._waiting:
                 self._begin(self._waiting.popleft(), now)
@@ -120,7 +129,7 @@ class SdoChannel:
                 return
 
     def _begin(self, job: SdoJob, now: float) -> None:
-        self._running = job
+        self._running, self._begun = job, now
         client = self._client
         if job.data is None:
             self._give(client.upload(job.index, job.subindex, now))
@@ -134,6 +143,8 @@ class SdoChannel:
             counters.timeouts += 1
         elif not result.good:
             counters.aborts += 1
+            code, known = result.code or 0, counters.codes
+            known[code if code in known or len(known) < MAX_CODES else AbortCode.GENERAL] += 1
             what = "write" if writing else "read"
             self.last_abort = f"{reason_of(result)}, {what} {object_text(result.index, result.subindex)}"
 

@@ -26,8 +26,6 @@ from gatewayd.canopen.manager.plan import ManagedPdo, NodePlan, ObjectReading
 from gatewayd.canopen.nmt import NmtCommand, NmtState
 from gatewayd.canopen.sdo.client import SdoResult
 
-ALIVE = 2.0
-"""Seconds between two questions for 1000h to a device without heartbeat."""
 DRIFT = 1.0
 """Seconds, or its heartbeat time if that is longer, after which a device that has left OPERATIONAL is booted again."""
 FULL = 1.0
@@ -70,6 +68,9 @@ class NodeObserver:
     def node_ended(self, reason: str, now: float) -> None:
         """It is not any more."""
 
+    def node_seen(self, now: float) -> None:
+        """It is in operation and lives: a heartbeat, or an answer of a device that has none."""
+
     def pdo_received(self, pdo: int, values: list[Value], now: float) -> None:
         """A TPDO, by its place in the plan, with the numbers of its objects."""
 
@@ -78,6 +79,9 @@ class NodeObserver:
 
     def object_unread(self, index: int, subindex: int, reason: str, now: float) -> None:
         """It could not be read."""
+
+    def object_written(self, index: int, subindex: int, now: float) -> None:
+        """The device took a value."""
 
     def object_unwritten(self, index: int, subindex: int, reason: str, now: float) -> None:
         """A value was not taken by the device."""
@@ -217,7 +221,7 @@ class ManagedNode:
         if now >= self._alive_due:
             self._alive_due = math.inf
             if not self.channel.put(SdoJob(0x1000, 0, None, self._alive), now):
-                self._alive_due = now + ALIVE
+                self._alive_due = now + self.plan.alive
         for poll in self._polls:
             if now >= poll.due:
                 self._read(poll, now)
@@ -258,7 +262,7 @@ class ManagedNode:
         self.counters.boots += 1
         self.nmt = NmtState.OPERATIONAL
         if not self.plan.heartbeat:
-            self._alive_due = now + ALIVE
+            self._alive_due = now + self.plan.alive
         for poll in self._polls:
             poll.due = now
         for outgoing in self._outgoing.values():
@@ -335,6 +339,8 @@ class ManagedNode:
             self._see(Seen.HEARTBEAT, now)
             self.boot.heartbeat(state, now)
             self._compare_state(now)
+            if self.running and self.nmt is NmtState.OPERATIONAL:
+                self._observer.node_seen(now)
 
     def _compare_state(self, now: float) -> None:
         """A device that was started and says otherwise for long is none that works."""
@@ -362,7 +368,8 @@ class ManagedNode:
             self._leave("no answer", now)
             self.boot.fail(BootError.NO_ANSWER, "read 1000h:00: no answer", now)
         else:
-            self._alive_due = now + ALIVE
+            self._alive_due = now + self.plan.alive
+            self._observer.node_seen(now)
 
     def _receive_emergency(self, frame: Frame, now: float) -> None:
         message = None if frame.remote else read_emergency(frame.data)
@@ -428,7 +435,9 @@ class ManagedNode:
             self._observer.object_unread(reading.index, reading.subindex, problem, now)
 
     def _written(self, result: SdoResult, now: float) -> None:
-        if not result.good:
+        if result.good:
+            self._observer.object_written(result.index, result.subindex, now)
+        else:
             self._observer.object_unwritten(result.index, result.subindex, reason_of(result), now)
 
     def _transmit(self, outgoing: _Outgoing, now: float) -> None:

@@ -75,6 +75,11 @@ class Setting:
     subindex: int
     data: bytes
 
+    @property
+    def meaning(self) -> list[int | str]:
+        """The same in the types of JSON."""
+        return [self.index, self.subindex, self.data.hex()]
+
 
 @dataclass(frozen=True, slots=True)
 class ExpectedIdentity:
@@ -111,6 +116,8 @@ class NodePlan:
     """Seconds that the device may be silent; 0: it has no heartbeat, and is asked for 1000h instead."""
     producer: int = 0
     """Its producer heartbeat time (1017h) in ms, which is written; 0: left as it is."""
+    alive: float = 2.0
+    """Seconds between two questions for 1000h to a device without heartbeat."""
     software: str | None = None
     """What 100Ah must say; None: anything."""
     settings: tuple[Setting, ...] = ()

@@ -23,6 +23,7 @@ from gatewayd.loop import clock
 from gatewayd.loop.progress import wait_with_progress
 from gatewayd.loop.retry import until_done
 
+FrameTap = Callable[[Frame, bool], None]
 REOPEN = 2.0
 """Seconds between two attempts at a bus that cannot be used as it is set up."""
 
@@ -45,6 +46,8 @@ class Manager:
         """Why the bus carries no frames, in words; empty while it does."""
         self.progress = 0
         """Counts while `run` goes on, whatever the bus does."""
+        self.tap: FrameTap | None = None
+        """Takes every frame that is heard or sent, and whether it was sent, while somebody traces."""
         self._report = report
         self._bus: SupervisedBus | None = None
         self._transmitter = Transmitter(
@@ -109,8 +112,10 @@ class Manager:
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
         """Received frames."""
-        receive = self.bus_manager.receive
+        receive, tap = self.bus_manager.receive, self.tap
         for frame in frames:
+            if tap is not None:
+                tap(frame, False)
             receive(frame, now)
         self.schedule(now)
 
@@ -162,11 +167,17 @@ class Manager:
             self._bus.set_filters(self.bus_manager.can_ids())
 
     def _offer(self, frame: Frame) -> bool:
-        return self._bus is not None and self._bus.send(frame)
+        return self._bus is not None and self._give(self._bus, frame)
 
     def _offer_at_once(self, frame: Frame) -> bool:
         bus = self._bus
-        return bus is not None and not bus.lags(self.plan.bitrate) and bus.send(frame)
+        return bus is not None and not bus.lags(self.plan.bitrate) and self._give(bus, frame)
+
+    def _give(self, bus: SupervisedBus, frame: Frame) -> bool:
+        taken = bus.send(frame)
+        if taken and self.tap is not None:
+            self.tap(frame, True)
+        return taken
 
     def _reschedule(self, now: float) -> None:
         """Deadlines may have moved away as well."""

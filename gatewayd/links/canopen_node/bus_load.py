@@ -13,50 +13,23 @@ their greatest rate:
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from math import ceil
 from typing import Final
 
 from gatewayd.canopen import lss
+from gatewayd.canopen.load import Share, frame_bits
 from gatewayd.core.definition import Direction
+from gatewayd.links.can_buses import BusUse
 from gatewayd.links.canopen_node.expand import ExpandedPdo, the_node
 from gatewayd.links.canopen_node.sections import CanopenWriter
 from gatewayd.mapping.expanded import ExpandedCell
 
 BIT_RATES: Final = tuple(sorted(rate for rate in lss.BIT_RATES if rate is not None))
 """Bit-rates of CiA 301, 5.2, in bit/s, from the slowest on."""
-WARNING_ABOVE: Final = 0.4
-"""Share of the bus above which SDO and other nodes become slow."""
-ERROR_ABOVE: Final = 0.7
-"""Share of the bus above which low-priority frames may wait for ever."""
 FIRST_EVENT_TYPE: Final = 254
 """Transmission types below are synchronous."""
 
-_STUFFED: Final = 34
-"""Bits of a frame that are stuffed, without the data: start, identifier, control, CRC (ISO 11898-1)."""
-_OVERHEAD: Final = 47
-"""Bits of a frame without data and stuff bits, with the three of the interframe space."""
 _HEARTBEATS_PER_TIMEOUT: Final = 2
-
-
-def frame_bits(length: int) -> int:
-    """Greatest length of a frame with an 11-bit identifier and `length` bytes, interframe space included, in bits."""
-    return _OVERHEAD + 8 * length + (_STUFFED + 8 * length - 1) // 4
-
-
-@dataclass(frozen=True, slots=True)
-class Share:
-    """What one frame takes of the bus."""
-
-    what: str
-    bits: int
-    rate: float
-    """Frames per second."""
-
-    @property
-    def bits_per_second(self) -> float:
-        """Bits per second."""
-        return self.bits * self.rate
 
 
 def pdo_bits(pdo: ExpandedPdo) -> int:
@@ -94,11 +67,6 @@ def bus_shares(cells: Sequence[ExpandedCell]) -> tuple[Share, ...]:
     return tuple(found)
 
 
-def load(shares: Iterable[Share], bit_rate: int) -> float:
-    """The share of the bus, 1.0 for all of it."""
-    return sum(share.bits_per_second for share in shares) / bit_rate
-
-
 def _sync_periods(cells: Sequence[ExpandedCell]) -> dict[int, float]:
     """The shortest period that is stated for a COB-ID of SYNC."""
     periods: dict[int, float] = {}
@@ -125,3 +93,25 @@ def _watched(cells: Sequence[ExpandedCell]) -> Iterable[Share]:
             shortest[writer.node] = min(writer.heartbeat, shortest.get(writer.node, writer.heartbeat))
     for node, timeout in sorted(shortest.items()):
         yield Share(f"node {node}: heartbeat", frame_bits(1), _HEARTBEATS_PER_TIMEOUT / timeout)
+
+
+def bus_use(cell: ExpandedCell) -> BusUse:
+    """What the node of a cell is on its bus, for other kinds of links on it."""
+    node = the_node(cell)
+    spec = node.part.spec
+    sends = {
+        pdo.slot.cob_id: f"{pdo.label} of node {spec.node}"
+        for pdo in node.pdos
+        if pdo.direction is Direction.OUTPUT and pdo.slot.cob_id is not None
+    }
+    return BusUse(
+        spec.interface,
+        spec.channel,
+        spec.bitrate,
+        spec.node,
+        "the gateway's own node (`canopen`)",
+        node.part.at("node"),
+        node.part.at("bitrate"),
+        sends,
+        bus_shares([cell]),
+    )

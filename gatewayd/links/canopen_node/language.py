@@ -34,6 +34,7 @@ from gatewayd.mapping.reach import Reach
 from gatewayd.mapping.section import Section
 
 if TYPE_CHECKING:
+    from gatewayd.links.can_buses import BusUse
     from gatewayd.links.canopen_node.expand import CanopenCell
     from gatewayd.links.canopen_node.plan import CanopenPlan
 
@@ -162,6 +163,13 @@ class CanopenLanguage(LinkLanguage):
         from gatewayd.links.canopen_node.expand import expand_canopen  # noqa: PLC0415 - see above
 
         return expand_canopen(part, variables)
+
+    def bus_uses(self, cell: ExpandedCell) -> Iterable[BusUse]:
+        """The node, with its PDOs and its heartbeat."""
+        if _node_of(cell) is not None:
+            from gatewayd.links.canopen_node.bus_load import bus_use  # noqa: PLC0415 - see above
+
+            yield bus_use(cell)
 
     def compile(self, cell: ExpandedCell) -> CanopenPlan:
         """One node on one bus."""

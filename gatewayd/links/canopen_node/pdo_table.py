@@ -6,14 +6,9 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from gatewayd.canopen.load import load
 from gatewayd.core.definition import Direction
-from gatewayd.links.canopen_node.bus_load import (
-    BIT_RATES,
-    FIRST_EVENT_TYPE,
-    bus_shares,
-    load,
-    pdo_rate,
-)
+from gatewayd.links.canopen_node.bus_load import BIT_RATES, FIRST_EVENT_TYPE, bus_shares, pdo_rate
 from gatewayd.links.canopen_node.expand import ExpandedPdo, MappedObject, the_node
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.report.wording import cob

@@ -24,12 +24,12 @@ from gatewayd.canopen.supervised import SupervisedBus
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction
 from gatewayd.core.requester import Requester
+from gatewayd.links.can_frames import packed
 from gatewayd.links.canopen_node.health import health_of, other_bit_rate
 from gatewayd.links.canopen_node.node import Node
 from gatewayd.links.canopen_node.observer import Observer
 from gatewayd.links.canopen_node.plan import CanopenPlan
 from gatewayd.links.canopen_node.store import BackgroundStore, Store
-from gatewayd.links.canopen_node.traffic import packed
 from gatewayd.links.contract import Context, Link, LinkHealth, LinkRuntime, Passage, Tap
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock

@@ -19,9 +19,9 @@ class DeviceKind(LinkKind):
     traffic = "gatewayd.links.devices.traffic"
     doctor = "gatewayd.links.devices.doctor"
     fields = {  # noqa: RUF012 - never changed
-        "family": "how it is spoken to: `modbus`",
-        "address": "where it is reached: host:port, or serial port with its settings",
-        "unit": "unit id of a Modbus device, or null",
+        "family": "how it is spoken to: `modbus`, `canopen`",
+        "address": "where it is reached: host:port, serial port with its settings, or CAN bus",
+        "unit": "unit id of a Modbus device, node-ID of a CANopen device, or null",
         "state": "`starting`, `good`, `partial` (some values are lost), `lost`",
         "reason": "why it is not good, or empty",
         "round_trip": "seconds from request to answer, of the last one, or null",
@@ -31,6 +31,17 @@ class DeviceKind(LinkKind):
         "exceptions": "requests that the device refused, by code",
         "age": "seconds since its last answer, or null",
         "losses": "how often it was lost",
+    }
+    fields |= {
+        "letter": "of a CANopen device: how its last boot went (CiA 302-2, A to O), or empty",
+        "nmt_state": "its NMT state, or empty where it is not known",
+        "identity": "what it says of itself: device type, vendor, product, revision, serial number",
+        "boots": "how often it was taken into operation",
+        "heartbeat_misses": "how often its heartbeat was missed",
+        "emergencies": "EMCY messages that it sent",
+        "emergency": "the last of them in words, or empty",
+        "pdos_received": "PDOs that it sent and that were used",
+        "pdos_sent": "PDOs that it was sent",
     }
     metrics = (
         LinkMetric("gatewayd_device_up", "up", "1 while the device answers"),

@@ -28,7 +28,7 @@ class ExpandedDevices(ExpandedPlaces):
     def is_complete(self) -> bool:
         """Whether every variable lies in a device, and can lie there."""
         placed = all(placement.problem is None for placement in self.placements)
-        return placed and all(place.where is not None for place in self.places)
+        return placed and all(_is_laid_out(place) for place in self.places)
 
     def of(self, device: str) -> tuple[ExpandedPlace, ...]:
         """The places in one device, by its name."""
@@ -38,6 +38,12 @@ class ExpandedDevices(ExpandedPlaces):
 def devices_of(cell: ExpandedCell) -> ExpandedDevices:
     """The places of a cell in devices."""
     return cell.link(ExpandedDevices) or ExpandedDevices(())
+
+
+def _is_laid_out(place: ExpandedPlace) -> bool:
+    if place.device is None or place.where is None:
+        return False
+    return family_of(place.device.spec).is_laid_out(place.where)
 
 
 def family_of(device: DeviceSpec) -> FamilyLanguage:

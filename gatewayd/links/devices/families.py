@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from gatewayd.links.devices.family import FamilyDescription, FamilyLanguage, FamilyRuntime
     from gatewayd.links.examination import Examination
 
-FAMILIES: Final = {"modbus": "gatewayd.links.devices.modbus"}
+FAMILIES: Final = {
+    "modbus": "gatewayd.links.devices.modbus",
+    "canopen": "gatewayd.links.devices.canopen",
+}
 """Package by the family's name, which its plans have (`DevicePlan.family`)."""
 
 

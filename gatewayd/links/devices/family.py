@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gatewayd.links.devices.plan import DevicePlan
@@ -10,11 +10,13 @@ from gatewayd.links.devices.plan import DevicePlan
 if TYPE_CHECKING:
     from gatewayd.core.cell import Cell
     from gatewayd.core.definition import CellDefinition
+    from gatewayd.links.can_buses import BusUse
     from gatewayd.links.contract import Context, Description, Link, SharedPart
     from gatewayd.links.devices.places import ExpandedPlace
     from gatewayd.links.devices.sections import DevicePlaceSpec, DeviceSpec
     from gatewayd.mapping.document import Document, Part
     from gatewayd.mapping.expanded import ExpandedCell, ExpandedVariable
+    from gatewayd.mapping.reach import Reach
 
 FamilyDescription = Callable[[DevicePlan, "CellDefinition"], "Description"]
 """Puts a plan into words: settings, places and address; writers are added for all families alike."""
@@ -45,6 +47,20 @@ class FamilyLanguage:
     ) -> Sequence[Any]:
         """Where each variable of a line lies in the device by the line's place with this number. Never raises."""
         raise NotImplementedError
+
+    def is_laid_out(self, where: Any) -> bool:
+        """Whether a variable can lie in one of these places; rules say why not."""
+        return True
+
+    def reach(self, where: Any) -> Reach | None:
+        """What one of these places shows; None: all that its variable has, or what is asked for elsewhere."""
+        return None
+
+    def bus_uses(
+        self, cell: ExpandedCell, device: Part[DeviceSpec], places: Sequence[ExpandedPlace]
+    ) -> Iterable[BusUse]:
+        """What a device is on a CAN bus."""
+        return ()
 
     def row(self, where: Any) -> Mapping[str, object]:
         """What tables show of one of these places: `device_place`, `device_type`, `device_scale`, `device_offset`."""

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Final
 
 from gatewayd.core.definition import Direction
+from gatewayd.links.can_buses import BusUse
 from gatewayd.links.devices.declaration import KIND
 from gatewayd.links.devices.expand import ExpandedDevices, devices_of, expand_devices, family_of
 from gatewayd.links.devices.places import ExpandedPlace
@@ -35,7 +36,10 @@ class DevicesLanguage(LinkLanguage):
     writer_keys = DeviceWriter
     rules = (
         *PLACE_RULES,
-        *(f"gatewayd.links.devices.rules.{name}" for name in ("places", "declared", "lines")),
+        *(
+            f"gatewayd.links.devices.rules.{name}"
+            for name in ("places", "declared", "lines", "objects", "buses")
+        ),
     )
     tables = "gatewayd.links.devices.tables"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
@@ -85,10 +89,20 @@ class DevicesLanguage(LinkLanguage):
         return bool(line.spec.by(DevicePlaces).device)
 
     def reaches(self, cell: ExpandedCell) -> Iterable[tuple[int, Reach]]:
-        """What its registers show."""
+        """What its registers and objects show."""
         for placement in devices_of(cell).placements:
             if placement.codec is not None:
                 yield placement.variable.index, reach_of(placement.codec, placement.width)
+        for place in devices_of(cell).places:
+            if place.device is not None and place.where is not None:
+                reach = family_of(place.device.spec).reach(place.where)
+                if reach is not None:
+                    yield place.variable.index, reach
+
+    def bus_uses(self, cell: ExpandedCell) -> Iterable[BusUse]:
+        """Its CANopen devices."""
+        for name, device in cell.document.parts(DeviceSpec).items():
+            yield from family_of(device.spec).bus_uses(cell, device, devices_of(cell).of(name))
 
     def expand(self, document: Document, variables: Sequence[ExpandedVariable]) -> ExpandedDevices:
         """The places, be there devices or not: rules look at them too."""

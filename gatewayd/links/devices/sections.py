@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Final, Literal
 
+from gatewayd.links.devices.canopen.sections import CanopenDeviceKeys, CanopenPlaceKeys
 from gatewayd.links.devices.modbus.sections import ModbusDeviceKeys, ModbusPlaceKeys
 from gatewayd.mapping import syntax
 from gatewayd.mapping.scalars import Duration, Name, OptionalDuration, refuse
 from gatewayd.mapping.section import Section
 from gatewayd.mapping.typed import BeforeValidator, Field
 
-DEVICE_SELECTORS: Final = ("modbus", "serial")
+DEVICE_SELECTORS: Final = ("modbus", "serial", "canopen")
 """Keys of a device of which exactly one says what it is; those of all families."""
-PLACE_SELECTORS: Final = ("coil", "discrete", "input", "holding")
+PLACE_SELECTORS: Final = ("coil", "discrete", "input", "holding", "object")
 """Keys of a place of which exactly one says where it is; those of all families."""
 
 
@@ -36,7 +37,7 @@ class DeviceKeys(Section):
     )
 
 
-class DeviceSpec(DeviceKeys, ModbusDeviceKeys):
+class DeviceSpec(DeviceKeys, ModbusDeviceKeys, CanopenDeviceKeys):
     """One device that the gateway talks to by itself."""
 
     schema_extra: ClassVar[Mapping[str, Any]] = {
@@ -50,6 +51,11 @@ class DeviceSpec(DeviceKeys, ModbusDeviceKeys):
             found = "none" if not given else " and ".join(given)
             message = f"a device has exactly one of {', '.join(DEVICE_SELECTORS)}; found {found}"
             refuse(syntax.MISSING_KEY, message, "write for example {modbus: 192.168.1.30:502, unit: 1}")
+        if self.canopen is not None and self.node is None:
+            message = "a CANopen device has a node-ID"
+            refuse(
+                syntax.MISSING_KEY, message, "write for example {canopen: can1, node: 5, eds: encoder.eds}"
+            )
 
     @property
     def selector(self) -> str:
@@ -76,7 +82,7 @@ class PlaceKeys(Section):
     )
 
 
-class DevicePlaceSpec(PlaceKeys, ModbusPlaceKeys):
+class DevicePlaceSpec(PlaceKeys, ModbusPlaceKeys, CanopenPlaceKeys):
     """Where a variable lies in a device, and how its number is written there."""
 
     schema_extra: ClassVar[Mapping[str, Any]] = {
@@ -129,8 +135,8 @@ class DevicePlaces(Section):
         ),
     ] = Field(
         default=(),
-        description="where it lies in a device: {at: NAME, coil|discrete|input|holding: address, ...}, or a list of "
-        "these; an address alone is a holding register",
+        description="where it lies in a device: {at: NAME, coil|discrete|input|holding: address, ...}, "
+        "{at: NAME, object: index, ...}, or a list of these; an address alone is a holding register",
     )
 
 

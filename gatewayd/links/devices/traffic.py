@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import struct
 from collections import OrderedDict
 from typing import Final
 
+from gatewayd.canopen.describe import frame_text
+from gatewayd.links.can_frames import unpacked
 from gatewayd.links.contract import Medium, TrafficDecoder
 from gatewayd.modbus.describe import answer_text, request_text
 from gatewayd.modbus.frames import HEADER_SIZE
@@ -25,6 +28,8 @@ class DeviceTraffic(TrafficDecoder):
 
     def words(self, data: bytes, peer: str, *, outgoing: bool) -> str:
         """`unit 1: read holding 100-103`; an answer that came in several pieces is not put together."""
+        if peer.startswith("CAN "):
+            return self._frame(data) or super().words(data, peer, outgoing=outgoing)
         is_rtu = peer.startswith("/") or peer.endswith(" RTU")
         if len(data) <= (_CHECK + 1 if is_rtu else HEADER_SIZE):
             return super().words(data, peer, outgoing=outgoing)
@@ -38,6 +43,15 @@ class DeviceTraffic(TrafficDecoder):
         if len(self._requests) > _REMEMBERED:
             self._requests.popitem(last=False)
         return f"unit {unit}: {request_text(pdu)}"
+
+    @staticmethod
+    def _frame(data: bytes) -> str:
+        """`185h TPDO 1 of node 5 01 02`; empty for what is no CAN frame."""
+        try:
+            frame = unpacked(data)
+        except struct.error:
+            return ""
+        return f"{frame.can_id:03X}h {frame_text(frame)}"
 
 
 DECODER = DeviceTraffic

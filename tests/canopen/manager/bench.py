@@ -34,9 +34,13 @@ class Diary(NodeObserver):
         self.values: list[Value] = []
         self.read: list[Value] = []
         self.emergencies: list[EmergencyMessage] = []
+        self.seen = 0
 
     def node_started(self, now: float) -> None:
         self.events.append("started")
+
+    def node_seen(self, now: float) -> None:
+        self.seen += 1
 
     def node_ended(self, reason: str, now: float) -> None:
         self.events.append(f"ended: {reason}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import Access, Dictionary, Entry, variable
 from gatewayd.canopen.frame import Frame, Priority
-from gatewayd.canopen.manager.channel import CAPACITY, SdoChannel, SdoJob, reason_of
+from gatewayd.canopen.manager.channel import CAPACITY, MAX_CODES, SdoChannel, SdoJob, reason_of
 from gatewayd.canopen.sdo.client import SdoResult
 from gatewayd.canopen.sdo.server import SdoServer
 
@@ -47,6 +47,15 @@ def test_one_transfer_at_a_time_in_their_order() -> None:
     assert (len(line.channel), line.channel.counters.transfers) == (0, 3)
 
 
+def test_round_trip_is_that_of_the_last_answer() -> None:
+    line = Line()
+    assert line.channel.round_trip is None
+    line.put()
+    for data in line.server.receive(line.sent.pop().data, 0.0):
+        line.channel.receive(Frame(0x585, data), 0.25)
+    assert line.channel.round_trip == 0.25
+
+
 def test_newest_write_takes_the_turn_of_the_older_one() -> None:
     line = Line()
     line.put(b"\2\0")
@@ -86,6 +95,18 @@ def test_abort_is_counted_and_kept_in_words() -> None:
     assert line.channel.counters.aborts == 2
     assert line.channel.last_abort == "06070012h too long, write 2000h:00"
     assert reason_of(line.results[0]) == "06020000h no such object"
+
+
+def test_codes_are_counted_apart_as_far_as_there_is_room() -> None:
+    line = Line()
+    for number in range(MAX_CODES + 10):
+        line.put(index=0x2000)
+        line.sent.clear()
+        line.channel.receive(Frame(0x585, b"\x80\x00\x20\x00" + bytes((number, 0, 0, 6))), 0.0)
+    codes = line.channel.counters.codes
+    assert len(codes) == MAX_CODES + 1
+    assert codes[0x0800_0000] == 10
+    assert codes[0x0600_0000] == 1
 
 
 def test_forgetting_calls_nobody() -> None:

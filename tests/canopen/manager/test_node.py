@@ -10,7 +10,7 @@ from gatewayd.canopen.datatypes import CanType
 from gatewayd.canopen.dictionary import AbortCode
 from gatewayd.canopen.frame import Frame
 from gatewayd.canopen.manager.boot import BootStep
-from gatewayd.canopen.manager.node import ALIVE, ManagedNode, NodeCondition
+from gatewayd.canopen.manager.node import ManagedNode, NodeCondition
 from gatewayd.canopen.manager.plan import ManagedPdo, ObjectReading
 from gatewayd.canopen.nmt import NmtCommand
 from gatewayd.canopen.sdo import protocol
@@ -37,6 +37,9 @@ def test_tpdo_is_values_and_counted() -> None:
     device.say(0x185, b"\1\0\0")
     bench.settle()
     assert diary.values == [-2, 1]
+    before = diary.seen
+    bench.run(1.0)
+    assert 9 <= diary.seen - before <= 11
     assert (node.counters.pdos_received, node.counters.pdos_short) == (2, 1)
 
 
@@ -155,11 +158,12 @@ def test_heartbeat_is_not_missed_over_a_gap_of_our_own() -> None:
 
 def test_device_without_heartbeat_is_asked_and_lost_when_it_does_not_answer() -> None:
     bench = Bench()
-    device, _, diary = operating(bench, heartbeat=0.0, producer=0)
-    bench.run(3 * ALIVE)
+    device, _, diary = operating(bench, heartbeat=0.0, producer=0, alive=0.5)
+    bench.run(2.0)
     assert diary.events == []
+    assert diary.seen == 4
     device.silent = True
-    bench.run(ALIVE + 1.1)
+    bench.run(1.6)
     assert diary.events == ["ended: no answer", "B: read 1000h:00: no answer"]
 
 

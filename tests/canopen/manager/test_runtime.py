@@ -70,6 +70,8 @@ def _manager(channel: str, **options: Any) -> tuple[Manager, list[str]]:
 async def test_devices_come_and_go_while_it_runs(channel: str) -> None:
     manager, lines = _manager(channel)
     diary = Diary()
+    passed: list[tuple[int, bool]] = []
+    manager.tap = lambda frame, outgoing: passed.append((frame.can_id, outgoing))
     first = manager.attach(NodePlan(5), diary)
     task = asyncio.create_task(manager.run())
     await until(lambda: first.running)
@@ -82,6 +84,7 @@ async def test_devices_come_and_go_while_it_runs(channel: str) -> None:
         await task
     assert diary.events == ["started", "ended: a reload", "started", "ended: the CAN bus is away"]
     assert lines == [f"CAN bus active: virtual {channel} is open", "CAN bus down: the manager ends"]
+    assert {(0x605, True), (0x585, False), (0, True)} <= set(passed)
     # It may run again.
     again = asyncio.create_task(manager.run())
     await until(lambda: second.running)

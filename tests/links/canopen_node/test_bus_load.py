@@ -6,13 +6,8 @@ import random
 
 import pytest
 
-from gatewayd.links.canopen_node.bus_load import (
-    BIT_RATES,
-    Share,
-    bus_shares,
-    frame_bits,
-    load,
-)
+from gatewayd.canopen.load import Share, frame_bits, load
+from gatewayd.links.canopen_node.bus_load import BIT_RATES, bus_shares
 from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.loader import load as load_file
 from gatewayd.mapping.loader import load_together

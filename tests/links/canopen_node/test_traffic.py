@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gatewayd.canopen.frame import Frame
-from gatewayd.links.canopen_node.traffic import CanTraffic, packed, unpacked
+from gatewayd.links.can_frames import packed, unpacked
+from gatewayd.links.canopen_node.traffic import CanTraffic
 
 
 @pytest.mark.parametrize("frame", [Frame(0x185, b"\1\2"), Frame(0, b""), Frame(0x705, remote=True, length=1)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from gatewayd.canopen.frame import Frame
+from gatewayd.links.can_frames import packed
 from gatewayd.links.registry import decoder_of
 
 
@@ -19,6 +21,13 @@ def test_frames_of_a_serial_line() -> None:
             "unit 9: write"
         )
         assert "refused with 02h" in decoder.words(bytes.fromhex("098602abcd"), line, outgoing=False)
+
+
+def test_frames_of_a_can_bus() -> None:
+    decoder = decoder_of("device")
+    data = packed(Frame(0x705, b"\5"))
+    assert decoder.words(data, "CAN can1", outgoing=False) == "705h heartbeat of node 5: operational"
+    assert decoder.words(b"\1\2", "CAN can1", outgoing=False) == "length 2: 01 02"
 
 
 def test_whatever_the_bytes_are() -> None:

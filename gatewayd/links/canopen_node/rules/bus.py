@@ -7,16 +7,9 @@ from itertools import chain
 from math import ceil
 
 from gatewayd.canopen.cob_ids import Function, is_restricted
+from gatewayd.canopen.load import ERROR_ABOVE, WARNING_ABOVE, Share, load
 from gatewayd.core.definition import Direction
-from gatewayd.links.canopen_node.bus_load import (
-    ERROR_ABOVE,
-    FIRST_EVENT_TYPE,
-    WARNING_ABOVE,
-    Share,
-    bus_shares,
-    load,
-    pdo_bits,
-)
+from gatewayd.links.canopen_node.bus_load import FIRST_EVENT_TYPE, bus_shares, pdo_bits
 from gatewayd.links.canopen_node.expand import CanopenCell, node_of, the_node
 from gatewayd.links.canopen_node.rules.pdos import cob_id_place
 from gatewayd.links.canopen_node.rules.registry import first_at_each_place

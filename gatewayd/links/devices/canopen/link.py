@@ -1,0 +1,304 @@
+"""The link to one CANopen device: on one side a node that a manager cares for, on the other a writer and outputs."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from gatewayd.canopen.datatypes import Value as Raw
+from gatewayd.canopen.describe import object_text
+from gatewayd.canopen.manager.emergency_text import EmergencyMessage
+from gatewayd.canopen.manager.letters import BootError
+from gatewayd.canopen.manager.node import NodeCondition
+from gatewayd.core.cell import Cell
+from gatewayd.core.definition import CellDefinition, Direction, Value, Variable
+from gatewayd.core.requester import Requester
+from gatewayd.links.canopen_values import fit, limits_of, meaning
+from gatewayd.links.contract import Context, LinkHealth
+from gatewayd.links.devices.canopen.buses import CanopenBuses
+from gatewayd.links.devices.canopen.figures import figures_of, health_of
+from gatewayd.links.devices.canopen.managed import ManagedDevice
+from gatewayd.links.devices.canopen.plan import CanopenDevicePlan, ObjectPlace
+from gatewayd.links.devices.family import FamilyRuntime
+from gatewayd.links.devices.inflow import Inflow
+from gatewayd.links.devices.outflow import Outflow
+from gatewayd.links.devices.plan import DevicePlan
+from gatewayd.logs.records import fields
+from gatewayd.loop import clock
+from gatewayd.mapping.plan import LinkPlan
+from gatewayd.report.wording import names_and_more
+
+PERIOD = 0.05
+"""Seconds between two looks at what only time brings."""
+CORE_TIME = 0.5
+"""Seconds without a count of the core's heartbeat after which the core counts as stuck."""
+
+log = logging.getLogger("gatewayd.devices")
+
+Reading = Callable[[Raw], Value | None]
+
+
+class CanopenDeviceLink(ManagedDevice):
+    """Joins one device to a cell. `CanopenBuses` puts it into the care of its bus's manager."""
+
+    title = "device"
+    plan: CanopenDevicePlan
+
+    def __init__(self, plan: CanopenDevicePlan, cell: Cell) -> None:
+        self.node, self.manager, self.clash = None, None, ""
+        self.heard, self.emergency, self.losses = None, None, 0
+        self._progress = 0
+        self._beat = (-1, 0.0)
+        self._latest: dict[int, Value | None] = {}
+        """What PDOs have brought, by variable."""
+        self._unread: dict[tuple[int, int], str] = {}
+        self._unwritten: dict[tuple[int, int], str] = {}
+        self._bind(plan, cell)
+        self._inflow = Inflow(
+            cell, plan.writer, f"{plan.name} ({plan.address})", self._inputs, plan.lost_after
+        )
+        self._outflow = Outflow(cell, plan.sendings, self._send)
+
+    def _bind(self, plan: CanopenDevicePlan, cell: Cell) -> None:
+        self.plan, self._cell = plan, cell
+        variables = cell.definition.variables
+        inputs = [place for place in plan.places if variables[place.variable].direction is Direction.INPUT]
+        self._inputs = [place.variable for place in inputs]
+        self._outputs: dict[int, list[ObjectPlace]] = {}
+        for place in plan.places:
+            if variables[place.variable].direction is Direction.OUTPUT:
+                self._outputs.setdefault(place.variable, []).append(place)
+        self._by_pdo: dict[int, list[tuple[int, int, Reading]]] = {}
+        self._by_object: dict[tuple[int, int], list[tuple[int, Reading, bool]]] = {}
+        for place in inputs:
+            reading = reading_of(place, variables[place.variable])
+            at, carried = (place.index, place.subindex), place.pdo is not None
+            self._by_object.setdefault(at, []).append((place.variable, reading, carried))
+            if place.pdo is not None:
+                self._by_pdo.setdefault(place.pdo, []).append((place.item, place.variable, reading))
+        cell.listeners.append(self._on_image)
+
+    @property
+    def progress(self) -> int:
+        """Counts while the link's task goes on, whatever the device does."""
+        return self._progress
+
+    async def run(self) -> None:
+        """Look at the time until cancelled; everything else is called by the manager."""
+        while True:
+            self._progress += 1
+            self._tick(clock.now())
+            await asyncio.sleep(PERIOD)
+
+    def departing(self, plan: LinkPlan | None, after: CellDefinition) -> Mapping[Requester, str]:
+        """The device as a writer, where another link takes this one's place."""
+        gone = plan is None and self._inflow.connected and self._inflow.requester.writer is not None
+        return {self._inflow.requester: f"the device {self.plan.name} changes or ends"} if gone else {}
+
+    def release(self, plan: LinkPlan | None, after: CellDefinition, now: float) -> None:
+        """Another link takes the place of this one: what the device owns is released."""
+        if plan is None:
+            self._inflow.lose("the new mapping changes the device", now)
+            self._outflow.lose()
+
+    def rebind(self, plan: LinkPlan, cell: Cell, now: float) -> None:
+        """Go on, unnoticed by the device, with the cell that succeeded the present one."""
+        assert isinstance(plan, CanopenDevicePlan)
+        before = self._cell.definition
+        places = {variable.name: index for index, variable in enumerate(cell.definition.variables)}
+        indices = {
+            index: places[variable.name]
+            for index, variable in enumerate(before.variables)
+            if variable.name in places
+        }
+        latest = self._latest
+        self._bind(plan, cell)
+        self._latest = {indices[index]: value for index, value in latest.items() if index in indices}
+        inputs = set(self._inputs)
+        self._inflow.rebind(cell, plan.writer, {old: new for old, new in indices.items() if new in inputs})
+        self._outflow.rebind(cell, plan.sendings, indices)
+
+    def flush(self, now: float) -> None:
+        """Have what changed last sent."""
+        self._outflow.update(now)
+        self._hand_over(now)
+
+    def health(self) -> LinkHealth:
+        """Whether it is in operation, and gives and takes everything."""
+        return health_of(self, clock.now())
+
+    def core_lives(self, now: float) -> bool:
+        """Whether the core of the cell goes on: the manager's heartbeat says so to the devices."""
+        count, since = self._beat
+        if self._cell.health.heartbeat != count:
+            self._beat = (self._cell.health.heartbeat, now)
+            return True
+        return now - since <= CORE_TIME
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What of it does not work although it is in operation, in words."""
+        return (*self._unread.values(), *self._unwritten.values())
+
+    # -- called by the manager ------------------------------------------------------------------------------------
+
+    def node_started(self, now: float) -> None:
+        """It is in operation."""
+        log.info("device in operation", extra=fields(**self._names(), found=self._letter()))
+        self._forget()
+        self.heard = now
+        self._inflow.connect(now)
+        self._outflow.connect(now)
+        self._hand_over(now)
+
+    def node_ended(self, reason: str, now: float) -> None:
+        """It is lost as a writer, and nothing is sent to it."""
+        log.warning("device lost", extra=fields(**self._names(), reason=reason))
+        self.losses += 1
+        self._forget()
+        self._inflow.lose(reason, now)
+        self._outflow.lose()
+
+    def node_seen(self, now: float) -> None:
+        """What its PDOs have brought is still so: it would have sent another one."""
+        self.heard = now
+        if self._latest:
+            self._inflow.receive(list(self._latest.items()), now)
+
+    def pdo_received(self, pdo: int, values: list[Raw], now: float) -> None:
+        """Values that changed."""
+        self.heard = now
+        found = [(variable, reading(values[item])) for item, variable, reading in self._by_pdo.get(pdo, ())]
+        if found:
+            self._latest.update(found)
+            self._inflow.receive(found, now)
+
+    def object_read(self, index: int, subindex: int, value: Raw, now: float) -> None:
+        """A value by SDO: of those in PDOs the first one."""
+        self.heard = now
+        if self._unread.pop((index, subindex), None) is not None:
+            log.info(
+                "device is read again", extra=fields(**self._names(), object=object_text(index, subindex))
+            )
+        found = []
+        for variable, reading, carried in self._by_object.get((index, subindex), ()):
+            found.append((variable, reading(value)))
+            if carried:
+                self._latest[variable] = found[-1][1]
+        if found:
+            self._inflow.receive(found, now)
+
+    def object_unread(self, index: int, subindex: int, reason: str, now: float) -> None:
+        """A value could not be read; it is lost once that lasts."""
+        found = self._by_object.get((index, subindex), ())
+        if not any(not carried for _, _, carried in found):
+            return  # a PDO brings it
+        variables = self._cell.definition.variables
+        names = names_and_more([variables[variable].name for variable, _, _ in found])
+        text = f"{names} cannot be read: {reason}"
+        if self._unread.get((index, subindex)) != text:
+            self._unread[index, subindex] = text
+            log.warning("device is not read", extra=fields(**self._names(), values=names, reason=reason))
+
+    def object_unwritten(self, index: int, subindex: int, reason: str, now: float) -> None:
+        """The device did not take a value."""
+        at = object_text(index, subindex)
+        text = f"{at} was not written: {reason}"
+        if self._unwritten.get((index, subindex)) != text:
+            self._unwritten[index, subindex] = text
+            log.warning(
+                "device did not take a value", extra=fields(**self._names(), object=at, reason=reason)
+            )
+
+    def object_written(self, index: int, subindex: int, now: float) -> None:
+        """The device took a value."""
+        self.heard = now
+        self._unwritten.pop((index, subindex), None)
+
+    def emergency_received(self, message: EmergencyMessage, now: float) -> None:
+        """It reports an error, or that it has gone."""
+        self.emergency = None if message.is_reset else message
+        level = logging.INFO if message.is_reset else logging.WARNING
+        log.log(level, "device reports", extra=fields(**self._names(), emergency=str(message)))
+
+    def boot_failed(self, letter: BootError, detail: str, now: float) -> None:
+        """It cannot be taken into operation; said once for each reason."""
+        reason = f"{letter.value} {letter.words}: {detail}"
+        if reason != self._failed:
+            self._failed = reason
+            log.warning("device is not in operation", extra=fields(**self._names(), reason=reason))
+
+    # -- inside --------------------------------------------------------------------------------------------------
+
+    _failed = ""
+
+    def _forget(self) -> None:
+        self._latest.clear()
+        self._unread.clear()
+        self._unwritten.clear()
+        self.emergency = None
+        self._failed = ""
+
+    def _letter(self) -> str:
+        return "" if self.node is None or self.node.boot.letter is None else self.node.boot.letter.words
+
+    def _tick(self, now: float) -> None:
+        late = self._inflow.expire(now)
+        if late and self.node is not None and self.node.condition is NodeCondition.OPERATIONAL:
+            variables = self._cell.definition.variables
+            values = names_and_more([variables[index].name for index in late])
+            log.warning("values of a device are lost", extra=fields(**self._names(), values=values))
+        self._outflow.tick(now)
+        self._hand_over(now)
+        self._cell.health.tables.setdefault("devices", {})[self.plan.number] = figures_of(self, now).words
+
+    def _on_image(self, direction: Direction) -> None:
+        if direction is Direction.OUTPUT:
+            now = clock.now()
+            self._outflow.update(now)
+            self._hand_over(now)
+
+    def _hand_over(self, now: float) -> None:
+        """Have what was written together sent together."""
+        if self.node is not None and self.manager is not None:
+            self.node.flush(now)
+            self.manager.schedule(now)
+
+    def _send(self, variable: int, value: Value) -> None:
+        if self.node is None:
+            return
+        now = clock.now()
+        for place in self._outputs[variable]:
+            raw = fit(value, place.type, place.linear)
+            if place.pdo is not None:
+                self.node.write_pdo(place.pdo, place.item, raw, now)
+            else:
+                self.node.write_object(place.index, place.subindex, place.type.pack(raw), now)
+
+    def _names(self) -> dict[str, object]:
+        return {"cell": self._cell.definition.name, "device": self.plan.name}
+
+
+def reading_of(place: ObjectPlace, variable: Variable) -> Reading:
+    """What makes a value of the cell of what an object holds; None: it is no value of the robot's type."""
+    reader = limits_of(variable, place.type, place.linear)
+    return reader.read if reader is not None else meaning(variable.kind, place.linear)
+
+
+class CanopenDeviceRuntime(FamilyRuntime):
+    """Makes links to CANopen devices."""
+
+    def share(self) -> CanopenBuses:
+        """All buses of a daemon that have a manager."""
+        return CanopenBuses()
+
+    def make(self, plan: DevicePlan, cell: Cell, context: Context) -> CanopenDeviceLink:
+        """A link without a manager: `CanopenBuses.serve` finds it one."""
+        assert isinstance(plan, CanopenDevicePlan)
+        return CanopenDeviceLink(plan, cell)
+
+
+FAMILY: Final = CanopenDeviceRuntime()
+"""Makes links of this family."""

@@ -1,0 +1,78 @@
+"""Managers of buses: one for each, devices that come and go, what cannot be managed."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from dataclasses import replace
+from uuid import uuid4
+
+from gatewayd.core.cell import Cell
+from gatewayd.links.devices.canopen.buses import CanopenBuses
+from gatewayd.links.devices.canopen.link import CanopenDeviceLink
+from tests.links.canopen_node.recorder import until
+from tests.links.devices.canopen.cells import an_encoder, link_of, managed, planned, the_device
+
+
+async def test_devices_of_two_cells_have_one_manager_and_the_second_of_a_node_none() -> None:
+    channel = str(uuid4())
+    plan = planned(channel=channel)
+    one, other = link_of(plan, Cell(plan.cell)), link_of(plan, Cell(plan.cell))
+    six = replace(the_device(plan), node=replace(the_device(plan).node, node=6, pdos=()), places=())
+    third = CanopenDeviceLink(six, Cell(plan.cell))
+    async with an_encoder(channel), managed([one, third]) as buses:
+        buses.serve([one, other, third], {})
+        assert len(buses.buses) == 1
+        assert one.manager is third.manager is not None
+        await until(lambda: one.health().figures["state"] == "good")
+        assert other.health().figures["reason"] == "node 5 is managed already"
+        # A device goes, and the others on its bus do not notice.
+        buses.serve([one], {})
+        assert third.node is None
+        assert one.health().figures["boots"] == 1
+        # The bus goes with its last device.
+        buses.serve([], {})
+        assert buses.buses == {}
+        assert one.manager is None
+
+
+async def test_bus_that_changes_begins_anew() -> None:
+    channel = str(uuid4())
+    plan, changed = (
+        planned(channel=channel),
+        planned(channel=channel, more=", manager: 127, manager_heartbeat: 50ms"),
+    )
+    link = link_of(plan, Cell(plan.cell))
+    async with an_encoder(channel), managed([link]) as buses:
+        await until(lambda: link.health().figures["state"] == "good")
+        successor = link_of(changed, Cell(changed.cell))
+        buses.serve([successor], {})
+        assert link.node is None
+        await until(lambda: successor.health().figures["state"] == "good")
+        assert [each.node for each in buses.buses] == [127]
+
+
+async def test_bus_that_is_not_there_is_a_trouble_and_progress_goes_on() -> None:
+    plan = planned()
+    bus = replace(the_device(plan).bus, interface="no such interface")
+    link = CanopenDeviceLink(replace(the_device(plan), bus=bus), Cell(plan.cell))
+    async with managed([link]) as buses:
+        await until(buses.troubles)
+        assert "no such interface" in buses.troubles()[0]
+        assert "the CAN bus is away" in str(link.health().figures["reason"])
+        before = buses.progress()["CAN manager can1"]
+        await until(lambda: buses.progress()["CAN manager can1"] > before)
+        buses.gap(0.0, 1.0)
+
+
+async def test_nothing_is_needed_beforehand() -> None:
+    buses = CanopenBuses()
+    prepared = await buses.prepare([planned()])
+    prepared.commit()
+    await prepared.abort()
+    task = asyncio.create_task(buses.run())
+    await asyncio.sleep(0)
+    await buses.close()
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task
