@@ -431,7 +431,6 @@ WITHOUT_TEST_FILE: dict[str, str] = {
     "modbus.client.counters": "numbers; tests/modbus/client/test_station.py",
     "modbus.client.unit": "records and a protocol; tests/modbus/client/test_station.py",
     "modbus.areas": "an enumeration; tests/mapping/test_compile.py",
-    "plc.c": "tests/links/modbus_server/plc/test_running.py compiles what it writes",
     "plc.export": "tests/cli/test_export.py",
     "plc.header": "texts; tests/links/modbus_server/plc/test_targets.py",
     "plc.keywords": "lists; tests/plc/test_names.py",

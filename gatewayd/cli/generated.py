@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +43,9 @@ def _state(path: Path, content: bytes, *, once: bool, force: bool) -> State:
     from gatewayd.links.exports import is_as_generated
 
     try:
+        if not path.is_dir() and path.exists() and not path.is_file():
+            # To read a pipe would wait, and a device may have no end.
+            raise OSError(errno.EINVAL, "not a regular file", str(path))
         there = path.read_bytes()
     except FileNotFoundError:
         return "new"
@@ -58,5 +62,9 @@ def write(files: Sequence[Planned]) -> None:
         if file.is_written:
             file.path.parent.mkdir(parents=True, exist_ok=True)
             beside = file.path.with_name(f".{file.path.name}.new")
-            beside.write_bytes(file.content)
-            beside.replace(file.path)
+            try:
+                beside.write_bytes(file.content)
+                beside.replace(file.path)
+            except BaseException:
+                beside.unlink(missing_ok=True)
+                raise

@@ -129,5 +129,5 @@ def _real(number: float) -> str:
 
 
 def comment(text: str) -> str:
-    """A comment: what would end it is set apart."""
-    return f"/* {text.replace('*/', '* /')} */"
+    """A comment: what would end it is set apart, and what would begin another, of which compilers warn."""
+    return f"/* {text.replace('*/', '* /').replace('/*', '/ *')} */"

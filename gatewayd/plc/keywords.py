@@ -49,6 +49,23 @@ _C: Final = """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false
     alignas alignof asm class delete export new operator private protected public template this throw try virtual
+    and bitand bitor catch compl explicit friend mutable namespace nullptr not or typename using xor
+"""
+_C_MACROS: Final = """
+    dbl_decimal_dig dbl_dig dbl_epsilon dbl_has_subnorm dbl_mant_dig dbl_max dbl_max_10_exp dbl_max_exp dbl_min
+    dbl_min_10_exp dbl_min_exp dbl_true_min decimal_dig flt_decimal_dig flt_dig flt_epsilon flt_eval_method
+    flt_has_subnorm flt_mant_dig flt_max flt_max_10_exp flt_max_exp flt_min flt_min_10_exp flt_min_exp flt_radix
+    flt_rounds flt_true_min fp_ilogb0 fp_ilogbnan fp_infinite fp_nan fp_normal fp_subnormal fp_zero huge_val
+    huge_valf huge_vall infinity int16_max int16_min int32_max int32_min int64_max int64_min int8_max int8_min
+    int_fast16_max int_fast16_min int_fast32_max int_fast32_min int_fast64_max int_fast64_min int_fast8_max
+    int_fast8_min int_least16_max int_least16_min int_least32_max int_least32_min int_least64_max int_least64_min
+    int_least8_max int_least8_min intmax_max intmax_min intptr_max intptr_min ldbl_decimal_dig ldbl_dig ldbl_epsilon
+    ldbl_has_subnorm ldbl_mant_dig ldbl_max ldbl_max_10_exp ldbl_max_exp ldbl_min ldbl_min_10_exp ldbl_min_exp
+    ldbl_true_min linux m_1_pi m_2_pi m_2_sqrtpi m_e m_ln10 m_ln2 m_log10e m_log2e m_pi m_pi_2 m_pi_4 m_sqrt1_2
+    m_sqrt2 math_errexcept math_errhandling math_errno nan null ptrdiff_max ptrdiff_min sig_atomic_max
+    sig_atomic_min size_max uint16_max uint32_max uint64_max uint8_max uint_fast16_max uint_fast32_max
+    uint_fast64_max uint_fast8_max uint_least16_max uint_least32_max uint_least64_max uint_least8_max uintmax_max
+    uintptr_max unix wchar_max wchar_min wint_max wint_min
 """
 
 
@@ -62,5 +79,5 @@ CODESYS: Final = IEC | _words(_EDITION_3, _CODESYS)
 """Of CODESYS 3 and of TwinCAT 3, which stems from it."""
 SIEMENS: Final = IEC | _words(_EDITION_3, _SIEMENS)
 LOGIX: Final = _words(_LOGIX, _BLOCKS, _TYPES)
-C: Final = _words(_C)
-"""Of C, and those of C++ that a shared header had better avoid."""
+C: Final = _words(_C, _C_MACROS)
+"""Of C, what the headers that ours includes define as macros, and words of C++ for a header that both read."""

@@ -78,15 +78,30 @@ def writer_of(cell: CellDefinition, candidates: Collection[int], name: str | Non
         raise ExportError(
             f"the mapping has several writers on {where}: say which the PLC is, with --writer: {choice}"
         )
-    raise ExportError(f"`{name}` is no writer on {where}: --writer is one of {choice}")
+    otherwise = any(writer.name == name for writer in cell.writers)
+    hint = "; the mapping has it on another link" if otherwise else ""
+    raise ExportError(f"`{name}` is no writer on {where}: --writer is one of {choice}{hint}")
 
 
 def renamed(tags: Sequence[_Tag], names: Mapping[str, str]) -> list[_Tag]:
-    """The tags under the names that they have in the PLC. Raises ExportError for a name that there is not."""
+    """The tags under the names that they have in the PLC.
+
+    Raises ExportError for a name that there is not, and where two variables would be called alike.
+    """
     known = {tag.member for tag in tags}
     for name in names:
         if name not in known:
             raise ExportError(
                 f"--name {name}={names[name]}: {did_you_mean(name, known, f'there is no `{name}`')}"
+            )
+    called: dict[str, str] = {}
+    for member in dict.fromkeys(tag.member for tag in tags):
+        name = names.get(member, member)
+        other = called.setdefault(name, member)
+        if other != member:
+            both = f"`{other}` and `{member}`"
+            changed = member if member in names else other
+            raise ExportError(
+                f"{both} would both be called `{name}`: give one another name here: --name {changed}=NAME"
             )
     return [replace(tag, member=names.get(tag.member, tag.member)) for tag in tags]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -64,3 +65,17 @@ def test_a_folder_in_the_way_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "part.st").mkdir()
     with pytest.raises(OSError, match="directory"):
         planned(tmp_path, [PART], force=False)
+
+
+def test_a_pipe_in_the_way_is_an_error_and_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "part.st")
+    with pytest.raises(OSError, match="not a regular file"):
+        planned(tmp_path, [PART], force=True)
+
+
+def test_what_cannot_be_put_there_leaves_nothing_behind(tmp_path: Path) -> None:
+    found = planned(tmp_path, [PART], force=False)
+    (tmp_path / "part.st").mkdir()
+    with pytest.raises(OSError, match="directory"):
+        write(found)
+    assert [path.name for path in tmp_path.iterdir()] == ["part.st"]

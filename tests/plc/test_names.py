@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from dataclasses import replace
 
 import pytest
 
 from gatewayd.links.exports import ExportError
 from gatewayd.links.modbus_server.plc.model import PlcModel
+from gatewayd.links.modbus_server.plc.registry import files_for
 from gatewayd.links.modbus_server.plc.targets.iec_st import HOLDS
+from gatewayd.plc import keywords
 from gatewayd.plc.names import refuse_unfit
 from gatewayd.plc.tags import PlcWishes
 from tests.links.modbus_server.plc.cells import model
@@ -48,6 +52,39 @@ def test_names_that_differ_in_capitals_only() -> None:
     assert "`ready` differs from `Ready` in capitals only" in problem(
         model(variable("Ready"), variable("ready", 1))
     )
+
+
+COMPILER = shutil.which("cc")
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_no_variable_is_called_like_a_macro_that_the_header_brings_along() -> None:
+    """A member `NAN` or `linux` would be a number to the compiler."""
+    (header,) = files_for("c", model(variable("ready")))
+    command = [COMPILER or "", "-std=gnu17", "-dM", "-E", "-x", "c", "-"]
+    done = subprocess.run(command, input=header.content(), capture_output=True, check=True)
+    names = [line.split()[1] for line in done.stdout.decode().splitlines()]
+    plain = {name.lower() for name in names if name[0].isalpha() and "(" not in name}
+    assert {name for name in plain if not name.startswith("gw_")} <= keywords.C
+
+
+@pytest.mark.parametrize(
+    "names", [{"ready": "other"}, {"ready": "both", "other": "both"}, {"other": "ready"}], ids=str
+)
+def test_two_variables_that_would_be_called_alike(names: dict[str, str]) -> None:
+    """They would be one member, and one of them would be lost."""
+    with pytest.raises(
+        ExportError, match=r"`ready` and `other` would both be called `\w+`: .* --name \w+=NAME"
+    ):
+        model(variable("ready"), variable("other", 1), wishes=PlcWishes(writer="plc", names=names))
+
+
+def test_variables_may_change_their_names_for_one_another() -> None:
+    names = {"ready": "other", "other": "ready"}
+    (first, second) = model(
+        variable("ready"), variable("other", 1), wishes=PlcWishes(writer="plc", names=names)
+    ).outputs
+    assert (first.name, first.tags[0].name, second.name) == ("other", "ready", "ready")
 
 
 def test_everything_is_said_at_once_and_bounded() -> None:

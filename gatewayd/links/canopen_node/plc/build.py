@@ -61,8 +61,9 @@ def model_of(plan: Plan, wishes: PlcWishes) -> PdoModel:
     mapped = {pdo: list(_tags(pdo, node, cell)) for pdo in chosen}
     called = iter(renamed([tag for its in mapped.values() for tag in its], wishes.names))
     images = tuple(_image(pdo, [next(called) for _tag in its], cell) for pdo, its in mapped.items())
-    for image in images:
-        _refuse_doubles(image)
+    doubles = [line for image in images for line in _doubles(image)]
+    if doubles:
+        raise ExportError("\n".join(doubles))
     return PdoModel(
         cell=cell.name,
         source=printable(PurePath(plan.source).name),
@@ -168,13 +169,15 @@ def _words(pdo: PdoPlan, cell: CellDefinition) -> Iterator[PdoWord]:
         start += entry.bits
 
 
-def _refuse_doubles(image: PdoImage) -> None:
-    known: dict[str, str] = {}
+def _doubles(image: PdoImage) -> Iterator[str]:
+    """Members of one name in the structure of a PDO: elements of families have names of their own there."""
+    known = {word.object_name: ("", f"the {word.about}") for word in image.words}
     for tag in image.tags:
-        other = known.setdefault(tag.object_name.lower(), tag.name)
-        if other != tag.name:
-            raise ExportError(
-                f"{image.name}: `{tag.name}` and `{other}` would be the same member `{tag.object_name}`: "
+        path, other = known.setdefault(tag.object_name.lower(), (tag.path, f"`{tag.name}`"))
+        # What differs in capitals only is refused for every tool, with all else that it does not take.
+        if path.lower() != tag.path.lower():
+            yield (
+                f"{image.name}: `{tag.name}` and {other} would be the same member `{tag.object_name}`: "
                 f"call one of them otherwise here: --name {split_name(tag.name)[0]}=NAME"
             )
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from gatewayd.core.definition import Writer
 from gatewayd.links.canopen_node.plc.build import model_of
 from gatewayd.links.canopen_node.plc.registry import REFUSED, files_for
 from gatewayd.links.exports import ExportError
@@ -75,6 +78,44 @@ def test_members_that_would_be_the_same_are_refused() -> None:
     )
     with pytest.raises(ExportError, match=r"would be the same member `a_1`.*--name a_1=NAME"):
         model(*lines)
+
+
+def test_a_variable_called_like_a_word_of_the_status_beside_it_is_refused() -> None:
+    """In the structure of the PDO each has a member."""
+    lines = (
+        "quality_2: {robot: output_int_register_0, canopen: {type: INTEGER16}}",
+        "status_flags: {robot: output_int_register_1, canopen: {type: INTEGER16}}",
+    )
+    state = "state: {status: [flags, quality of status_flags], variables: [quality_2, status_flags]}"
+    with pytest.raises(ExportError) as caught:
+        model(*lines, settings=f", pdos: {{{state}}}")
+    assert str(caught.value).splitlines() == [
+        f"tpdo1: `{name}` and {word} would be the same member `{name}`: "
+        f"call one of them otherwise here: --name {name}=NAME"
+        for name, word in (
+            ("quality_2", "the quality of status_flags"),
+            ("status_flags", "the flags of the status"),
+        )
+    ]
+
+
+def test_names_that_differ_in_capitals_only_are_refused_with_all_else() -> None:
+    found = model(
+        "Ready: {robot: output_bit_register_0, canopen: auto}",
+        "ready: {robot: output_bit_register_1, canopen: auto}",
+        "step: {robot: output_bit_register_2, canopen: auto}",
+    )
+    with pytest.raises(
+        ExportError, match=r"(?s)`ready` differs from `Ready` in capitals only.*`step` is a word"
+    ):
+        files_for("iec-st", found)
+
+
+def test_a_writer_on_another_link_is_said_to_be_one() -> None:
+    plan = plan_of(START, TEMPERATURE, settings="")
+    cell = replace(plan.cell, writers=(*plan.cell.writers, Writer("hmi")))
+    with pytest.raises(ExportError, match=r"`hmi` is no writer on CANopen.* on another link"):
+        model_of(replace(plan, cell=cell), PlcWishes(writer="hmi"))
 
 
 @pytest.mark.parametrize("target", sorted(REFUSED))
