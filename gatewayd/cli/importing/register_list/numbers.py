@@ -128,9 +128,9 @@ def _of_iec(kind: str, number: int, part: str) -> Address:
         if not part.isdecimal():
             raise NotReadable("write %MX100.3, with the bit")
         hint = "CODESYS counts bytes there: write 50.3 for its %MX100.3, and 50.11 for %MX101.3"
-        return replace(_plain(number, part), doubt="%MX100.3 is taken as bit 3 of %MW100", hint=hint)
+        return replace(_plain(number, part), doubt="%MXn.b is taken as bit b of %MWn", hint=hint)
     if kind == "MD":
-        text = "%MD50 is taken as a double word, which begins at %MW100"
+        text = "%MDn is taken as the double word that begins at %MW(2n): %MD50 at %MW100"
         hint = "Schneider's controllers count words there: write %MW for their %MD"
         return replace(_plain(2 * number, part), doubt=text, hint=hint)
     if kind in ("QW", "IW"):

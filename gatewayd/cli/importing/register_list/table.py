@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from gatewayd.cli.importing.register_list.columns import DETAIL, MEANINGS, column_of
@@ -191,10 +191,12 @@ def _table(
 
 def _row(columns: Sequence[str], record: Sequence[ListCell], findings: ListFindings) -> ListRow:
     cells: dict[str, ListCell] = {}
-    for index, cell in enumerate(record):
+    for index, listed in enumerate(record):
+        cell = listed
         if cell.text.endswith(_END):
             text = "a quotation mark is not closed: all that follows would be this cell"
             findings.error(cell.place, text, "close it, or write it twice where it belongs to the text")
+            cell = replace(cell, text=cell.text.removesuffix(_END).rstrip())
         elif cell.goes_on:
             text = "a text in quotation marks goes on in the next line"
             findings.repeated_doubt(cell.place, text, "see whether rows are missing: a quotation mark may be")

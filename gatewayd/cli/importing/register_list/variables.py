@@ -126,8 +126,9 @@ def _register(
         number = free[side, kind]
         free[side, kind] += 1
         if number >= _MAX_REGISTERS[kind]:
-            text = f"the robot has no register {side}_{kind}_register_{number} for it"
-            findings.error(place.row.place("name"), text, "leave out what the robot program does not need")
+            text = f"the robot has no {side}_{kind}_register after {_MAX_REGISTERS[kind] - 1}"
+            hint = "leave out what the robot program does not need, or name fields of the robot in a column `robot`"
+            findings.repeated_error(place.row.place("name"), text, hint)
         chosen[place.name] = f"{side}_{kind}_register_{number}"
         findings.repeated_doubt(
             place.row.place("name"),

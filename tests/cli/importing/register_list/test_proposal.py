@@ -109,7 +109,7 @@ def test_columns_are_those_of_the_file() -> None:
         ),
         (
             "name,address,type,access\n" + "".join(f"a{n},{n},int16,R\n" for n in range(25)),
-            "no register output_int_register_24",
+            "no output_int_register after 23",
         ),
         ("name,address,type,access,object\na,1,int16,R,2000h:01\n", "CANopen objects are not imported"),
     ],
@@ -289,6 +289,12 @@ def test_both_limits_in_one_cell(cell: str) -> None:
     assert "limits: [0, 100]" in lines(found)["speed"]
 
 
+def test_what_the_robot_has_no_registers_for_is_one_error() -> None:
+    rows = "".join(f"v{number},{number},int16,R\n" for number in range(60))
+    (finding,) = errors(made(f"name,address,type,access\n{rows}", "from-0"))
+    assert finding[-1].startswith("the robot has no output_int_register after 23 (36 rows: lines 26, 27, ")
+
+
 def test_limits_twice_are_an_error() -> None:
     found = made("name,address,type,access,limits,min,max\nspeed,10,uint16,W,0..5,0,5\n", "from-0")
     assert [text for *_, text in errors(found)] == ["limits here, and in a column of their own"]
@@ -297,8 +303,12 @@ def test_limits_twice_are_an_error() -> None:
 @pytest.mark.parametrize(
     "address, place, doubt",
     [
-        ("%MX10.3", "10.3", "%MX100.3 is taken as bit 3 of %MW100"),
-        ("%MD5", "{holding: 10, type: int32, order: ABCD}", "%MD50 is taken as a double word"),
+        ("%MX10.3", "10.3", "%MXn.b is taken as bit b of %MWn"),
+        (
+            "%MD5",
+            "{holding: 10, type: int32, order: ABCD}",
+            "%MDn is taken as the double word that begins at %MW(2n)",
+        ),
         ("%QW7", "{holding: 7, type: int32, order: ABCD}", "%QW are outputs of the PLC"),
         ("%IW7", "{holding: 7, type: int32, order: ABCD}", "%IW are inputs of the PLC"),
     ],

@@ -30,7 +30,8 @@ def test_a_cell_may_have_several_lines() -> None:
 
 
 def test_a_quotation_mark_that_is_not_closed_swallows_no_rows() -> None:
-    _, findings = read('name,comment,address\na,"one,7\nb,two,8\n')
+    rows, findings = read('name,comment,address\na,"one,7\nb,two,8\n')
+    assert rows[0]["comment"][0] == "one,7 b,two,8"
     assert findings == ["a quotation mark is not closed: all that follows would be this cell"]
 
 
