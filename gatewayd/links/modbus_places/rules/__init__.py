@@ -1,1 +1,1 @@
-"""Rules about registers, units and listeners."""
+"""Rules about places in Modbus areas, whichever kind of link has them."""
