@@ -36,6 +36,9 @@ class Holds:
 
 def refuse_unfit(model: CellModel, holds: Holds, *, small: bool) -> None:
     """Raises ExportError with all that the target cannot hold, and the remedy of each."""
+    if not (model.inputs or model.outputs):
+        why = "; ".join(model.left_out)
+        raise ExportError(f"there is nothing for this PLC to read or to write{': ' if why else ''}{why}")
     found = [*_names(model, holds), *_types(model, holds, small=small)]
     if found:
         more = [f"and {len(found) - _SHOWN} more"] if len(found) > _SHOWN else []

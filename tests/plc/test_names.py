@@ -48,6 +48,13 @@ def test_the_longest_name_that_it_takes() -> None:
     refuse_unfit(model(variable("a" * 32)), HOLDS, small=False)
 
 
+def test_a_program_with_nothing_to_read_or_to_write() -> None:
+    """Its data types would have no members."""
+    start = "start: {robot: input_bit_register_0, modbus: 0.0, owner: plc}"
+    text = problem(model(start, wishes=PlcWishes(writer="none")))
+    assert text.startswith("there is nothing for this PLC to read or to write: `start`: ")
+
+
 def test_names_that_differ_in_capitals_only() -> None:
     assert "`ready` differs from `Ready` in capitals only" in problem(
         model(variable("Ready"), variable("ready", 1))

@@ -38,11 +38,11 @@ _LAST_SYNCHRONOUS: Final = 240
 
 
 def model_of(plan: Plan, wishes: PlcWishes) -> PdoModel:
-    """The model. Raises ExportError for a cell that is on no CAN bus, and where no program could do what it says."""
+    """The model. Raises ExportError for a cell that is no CANopen node, and where no program could do what it says."""
     node = canopen_of(plan)
     if node is None:
         raise ExportError(
-            f"{plan.source}: the cell is on no CAN bus: "
+            f"{plan.source}: the cell is no CANopen node: "
             "add `canopen: {channel: can0, bitrate: 500000, node: 16}`"
         )
     if wishes.host is not None:

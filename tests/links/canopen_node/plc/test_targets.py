@@ -52,6 +52,12 @@ def test_a_program_that_only_reads_sends_nothing(target: str) -> None:
 
 
 @EVERY_TARGET
+def test_a_program_that_only_writes_receives_nothing(target: str) -> None:
+    found = model("start: {robot: input_bit_register_0, canopen: auto, owner: plc}")
+    assert not any("from_node" in text for text in texts(target, found).values())
+
+
+@EVERY_TARGET
 def test_texts_of_the_mapping_never_leave_their_comment(target: str) -> None:
     found = model(
         r"""a: {robot: output_int_register_0, canopen: auto, unit: "s\nOUTSIDE", comment: "x\r\nOUTSIDE *) */ OUT"}"""

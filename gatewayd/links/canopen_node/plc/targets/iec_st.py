@@ -37,7 +37,7 @@ def files(model: PdoModel) -> Iterator[ExportedFile]:
     units = blocks(model, DIALECT, CONTENT)
     yield ExportedFile(f"{prefix}_Blocks.st", text_of(header(model, "blocks"), map(unit_source, units)))
     notes = (
-        "(* Copy the bytes of the TPDOs from your master into from_node here. *)",
+        "(* Copy the bytes of the TPDOs from your master into from_node here. *)" if model.from_node else "",
         "(* Copy the bytes of to_node into the RPDOs of your master here. *)" if model.to_node else "",
     )
     program = unit_source(main(model, notes=notes))
