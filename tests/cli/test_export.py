@@ -55,8 +55,8 @@ def test_standard_input() -> None:
 @pytest.mark.parametrize(
     "arguments, code, message",
     [
-        (["eds", MODBUS_ONLY], 1, "the cell is no CANopen node"),
-        (["dcf", MODBUS_ONLY], 1, "the cell is no CANopen node"),
+        (["eds", MODBUS_ONLY], 1, "the cell is on no CAN bus"),
+        (["dcf", MODBUS_ONLY], 1, "the cell is on no CAN bus"),
         (["urscript", MODBUS_ONLY, "--handshake", "in_bits"], 1, "TOGGLE:ACKNOWLEDGE"),
         (["eds", BROKEN], 1, "error GW402 pdo-too-long"),
         (["eds", "nowhere.yaml"], 2, "nowhere.yaml: cannot be read: No such file or directory"),

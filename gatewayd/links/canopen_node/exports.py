@@ -24,7 +24,7 @@ def _exported(plan: Plan, *, configured: bool) -> str:
     node = canopen_of(plan)
     if node is None:
         raise ExportError(
-            f"{plan.source}: the cell is no CANopen node: "
+            f"{plan.source}: the cell is on no CAN bus: "
             "add `canopen: {channel: can0, bitrate: 500000, node: 16}`"
         )
     dictionary = objects_of(node, plan.cell)
