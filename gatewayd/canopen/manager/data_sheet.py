@@ -141,12 +141,15 @@ class DataSheet:
 
     @property
     def identity(self) -> ExpectedIdentity:
-        """What the device should say of itself. 0 in a data sheet says nothing; serial numbers are never in one."""
+        """What the device should say of itself. 0 in a data sheet says nothing; serial numbers are never in one.
+
+        Product codes are optional in devices: one that is named only for tools ([DeviceInfo]) is not asked for.
+        """
         about = self._dictionary.device_information
         return ExpectedIdentity(
             self.number(0x1000, 0) or None,
             self.number(0x1018, 1) or about.vendor_number or None,
-            self.number(0x1018, 2) or about.product_number or None,
+            (self.number(0x1018, 2) or about.product_number or None) if self.find(0x1018, 2) else None,
             None,
             None,
         )

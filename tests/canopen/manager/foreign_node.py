@@ -14,9 +14,9 @@ from typing import Any, cast
 
 import can
 
-from tests.canopen.manager.sheets import FILE, entry
+from tests.canopen.manager.sheets import DEVICE
 
-VENDOR = 0x1F0
+VENDOR, PRODUCT = 0x1F0, 0x401
 BIT_RATE = 500_000
 
 
@@ -31,22 +31,7 @@ class Canopen:
     def __init__(self, interface: str, channel: str, node: int) -> None:
         import canopen
 
-        text = FILE + "".join(
-            (
-                entry("1017", 6, PDOMapping=0, DefaultValue=0),
-                entry("1014", 7, PDOMapping=0, DefaultValue="$NODEID+0x80"),
-                entry("2000", 6, DefaultValue=0),
-                entry("6200", 5, DefaultValue=0),
-                entry("1400", 7, ObjectType="0x9", SubNumber=2),
-                entry("1400sub0", 5, DefaultValue=1),
-                entry("1400sub1", 7, DefaultValue="$NODEID+0x200"),
-                entry("1400sub2", 5, DefaultValue=255),
-                entry("1600", 7, ObjectType="0x9", SubNumber=2),
-                entry("1600sub0", 5, DefaultValue=1),
-                entry("1600sub1", 7, DefaultValue="0x62000008"),
-            )
-        )
-        sheet = io.StringIO(text)
+        sheet = io.StringIO(DEVICE)
         sheet.name = "device.eds"
         self._network: Any = canopen.Network(_bus(interface, channel))
         self._network.NOTIFIER_CYCLE = 0.01
@@ -109,6 +94,7 @@ class Durand:
         objects[0x6200] = Variable(DatatypeEnum.UNSIGNED8, "rw", 0)
         objects.write(0x1000, 0, 0x20196)
         objects.write(0x1018, 1, VENDOR)
+        objects.write(0x1018, 2, PRODUCT)
         self._node.tpdo[0].mapping = [(0x6004, 0)]
         self._node.rpdo[0].mapping = [(0x6200, 0)]
         self._node.nmt.reset()

@@ -24,7 +24,7 @@ DefaultValue=0x00020196
 [1018]
 ParameterName=Identity
 ObjectType=0x9
-SubNumber=2
+SubNumber=3
 [1018sub0]
 ParameterName=Highest
 DataType=0x0005
@@ -35,6 +35,10 @@ ParameterName=Vendor-ID
 DataType=0x0007
 AccessType=ro
 DefaultValue=0x1F0
+[1018sub2]
+ParameterName=Product code
+DataType=0x0007
+AccessType=ro
 [1800]
 ParameterName=TPDO 1
 ObjectType=0x9
@@ -82,3 +86,21 @@ def entry(index: str, kind: int, **keys: object) -> str:
     lines = {"ParameterName": f"Object {index}", "ObjectType": "0x7", "DataType": f"0x{kind:04X}"}
     lines |= {"AccessType": "rw", "PDOMapping": "1"} | {key: str(value) for key, value in keys.items()}
     return f"[{index}]\n" + "".join(f"{key}={value}\n" for key, value in lines.items())
+
+
+DEVICE = FILE + "".join(
+    (
+        entry("1017", 6, PDOMapping=0, DefaultValue=0),
+        entry("1014", 7, PDOMapping=0, DefaultValue="$NODEID+0x80"),
+        entry("2000", 6, DefaultValue=0),
+        entry("6200", 5, DefaultValue=0),
+        entry("1400", 7, ObjectType="0x9", SubNumber=2),
+        entry("1400sub0", 5, DefaultValue=1),
+        entry("1400sub1", 7, DefaultValue="$NODEID+0x200"),
+        entry("1400sub2", 5, DefaultValue=255),
+        entry("1600", 7, ObjectType="0x9", SubNumber=2),
+        entry("1600sub0", 5, DefaultValue=1),
+        entry("1600sub1", 7, DefaultValue="0x62000008"),
+    )
+)
+"""The sheet of the devices in `foreign_node`."""

@@ -163,6 +163,10 @@ def test_switched_off_and_empty_pdos_are_none() -> None:
     assert sheet(text=FILE.replace("DefaultValue=0x60040020", "DefaultValue=0")).pdos() == ()
 
 
+def test_product_code_that_only_tools_know_is_not_asked_for() -> None:
+    assert sheet(text=FILE.replace("[1018sub2]", "[2222]")).identity.product is None
+
+
 def test_layout_that_cannot_be_written() -> None:
     assert sheet(
         text=FILE.replace("Number\nDataType=0x0005\nAccessType=rw", "Number\nDataType=0x0005\nAccessType=ro")

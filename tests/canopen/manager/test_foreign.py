@@ -2,64 +2,19 @@
 
 from __future__ import annotations
 
-import asyncio
-import json
 import signal
 import sys
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, suppress
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator
 
 import pytest
 
-from gatewayd.canopen.datatypes import CanType
-from gatewayd.canopen.manager.node import ManagedNode
-from gatewayd.canopen.manager.plan import (
-    ExpectedIdentity,
-    ManagedPdo,
-    ManagerPlan,
-    NodePlan,
-    ObjectReading,
-    PdoObject,
-    Setting,
-)
-from gatewayd.canopen.manager.runtime import Manager
+from gatewayd.canopen.manager.plan import ExpectedIdentity
 from gatewayd.loop import clock
-from tests.canopen.manager.bench import Diary
-from tests.canopen.manager.foreign_node import VENDOR
+from tests.canopen.manager.foreign import NODES, PATIENCE, Foreign, care, managing
 from tests.e2e.processes import HOST, Process, free_port
 from tests.links.canopen_node.recorder import until
 
 pytestmark = pytest.mark.slow
-
-POSITION = PdoObject(0x6004, 0, 32, CanType.UNSIGNED32)
-OUTPUT = PdoObject(0x6200, 0, 8, CanType.UNSIGNED8)
-NODES = {"canopen": 5, "durand": 6}
-PATIENCE = 10.0
-
-
-class Foreign(Process):
-    """A device by somebody else."""
-
-    def __init__(self, kind: str, channel: str, log: Path) -> None:
-        self.kind, self.node = kind, NODES[kind]
-        words = [
-            sys.executable,
-            "-m",
-            "tests.canopen.manager.foreign_node",
-            kind,
-            "slcan",
-            channel,
-            str(self.node),
-        ]
-        super().__init__(words, log)
-
-    def do(self, *command: Any) -> Any:
-        """Carry out a command; its result."""
-        assert self.popen.stdin is not None
-        self.popen.stdin.write(json.dumps(command) + "\n")
-        return json.loads(self.answer())
 
 
 @pytest.fixture(scope="module")
@@ -88,35 +43,6 @@ def devices(channel: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 @pytest.fixture(params=NODES)
 def device(request: pytest.FixtureRequest, devices: dict[str, Foreign]) -> Foreign:
     return devices[request.param]
-
-
-@asynccontextmanager
-async def managing(channel: str) -> AsyncIterator[Manager]:
-    manager = Manager(ManagerPlan("slcan", channel, 500_000, node=127, heartbeat=100))
-    task = asyncio.create_task(manager.run())
-    yield manager
-    task.cancel()
-    with suppress(asyncio.CancelledError):
-        await task
-
-
-def care(manager: Manager, device: Foreign, **changes: Any) -> tuple[ManagedNode, Diary]:
-    node, diary = device.node, Diary()
-    settings: dict[str, Any] = {
-        "expected": ExpectedIdentity(0x20196, VENDOR),
-        "heartbeat": 0.5,
-        "producer": 100,
-        "pdos": (
-            ManagedPdo(1, True, 0x180 + node, (POSITION,), written=True, transmission=255),
-            ManagedPdo(1, False, 0x200 + node, (OUTPUT,)),
-        ),
-        "readings": (
-            ObjectReading(0x6004, 0, CanType.UNSIGNED32),
-            ObjectReading(0x2000, 0, CanType.UNSIGNED16, 0.05),
-        ),
-        "settings": (Setting(0x2000, 0, b"\x34\x12"),),
-    }
-    return manager.attach(NodePlan(node, **settings | changes), diary), diary
 
 
 async def test_boot_values_emergencies_reboot_and_loss(channel: str, device: Foreign) -> None:

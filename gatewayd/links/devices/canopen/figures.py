@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 from gatewayd.canopen.manager.channel import SdoCounters
 from gatewayd.canopen.manager.node import ManagedCounters, NodeCondition
 from gatewayd.links.contract import LinkHealth
 from gatewayd.links.devices.canopen.managed import ManagedDevice
 from gatewayd.links.devices.status_words import DeviceFigures, DeviceState
-
-_REMEDY: Final = "look at its power, its cable, its node-ID and the bit-rate of the bus"
 
 
 def state_of(link: ManagedDevice) -> tuple[DeviceState, str]:
@@ -26,9 +22,7 @@ def state_of(link: ManagedDevice) -> tuple[DeviceState, str]:
     if condition is NodeCondition.READY:
         missing = ", ".join(map(str, manager.bus_manager.missing))
         return DeviceState.STARTING, f"it waits for mandatory nodes that are missing: {missing}"
-    if condition is NodeCondition.ABSENT:
-        return DeviceState.LOST, f"{node.problem}: {_REMEDY}"
-    if condition is NodeCondition.FAILED:
+    if condition in (NodeCondition.ABSENT, NodeCondition.FAILED):
         return DeviceState.LOST, node.problem
     if condition is NodeCondition.BOOTING:
         return DeviceState.STARTING, f"the manager {node.boot.step.value}"

@@ -92,6 +92,10 @@ class CanopenDeviceLink(ManagedDevice):
             self._tick(clock.now())
             await asyncio.sleep(PERIOD)
 
+    def gap(self, since: float, now: float) -> None:
+        """The process stood still from `since` to `now`."""
+        self._inflow.gap(now - since)
+
     def departing(self, plan: LinkPlan | None, after: CellDefinition) -> Mapping[Requester, str]:
         """The device as a writer, where another link takes this one's place."""
         gone = plan is None and self._inflow.connected and self._inflow.requester.writer is not None

@@ -17,6 +17,7 @@ from gatewayd.core.cell import Cell
 from gatewayd.links.devices.canopen.buses import CanopenBuses
 from gatewayd.links.devices.canopen.link import CanopenDeviceLink
 from gatewayd.links.devices.canopen.plan import CanopenDevicePlan
+from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.loader import load
 from gatewayd.mapping.plan import Plan
 
@@ -152,3 +153,16 @@ async def managed(links: list[CanopenDeviceLink]) -> AsyncIterator[CanopenBuses]
 def link_of(plan: Plan, cell: Cell) -> CanopenDeviceLink:
     """The link to its encoder."""
     return CanopenDeviceLink(the_device(plan), cell)
+
+
+def expanded(variables: str, more: str = "") -> ExpandedCell:
+    """A cell with these variables."""
+    found = load(text(variables, more=more).encode(), "press.yaml")
+    assert found.cell is not None
+    return found.cell
+
+
+def line(name: str, robot: str, place: str) -> str:
+    """One variable."""
+    owner = ", owner: encoder" if robot.startswith("input") else ""
+    return f"  {name}: {{robot: {robot}, device: {{at: encoder, {place}}}{owner}}}\n"

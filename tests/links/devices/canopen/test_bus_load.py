@@ -9,8 +9,7 @@ from gatewayd.canopen.sync import SyncPlan
 from gatewayd.links.devices.canopen.bus_load import device_shares, manager_shares
 from gatewayd.links.devices.expand import devices_of
 from gatewayd.links.devices.sections import DeviceSpec
-from tests.links.devices.canopen.cells import VARIABLES
-from tests.links.devices.canopen.test_expand import expanded
+from tests.links.devices.canopen.cells import VARIABLES, expanded
 
 
 def shares(more: str = "") -> dict[str, float]:

@@ -9,32 +9,18 @@ from gatewayd.canopen.manager.plan import ManagedPdo, PdoObject
 from gatewayd.links.devices.canopen.expand import DeviceLayout, lay_out, object_of
 from gatewayd.links.devices.expand import devices_of
 from gatewayd.links.devices.sections import DeviceSpec
-from gatewayd.mapping.expanded import ExpandedCell
 from gatewayd.mapping.loader import load
-from tests.links.devices.canopen.cells import text
+from tests.links.devices.canopen.cells import expanded, line, text
 
 POSITION = PdoObject(0x6004, 0, 32, CanType.UNSIGNED32)
 SPEED = PdoObject(0x6030, 0, 16, CanType.INTEGER16)
 SWITCH = PdoObject(0x6010, 0, 1, CanType.BOOLEAN)
 
 
-def expanded(variables: str, more: str = "") -> ExpandedCell:
-    """A cell with these variables."""
-    found = load(text(variables, more=more).encode(), "press.yaml")
-    assert found.cell is not None
-    return found.cell
-
-
 def layout(variables: str, more: str = "") -> DeviceLayout:
     """The PDOs of its encoder."""
     cell = expanded(variables, more)
     return lay_out(cell.document, cell.document.parts(DeviceSpec)["encoder"], devices_of(cell).of("encoder"))
-
-
-def line(name: str, robot: str, place: str) -> str:
-    """One variable."""
-    owner = ", owner: encoder" if robot.startswith("input") else ""
-    return f"  {name}: {{robot: {robot}, device: {{at: encoder, {place}}}{owner}}}\n"
 
 
 def test_pdo_of_the_data_sheet_is_taken_as_it_is() -> None:

@@ -14,8 +14,7 @@ from gatewayd.links.devices.declaration import KIND
 from gatewayd.links.devices.modbus.sections import ModbusDeviceKeys, ModbusPlaceKeys
 from gatewayd.links.devices.sections import DeviceKeys, PlaceKeys
 from gatewayd.mapping.loader import load
-from tests.links.devices.canopen.cells import SHEET, VARIABLES, planned, text, the_device
-from tests.links.devices.canopen.test_expand import line
+from tests.links.devices.canopen.cells import SHEET, VARIABLES, line, planned, text, the_device
 
 
 def test_plan_has_all_that_the_daemon_needs() -> None:

@@ -143,6 +143,21 @@ async def test_reload_goes_on_with_the_same_device(channel: str) -> None:
         assert successor.owner("position") == ""
 
 
+def test_gap_of_our_own_makes_no_value_old() -> None:
+    plan = planned()
+    robot = FakeRobot(plan)
+    link = link_of(plan, robot.cell)
+    robot.fresh(100.0)
+    link.node_started(100.0)
+    link.pdo_received(0, [1500], 100.0)
+    link.gap(100.5, 160.0)
+    assert robot.owner("position") == "encoder"
+    link._tick(160.1)
+    assert robot.owner("position") == "encoder"
+    link._tick(170.0)
+    assert robot.owner("position") == ""
+
+
 def test_departing_writer_is_named() -> None:
     plan = planned()
     cell = Cell(plan.cell)
