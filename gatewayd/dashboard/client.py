@@ -22,7 +22,6 @@ from gatewayd.loop import clock
 from gatewayd.loop.progress import wait_with_progress
 from gatewayd.loop.resolve import resolve
 
-DEFAULT_PORT = 29999
 CONNECT_WITHIN = 5.0
 """Seconds for a connection."""
 GREETED_WITHIN = 10.0

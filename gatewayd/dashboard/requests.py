@@ -36,6 +36,8 @@ class StateQuestion(Enum):
     """e-Series from 5.6 on; a CB3 controller knows no local control."""
 
 
+DEFAULT_PORT = 29999
+"""Where a controller listens."""
 ANSWER_WITHIN = 15.0
 """Seconds within which commands are answered: `play` returns when the program has been started."""
 LOADED_WITHIN = 120.0

@@ -45,12 +45,13 @@ class LinkLanguage:
     """Of the kind: the key of its section, and of its places at variables and writers."""
     section_key: ClassVar[str] = ""
     """Of its section in the file, where that is another one than `key`; see `top_key`."""
-    section: ClassVar[type[Section]]
-    """The table at the top of the file; of a kind with `several` links, each table in it."""
+    section: ClassVar[type[Section] | None]
+    """The table at the top of the file; of a kind with `several` links, each table in it. None: its links are declared
+    inside the section of another kind, and `compile_links` makes them."""
     several: ClassVar[bool] = False
     """Whether its section is a table of names, each with a table of its own. A valid one is no part in
     `Document.sections`, but one of `Document.named`; each makes a link of that name (`compile_links`)."""
-    meaning: ClassVar[str]
+    meaning: ClassVar[str] = ""
     """What the section is, for editors: `the Modbus TCP server`."""
     required: ClassVar[bool] = False
     defines: ClassVar[bool] = False
@@ -120,6 +121,9 @@ class LinkLanguage:
 
     # -- writers -----------------------------------------------------------------------------------------------------
 
+    commands: ClassVar[bool] = False
+    """Whether who writes by this kind means each value that it writes, so that it may give commands
+    (`core.commands`)."""
     writer_example: ClassVar[str] = ""
     """How a writer is made known: `modbus: 192.168.1.20`."""
     way: ClassVar[str] = ""

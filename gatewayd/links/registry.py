@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 LINK_KINDS = (
     "gatewayd.links.robot",
+    "gatewayd.links.robot.dashboard",
     "gatewayd.links.modbus_server",
     "gatewayd.links.canopen_node",
     "gatewayd.links.devices",

@@ -84,6 +84,7 @@ def _variable(variable: ExpandedVariable, shown: Shown) -> Variable:
         shown=shown.bounds,
         shows_nan=shown.nan,
         valid_running=variable.valid_running,
+        via=variable.via,
     )
 
 

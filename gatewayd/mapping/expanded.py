@@ -41,6 +41,8 @@ class Defined:
     """It grows for ever."""
     moves: bool = False
     """Writing it moves the robot, whatever the variable is called."""
+    via: str = ""
+    """Name of the link that carries it, where the robot's packages do not; an input is a command then."""
     counterpart: str = ""
     """What lies on the other side: the input to write for an output, the output that reports for an input; or empty."""
 

@@ -77,6 +77,7 @@ FILE: Final = _with(
             if language.required
             else language.section | None
             for language in languages()
+            if language.section is not None
         },
         "writers": dict[Name, WRITER],  # type: ignore[valid-type]
         "groups": dict[Name, Group],
@@ -92,6 +93,7 @@ FILE: Final = _with(
         if language.required
         else Field(default=None, description=language.meaning)
         for language in languages()
+        if language.section is not None
     },
     writers=Field(default_factory=dict, description="who may write inputs"),
     groups=Field(default_factory=dict, description="variables that are owned together"),

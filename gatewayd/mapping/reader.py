@@ -211,10 +211,13 @@ class _Reader:
         return MappingTest(name, entry.key.position, tuple(step for step in steps if step is not None))
 
     def _link(self, language: LinkLanguage, root: Table) -> Part[Section] | None:
-        part = self._section(language.section, root.entries.get(language.top_key))
+        part = None
+        if language.section is not None:
+            part = self._section(language.section, root.entries.get(language.top_key))
         return None if part is None or self._is_broken(language, part) else part
 
     def _named(self, language: LinkLanguage, root: Table) -> dict[str, Part[Section]]:
+        assert language.section is not None
         parts = self._sections(language.section, root.entries.get(language.top_key))
         return {name: part for name, part in parts.items() if not self._is_broken(language, part)}
 

@@ -42,9 +42,11 @@ _STATES = {
     ProgramState.RUNNING: "PLAYING",
     ProgramState.RESUMING: "PLAYING",
     ProgramState.RETRACTING: "PLAYING",
-    ProgramState.PAUSING: "PAUSED",
+    ProgramState.STOPPING: "PLAYING",
+    ProgramState.PAUSING: "PLAYING",
     ProgramState.PAUSED: "PAUSED",
 }
+"""As long as the arm brakes, the program has not come to its end."""
 
 
 class PolyScope:
@@ -105,6 +107,10 @@ class PolyScope:
         if word in self._tells:
             return self._tells[word]()
         return "showing popup" if word.startswith("popup ") else "Added log message"
+
+    def is_question(self, line: str) -> bool:
+        """Whether a line asks for something that changes nothing."""
+        return " ".join(line.split()).lower() in self._tells
 
     def _is_known(self, word: str) -> bool:
         since = _SINCE.get(word)

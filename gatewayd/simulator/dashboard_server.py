@@ -99,7 +99,8 @@ class _Connection(asyncio.Protocol):
             line = each.decode("utf-8", "replace").strip()
             self._server.note(line)
             answer = self._server.polyscope.answer(line, allowed=self._allowed)
-            _log.info("dashboard: %s: %s", line, answer)
+            level = logging.DEBUG if self._server.polyscope.is_question(line) else logging.INFO
+            _log.log(level, "dashboard: %s: %s", line, answer)
             self._say(answer)
             if line.lower() == "quit":
                 self._transport.close()

@@ -70,6 +70,7 @@ _SECTIONS = {
     "": "The file",
     "RobotSection": "`robot:`",
     "Watchdog": "`robot: watchdog:`",
+    "DashboardSection": "`robot: dashboard:`",
     "Modbus": "`modbus:`",
     "Canopen": "`canopen:`",
     "IdentitySpec": "`canopen: identity:`",

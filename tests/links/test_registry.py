@@ -52,6 +52,7 @@ def test_a_kind_that_is_none_is_an_error(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_every_kind_has_a_decoder_of_its_own() -> None:
     assert {kind.key: decoder_of(kind.key).medium for kind in kinds()} == {
         "robot": Medium.TCP_CLIENT,
+        "dashboard": Medium.TCP_CLIENT,
         "modbus": Medium.TCP_SERVER,
         "canopen": Medium.CAN,
         "device": Medium.OTHER,

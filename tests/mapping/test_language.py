@@ -16,8 +16,8 @@ def test_keys_come_in_the_order_of_the_kinds() -> None:
         "gatewayd", "cell", "robot", "modbus", "canopen", "devices", "writers", "groups", "variables", "tests",
     ]  # fmt: skip
     assert list(VARIABLE.model_fields) == [
-        "robot", "modbus", "canopen", "device", "owner", "takeover", "lease", "group", "limits", "clamp", "on_release",
-        "on_stale", "valid", "deadband", "unit", "comment",
+        "robot", "dashboard", "modbus", "canopen", "device", "owner", "takeover", "lease", "group", "limits", "clamp",
+        "on_release", "on_stale", "valid", "deadband", "unit", "comment",
     ]  # fmt: skip
     assert list(WRITER.model_fields) == [
         "modbus", "canopen", "pdos", "node", "heartbeat", "guarding", "device", "timeout", "timeout_counts",

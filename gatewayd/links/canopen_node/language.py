@@ -46,6 +46,7 @@ class CanopenLanguage(LinkLanguage):
     """Section `canopen`, the key `canopen` of variables; `canopen`, `node`, `heartbeat`, `guarding` of writers."""
 
     key = KIND.key
+    commands = True
     section = Canopen
     meaning = "the CANopen node"
     variable_keys = CanopenPlaces

@@ -31,6 +31,7 @@ class ModbusLanguage(LinkLanguage):
     section = Modbus
     meaning = "the Modbus TCP server"
     counts_absent = True
+    commands = True
     variable_keys = ModbusPlaces
     writer_keys = ModbusWriter
     rules = (

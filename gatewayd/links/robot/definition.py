@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from gatewayd.core.definition import Direction, ValueKind
+from gatewayd.links.robot.dashboard.definition import defined
+from gatewayd.links.robot.dashboard.sections import DashboardPlace
 from gatewayd.links.robot.reference import FieldDeclaration, Target, resolve
 from gatewayd.links.robot.sections import RobotField, RobotPlace, RobotSection, RobotValidity
 from gatewayd.mapping.document import Document, Part
@@ -29,10 +31,12 @@ _OUTPUT_REGISTER: Final = "output_"
 
 def define(line: Part[VariableSpec], document: Document) -> tuple[list[Defined], bool]:
     """The values that a line names, in order, and whether they are a family. Raises UnresolvedReference."""
-    place = line.spec.by(RobotPlace).robot
+    robot, name = document.part(RobotSection), line.spec.by(DashboardPlace).dashboard
+    if name is not None:
+        return [defined(name, robot.spec.dashboard if robot is not None else None)], False
+    place = line.spec.by(RobotPlace).field
     reference = place.field
     targets = resolve(reference, declared(place))
-    robot = document.part(RobotSection)
     of_all = robot is not None and robot.spec.valid is not None
     is_asked = line.spec.by(RobotValidity).valid is not None
     values = [
@@ -60,8 +64,10 @@ def field_of(variable: ExpandedVariable) -> Field | None:
 
 def type_of(variable: ExpandedVariable) -> DataType | None:
     """The type that is declared for the field that carries it; None where the catalogue says it."""
+    if variable.via:
+        return None
     is_bit_register = not variable.target.startswith(variable.field)
-    return None if is_bit_register else declared(variable.spec.by(RobotPlace).robot).type
+    return None if is_bit_register else declared(variable.spec.by(RobotPlace).field).type
 
 
 def is_program_output(variable: ExpandedVariable) -> bool:

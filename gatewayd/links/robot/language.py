@@ -7,6 +7,7 @@ from typing import ClassVar, Final
 
 from gatewayd.core.definition import Direction
 from gatewayd.links.language import DefiningLanguage, WriterName
+from gatewayd.links.robot.dashboard.sections import DashboardPlace, DashboardSection
 from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.robot.definition import define, type_of
 from gatewayd.links.robot.plan import RobotPlan, WatchdogPlan
@@ -57,11 +58,13 @@ class RobotLanguage(DefiningLanguage):
     tables = "gatewayd.links.robot.tables"
     nested: ClassVar[Mapping[tuple[type[Section], str], type[Section]]] = {
         (RobotSection, "watchdog"): Watchdog,
+        (RobotSection, "dashboard"): DashboardSection,
         (VariableSpec, "robot"): RobotField,
     }
     articles: ClassVar[Mapping[type[Section], str]] = {
         RobotSection: "the section `robot`",
         Watchdog: "the watchdog",
+        DashboardSection: "the dashboard server",
         RobotField: "a field of the robot",
     }
     telling_keys = ("host", "frequency", "port", "series", "version", "adopt_for", "valid")
@@ -81,8 +84,22 @@ class RobotLanguage(DefiningLanguage):
         ):
             message = "`adopt_for` is for adopted inputs, and `on_connect: fallback` adopts none"
             yield robot.key_at("adopt_for"), message, "remove one of the two"
-        for line in document.variables.values():
+        lines = document.variables.values()
+        has_any = any(line.spec.by(DashboardPlace).dashboard is not None for line in lines)
+        if robot is not None and robot.spec.dashboard is not None and not has_any:
+            message = "the dashboard server is opened, and no variable is a command or a state of it"
+            yield (
+                robot.key_at("dashboard"),
+                message,
+                "add for example `start: {dashboard: play}`, or remove it",
+            )
+        for line in lines:
             place = line.spec.by(RobotPlace).robot
+            if place is None:
+                if line.spec.by(RobotValidity).valid is not None:
+                    message = "`valid` is for outputs that packages carry, and the dashboard server needs no program"
+                    yield line.key_at("valid"), message, "remove it"
+                continue
             if place.direction is not None and is_known(place.field):
                 message = f"the direction of `{place.field}` follows from its name"
                 yield line.key_at("robot", "direction"), message, "remove it"
@@ -110,7 +127,8 @@ class RobotLanguage(DefiningLanguage):
 
     def named(self, line: Part[VariableSpec]) -> str:
         """The reference of a line."""
-        return str(line.spec.by(RobotPlace).robot.field)
+        name = line.spec.by(DashboardPlace).dashboard
+        return f"dashboard {name}" if name is not None else str(line.spec.by(RobotPlace).field.field)
 
     def settings(self, document: Document) -> CellSettings:
         """When values are stale, and what becomes of those that the controller holds."""
@@ -164,7 +182,11 @@ def _declared_types(cell: ExpandedCell) -> tuple[tuple[str, str], ...]:
 
 def _fields(cell: ExpandedCell, direction: Direction) -> tuple[str, ...]:
     return tuple(
-        dict.fromkeys(variable.field for variable in cell.variables if variable.direction is direction)
+        dict.fromkeys(
+            variable.field
+            for variable in cell.variables
+            if variable.direction is direction and not variable.via
+        )
     )
 
 

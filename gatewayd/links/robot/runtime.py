@@ -344,7 +344,8 @@ class RobotLink(SourceLink):
         self._notes.refused(self._agreed, reasons, self._cell.definition.variables)
         for index, reason in reasons.items():
             self._cell.set_availability([index], False, reason, now)
-        served = (index for index in range(len(self._cell.definition.variables)) if index not in reasons)
+        variables = self._cell.definition.variables
+        served = (index for index, each in enumerate(variables) if index not in reasons and not each.via)
         self._cell.set_availability(served, True, "", now)
 
     def _adopt(self, session: Session, flat: Sequence[Value], now: float) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
+from gatewayd.links.robot.dashboard.sections import DashboardPlace, DashboardSection
 from gatewayd.links.robot.scalars import RobotReference, Version
-from gatewayd.mapping.scalars import Duration, Host, Name, Names, OptionalDuration, Real, Whole
+from gatewayd.mapping import syntax
+from gatewayd.mapping.scalars import Duration, Host, Name, Names, OptionalDuration, Real, Whole, refuse
 from gatewayd.mapping.section import Section
 from gatewayd.mapping.typed import BeforeValidator, Field
 from gatewayd.rtde.types import DEFAULT_PORT
@@ -69,6 +72,11 @@ class RobotSection(Section):
         description="running: the output registers (`output_*`) are good only while the robot program runs",
     )
     watchdog: Watchdog | None = Field(default=None, description="register that is fed while all is well")
+    dashboard: DashboardSection | None = Field(
+        default=None,
+        description="the dashboard server of CB3 and e-Series controllers, by which variables start programs; default: "
+        "it is not used",
+    )
 
 
 class RobotField(Section):
@@ -93,12 +101,39 @@ def _field(value: Any) -> Any:
 class RobotPlace(Section):
     """What a variable is in the robot."""
 
+    schema_extra: ClassVar[Mapping[str, Any]] = {
+        "oneOf": [{"required": ["robot"]}, {"required": ["dashboard"]}]
+    }
+
     robot: Annotated[
-        RobotField, BeforeValidator(_field, json_schema_input_type=RobotReference | RobotField)
+        RobotField | None, BeforeValidator(_field, json_schema_input_type=RobotReference | RobotField)
     ] = Field(
+        default=None,
         description="RTDE field, 'field[element]', field.bit, a range of registers such as output_int_register_0..23, "
-        "or {field: ..., type: ...} for one that the catalogue does not have"
+        "or {field: ..., type: ...} for one that the catalogue does not have",
     )
+
+    @property
+    def field(self) -> RobotField:
+        """The field of a variable that packages carry."""
+        assert self.robot is not None
+        return self.robot
+
+    def judge(self) -> None:
+        """A variable is one thing in the robot."""
+        dashboard = self.by(DashboardPlace).dashboard
+        if self.robot is None and dashboard is None:
+            refuse(syntax.MISSING_KEY, "a variable needs the key `robot` or `dashboard`", _WHAT_IT_IS)
+        if self.robot is not None and dashboard is not None:
+            message = (
+                f"a variable is either `robot: {self.robot.field}` or `dashboard: {dashboard}`, not both"
+            )
+            refuse(syntax.UNKNOWN_KEY, message, "remove one of the two, or make two variables of it")
+
+
+_WHAT_IT_IS = (
+    "`robot`: an RTDE field such as input_bit_register_0; `dashboard`: a command or state such as play"
+)
 
 
 class RobotValidity(Section):

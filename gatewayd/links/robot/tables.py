@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from gatewayd.core.definition import Direction
+from gatewayd.links.robot.dashboard.variables import meanings_of, name_of
 from gatewayd.links.robot.declaration import KIND
 from gatewayd.links.tables import LinkTables
 from gatewayd.mapping.expanded import ExpandedCell
@@ -36,6 +37,9 @@ class RobotTables(LinkTables):
         used: dict[str, set[int | None]] = {}
         for variable in cell.variables:
             used.setdefault(variable.field, set()).add(variable.bit)
+        for variable in cell.variables:
+            if variable.via and (numbers := meanings_of(name_of(variable.field))):
+                yield f"{variable.field}: {', '.join(f'{number} {words}' for number, words in numbers.items())}"
         for field, bits in used.items():
             words = [f"{number} {words}" for number, words in MEANINGS.get(field, {}).items()]
             words += [

@@ -255,8 +255,8 @@ def test_it_is_in_status_metrics_and_page(served: Served) -> None:
 
 def test_its_word_is_in_the_status_block_behind_all_others(served: Served) -> None:
     reader = Plc(served.modbus, STRANGER, host=HOST)
-    before = reader.status(52)
-    wait_for(lambda: reader.status(52) > before, "lines that were sent")
+    before = reader.status(60)
+    wait_for(lambda: reader.status(60) > before, "lines that were sent")
     assert reader.status(0) == 1
     reader.close()
 

@@ -1,4 +1,4 @@
-"""Rule GW520: bits that several writers own by turns, in one register."""
+"""Rules GW520 and GW859: bits in one register that several writers own by turns, and commands."""
 
 from __future__ import annotations
 
@@ -30,6 +30,28 @@ def shared_register(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 continue
             reported.add(line)
             yield _shared_bit(rule, cell, bit, next(other for other in bits if other.lock != bit.lock))
+
+
+@cell_rule("GW859", Severity.WARNING)
+def command_in_shared_register(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """A command in a register with bits of other locks, whose write does not give it."""
+    with_coil = {place.variable.index for place in placements_of(cell) if place.area is Area.COIL}
+    for bits in _registers(cell):
+        for bit in bits:
+            other = next((other for other in bits if other.lock != bit.lock), None)
+            command = bit.place.variable
+            if other is None or not command.via or command.index in with_coil:
+                continue
+            message = (
+                f"writing the whole register does not give the command `{command.name}` at {where(bit.place)}: "
+                f"`{other.place.variable.name}` shares the register"
+            )
+            related = (Related(other.place.position, f"`{other.place.variable.name}` is here"),)
+            hint = (
+                "give it a register of its own or a coil, or put the bits of the register into one `group`; as it is, "
+                "function 22 (mask write) alone gives it"
+            )
+            yield rule.at(bit.place.position, message, hint=hint, related=related)
 
 
 @dataclass(frozen=True, slots=True)

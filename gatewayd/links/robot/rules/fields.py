@@ -142,7 +142,7 @@ def no_such_part(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     for part, error in unresolved(cell):
         if error.problem in _PARTS:
             message, hint = _PARTS[error.problem]
-            text = str(part.spec.by(RobotPlace).robot.field)
+            text = str(part.spec.by(RobotPlace).field.field)
             values = {"name": error.name, "text": text, "last": _last(error)}
             position = part.at("robot")
             yield rule.at(position, message.format(**values), hint=hint.format(**values))
@@ -179,7 +179,7 @@ def input_mapped_twice(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
     owners: dict[tuple[str, int | None], dict[int | None, ExpandedVariable]] = {}
     reported: set[tuple[str, str]] = set()
     for variable in cell.variables:
-        if variable.direction is not Direction.INPUT:
+        if variable.direction is not Direction.INPUT or variable.via:
             continue
         taken = owners.setdefault((variable.field, variable.element), {})
         whole = taken.get(None)
@@ -224,7 +224,7 @@ def long_recipe(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
 
 
 def _names(variables: Iterable[ExpandedVariable]) -> list[str]:
-    return list(dict.fromkeys(variable.field for variable in variables))
+    return list(dict.fromkeys(variable.field for variable in variables if not variable.via))
 
 
 def _length(names: Sequence[str]) -> int:

@@ -23,7 +23,7 @@ class UdpLines(LinkKind):
     fields = {"listen": "host:port of the socket", "to": "who gets the lines", "sent": "lines sent"}  # noqa: RUF012
     place = "name that the lines have for it, or null"
     has_one_place = True
-    status_fields = (StatusField(52, 1, "lines_sent", "lines sent, wraps"),)
+    status_fields = (StatusField(60, 1, "lines_sent", "lines sent, wraps"),)
     metrics = (LinkMetric("gatewayd_lines_total", "lines", "lines, by direction", label="direction"),)
 
     def describe(self, plan: LinkPlan, cell: CellDefinition) -> Description:

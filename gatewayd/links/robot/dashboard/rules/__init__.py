@@ -1,0 +1,1 @@
+"""Rules GW85x: the dashboard server, its commands and its states."""
