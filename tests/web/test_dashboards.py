@@ -114,6 +114,10 @@ def test_every_metric_of_the_cells_is_looked_at_or_named_here() -> None:
         "gatewayd_robot_watchdog_fed",  # only with a watchdog in the mapping
         "gatewayd_modbus_refused_connections_total",  # the log names the peers
         "gatewayd_modbus_ignored_total",  # only with `write_gaps: ignore`, and constant in kind
+        "gatewayd_dashboard_up",  # the state `connected` and the page say it
+        "gatewayd_dashboard_connections_total",
+        "gatewayd_dashboard_commands_total",
+        "gatewayd_dashboard_refused_total",  # the event says which, and why
         "gatewayd_device_round_trip_seconds",
         "gatewayd_device_answers_total",
         "gatewayd_device_timeouts_total",  # device_up says when it matters

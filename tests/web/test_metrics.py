@@ -24,7 +24,9 @@ from tests.works import finished
 Samples = dict[str, dict[tuple[tuple[str, str], ...], float]]
 
 ONLY_WITH_CAN = {"gatewayd_can_bus_state", "gatewayd_can_total"}
-ONLY_WITH_DEVICES = {info.name for info in METRICS if info.name.startswith("gatewayd_device_")}
+ONLY_WITH_DEVICES = {
+    info.name for info in METRICS if info.name.startswith(("gatewayd_device_", "gatewayd_dashboard_"))
+}
 
 
 def read(probes: Probes) -> Samples:
