@@ -23,6 +23,7 @@ from gatewayd.rtde.lists import ListMemory
 from gatewayd.rtde.loss import Loss, connect_failure
 from gatewayd.rtde.messages import PropertiesReply, TextMessage
 from gatewayd.rtde.pace import Statistics
+from gatewayd.rtde.receiving import PackageReceiver
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.sending import StreamTap
 from gatewayd.rtde.session import ClientSettings, Session
@@ -66,6 +67,12 @@ class RtdeClient:
     def peer_address(self) -> tuple[str, int] | None:
         """The controller's end of the connection; None without one."""
         return self._connection.sender.peer if self._connection is not None else None
+
+    @property
+    def receiver(self) -> PackageReceiver | None:
+        """Who reads the socket of the session; None without a session."""
+        connection = self._connection
+        return connection.receiver if connection is not None and connection.session is not None else None
 
     def send(self, recipe: InputRecipe, values: Sequence[Scalar]) -> bool:
         """Send values of one of `session.inputs`, flat in the order of its `recipe`, in one package.
@@ -123,7 +130,7 @@ class RtdeClient:
         """Hand `tap` the bytes of this connection and of those to come; None: no more."""
         self._tap = tap
         if self._connection is not None:
-            self._connection.sender.tap = tap
+            self._connection.trace(tap)
 
     def gap(self) -> None:
         """The process stood still until now: for that time nobody is taken for silent."""
@@ -204,7 +211,7 @@ class RtdeClient:
 
     def _new_connection(self, settings: ClientSettings) -> Connection:
         connection = Connection(settings, self._handler, self.statistics, self._observer)
-        connection.sender.tap = self._tap
+        connection.trace(self._tap)
         return connection
 
     async def _open_socket(self, loop: asyncio.AbstractEventLoop) -> socket.socket:

@@ -106,6 +106,14 @@ class _Endpoint(Generic[_Received, _Sent]):
             rest.clear()
         return self._messages(data)
 
+    def data_header(self, recipe: int, size: int) -> bytes:
+        """What a data package with an id and `size` bytes of values begins with."""
+        return _HEADER.pack(_HEADER.size + 1 + size, _DATA) + bytes((recipe,))
+
+    def skip(self, size: int) -> None:
+        """So many bytes, whole packages, were received and taken by somebody else."""
+        self._consumed += size
+
     def _messages(self, data: bytes) -> Iterator[_Received | StrangePackage]:
         position = 0
         end = len(data)

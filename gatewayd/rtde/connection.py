@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar, cast
 
 from gatewayd.report.format import counted
 from gatewayd.rtde.claims import HandshakeError, InputRecipe
 from gatewayd.rtde.codec import ClientProtocol, ProtocolError
-from gatewayd.rtde.delivery import OutputDelivery
+from gatewayd.rtde.delivery import BEGINNING, OutputDelivery, SteadyOutput
 from gatewayd.rtde.handler import ClientHandler, ConnectionObserver
 from gatewayd.rtde.lists import ListOutcome
 from gatewayd.rtde.loss import Loss, LossReason, connection_failure
@@ -28,17 +27,17 @@ from gatewayd.rtde.messages import (
 from gatewayd.rtde.negotiation import Negotiation
 from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.properties import PropertyQuestions
+from gatewayd.rtde.receiving import PackageReceiver
 from gatewayd.rtde.recipe import Scalar
-from gatewayd.rtde.sending import PackageSender
+from gatewayd.rtde.sending import PackageSender, StreamTap
 from gatewayd.rtde.session import ClientSettings, Session, Wishes
+from gatewayd.rtde.silence import Silence
 from gatewayd.rtde.steps import NextStep, Notice
 from gatewayd.rtde.strange import Oddity, StrangePackage, odd_data
+from gatewayd.rtde.timers import Deadline, ProbeTimer, RetryTimer
+from gatewayd.rtde.waiters import Waiters
 
-_FIRST_CLAIM_RETRY = 0.1
 _MEASURE_EVERY = 1.0
-_PERIODS_OF_PATIENCE = 5
-_READ = 65536
-"""Bytes of the buffer that every read goes into: a fresh one for each would cost more than its package."""
 
 
 class Connection(asyncio.BufferedProtocol):
@@ -66,28 +65,25 @@ class Connection(asyncio.BufferedProtocol):
         self._codec = ClientProtocol()
         self.sender = PackageSender(self._codec)
         """The way out, and whoever looks on."""
+        self.receiver = PackageReceiver(self.buffer_updated, self._interrupted)
+        """The way in, and who reads it."""
         self._negotiation = Negotiation(settings)
         self._complained = False
         self._lost = loop.create_future()
-        self._waiters: list[asyncio.Future[None]] = []
-        self._deadline: asyncio.TimerHandle | None = None
-        self._check: asyncio.TimerHandle | None = None
-        self._retry: asyncio.TimerHandle | None = None
-        self._retry_delay = _FIRST_CLAIM_RETRY
-        self._probe: asyncio.TimerHandle | None = None
-        self._probed_at = 0.0
+        self._waiters = Waiters()
+        self._deadline = Deadline(self._unanswered)
+        self._check = Deadline(self._watch)
+        self._retry = RetryTimer(settings.claim_retry, self._retry_claims)
+        self._probe = ProbeTimer(settings.handshake_timeout, self._probe_ended)
         self._asked_at: float | None = None
         self._round_trip = 0.0
-        self._received = memoryview(bytearray(_READ))
         self._delivery: OutputDelivery | None = None
+        self._steady = SteadyOutput()
         self._change: Wishes | None = None
         self._questions = PropertyQuestions()
-        self._patience = settings.first_data_timeout
-        self._heard = 0.0
+        self._silence = Silence(settings)
         self._measured = 0.0
         self._was_paused = False
-        self._passed_over: StrangePackage | None = None
-        """The last strange package, if no data came since."""
 
     @property
     def lists(self) -> ListOutcome:
@@ -118,15 +114,19 @@ class Connection(asyncio.BufferedProtocol):
 
     def probe(self) -> bool:
         """Ask something whose answer queues behind the packages; False if no answer can be expected to it."""
-        if self.session is None or self.done.done() or self._probe is not None:
+        if self.session is None or self.done.done() or self._probe.running:
             return False
         question = self._negotiation.probe()
         if question is None:
             return False
-        self._probed_at = self._loop.time()
-        self._probe = self._loop.call_later(self._settings.handshake_timeout, self._probe_unanswered)
+        self._probe.start()
         self._write(question)
         return not self.done.done()
+
+    def trace(self, tap: StreamTap | None) -> None:
+        """Hand `tap` all bytes from now on; None: no more."""
+        self.sender.tap = tap
+        self._steady.size = 0
 
     def reconnect(self, text: str) -> None:
         """End the connection for a reason of the user's; what was sent is still delivered."""
@@ -167,6 +167,7 @@ class Connection(asyncio.BufferedProtocol):
         """Let what was sent reach the controller, then close. No handler is called any more."""
         self._end()
         self.done.cancel()
+        self.receiver.resume()
         await self.sender.close(self._lost)
 
     # what asyncio calls
@@ -174,37 +175,51 @@ class Connection(asyncio.BufferedProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """See asyncio.BufferedProtocol."""
         self.sender.open(cast("asyncio.Transport", transport))
+        self.receiver.open(cast("asyncio.Transport", transport))
         self._observer.connected(self.sender.own, self.sender.peer)
         self._request(self._negotiation.begin())
         self._watch()
 
     def get_buffer(self, sizehint: int) -> memoryview:
         """See asyncio.BufferedProtocol."""
-        return self._received
+        return self.receiver.buffer
 
     def buffer_updated(self, nbytes: int) -> None:
         """See asyncio.BufferedProtocol."""
-        data = bytes(self._received[:nbytes])
-        self.sender.received(data)
-        self._guarded(lambda: self._receive(data))
+        buffer, steady = self.receiver.buffer, self._steady
+        try:
+            if nbytes != steady.size or BEGINNING.unpack_from(buffer)[0] != steady.beginning:
+                self._receive(bytes(buffer[:nbytes]))
+                return
+            # Nearly every read brings just what is to come. It is taken in by as few functions as can be: caches that
+            # others have used for 2 ms make each line cost several times its usual time.
+            delivery = self._delivery
+            assert delivery is not None
+            steady.taken += nbytes
+            self._silence.heard = now = self._loop.time()
+            restarted = delivery.deliver_newest(delivery.outputs.unpack_from(buffer, BEGINNING.size), now)
+            if restarted is not None:
+                self._fail(LossReason.RESTARTED, restarted)
+        except Exception as error:  # noqa: BLE001  see `_broken`
+            self._broken(error)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """See asyncio.BufferedProtocol."""
         self._lost.set_result(None)
+        self.receiver.close()
         self._conclude(connection_failure(exc if isinstance(exc, OSError) else None, self._settings.address))
 
-    def _guarded(self, work: Callable[[], None]) -> None:
-        """Do what calls handlers. asyncio would log their exceptions and go on; so `run` raises them."""
-        try:
-            work()
-        except Exception as error:  # noqa: BLE001  see above
-            self._end()
-            if not self.done.done():
-                self.done.set_exception(error)
+    def _broken(self, error: Exception) -> None:
+        """A handler has raised this. asyncio would log it and go on; so `done` has it, and `run` raises it."""
+        self._end()
+        if not self.done.done():
+            self.done.set_exception(error)
 
     # messages
 
     def _receive(self, data: bytes) -> None:
+        self.sender.received(data)
+        self._codec.skip(self._steady.stop())
         now = self._loop.time()
         packages: list[DataPackage] = []
         failure: ProtocolError | None = None
@@ -228,9 +243,17 @@ class Connection(asyncio.BufferedProtocol):
         self._deliver(packages, now)
         if failure is not None:
             self._fail(LossReason.PROTOCOL, f"what the controller sent is not RTDE: {failure}")
+        self._find_steady()
+
+    def _find_steady(self) -> None:
+        recipe, delivery, negotiation = self._negotiation.outputs_id, self._delivery, self._negotiation
+        if recipe is None or delivery is None or self._codec.buffered or self.done.done() or self.sender.tap:
+            return
+        if negotiation.running and self._silence.regular:
+            self._steady.expect(self._codec.data_header(recipe, delivery.outputs.size), delivery.outputs.size)
 
     def _pass_over(self, package: StrangePackage) -> None:
-        self._passed_over = package
+        self._silence.odd = package
         if self._statistics.strange.count(package):
             self._handler.strange(package)
 
@@ -259,9 +282,9 @@ class Connection(asyncio.BufferedProtocol):
         if step.send is not None:
             self._request(step.send)
         elif self._negotiation.reading:
-            self._await(self._patience)
+            self._await(self._silence.patience)
         elif not self._negotiation.waiting:
-            self._disarm()
+            self._deadline.cancel()
         if self.done.done():
             return
         if self._negotiation.claims.exhausted:
@@ -294,16 +317,14 @@ class Connection(asyncio.BufferedProtocol):
         if delivery is None or not packages or self.done.done():
             return
         recipe, size = self._negotiation.outputs_id, delivery.outputs.size
-        agreed = [one for one in packages if one.recipe == recipe and len(one.payload) == size]
+        agreed = [one.payload for one in packages if one.recipe == recipe and len(one.payload) == size]
         if len(agreed) < len(packages):
             for odd in odd_data(packages, recipe, size):
                 self._pass_over(odd)
         packages.clear()
         if not agreed:
             return
-        self._heard = now
-        self._passed_over = None
-        self._patience = max(self._settings.data_timeout, _PERIODS_OF_PATIENCE * delivery.period)
+        self._silence.data(now)
         restarted = delivery.deliver(agreed, now, self.done.done)
         if restarted is not None:
             self._fail(LossReason.RESTARTED, restarted)
@@ -311,7 +332,7 @@ class Connection(asyncio.BufferedProtocol):
     def _started(self) -> None:
         now = self._loop.time()
         session = self.session = self._negotiation.session(self._round_trip)
-        self.started_at = self._heard = self._measured = now
+        self.started_at = self._silence.heard = self._measured = now
         self._statistics.sessions += 1
         self._expect_packages(session)
         self._schedule_retry()
@@ -319,7 +340,9 @@ class Connection(asyncio.BufferedProtocol):
 
     def _expect_packages(self, session: Session) -> None:
         handler, statistics, every = self._handler, self._statistics, self._settings.every
-        self._delivery = OutputDelivery(session, handler, statistics, self._heard, every=every)
+        self.receiver.expect((BEGINNING.size + session.outputs.size) / session.period)
+        self._silence.expect(session.period)
+        self._delivery = OutputDelivery(session, handler, statistics, self._silence.heard, every=every)
 
     def _changed(self) -> None:
         self._pause_answered()
@@ -334,7 +357,7 @@ class Connection(asyncio.BufferedProtocol):
         self._observer.paused()
 
     def _inputs_changed(self) -> None:
-        self._heard = self._loop.time()
+        self._silence.heard = self._loop.time()
         self._resume_pace()
         self.session = self._negotiation.session(self._round_trip)
         self._schedule_retry()
@@ -351,21 +374,14 @@ class Connection(asyncio.BufferedProtocol):
             self._delivery.pace.resume()
 
     def _pause_answered(self) -> None:
-        self._heard = self._loop.time()
-        for waiter in self._waiters:
-            if not waiter.done():
-                waiter.set_result(None)
-        self._waiters.clear()
+        self._silence.heard = self._loop.time()
+        self._waiters.wake()
 
-    def _probe_answered(self) -> None:
-        if self._probe is not None:  # else it was given up
-            self._probe.cancel()
-            self._probe = None
-            self._handler.probed(self._loop.time() - self._probed_at)
-
-    def _probe_unanswered(self) -> None:
-        self._probe = None
-        self._guarded(lambda: self._handler.probed(math.inf))
+    def _probe_ended(self, delay: float) -> None:
+        try:
+            self._handler.probed(delay)
+        except Exception as error:  # noqa: BLE001  see `_broken`
+            self._broken(error)
 
     _EVENTS: ClassVar[dict[Notice, Callable[[Connection], None]]] = {
         Notice.STARTED: _started,
@@ -373,7 +389,7 @@ class Connection(asyncio.BufferedProtocol):
         Notice.CHANGED: _changed,
         Notice.PAUSED: _paused,
         Notice.RESUMED: _resumed,
-        Notice.PROBED: _probe_answered,
+        Notice.PROBED: lambda self: self._probe.answered(),
     }
 
     # sending
@@ -389,77 +405,61 @@ class Connection(asyncio.BufferedProtocol):
     def _request(self, message: ExecutableMessage) -> None:
         self._write(message)
         self._was_paused |= isinstance(message, Pause)
+        self._steady.size = 0
         self._asked_at = self._loop.time()
         self._await(self._settings.handshake_timeout)
 
     def _await(self, seconds: float) -> None:
-        self._disarm()
         if not self.done.done():
-            self._deadline = self._loop.call_later(seconds, self._unanswered)
+            self._deadline.set(seconds)
 
     async def _ask(self, message: ExecutableMessage | None) -> None:
         if message is None or self.done.done():
             return
-        waiter: asyncio.Future[None] = self._loop.create_future()
-        self._waiters.append(waiter)
         self._request(message)
-        await waiter
+        if not self.done.done():
+            await self._waiters.wait()
 
     # clocks
 
-    def _disarm(self) -> None:
-        if self._deadline is not None:
-            self._deadline.cancel()
-            self._deadline = None
-
     def _unanswered(self) -> None:
         if self._negotiation.reading:
-            self._fall_silent(self._patience, first=self.session is None)
+            self._fall_silent(self._silence.patience, first=self.session is None)
             return
         what, limit = self._negotiation.awaited, self._settings.handshake_timeout
-        self._fail(LossReason.UNANSWERED, f"{what} did not arrive within {limit:g} s{self._instead()}")
+        instead = self._silence.instead(self._codec.unfinished)
+        self._fail(LossReason.UNANSWERED, f"{what} did not arrive within {limit:g} s{instead}")
 
     def _fall_silent(self, seconds: float, *, first: bool) -> None:
-        instead = self._instead()
+        instead = self._silence.instead(self._codec.unfinished)
         if not instead and first:
             instead = ": is the robot powered and its safety set-up confirmed?"
         self._fail(LossReason.SILENT, f"no data from the controller for {seconds:.1f} s{instead}")
 
-    def _instead(self) -> str:
-        """What came in place of what was due, in words."""
-        if self._codec.unfinished:
-            return f"; what it sent stops at {self._codec.unfinished}"
-        return f"; it sent {self._passed_over} instead" if self._passed_over is not None else ""
-
     def gap(self) -> None:
         """The process stood still until now: what the controller sent meanwhile is still to be read."""
-        self._heard = self._loop.time()
+        self._silence.heard = now = self._loop.time()
         if self._delivery is not None:
-            self._delivery.pace.gap(self._heard)
+            self._delivery.pace.gap(now)
 
     def _watch(self) -> None:
         self._statistics.progress += 1
         now = self._loop.time()
-        silence = now - self._heard
-        if self._negotiation.running and silence > self._patience:
+        silence = self._silence.exceeded(now)
+        if self._negotiation.running and silence is not None:
             first = self._delivery is None or self._delivery.pace.timestamp is None
             self._fall_silent(silence, first=first)
             return
         if self._delivery is not None and now - self._measured >= _MEASURE_EVERY:
             self._delivery.pace.measure(now)
             self._measured = now
-        self._check = self._loop.call_later(
-            min(self._settings.data_timeout / 4, _MEASURE_EVERY / 2), self._watch
-        )
+        self._check.set(min(self._settings.data_timeout / 4, _MEASURE_EVERY / 2))
 
     def _schedule_retry(self) -> None:
-        if self._retry is None and self._negotiation.claims.retriable and not self.done.done():
-            delay = min(self._retry_delay, self._settings.claim_retry)
-            self._retry_delay = 2 * delay
-            self._retry = self._loop.call_later(delay, self._retry_claims)
+        if self._negotiation.claims.retriable and not self.done.done():
+            self._retry.schedule()
 
     def _retry_claims(self) -> None:
-        self._retry = None
         self._claim(self._negotiation.retry_claims())
         self._schedule_retry()
 
@@ -470,6 +470,9 @@ class Connection(asyncio.BufferedProtocol):
             self._request(request)
 
     # ends
+
+    def _interrupted(self) -> None:
+        self._fail(LossReason.FAILED, "a signal handler interrupted the reading of what the controller sent")
 
     def _give_up_recipes(self) -> None:
         self._fail(
@@ -489,7 +492,7 @@ class Connection(asyncio.BufferedProtocol):
     def _end(self) -> None:
         """Stop everything that could still call a handler."""
         self.session = None
-        for handle in (self._deadline, self._check, self._retry, self._probe):
-            if handle is not None:
-                handle.cancel()
+        self._steady.size = 0
+        for timer in (self._deadline, self._check, self._retry, self._probe):
+            timer.cancel()
         self._pause_answered()

@@ -78,7 +78,8 @@ class Negotiation:
     @property
     def delivering(self) -> bool:
         """Whether a data package that comes now is one of the working recipe."""
-        return self.state in {State.RUNNING, State.PAUSING}
+        state = self.state
+        return state is State.RUNNING or state is State.PAUSING  # asked for each package: a set would hash
 
     @property
     def waiting(self) -> bool:

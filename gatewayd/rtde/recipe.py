@@ -9,7 +9,7 @@ from gatewayd.report.format import counted
 from gatewayd.rtde.codec import ProtocolError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from gatewayd.rtde.types import DataType
 
@@ -23,7 +23,7 @@ class Recipe:
     Values travel as one flat tuple in which a vector takes as many places as it has elements.
     """
 
-    __slots__ = ("_struct", "count", "kinds", "names", "size", "slots", "types")
+    __slots__ = ("_struct", "count", "kinds", "names", "size", "slots", "types", "unpack_from")
 
     def __init__(self, names: Sequence[str], types: Sequence[DataType]) -> None:
         if len(names) != len(types):
@@ -34,6 +34,8 @@ class Recipe:
         self.kinds = dict(zip(names, types, strict=True))
         """The type of each field."""
         self._struct = struct.Struct(">" + "".join(data_type.format for data_type in types))
+        self.unpack_from: Callable[[bytes | memoryview, int], tuple[Scalar, ...]] = self._struct.unpack_from
+        """The flat values of a payload that lies at this place of a buffer, which has to have all of it."""
         self.size = self._struct.size
         """Bytes of a payload, without the recipe id."""
         self.slots: dict[str, slice] = {}

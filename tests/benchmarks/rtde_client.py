@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable
 
 from gatewayd import rtde
+from gatewayd.rtde import sync
 
 LOOKED_AT = 8
 REGISTER = 18
@@ -39,6 +40,15 @@ def read_gatewayd(host: str, port: int, *names: str) -> None:
                     getattr(sample, name)
 
     asyncio.run(main())
+
+
+def read_blocking(host: str, port: int, *names: str) -> None:
+    """`gatewayd.rtde.sync`, by its blocking iterator."""
+    looked_at = names[:LOOKED_AT]
+    with sync.connect(host, port=port, outputs=names, strict=False) as robot:
+        for sample in robot:
+            for name in looked_at:
+                getattr(sample, name)
 
 
 FORMATS = {
@@ -172,6 +182,7 @@ def _report(seconds: float, at: float) -> None:
 
 CLIENTS: dict[tuple[str, str], Callable[..., None]] = {
     ("read", "gatewayd"): read_gatewayd,
+    ("read", "gatewayd.sync"): read_blocking,
     ("read", "official"): read_official,
     ("read", "ur_rtde"): read_ur_rtde,
     ("loop", "gatewayd"): loop_gatewayd,

@@ -309,3 +309,13 @@ def test_no_more_than_one_package_is_kept() -> None:
     assert client.buffered == MAX_PACKAGE - 1
     assert len(list(client.receive(b"\x00"))) == 1
     assert client.buffered == 0
+
+
+def test_the_beginning_of_a_data_package_can_be_known_before_it_comes() -> None:
+    client, controller = speaking(2)
+    package = controller.send(messages.DataPackage(7, b"values"))
+    assert client.data_header(7, 6) + b"values" == package
+    client.skip(len(package))
+    with pytest.raises(ProtocolError) as caught:
+        list(client.receive(package + bytes(3)))
+    assert caught.value.offset == 4 + 2 * len(package), "after the version, one that was skipped, one that was read"

@@ -13,10 +13,11 @@ from gatewayd.rtde.client import RtdeClient
 from gatewayd.rtde.loss import LossReason
 from gatewayd.rtde.session import ClientSettings
 from gatewayd.rtde.strange import Oddity
-from tests.rtde.conftest import E_SERIES, send
+from tests.rtde.conftest import E_SERIES, Notebook, send
 
 if TYPE_CHECKING:
-    from tests.rtde.conftest import Connected, Controller, Notebook
+    from gatewayd.rtde.recipe import Scalar
+    from tests.rtde.conftest import Connected, Controller
 
 Until = Callable[..., Awaitable[None]]
 DOUBLES = tuple(f"input_double_register_{number}" for number in range(24))
@@ -362,7 +363,9 @@ async def test_used_up_recipe_ids_cost_a_new_connection(
     async with connected(inputs=DOUBLES, claim_retry=0.02) as (client, seen):
         await until(lambda: seen.packages)
         assert client._connection is not None
-        client._connection._negotiation.claims._used = 255
+        negotiation = client._connection._negotiation
+        await until(lambda: not negotiation.waiting)  # a claim that is under way would still be taken
+        negotiation.claims._used = 255
         controller.script.in_use = set()
         await until(lambda: len(seen.sessions) == 2)
         assert seen.losses[0].reason is LossReason.RECIPES
@@ -477,3 +480,63 @@ async def test_a_reading_waits_for_its_package_as_long_as_for_first_data(
         assert "safety set-up confirmed" in seen.losses[0].text
         controller.script.sends_data = True
         await until(lambda: seen.packages)
+
+
+@pytest.mark.parametrize("protocol", [1, 2])
+@pytest.mark.parametrize("cut", ["packages", "halves", "pairs", "whole"])
+async def test_however_the_output_is_cut_into_reads_the_same_comes_of_it(
+    cut: str, protocol: int, controller: Controller, connected: Connected, until: Until
+) -> None:
+    controller.script.sends_data = False
+    async with connected(protocol=protocol, every=True) as (client, seen):
+        await until(lambda: seen.sessions)
+        connection, speaks, layout = client._connection, controller.peer.protocol, seen.sessions[0].outputs
+        assert connection is not None
+        stamps = [1.0 + 0.002 * number for number in range(12)]
+        packages = [speaks.send(messages.DataPackage(1, layout.pack((stamp,)))) for stamp in stamps]
+        text = speaks.send(messages.TextMessage("hello", "URControl", messages.TextLevel.INFO))
+        foreign = bytes(packages[0][:2]) + b"U\xff" + packages[0][4:]
+        unknown = b"\x00" + bytes([len(packages[0])]) + bytes(len(packages[0]) - 2)
+        foreigners = [foreign] if protocol > 1 else []  # without an id nothing is foreign
+        stream = [*packages[:4], text, *packages[4:7], *foreigners, *packages[7:8], unknown, *packages[8:]]
+        joined = b"".join(stream)
+        reads = {
+            "packages": stream,
+            "halves": [half for one in stream for half in (one[:5], one[5:])],
+            "pairs": [b"".join(stream[at : at + 2]) for at in range(0, len(stream), 2)],
+            "whole": [joined],
+        }[cut]
+        shown: list[bytes] = []
+        for number, read in enumerate(reads):
+            if number == len(reads) // 2:
+                client.trace(lambda data, _sent, _own: shown.append(data))
+            connection.receiver.buffer[: len(read)] = read
+            connection.buffer_updated(len(read))
+        came = [values[0] for values in (*seen.earlier_packages, *seen.packages)]
+        assert sorted(came) == stamps
+        assert client.statistics.packages == len(stamps)
+        oddities = {one.oddity for one in seen.strange_packages}
+        assert oddities == ({Oddity.RECIPE, Oddity.UNKNOWN_TYPE} if foreigners else {Oddity.UNKNOWN_TYPE})
+        assert len(seen.texts) == 1
+        assert b"".join(shown) == b"".join(reads[len(reads) // 2 :])
+        client.trace(None)
+        connection.receiver.buffer[:3] = b"\x00\x02U"
+        connection.buffer_updated(3)
+        await until(lambda: seen.losses)
+        assert seen.losses[0].reason is LossReason.PROTOCOL
+        assert f"at byte {connection._codec._consumed} of the stream" in seen.losses[0].text
+        assert connection._codec._consumed > len(joined)
+
+
+async def test_a_handler_that_fails_at_a_package_ends_the_client(controller: Controller) -> None:
+    class Tired(Notebook):
+        def values(self, values: tuple[Scalar, ...], now: float) -> None:
+            super().values(values, now)
+            if len(self.packages) == 20:
+                raise ArithmeticError
+
+    seen = Tired()
+    one = RtdeClient(ClientSettings(host="127.0.0.1", port=controller.port), seen)
+    with pytest.raises(ArithmeticError):
+        await asyncio.wait_for(one.run(), 5)
+    assert len(seen.packages) == 20

@@ -7,9 +7,9 @@ from typing import cast
 
 import pytest
 
-from gatewayd.rtde.delivery import OutputDelivery
+from gatewayd.rtde.delivery import BEGINNING, OutputDelivery, SteadyOutput
 from gatewayd.rtde.handler import ClientHandler
-from gatewayd.rtde.messages import ControllerVersion, DataPackage
+from gatewayd.rtde.messages import ControllerVersion
 from gatewayd.rtde.pace import Statistics
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.session import Session
@@ -36,8 +36,8 @@ def delivery(name: str, *, every: bool) -> tuple[OutputDelivery, Listener, Stati
     return made, listener, statistics
 
 
-def packages(*times: float) -> list[DataPackage]:
-    return [DataPackage(1, struct.pack(">d", time)) for time in times]
+def packages(*times: float) -> list[bytes]:
+    return [struct.pack(">d", time) for time in times]
 
 
 @pytest.mark.parametrize(
@@ -63,3 +63,13 @@ def test_nothing_follows_the_end() -> None:
     made, listener, _ = delivery("timestamp", every=True)
     assert made.deliver(packages(1.0, 1.002, 1.004), 1.0, lambda: bool(listener.packages)) is None
     assert listener.packages == [1.0]
+
+
+def test_what_is_to_come_is_known_by_its_size_and_its_beginning() -> None:
+    steady = SteadyOutput()
+    assert steady.size == 0
+    steady.expect(b"\x00\x0cU\x07", 8)
+    assert (steady.size, steady.beginning) == (12, BEGINNING.unpack(b"\x00\x0cU\x07")[0])
+    steady.taken += 24
+    assert steady.stop() == 24
+    assert (steady.size, steady.stop()) == (0, 0)

@@ -37,6 +37,7 @@ def test_values_survive_packing(filled: tuple[Recipe, list[Any]]) -> None:
     payload = recipe.pack(values)
     assert len(payload) == recipe.size
     assert recipe.unpack(payload) == tuple(values)
+    assert recipe.unpack_from(b"head" + payload + b"rest", 4) == tuple(values)
 
 
 @pytest.mark.parametrize(

@@ -133,6 +133,6 @@ def test_a_wait_within_its_own_loop_is_refused(port: int) -> None:
             except rtde.RtdeError as error:
                 refused.append(error)
 
-        assert robot._thread is not None
-        robot._thread.run(nested())
+        assert robot._reader is not None
+        robot._reader.run(nested())
         assert "wait for itself" in str(refused[0])

@@ -31,6 +31,7 @@ from gatewayd.rtde.messages import TextMessage
 from gatewayd.rtde.recipe import Scalar
 from gatewayd.rtde.session import Session, Unavailable
 from gatewayd.rtde.strange import StrangePackage
+from gatewayd.rtde.waiters import Waiters
 
 _EVENTS = 1000
 _Result = TypeVar("_Result")
@@ -88,7 +89,7 @@ class RobotFeed(ConnectionObserver):
         self._connected = False
         self._ever = False
         self._missing: tuple[Unavailable, ...] = ()
-        self._waiters: list[asyncio.Future[None]] = []
+        self._waiters = Waiters()
 
     # for the robot
 
@@ -140,7 +141,7 @@ class RobotFeed(ConnectionObserver):
             stream.end(None if closed else error)
         if closed:
             self.events.end()
-        self._notify()
+        self._waiters.wake()
 
     async def until(self, condition: Callable[[], _Result | None], timeout: float | None) -> _Result:  # noqa: ASYNC109
         """The first result of `condition` that is not None, asked now and whenever something has happened.
@@ -151,13 +152,7 @@ class RobotFeed(ConnectionObserver):
             while (result := condition()) is None:
                 if self.failure is not None:
                     raise self.failure
-                waiter = asyncio.get_running_loop().create_future()
-                self._waiters.append(waiter)
-                try:
-                    await waiter
-                finally:
-                    if waiter in self._waiters:
-                        self._waiters.remove(waiter)
+                await self._waiters.wait()
         return result
 
     # what the client calls
@@ -184,12 +179,12 @@ class RobotFeed(ConnectionObserver):
         """See ClientHandler."""
         layout = self._layout
         assert layout is not None
-        self.latest = sample = Sample(layout, values, now)
+        self.latest = sample = layout.sample(layout, values, now)
         self.samples += 1
         for stream in self.streams:
             stream.put(sample)
         if self._waiters:
-            self._notify()
+            self._waiters.wake()
 
     def earlier(self, values: tuple[Scalar, ...], now: float) -> bool:
         """See ClientHandler."""
@@ -203,7 +198,7 @@ class RobotFeed(ConnectionObserver):
         self._report_missing(session)
         if self.state is ConnectionState.RUNNING and not self.running:
             self.paused()
-        self._notify()
+        self._waiters.wake()
 
     def changed(self, session: Session) -> None:
         """See ConnectionObserver. TypesDifferError ends the client."""
@@ -276,13 +271,7 @@ class RobotFeed(ConnectionObserver):
 
     def _tell(self, event: RobotEvent) -> None:
         self.events.put(event)
-        self._notify()
-
-    def _notify(self) -> None:
-        waiters, self._waiters = self._waiters, []
-        for waiter in waiters:
-            if not waiter.done():
-                waiter.set_result(None)
+        self._waiters.wake()
 
 
 def _address(socket_name: tuple[str, int] | None) -> tuple[str, int] | None:

@@ -56,7 +56,14 @@ class BoundedStream(Generic[_Item]):
 
     def take(self) -> list[_Item]:
         """All that is there, without waiting."""
-        self._begin_reading()
+        return self.found() or []
+
+    def found(self) -> list[_Item] | None:
+        """All that is there, without waiting; None if nothing is."""
+        if self._lost or not self._read:
+            self._begin_reading()
+        if not self._items:
+            return None
         items = list(self._items)
         self._items.clear()
         return items

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,18 +22,26 @@ LAYOUT = SampleLayout(
 SAMPLE = Sample(LAYOUT, (12.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7), 99.0)
 
 
-def test_a_field_is_an_attribute_and_an_item() -> None:
-    assert SAMPLE.actual_q[3] == SAMPLE["actual_q"][3] == 4.0  # type: ignore[index]
-    assert (SAMPLE.robot_mode, SAMPLE.timestamp, SAMPLE.received) == (7, 12.5, 99.0)
-    assert SAMPLE.as_dict() == {"robot_mode": 7, "actual_q": (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)}
-    assert SAMPLE.values == (7, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-    assert {"actual_q", "timestamp", "values"} <= set(dir(SAMPLE))
-    assert "timestamp" in SAMPLE
-    assert "actual_qd" not in SAMPLE
-    assert repr(SAMPLE).startswith("<Sample robot_mode=7, actual_q=(1.0,")
+@pytest.mark.parametrize("made", [Sample, LAYOUT.sample], ids=["by name", "by property"])
+def test_a_field_is_an_attribute_and_an_item(made: type[Sample]) -> None:
+    sample = made(LAYOUT, SAMPLE._flat, 99.0)
+    assert isinstance(sample, Sample)
+    assert sample.actual_q[3] == sample["actual_q"][3] == 4.0  # type: ignore[index]
+    assert (sample.robot_mode, sample.timestamp, sample.received) == (7, 12.5, 99.0)
+    assert sample.as_dict() == {"robot_mode": 7, "actual_q": (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)}
+    assert sample.values == (7, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert {"actual_q", "timestamp", "values"} <= set(dir(sample))
+    assert "timestamp" in sample
+    assert "actual_qd" not in sample
+    assert repr(sample).startswith("<Sample robot_mode=7, actual_q=(1.0,")
 
 
 def test_a_field_that_is_not_there_is_named_with_what_may_be_meant() -> None:
+    sample: Any = LAYOUT.sample(LAYOUT, SAMPLE._flat, 99.0)
+    with pytest.raises(AttributeError, match="actual_p is no field of this sample; did you mean actual_q"):
+        _ = sample.actual_p
+    with pytest.raises(AttributeError):
+        sample.actual_q = 1
     with pytest.raises(AttributeError, match="actual_p is no field of this sample; did you mean actual_q"):
         _ = SAMPLE.actual_p
     with pytest.raises(KeyError, match="no field of this sample"):
@@ -44,8 +54,18 @@ def test_wanted_fields_come_in_the_wanted_order(data: st.DataObject) -> None:
     wanted = tuple(data.draw(st.permutations(names)))[: data.draw(st.integers(0, len(names)))]
     recipe = Recipe(names, [OUTPUTS[name].type for name in names])
     flat = tuple(range(recipe.count))
-    sample = Sample(SampleLayout(recipe, wanted), flat, 0.0)
+    layout = SampleLayout(recipe, wanted)
+    sample = layout.sample(layout, flat, 0.0)
     assert sample.values == tuple(place for name in wanted for place in flat[recipe.slots[name]])
     for name in names:
         found = getattr(sample, name)
         assert (found if isinstance(found, tuple) else (found,)) == flat[recipe.slots[name]]
+
+
+def test_a_field_does_not_hide_what_a_sample_has() -> None:
+    layout = SampleLayout(
+        Recipe(("values", "robot_mode"), [OUTPUTS["robot_mode"].type] * 2), ("values", "robot_mode")
+    )
+    sample = layout.sample(layout, (1, 2), 0.0)
+    assert sample.values == (1, 2)
+    assert sample["values"] == 1
