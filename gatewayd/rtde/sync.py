@@ -5,9 +5,9 @@
             print(sample.actual_q)
 
 The robot lives in an event loop of its own, in a daemon thread, so that no package is missed while the script does
-something else. A script that does nothing but wait for packages reads them itself, which takes half the CPU time; 40 ms
-after its last call, at most, the loop reads again. Ctrl-C ends any wait. Arguments, names and errors are those of
-`gatewayd.rtde`.
+something else. A script that does nothing but wait for packages reads them itself, which takes a quarter of the CPU
+time; 0.2 s after its last call, at most, the loop reads again. Ctrl-C ends any wait. Arguments, names and errors are
+those of `gatewayd.rtde`.
 """
 
 from __future__ import annotations

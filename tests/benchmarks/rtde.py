@@ -35,11 +35,13 @@ NEWEST = SoftwareVersion(5, 26, 0)
 LOOPS = 500
 SETTLE = 1.0
 
+OURS = ("gatewayd", "gatewayd.sync")
 READING = f"""\
-CPU time of the client's process for each package at {RATE} Hz, in us; it looks at eight fields of each. `official` is
-written in the style of the client that Universal Robots publishes: blocking, an object for each package, a struct call
-for each field. ur_rtde receives in C++, and is asked for eight fields in each cycle; it does not know all fields.
-Median of {ROUNDS} rounds in turn.
+CPU time of the client's process for each package at {RATE} Hz, in us; it looks at eight fields of each. `gatewayd` is
+the asynchronous API, `gatewayd.sync` the blocking one. `official` is written in the style of the client that Universal
+Robots publishes: blocking, an object for each package, a struct call for each field. ur_rtde receives in C++, and is
+asked for eight fields in each cycle; it does not know all fields. Median of {ROUNDS} rounds, in each of which every
+client has its turn.
 {RULE}"""
 RECORDING = f"""\
 `gatewayd rtde record` of all fields of a simulated robot at {RATE} Hz. CPU as a share of a core; bytes of a package."""
@@ -79,19 +81,22 @@ def _listens(host: str) -> bool:
 
 
 def _reading(job: Job) -> Table:
-    kinds = ["gatewayd", "official", *(["ur_rtde"] if find_spec("rtde_receive") else [])]
+    others = ["official", *(["ur_rtde"] if find_spec("rtde_receive") else [])]
+    pairs = [(ours, other) for ours in OURS for other in others]
     samples = Samples()
     table = Table(
-        "An RTDE client's CPU time", READING, ("recipe", *kinds, *(f"/ {kind}" for kind in kinds[1:]), *NOISE)
+        "An RTDE client's CPU time",
+        READING,
+        ("recipe", *OURS, *others, *(f"{ours} / {other}" for ours, other in pairs), *NOISE),
     )
     for title, names in (("30 fields", USUAL), (f"{len(everything())} fields", everything())):
-        used = [kind for kind in kinds if kind != "ur_rtde" or names is USUAL]
-        found = {
-            kind: median(_cpu(kind, names, job.seconds, title, samples) for _ in range(ROUNDS))
-            for kind in used
-        }
-        cells = [f"{found[kind] * 1e6:.1f}" if kind in found else "-" for kind in kinds]
-        ratios = [f"{found['gatewayd'] / found[kind]:.2f}" if kind in found else "-" for kind in kinds[1:]]
+        used = [*OURS, *(kind for kind in others if kind != "ur_rtde" or names is USUAL)]
+        rounds = [
+            {kind: _cpu(kind, names, job.seconds, title, samples) for kind in used} for _ in range(ROUNDS)
+        ]
+        found = {kind: median(one[kind] for one in rounds) for kind in used}
+        cells = [f"{found[kind] * 1e6:.1f}" if kind in found else "-" for kind in (*OURS, *others)]
+        ratios = [f"{found[ours] / found[other]:.2f}" if other in found else "-" for ours, other in pairs]
         table.add(title, *cells, *ratios, *samples.noise(title))
     table.note = samples.note
     return table

@@ -4,8 +4,8 @@ TASK `read`: receive every package, look at the first eight fields, until stoppe
 `input_int_register_18`, each as soon as `output_int_register_18` shows the one before; after as many as the only NAME
 says prints a line for each: cycles of the controller, and seconds, until it was seen.
 
-KIND `gatewayd` and `ur_rtde` are these; `official` is a client in the style of the one that Universal Robots publishes:
-an object for each package, to which each field is given by itself.
+KIND `gatewayd`, `gatewayd.sync` and `ur_rtde` are these; `official` is a client in the style of the one that Universal
+Robots publishes: an object for each package, to which each field is given by itself.
 """
 
 from __future__ import annotations

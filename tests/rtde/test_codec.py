@@ -318,4 +318,6 @@ def test_the_beginning_of_a_data_package_can_be_known_before_it_comes() -> None:
     client.skip(len(package))
     with pytest.raises(ProtocolError) as caught:
         list(client.receive(package + bytes(3)))
-    assert caught.value.offset == 4 + 2 * len(package), "after the version, one that was skipped, one that was read"
+    assert caught.value.offset == 4 + 2 * len(package), (
+        "after the version, one that was skipped, one that was read"
+    )
