@@ -114,7 +114,8 @@ class _Definitions:
 
     def _words(self, arguments: tuple[Any, ...], _bounds: Mapping[str, Any]) -> Schema:
         words = {"const": arguments[0]} if len(arguments) == 1 else {"enum": list(arguments)}
-        return {**words, "type": _PLAIN[type(arguments[0])]}
+        types = {type(word) for word in arguments}
+        return {**words, "type": _PLAIN[types.pop()]} if len(types) == 1 else words
 
     def _items(self, arguments: tuple[Any, ...], bounds: Mapping[str, Any]) -> Schema:
         if len(arguments) == 1 or arguments[1] is ...:

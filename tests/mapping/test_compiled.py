@@ -29,7 +29,7 @@ def travelled(one: Compiled) -> Compiled:
 
 @pytest.mark.parametrize("path", MAPPINGS, ids=lambda path: path.stem)
 def test_shipped_mappings_arrive_as_they_were(path: Path) -> None:
-    sent = Compiled((compiled(path.read_bytes(), path.name),))
+    sent = Compiled((compiled(path.read_bytes(), str(path)),))
     assert sent.plans
     assert travelled(sent) == sent
 

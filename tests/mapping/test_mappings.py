@@ -8,7 +8,10 @@ import pytest
 
 from gatewayd.core.definition import Direction
 from gatewayd.links.canopen_node.plan import CanopenPlan
+from gatewayd.links.devices.canopen.plan import CanopenDevicePlan
+from gatewayd.links.devices.modbus.plan import ModbusDevicePlan
 from gatewayd.links.modbus_server.plan import ModbusPlan
+from gatewayd.links.robot.plan import robot_of
 from gatewayd.mapping.loader import Loaded, load, load_together
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.areas import Area
@@ -18,7 +21,7 @@ NAMES = [path.name for path in sorted(MAPPINGS.glob("*.yaml"))]
 
 
 def loaded(name: str) -> Loaded:
-    return load((MAPPINGS / name).read_bytes(), name)
+    return load((MAPPINGS / name).read_bytes(), str(MAPPINGS / name))
 
 
 def plan(name: str) -> Plan:
@@ -36,13 +39,16 @@ def test_passes_strictly(name: str) -> None:
 
 def test_all_of_them_can_run_in_one_process() -> None:
     """`gatewayd run mappings` is a way to look at them; `check --strict` of all at once is what CI does."""
-    found = load_together([(name, (MAPPINGS / name).read_bytes()) for name in NAMES])
+    found = load_together([(str(MAPPINGS / name), (MAPPINGS / name).read_bytes()) for name in NAMES])
     assert [finding.message for one in found for finding in one.diagnostics] == []
 
 
 FINGERPRINTS = {
+    "can-encoder.yaml": 0x5487E2E6,
     "canopen-only.yaml": 0xCE63E024,
     "full-image.yaml": 0xD1CF3B6F,
+    "io-island.yaml": 0xF579338F,
+    "rtu-gripper.yaml": 0xE1896041,
     "small-cell.yaml": 0x8261FCB6,
     "two-buses.yaml": 0x317A2AE8,
     "two-plcs.yaml": 0x9A171BB0,
@@ -62,7 +68,7 @@ def test_listens_on_loopback_and_says_how_to_change_it(name: str) -> None:
     text = (MAPPINGS / name).read_text()
     assert text.startswith("# yaml-language-server: $schema=schema.json\n")
     modbus = plan(name).of(ModbusPlan).get("modbus")
-    assert (modbus is None) == (name == "canopen-only.yaml")
+    assert (modbus is None) == (name in {"can-encoder.yaml", "canopen-only.yaml", "rtu-gripper.yaml"})
     if modbus is not None:
         assert modbus.host == "127.0.0.1"
         assert modbus.port > 1023
@@ -79,8 +85,11 @@ def test_names_a_bus_to_try_it_on(name: str) -> None:
 
 def test_ready_made_files_are_there() -> None:
     assert set(NAMES) == {
+        "can-encoder.yaml",
         "canopen-only.yaml",
         "full-image.yaml",
+        "io-island.yaml",
+        "rtu-gripper.yaml",
         "small-cell.yaml",
         "two-buses.yaml",
         "two-plcs.yaml",
@@ -164,3 +173,15 @@ def test_two_plcs_share_by_priority() -> None:
     assert locks["motion"] == (["cell_plc", "panel"], True)
     assert locks["line_stop"] == (["line_plc"], False)
     assert locks["call"] == (names, False)
+
+
+def test_devices_are_where_only_documentation_is() -> None:
+    """Whoever runs one by mistake reaches nobody (RFC 5737); the three families of lines are shown."""
+    lines = set()
+    for name in ("can-encoder.yaml", "io-island.yaml", "rtu-gripper.yaml"):
+        found = plan(name)
+        assert robot_of(found).host.startswith("192.0.2.")
+        modbus = found.of(ModbusDevicePlan).values()
+        lines |= {device.line.text for device in modbus}
+        lines |= {device.address for device in found.of(CanopenDevicePlan).values()}
+    assert lines == {"192.0.2.30:502", "/dev/ttyUSB0 115200 8N1", "can1 node 5"}

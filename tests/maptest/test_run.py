@@ -23,7 +23,7 @@ MAPPINGS = sorted((Path(__file__).parents[2] / "mappings").glob("*.yaml"))
 
 @pytest.mark.parametrize("path", MAPPINGS, ids=lambda path: path.name)
 def test_the_tests_of_shipped_mappings_pass(path: Path) -> None:
-    result = run_file(load(path.read_bytes(), path.name))
+    result = run_file(load(path.read_bytes(), str(path)))
     failed = [(str(one.position), one.message) for found in result.outcomes for one in found.failures]
     assert failed == []
 

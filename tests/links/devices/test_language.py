@@ -77,6 +77,11 @@ def test_findings_of_a_device_stand_at_its_place(section: str, rule: str) -> Non
     assert (rule, 5) in [(each.rule.slug, each.position.line) for each in found]
 
 
+def test_an_owner_that_is_none_of_the_writers_leaves_nobody() -> None:
+    found = loaded(VARIABLES.replace("owner: island", "owner: islnad", 1))
+    assert "`present` comes from `island`, but nobody may write it" in [one.message for one in found.errors]
+
+
 def test_a_file_without_devices_is_not_judged_by_their_rules() -> None:
     """And its fingerprint is what it was: tests/golden has those of all shipped mappings."""
     text = "gatewayd: 1\ncell: press\nrobot: {host: 127.0.0.1}\nvariables:\n"

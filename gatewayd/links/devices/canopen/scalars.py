@@ -36,7 +36,8 @@ ObjectIndex = Annotated[
     int,
     BeforeValidator(
         _object_index,
-        json_schema_input_type=Annotated[str, Field(pattern="^0x[0-9A-Fa-f]{4}$", examples=["0x6004"])],
+        # An editor that knows YAML takes 0x6004 for a number.
+        json_schema_input_type=int | Annotated[str, Field(pattern="^0x[0-9A-Fa-f]{4}$", examples=["0x6004"])],
     ),
 ]
 """Index of an object: 0x1000 to 0xFFFF."""

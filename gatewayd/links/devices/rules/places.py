@@ -78,12 +78,8 @@ def device_is_no_owner(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
         if writer is None or lock is None or writer in cell.locks[lock].owners:
             continue
         owned = cell.locks[lock]
-        message = (
-            f"`{place.variable.part.name}` comes from `{place.name}`, but only "
-            f"{alternatives(owned.owners)} may write it"
-        )
-        if not owned.owners:
-            message = f"`{place.variable.part.name}` comes from `{place.name}`, but nobody may write it"
+        who = f"only {alternatives(owned.owners)}" if owned.owners else "nobody"
+        message = f"`{place.variable.part.name}` comes from `{place.name}`, but {who} may write it"
         hint = f"write `owner: {writer}`, or a list by priority with `{writer}` in it"
         yield rule.at(owned.position, message, hint=hint, related=(Related(place.at("at"), "it lies here"),))
 
