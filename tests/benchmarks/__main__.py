@@ -20,6 +20,7 @@ SUBJECTS = {
     "growth": "cells, connections and variables: what each of them adds, and where that ends",
     "canopen": "CPU per PDO, a saturated bus and SYNC, beside python-canopen's own node",
     "rtde": "RTDE clients: CPU per package, recordings, a control loop, beside ur_rtde and the official style",
+    "devices": "the Modbus client: polls per second and CPU, silent units, beside pymodbus's and libmodbus's",
     "check": "start and `gatewayd check`, as multiples of an empty Python",
     "script": "the script that a user would write instead: ur_rtde feeding a pymodbus server",
 }

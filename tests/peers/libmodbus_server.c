@@ -1,4 +1,4 @@
-/* libmodbus as a server of other people's, with units 1 to 3 on TCP or one unit on a serial line.
+/* libmodbus as a server of other people's, with units 1 to 32 on TCP or one unit on a serial line.
  * Usage: libmodbus_server tcp ADDRESS PORT | libmodbus_server rtu DEVICE BAUDRATE UNIT
  * Prints "listening" once it serves. A holding register that was never written reads as its address.
  * Build: cc -O2 -o libmodbus_server libmodbus_server.c -I/usr/include/modbus -lmodbus */
@@ -10,7 +10,7 @@
 #include <sys/select.h>
 #include <unistd.h>
 
-#define UNITS 3
+#define UNITS 32
 #define REGISTERS 2000
 
 static modbus_mapping_t *new_unit(void)

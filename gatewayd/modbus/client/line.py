@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
 
+from gatewayd.modbus.client.breaker import BreakerState
 from gatewayd.modbus.client.conversation import Broken, Conversation, Finished
-from gatewayd.modbus.client.polling import NEVER
+from gatewayd.modbus.client.polling import AT_ONCE, NEVER
 from gatewayd.modbus.client.probes import DEFAULT_SHARE, ProbeBudget
 from gatewayd.modbus.client.requests import (
     ConnectionLost,
@@ -63,13 +64,17 @@ class Line:
         """That were opened, so far."""
         self.was_of_use = False
         """Whether anything was answered on the connection, or on the last one."""
+        self.silence_limit = NEVER
+        """Seconds after which a connection is given up on which nobody at all answers."""
         self._conversation: Conversation | None = None
+        self._unanswered_since = NEVER
         self._budget = ProbeBudget(settings.probe_share)
         self._turns = 0
         self._writes_in_row = 0
         self._paused_until = float("-inf")
-        self._free_probes: set[Station] = set()
+        self._may_be_back: set[Station] = set()
         self._probe: Job | None = None
+        self._failed_probe_at = 0
         self._broadcasts: deque[ModbusRequest] = deque()
         self._has_finished = False
         self._culprit: Job | None = None
@@ -87,12 +92,12 @@ class Line:
         """Another unit, which may be added at any time."""
         self.stations.append(station)
         station.served = 0
-        self._free_probes.add(station)
+        self._may_be_back.add(station)
 
     def remove(self, station: Station, now: float) -> None:
         """The unit goes: it counts as lost, and what is underway for it is ignored."""
         self.stations.remove(station)
-        self._free_probes.discard(station)
+        self._may_be_back.discard(station)
         if self._conversation is not None:
             for job in self._conversation.jobs:
                 if job.station is station:
@@ -123,12 +128,13 @@ class Line:
         is_new = self.settings.use is ConnectionUse.KEPT or bool(self.trouble) or not self.connections
         self._conversation = conversation
         self._has_finished = self._is_culprit_known = self.was_of_use = False
+        self._unanswered_since = NEVER
         self.trouble = ""
         self.connections += 1
         for station in self.stations if is_new else ():
             station.connected(now, may_be_back=self._is_nobodys_fault)
             if self._is_nobodys_fault:
-                self._free_probes.add(station)
+                self._may_be_back.add(station)
 
     def disconnected(self, reason: str, now: float) -> None:
         """It has ended, or could not be opened: what was underway is lost.
@@ -157,6 +163,7 @@ class Line:
     def received(self, data: bytes, now: float) -> str:
         """Bytes have come in. Why the connection has to be closed, or nothing."""
         assert self._conversation is not None
+        self._unanswered_since = NEVER
         return self._take(self._conversation.received, data, now)
 
     def check(self, now: float) -> str:
@@ -167,7 +174,11 @@ class Line:
         trouble = self.trouble
         for station in self.stations:
             if trouble or now >= station.deadline:
+                if now >= station.deadline:
+                    self._may_be_back.add(station)
                 station.check(now, trouble)
+        if not reason and self._is_silent(now):
+            reason = f"nobody answers for {self.silence_limit:g} s"
         return reason
 
     def next_frame(self, now: float) -> bytes | None:
@@ -194,13 +205,20 @@ class Line:
         """When somebody has something to send, connection or not."""
         if self._broadcasts:
             return float("-inf")
-        allowed = self._probes_allowed_at
+        allowed = self._probes_allowed()
         due = NEVER
         for station in self.stations:
             due = min(due, station.write_due)
             if station.read_due < due:
                 due = min(due, self._read_due(station, allowed))
         return due
+
+    def _is_silent(self, now: float) -> bool:
+        return (
+            self._conversation is not None
+            and now - self._unanswered_since >= self.silence_limit
+            and not self._is_protected
+        )
 
     @property
     def _is_ambiguous(self) -> bool:
@@ -210,34 +228,26 @@ class Line:
     @property
     def _is_protected(self) -> bool:
         """Whether there is somebody whom probes would cost time."""
-        return any(station.breaker.is_closed for station in self.stations)
+        for station in self.stations:  # noqa: SIM110 - asked several times for each answer; `any` takes thrice as long
+            if station.breaker.state is BreakerState.CLOSED:
+                return True
+        return False
 
-    @property
-    def _probes_allowed_at(self) -> float:
-        """When the next probe may go out that costs others time; one after the other."""
+    def _probes_allowed(self) -> tuple[float, float]:
+        """When the next probe may go out, one after the other: to a unit that stays away, to one that may be back."""
         if not self._is_protected:
-            return float("-inf")
-        return self._budget.free_at if self._probe is None else NEVER
+            return AT_ONCE, AT_ONCE
+        return (self._budget.free_at, AT_ONCE) if self._probe is None else (NEVER, NEVER)
 
-    def _read_due(self, station: Station, allowed: float) -> float:
-        if station.breaker.is_closed or station in self._free_probes:
+    def _read_due(self, station: Station, allowed: tuple[float, float]) -> float:
+        if station.breaker.state is BreakerState.CLOSED:
             return station.read_due
-        return max(station.read_due, allowed)
+        return max(station.read_due, allowed[station in self._may_be_back])
 
     def _next_job(self, now: float) -> Job | None:
         if self._broadcasts:
             return Job(0, self._broadcasts.popleft(), 0.0, now, _ignored)
-        writing = reading = None
-        allowed = self._probes_allowed_at
-        for station in self.stations:
-            if station.write_due <= now and (writing is None or station.served < writing.served):
-                writing = station
-            if (
-                station.read_due <= now
-                and (reading is None or station.served < reading.served)
-                and self._read_due(station, allowed) <= now
-            ):
-                reading = station
+        writing, reading = self._waiting(now)
         if writing is not None and (reading is None or self._writes_in_row < MAX_WRITES_IN_ROW):
             self._writes_in_row += 1
             self._serve(writing)
@@ -248,10 +258,33 @@ class Line:
         self._serve(reading)
         job = reading.take_read(now)
         if job.is_probe:
-            if reading not in self._free_probes:
-                self._probe = job
-            self._free_probes.discard(reading)
+            self._probe = job
+            self._may_be_back.discard(reading)
         return job
+
+    def _waiting(self, now: float) -> tuple[Station | None, Station | None]:
+        """Who is next to write, and who to be read or probed."""
+        writing = polled = probed = None
+        allowed = self._probes_allowed()
+        for station in self.stations:
+            if station.write_due <= now and (writing is None or station.served < writing.served):
+                writing = station
+            if station.read_due > now:
+                continue
+            if station.breaker.state is BreakerState.CLOSED:
+                if polled is None or station.served < polled.served:
+                    polled = station
+            elif (probed is None or station.served < probed.served) and self._read_due(
+                station, allowed
+            ) <= now:
+                probed = station
+        return writing, self._first(polled, probed)
+
+    def _first(self, polled: Station | None, probed: Station | None) -> Station | None:
+        """Who has waited longer; but between two probes in vain everybody who answers has a turn."""
+        if polled is None or probed is None:
+            return polled or probed
+        return polled if polled.served < max(probed.served, self._failed_probe_at) else probed
 
     def _serve(self, station: Station) -> None:
         self._turns += 1
@@ -280,18 +313,25 @@ class Line:
         self._has_finished = True
         is_answered = isinstance(outcome, bytes | ExceptionAnswer)
         self.was_of_use = self.was_of_use or is_answered
-        if not is_answered and job.station is not None and self._is_ambiguous:
-            job.station.hold(now + job.timeout)
+        if not is_answered:
+            self._unanswered_since = min(self._unanswered_since, job.sent_at)
+        station = job.station
+        if not is_answered and station is not None and self._is_ambiguous:
+            station.hold(now + job.timeout)
         was_protected = self._is_protected
+        was_closed = station is not None and station.breaker.is_closed
         job.done(job, outcome, now)
-        if job.is_probe and job.station is not None and not job.station.breaker.is_closed:
+        if station is not None and was_closed and not station.breaker.is_closed:
+            self._may_be_back.add(station)
+        if job.is_probe and station is not None and not station.breaker.is_closed:
             cost = now - job.sent_at
             if not is_answered:
                 cost = max(cost, job.timeout)  # bytes that are no answer may cost others theirs
             self._budget.spend(cost, now)
+            self._failed_probe_at = self._turns + 1
         if not was_protected and self._is_protected:
             # What was off altogether comes back together: nobody waits for those that stay away.
-            self._free_probes.update(self.stations)
+            self._may_be_back.update(self.stations)
 
 
 def _ignored(job: Job, outcome: bytes | Failure, now: float) -> None:

@@ -15,6 +15,12 @@ from gatewayd.modbus.client.line import Line
 from gatewayd.modbus.client.runner import LineError, LineRunner
 from gatewayd.modbus.client.timing import RtuTiming
 
+SILENCE_LIMIT = 5.0
+"""Seconds without any answer after which another connection is tried."""
+_UNACKNOWLEDGED = 3000
+"""Milliseconds after which the kernel gives up what the peer does not acknowledge (RFC 5482).
+
+Otherwise the pauses between its repetitions grow to minutes, and a device that was off would be found as late."""
 _KEEPALIVE = (
     (socket.TCP_KEEPIDLE, 5),
     (socket.TCP_KEEPINTVL, 2),
@@ -51,6 +57,7 @@ class TcpLine(LineRunner):
     ) -> None:
         super().__init__(line, report)
         self.address = address
+        line.silence_limit = SILENCE_LIMIT
 
     async def open(self) -> _TcpChannel:
         """See LineRunner."""
@@ -93,7 +100,7 @@ class _TcpChannel(asyncio.Protocol):
         connection = transport.get_extra_info("socket")
         # asyncio has set TCP_NODELAY. Keep-alive notices a peer that was switched off while nothing is underway.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        for option, value in _KEEPALIVE:
+        for option, value in (*_KEEPALIVE, (socket.TCP_USER_TIMEOUT, _UNACKNOWLEDGED)):
             connection.setsockopt(socket.IPPROTO_TCP, option, value)
 
     def data_received(self, data: bytes) -> None:

@@ -104,6 +104,36 @@ def test_units_that_are_silent_from_the_start_do_not_hold_up_the_others() -> Non
     assert [number for number, own in stations.items() if own.state is UnitState.ONLINE] == [2, 4, 6, 7, 8]
 
 
+def test_silent_units_at_the_start_cost_no_other_its_place() -> None:
+    """Four time-outs in a row would take longer than `lost_after`."""
+    units = {
+        number: StationSettings(number, polls(0.1), TIMEOUT, BreakerSettings(lost_after=1.0))
+        for number in range(1, 33)
+    }
+    world, stations, _, answering = make_world(units)
+    for number in range(29, 33):
+        silence(answering[number])
+    world.run(20.0)
+    assert [own.counters.losses for own in stations.values()] == [0] * 32
+    assert sum(own.state is UnitState.ONLINE for own in stations.values()) == 28
+
+
+def test_units_that_were_late_together_are_found_together_though_others_stay_away() -> None:
+    world, stations, _, units = make_world(units_of(12))
+    for number in (1, 2, 3):
+        silence(units[number])
+    world.run(10.0)
+    for number in (4, 5, 6, 7, 8):
+        silence(units[number])
+    world.run(3.0)
+    assert [number for number, own in stations.items() if own.state is UnitState.ONLINE] == [9, 10, 11, 12]
+    stations[9].counters.losses = 0
+    for number in (4, 5, 6, 7, 8):
+        heal(units[number])
+    world.run(20 * TIMEOUT * 4)
+    assert [number for number, own in stations.items() if own.state is UnitState.ONLINE] == list(range(4, 13))
+
+
 def test_units_that_come_back_together_are_found_together() -> None:
     """Power of the cabinet is off and on again, while two more stay away."""
     world, stations, _, units = make_world(units_of(10))
@@ -156,6 +186,25 @@ def test_line_without_connection_loses_its_units_in_time_and_says_why() -> None:
     world.is_reachable = True
     world.run(0.1)
     assert stations[1].state is UnitState.ONLINE
+
+
+def test_connection_on_which_nobody_answers_is_opened_again() -> None:
+    world, stations, _, units = make_world(units_of(2))
+    world.line.silence_limit = 5.0
+    world.run(1.0)
+    silence(units[1])
+    world.run(20.0)
+    assert world.line.connections == 1, "the other unit answers"
+    silence(units[2])
+    world.run(20.0)
+    assert world.line.connections in range(3, 6)
+    assert world.line.trouble == ""
+    heal(units[2])
+    world.run(2.0)
+    assert stations[2].state is UnitState.ONLINE
+    connections = world.line.connections
+    world.run(20.0)
+    assert world.line.connections == connections
 
 
 def test_unit_that_was_never_there_is_lost_when_there_is_no_connection() -> None:

@@ -51,6 +51,7 @@ async def test_values_and_writes_over_a_socket() -> None:
             connection = channel._transport.get_extra_info("socket")  # type: ignore[attr-defined]
             assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
             assert connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+            assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 3000
             progress = line.progress
             await until(lambda: line.progress > progress, "progress")
     assert reports == []
@@ -59,14 +60,16 @@ async def test_values_and_writes_over_a_socket() -> None:
 
 async def test_connection_is_opened_again_without_a_loss() -> None:
     async with serving() as server:
-        line, station, heard, reports = made(server.port)
+        line, _station, heard, reports = made(server.port)
         async with running(line):
             for _ in range(5):
-                await until(lambda: station.state is UnitState.ONLINE and line.line.was_of_use, "values")
+                heard.values.clear()
+                await until(lambda: heard.values, "values")
                 before = server.accepted
                 server.drop()
                 await until(lambda: server.accepted > before, "another connection")  # noqa: B023 - waited for here
-            await until(lambda: line.line.was_of_use, "values")
+            heard.values.clear()
+            await until(lambda: heard.values, "values")
             assert [state for state, _, _ in heard.states] == [UnitState.ONLINE]
     assert reports == []
 

@@ -130,6 +130,8 @@ class World:
         end = self.now + seconds
         while True:
             self._turn()
+            if self.is_reachable and not self._is_open:
+                continue
             upcoming = self._coming[0][0] if self._coming else float("inf")
             following = min(upcoming, self.line.wake_at())
             if following > end:
