@@ -21,6 +21,7 @@ COMMANDS = {
     "reload": "Make the running gateway read its mapping files again.",
     "status": "Print the state of the running gateway.",
     "watch": "Watch the variables of the running gateway live.",
+    "devices": "Print the devices, find them on a line, read and write one.",
     "locks": "Print who owns what; take and release locks.",
     "events": "Print past events, and follow new ones.",
     "trace": "Print the traffic on the links of the running gateway, decoded.",

@@ -105,8 +105,8 @@ class Api:
         traced: TracedGateway | None = None,
     ) -> None:
         self._stood_still = stood_still
-        self._gateway = gateway
-        self._audit = audit
+        self.gateway = gateway
+        self.audited = audit
         self._notes = notes
         self._declarations = Declarations()
         self.traces = Traces(traced) if traced is not None else None
@@ -124,11 +124,11 @@ class Api:
 
     def status(self, moment: Moment) -> Generator[None, None, Status]:
         """Everything at a glance."""
-        runtimes, cells = self._gateway.runtimes, []
+        runtimes, cells = self.gateway.runtimes, []
         for runtime in runtimes:
             cells.append(cell_view(runtime, self._declarations.of(runtime.plan), moment.now))
             yield
-        troubles = [*self._notes(), *self._gateway.troubles()]
+        troubles = [*self._notes(), *self.gateway.troubles()]
         troubles += [f"{cell['name']}: {problem}" for cell in cells for problem in cell["problems"]]
         started = min((runtime.cell.health.started for runtime in runtimes), default=math.inf)
         return Status(
@@ -212,7 +212,7 @@ class Api:
         limit = _count(query, "limit", 100)
         if "cell" in query:
             self._runtimes(query["cell"])
-        wanted = [record for record in self._audit if _is_wanted(record, query)]
+        wanted = [record for record in self.audited if _is_wanted(record, query)]
         found = []
         for record in _last(wanted, limit):
             found.append(record_view(record))
@@ -269,10 +269,10 @@ class Api:
 
     def _runtimes(self, cell: str | None) -> Sequence[ServedCell]:
         if cell is None:
-            return self._gateway.runtimes
-        found = [runtime for runtime in self._gateway.runtimes if runtime.cell.definition.name == cell]
+            return self.gateway.runtimes
+        found = [runtime for runtime in self.gateway.runtimes if runtime.cell.definition.name == cell]
         if not found:
-            names = ", ".join(runtime.cell.definition.name for runtime in self._gateway.runtimes)
+            names = ", ".join(runtime.cell.definition.name for runtime in self.gateway.runtimes)
             raise ApiError(404, "no_such_cell", f"there is no cell {cell}, only {names}")
         return found
 

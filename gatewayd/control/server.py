@@ -18,6 +18,7 @@ from aiohttp import web
 from aiohttp.typedefs import Middleware
 
 from gatewayd.control.api import Api, ApiError, Cursor, Moment
+from gatewayd.control.devices import devices_by_hand
 from gatewayd.control.endpoint import Reload
 from gatewayd.control.packages import MAX_FEEDS, PackageFeeds
 from gatewayd.control.trace import MAX_TRACES, Traces
@@ -49,6 +50,7 @@ log = logging.getLogger("gatewayd.control")
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 _Act = Callable[[str, Mapping[str, Any], str, Moment], Mapping[str, object]]
+_Ask = Callable[[str, Mapping[str, Any], str], Awaitable[Mapping[str, object]]]
 _Question = Callable[[Mapping[str, str], Moment], Generator[None, None, Mapping[str, object]]]
 
 
@@ -59,6 +61,9 @@ async def serving(listening: socket.socket, api: Api, reload: Reload | None) -> 
     if api.traces is not None:
         served.router.add_get("/v1/trace", partial(_trace, api.traces, api.share))
     served.router.add_get("/v1/packages", partial(_packages, api.feeds, api.share))
+    devices = devices_by_hand(api)
+    served.router.add_post("/v1/devices/{name}/read", partial(_ask_device, api, devices.read))
+    served.router.add_post("/v1/devices/{name}/write", partial(_ask_device, api, devices.write))
     served.middlewares.insert(0, _in_turn(api.share))
     runner = web.AppRunner(served, access_log=None, handle_signals=False, shutdown_timeout=0.1)
     await runner.setup()
@@ -246,6 +251,14 @@ async def _trace(traces: Traces, share: LoopShare, request: web.Request) -> web.
     finally:
         traces.close(trace)
     return response
+
+
+async def _ask_device(api: Api, ask: _Ask, request: web.Request) -> web.StreamResponse:
+    """Read or write a place of a device, on the connection that the gateway has."""
+    api.refuse_what_waited()
+    body, who = await _body(request), await _who(request)
+    api.refuse_what_waited()
+    return _json(await ask(request.match_info["name"], body, who))
 
 
 async def _packages(feeds: PackageFeeds, share: LoopShare, request: web.Request) -> web.StreamResponse:

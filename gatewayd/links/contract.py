@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gatewayd.core.objection import Objection
     from gatewayd.core.requester import Requester
     from gatewayd.core.status_layout import LinkTable, StatusField
+    from gatewayd.links.access import PlaceAnswer, PlaceRequest
     from gatewayd.mapping.plan import LinkPlan, Plan
 
 # -- declaration -------------------------------------------------------------------------------------------------
@@ -120,6 +121,9 @@ class LinkKind:
     doctor: ClassVar[str] = ""
     """Module whose `EXAMINATION` looks at what its links need, where they are to run (`links.examination`); empty:
     nothing is looked at.
+    """
+    access: ClassVar[str] = ""
+    """Module whose `ACCESS` talks to devices of its kind where no gateway does (`links.access`); empty: there are none.
     """
     usual: ClassVar[bool] = False
     """Nearly every cell has one: its runtime is imported while the mapping files are read."""
@@ -317,6 +321,13 @@ class Link:
 
     def trace(self, tap: Tap | None) -> None:
         """Hand `tap` what passes from now on; None: nobody traces any more. Called again and again with the same."""
+
+    async def ask(self, request: PlaceRequest) -> PlaceAnswer:
+        """Read or write a place of the device at the other end, by hand; only links of kinds with `access` are asked.
+
+        Raises `links.access.AccessError`.
+        """
+        raise NotImplementedError
 
     def health(self) -> LinkHealth:
         """How it is now."""

@@ -11,6 +11,7 @@ from gatewayd.core.status_layout import FIELDS, LinkTable, StatusField
 from gatewayd.links.contract import LinkKind, LinkRuntime, TrafficDecoder
 
 if TYPE_CHECKING:
+    from gatewayd.links.access import DeviceAccess
     from gatewayd.links.examination import Examination
     from gatewayd.links.exports import Export, ExportSet
     from gatewayd.links.language import DefiningLanguage, LinkLanguage
@@ -109,6 +110,13 @@ def examination_of(key: str) -> Examination | None:
     # Commands that look at nothing import this module, too.
     module = kind_of(key).doctor
     found: Examination | None = import_module(module).EXAMINATION if module else None
+    return found
+
+
+def access_of(key: str) -> DeviceAccess | None:
+    """What talks to devices of links with this key where no gateway does; None: it has no devices."""
+    module = kind_of(key).access
+    found: DeviceAccess | None = import_module(module).ACCESS if module else None
     return found
 
 

@@ -16,6 +16,9 @@ from gatewayd.report.printable import printable
 
 ACCEPTED = "write accepted"
 """What happened when a write was accepted; the core has no event for it."""
+DEVICE_WRITTEN = "device written"
+"""What happened when the operator wrote to a device past the variables; the core has no event for it."""
+REFUSED = EventKind.REFUSED.value
 UNDECLARED, GATEWAY = "undeclared", "gateway"
 """Who did it where no writer did: a peer that no writer stands for, or gatewayd. No writer may have these names."""
 UNDECLARED_PEER = "an undeclared peer"
@@ -38,9 +41,10 @@ BAD = frozenset(
 )
 """What somebody should look at."""
 _NOBODY = {EventKind.REFUSED: UNDECLARED, EventKind.UNSERVED: UNDECLARED, EventKind.FALLBACK: GATEWAY}
-_REFUSED, _UNSERVED = EventKind.REFUSED.value, EventKind.UNSERVED.value
+_UNSERVED = EventKind.UNSERVED.value
 _TEXTS = {
     ACCEPTED: "{writer} wrote {variable}: {old} -> {new}",
+    DEVICE_WRITTEN: "{writer} {request}",
     EventKind.FALLBACK.value: "{variable} fell back from {old} to {new}",
     EventKind.ACQUIRED.value: "{writer} took {lock}",
     EventKind.TAKEN_OVER.value: "{writer} took {lock} over from {holder}",
@@ -67,7 +71,8 @@ _WITHOUT_VALUES = {
 _IN_PARENTHESES = frozenset(
     {
         ACCEPTED,
-        _REFUSED,
+        DEVICE_WRITTEN,
+        REFUSED,
         _UNSERVED,
         EventKind.ACQUIRED.value,
         EventKind.TAKEN_OVER.value,
@@ -150,7 +155,7 @@ class EventRecord:
         return printable(self._text(refused))
 
     def _text(self, refused: str) -> str:
-        if self.what == _REFUSED:
+        if self.what == REFUSED:
             text = self._refusal(refused)
         elif self.what == _UNSERVED:
             text = f"{self._who()} {self.request}"
@@ -187,6 +192,7 @@ class EventRecord:
             "variable": self.variable and self.variable + others,
             "lock": self.lock and self.lock + others,
             "holder": self.holder,
+            "request": self.request or None,
             "old": None if self.old is None else value(self.old),
             "new": None if self.new is None else value(self.new, self.unit),
         }

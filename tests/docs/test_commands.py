@@ -26,6 +26,7 @@ ELSEWHERE = {
     r"gatewayd run .*": "tests/docs/test_tutorial.py, tests/e2e",
     r"gatewayd diff .*": "tests/cli/test_diff.py",
     r"gatewayd (status|watch|locks|events|force|unforce|trace)\b.*": "tests/cli, tests/e2e",
+    r"gatewayd devices\b.*": "tests/cli/devices, tests/links/devices",
     r"gatewayd doctor .*": "tests/cli/test_doctor.py",
     r"gatewayd import csv .*": "tests/cli/importing/test_csv.py, with the list of the guide",
     r"gatewayd rtde (record|watch|get|set|message|fields|info|convert|plot) .*": "tests/cli/rtde",

@@ -18,6 +18,7 @@ class DeviceKind(LinkKind):
     title = "device"
     traffic = "gatewayd.links.devices.traffic"
     doctor = "gatewayd.links.devices.doctor"
+    access = "gatewayd.links.devices.access"
     fields = {  # noqa: RUF012 - never changed
         "family": "how it is spoken to: `modbus`, `canopen`",
         "address": "where it is reached: host:port, serial port with its settings, or CAN bus",

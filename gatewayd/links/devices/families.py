@@ -1,7 +1,8 @@
 """The families of devices that there are: what differs between them lies in a package each, imported when it is used.
 
 A package has `language` (`FAMILY`, a `FamilyLanguage`), `description` (`FAMILY`, a `FamilyDescription`), `link`
-(`FAMILY`, a `FamilyRuntime`) and `doctor` (`EXAMINATION`). Its sections are bases of those in `sections`.
+(`FAMILY`, a `FamilyRuntime`), `doctor` (`EXAMINATION`) and `access` (`ACCESS`, a `DeviceAccess`). Its sections are
+bases of those in `sections`.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Final, cast
 
 if TYPE_CHECKING:
     # The daemon has no use for the language, and a check none for links.
+    from gatewayd.links.access import DeviceAccess
     from gatewayd.links.devices.family import FamilyDescription, FamilyLanguage, FamilyRuntime
     from gatewayd.links.examination import Examination
 
@@ -38,6 +40,12 @@ def description_of_family(family: str) -> FamilyDescription:
 def examination_of_family(family: str) -> Examination:
     """What looks at what devices of a family need."""
     return cast("Examination", import_module(f"{FAMILIES[family]}.doctor").EXAMINATION)
+
+
+@cache
+def access_of_family(family: str) -> DeviceAccess:
+    """What talks to devices of a family where no gateway does."""
+    return cast("DeviceAccess", import_module(f"{FAMILIES[family]}.access").ACCESS)
 
 
 @cache

@@ -8,8 +8,10 @@ or when nothing came for `lost_after` seconds though something was wanted, whate
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from functools import partial
 
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.client.breaker import Breaker, BreakerState
@@ -30,8 +32,15 @@ from gatewayd.modbus.client.unit import StationListener, StationSettings, UnitSt
 from gatewayd.modbus.client.writer import UnitWriter
 from gatewayd.modbus.client.writes import WriteOrder
 
+MAX_ASKED = 8
+"""Requests from outside the polls and writes that may wait for one unit."""
+
 _KEEPALIVE = ReadGroup(Area.HOLDING, 0, 1, (GroupMember(0, 0, 1),), (read(Area.HOLDING, 0, 1),))
 """Any answer shows that a unit is there, an exception too."""
+
+
+Answered = Callable[["bytes | Failure", float], None]
+"""Hears what became of a request, and when."""
 
 
 @dataclass(eq=False, slots=True)
@@ -84,6 +93,7 @@ class Station:
         self._writer = UnitWriter(has_mask_write=settings.has_mask_write)
         self._reader = IdentityReader(settings.is_identified, settings.serial)
         self._is_identifying = False
+        self._asked: deque[tuple[ModbusRequest, Answered]] = deque()
         self._hold_until = AT_ONCE
 
     def write(self, key: Hashable, order: WriteOrder, now: float, *, repeat: float | None = None) -> bool:
@@ -106,6 +116,18 @@ class Station:
         self._writer.cancel(key)
         self._refresh()
 
+    def ask(self, request: ModbusRequest, answered: Answered) -> bool:
+        """Send one more request, once, in the turn of the unit's reads; `answered` hears the outcome, or its loss.
+
+        False while the unit is not online, and where `MAX_ASKED` wait already.
+        """
+        if self.state is not UnitState.ONLINE or len(self._asked) >= MAX_ASKED:
+            return False
+        self._asked.append((request, answered))
+        self._refresh()
+        self.wake()
+        return True
+
     def take_write(self, now: float) -> Job:
         """The next request of a write, to be sent now. Only when `write_due` has come."""
         return self._job(self._writer.take(now), self._write_done, now)
@@ -118,6 +140,9 @@ class Station:
         elif (request := self._reader.request) is not None:
             self._is_identifying = True
             return self._job(request, self._identity_done, now)
+        elif self._asked:
+            asked, answered = self._asked.popleft()
+            return self._job(asked, partial(self._ask_done, answered), now)
         cycle = min(self._cycles, key=_due) if len(self._cycles) > 1 else self._cycles[0]
         group, part, request = cycle.take(now)
         job = self._job(request, self._read_done, now)
@@ -166,6 +191,8 @@ class Station:
             self.read_due = NEVER
         elif self._reader.request is not None:
             self.read_due = NEVER if self._is_identifying else hold
+        elif self._asked:
+            self.read_due = hold
         elif len(self._cycles) == 1:
             self.read_due = max(self._cycles[0].due, hold)
         else:
@@ -218,6 +245,10 @@ class Station:
         if identity is not None:
             former, self.identity = self.identity, identity
             self.listener.identified(identity, former, now)
+
+    def _ask_done(self, answered: Answered, job: Job, outcome: bytes | Failure, now: float) -> None:
+        self._judge(job, outcome, now)
+        answered(outcome, now)
 
     def _judge(self, job: Job, outcome: bytes | Failure, now: float) -> None:
         """Count the outcome of a request, and have the breaker hear of it."""
@@ -273,6 +304,8 @@ class Station:
         self._refresh()
         self.state = UnitState.LOST
         self.listener.state_changed(self.state, reason, now)
+        while self._asked:
+            self._asked.popleft()[1](ConnectionLost(reason), now)
 
 
 def _due(cycle: PollCycle) -> float:

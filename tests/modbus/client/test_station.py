@@ -5,8 +5,16 @@ import pytest
 from gatewayd.modbus.areas import Area
 from gatewayd.modbus.client.breaker import BreakerSettings
 from gatewayd.modbus.client.grouping import WantedItem, plan_classes
-from gatewayd.modbus.client.requests import BadAnswer, ExceptionAnswer, TimedOut, write_coil, write_register
-from gatewayd.modbus.client.station import Station
+from gatewayd.modbus.client.requests import (
+    BadAnswer,
+    ConnectionLost,
+    ExceptionAnswer,
+    TimedOut,
+    read,
+    write_coil,
+    write_register,
+)
+from gatewayd.modbus.client.station import MAX_ASKED, Station
 from gatewayd.modbus.client.unit import StationSettings, UnitState
 from gatewayd.modbus.client.writes import PartWrite
 from tests.modbus.client.world import Unit, make_world, polls
@@ -271,3 +279,34 @@ def test_several_requests_of_one_unit_are_underway_where_that_is_allowed() -> No
     units[1].delay = 0.05
     world.run(1.0)
     assert stations[1].counters.answers > 35, "one after the other there would be 20"
+
+
+def test_request_from_outside_goes_between_the_polls() -> None:
+    world, stations, heard, units = make_world({1: StationSettings(1, polls(0.02))})
+    units[1].registers = {40: 7}
+    world.run(0.1)
+    answers: list[tuple[object, float]] = []
+    assert stations[1].ask(read(Area.HOLDING, 40, 1), lambda outcome, now: answers.append((outcome, now)))
+    before = len(heard[1].values)
+    world.run(0.1)
+    assert [outcome for outcome, _ in answers] == [b"\x00\x07"]
+    assert len(heard[1].values) - before >= 4
+    assert [pdu for _, _, pdu in world.sent].count(read(Area.HOLDING, 40, 1).pdu) == 1
+
+
+def test_requests_from_outside_are_bounded_and_end_with_the_unit() -> None:
+    world, stations, _, units = make_world({1: StationSettings(1, polls(0.02))})
+    answers: list[object] = []
+
+    def ask() -> bool:
+        return stations[1].ask(write_coil(5, on=True), lambda outcome, _now: answers.append(outcome))
+
+    assert not ask()
+    world.run(0.1)
+    silence(units[1])
+    assert [ask() for _ in range(MAX_ASKED + 1)] == [True] * MAX_ASKED + [False]
+    world.run(3.0)
+    assert state_of(stations[1]) is UnitState.LOST
+    assert len(answers) == MAX_ASKED
+    assert all(isinstance(each, TimedOut | ConnectionLost) for each in answers)
+    assert not ask()

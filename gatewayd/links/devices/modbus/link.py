@@ -10,9 +10,11 @@ from typing import Final
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Value
 from gatewayd.core.requester import Requester
+from gatewayd.links.access import AccessError, AccessProblem, PlaceAnswer, PlaceRequest
 from gatewayd.links.contract import Context, Link, LinkHealth
 from gatewayd.links.devices.family import FamilyRuntime
 from gatewayd.links.devices.inflow import Inflow
+from gatewayd.links.devices.modbus.asking import ask_place, exchange
 from gatewayd.links.devices.modbus.lines import ModbusLines
 from gatewayd.links.devices.modbus.orders import OrderMaker
 from gatewayd.links.devices.modbus.plan import ModbusDevicePlan
@@ -34,6 +36,8 @@ from gatewayd.report.wording import names_and_more
 
 PERIOD = 0.05
 """Seconds between two looks at what only time brings."""
+_ASKED_LIMIT: Final = 5.0
+"""Seconds for a request by hand, with its time in the queue of the line."""
 
 log = logging.getLogger("gatewayd.devices")
 
@@ -130,6 +134,20 @@ class ModbusDeviceLink(Link):
         """Whether it answers, and to everything."""
         figures = {"family": self.plan.family, "address": self.plan.line.text, "unit": self.plan.unit}
         return self._figures(clock.now()).health(self.plan.name, figures)
+
+    async def ask(self, request: PlaceRequest) -> PlaceAnswer:
+        """Read or write a place by hand, between the polls."""
+        if self.station.state is not UnitState.ONLINE:
+            raise AccessError(
+                AccessProblem.NO_ANSWER, f"device {self.plan.name} is not asked: {self._state()[1]}"
+            )
+        station = self.station
+        return await ask_place(
+            self.plan,
+            self._cell.definition,
+            request,
+            lambda each: exchange(station, each, _ASKED_LIMIT),
+        )
 
     def _figures(self, now: float) -> DeviceFigures:
         state, reason = self._state()
