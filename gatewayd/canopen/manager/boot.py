@@ -178,6 +178,8 @@ class Boot:
         self._fresh = self._kept = False
         self._questions: deque[Question] = deque()
         self._attempts = 0
+        self._state: int | None = None
+        """What a heartbeat has said since the step began."""
         self._due = math.inf
         self._round = 0
 
@@ -214,14 +216,20 @@ class Boot:
             self.begin(now, fresh=True)
 
     def heartbeat(self, state: int, now: float) -> None:
-        """The device has sent a heartbeat with its NMT state."""
-        if self._questions:
-            return
-        if self.step is BootStep.STATE:
-            found = state == NmtState.OPERATIONAL
-            self._end(BootSignal.OPERATIONAL if found else BootSignal.OTHER, "", now)
-        elif self.step is BootStep.ERROR_CONTROL:
+        """The device has sent a heartbeat with its NMT state.
+
+        Some send the first one before they confirm that its time was written: it counts when that is confirmed.
+        """
+        self._state = state
+        if not self._questions and self.step in (BootStep.STATE, BootStep.ERROR_CONTROL):
+            self._judge_heartbeat(now)
+
+    def _judge_heartbeat(self, now: float) -> None:
+        if self.step is BootStep.ERROR_CONTROL:
             self._end(BootSignal.GOOD, "", now)
+        else:
+            found = self._state == NmtState.OPERATIONAL
+            self._end(BootSignal.OPERATIONAL if found else BootSignal.OTHER, "", now)
 
     def started(self) -> None:
         """It was sent the command to start."""
@@ -259,7 +267,7 @@ class Boot:
     # -- inside --------------------------------------------------------------------------------------------------
 
     def _enter(self, step: BootStep, now: float) -> None:
-        self.step, self._due = step, math.inf
+        self.step, self._due, self._state = step, math.inf, None
         self._round += 1
         act = self.ENTRIES.get(step)
         self._questions = deque(act(self, now) if act is not None else ())
@@ -360,6 +368,8 @@ class Boot:
             self._end(BootSignal.FRESH, "", now)
         elif not self._plan.keep or not self._plan.heartbeat:
             self._end(BootSignal.OTHER, "", now)
+        elif self._state is not None:
+            self._judge_heartbeat(now)
         else:
             self._due = now + self._plan.heartbeat
 
@@ -436,7 +446,7 @@ class Boot:
         return take
 
     def _wait_for_heartbeat(self, now: float) -> None:
-        if self._plan.heartbeat:
+        if self._plan.heartbeat and self._state is None:
             self._due = now + self._plan.heartbeat
         else:
             self._end(BootSignal.GOOD, "", now)

@@ -167,7 +167,9 @@ class Device:
             self.silent = self.dies_of_reset and frame.data[0] == NmtCommand.RESET_COMMUNICATION
             self.nmt.receive(frame, now)
         elif frame.can_id == 0x600 + self.node and self.nmt.allows(Service.SDO):
-            for answer in self.server.receive(frame.data, now):
+            answers = self.server.receive(frame.data, now)
+            self.tick(now)  # a heartbeat whose time was written comes first
+            for answer in answers:
                 made = Frame(0x580 + self.node, answer)
                 if self.held is not None:
                     self.held.append(made)

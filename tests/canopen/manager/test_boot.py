@@ -222,6 +222,15 @@ def test_device_without_the_heartbeat_that_it_should_have() -> None:
     assert not device.heartbeat.enabled
 
 
+def test_heartbeat_that_comes_before_its_time_is_confirmed_counts() -> None:
+    bench = Bench()
+    device = bench.device()
+    node, _ = bench.attach(heartbeat=9.0, producer=3000)
+    bench.up()
+    bench.run(1.0, until=lambda: (0x1017, 0) in device.written)
+    assert node.running
+
+
 def test_device_that_does_not_come_back_from_its_reset() -> None:
     bench = Bench()
     device = bench.device()
@@ -237,12 +246,17 @@ def test_device_that_boots_in_the_middle_of_its_boot_begins_again() -> None:
     device = bench.device()
     node, diary = bench.attach(settings=tuple(Setting(0x2000, 0, bytes((n, 0))) for n in range(30)))
     bench.up()
-    bench.run(1.0, until=lambda: len(device.written) > 10)
+    device.held = []
+    while len(device.written) < 10:
+        bench.run(0.1, until=lambda: device.held)
+        bench.put(device.held.pop(0), device)
+        bench.settle()
+    device.held = None
     device.reboot()
     bench.run(1.0)
     assert diary.events == ["started"]
     assert device.entries[0x2000, 0].value == b"\x1d\0"
-    assert node.counters.boots == 1
+    assert (node.counters.boots, node.counters.boot_ups) == (1, 2)
 
 
 def test_flood_of_boot_up_messages_is_answered_once() -> None:

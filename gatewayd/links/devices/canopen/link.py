@@ -32,6 +32,8 @@ from gatewayd.report.wording import names_and_more
 
 PERIOD = 0.05
 """Seconds between two looks at what only time brings."""
+LAST_SYNCHRONOUS = 240
+"""Transmission types up to it are synchronous."""
 CORE_TIME = 0.5
 """Seconds without a count of the core's heartbeat after which the core counts as stuck."""
 
@@ -52,7 +54,7 @@ class CanopenDeviceLink(ManagedDevice):
         self._progress = 0
         self._beat = (-1, 0.0)
         self._latest: dict[int, Value | None] = {}
-        """What PDOs have brought, by variable."""
+        """What PDOs have brought that come when a value changes, by variable."""
         self._unread: dict[tuple[int, int], str] = {}
         self._unwritten: dict[tuple[int, int], str] = {}
         self._bind(plan, cell)
@@ -71,13 +73,18 @@ class CanopenDeviceLink(ManagedDevice):
             if variables[place.variable].direction is Direction.OUTPUT:
                 self._outputs.setdefault(place.variable, []).append(place)
         self._by_pdo: dict[int, list[tuple[int, int, Reading]]] = {}
-        self._by_object: dict[tuple[int, int], list[tuple[int, Reading, bool]]] = {}
+        self._by_object: dict[tuple[int, int], list[tuple[int, Reading, int | None]]] = {}
         for place in inputs:
             reading = reading_of(place, variables[place.variable])
-            at, carried = (place.index, place.subindex), place.pdo is not None
-            self._by_object.setdefault(at, []).append((place.variable, reading, carried))
+            at = place.index, place.subindex
+            self._by_object.setdefault(at, []).append((place.variable, reading, place.pdo))
             if place.pdo is not None:
                 self._by_pdo.setdefault(place.pdo, []).append((place.item, place.variable, reading))
+        self._on_change = {
+            number
+            for number, pdo in enumerate(plan.node.pdos)
+            if pdo.transmission is None or pdo.transmission > LAST_SYNCHRONOUS
+        }
         cell.listeners.append(self._on_image)
 
     @property
@@ -166,7 +173,10 @@ class CanopenDeviceLink(ManagedDevice):
         self._outflow.lose()
 
     def node_seen(self, now: float) -> None:
-        """What its PDOs have brought is still so: it would have sent another one."""
+        """What PDOs have brought that it sends on change is still so: it would have sent another one.
+
+        What comes with SYNC is good only while it comes.
+        """
         self.heard = now
         if self._latest:
             self._inflow.receive(list(self._latest.items()), now)
@@ -176,7 +186,8 @@ class CanopenDeviceLink(ManagedDevice):
         self.heard = now
         found = [(variable, reading(values[item])) for item, variable, reading in self._by_pdo.get(pdo, ())]
         if found:
-            self._latest.update(found)
+            if pdo in self._on_change:
+                self._latest.update(found)
             self._inflow.receive(found, now)
 
     def object_read(self, index: int, subindex: int, value: Raw, now: float) -> None:
@@ -187,9 +198,9 @@ class CanopenDeviceLink(ManagedDevice):
                 "device is read again", extra=fields(**self._names(), object=object_text(index, subindex))
             )
         found = []
-        for variable, reading, carried in self._by_object.get((index, subindex), ()):
+        for variable, reading, pdo in self._by_object.get((index, subindex), ()):
             found.append((variable, reading(value)))
-            if carried:
+            if pdo in self._on_change:
                 self._latest[variable] = found[-1][1]
         if found:
             self._inflow.receive(found, now)
@@ -197,7 +208,7 @@ class CanopenDeviceLink(ManagedDevice):
     def object_unread(self, index: int, subindex: int, reason: str, now: float) -> None:
         """A value could not be read; it is lost once that lasts."""
         found = self._by_object.get((index, subindex), ())
-        if not any(not carried for _, _, carried in found):
+        if all(pdo is not None for _, _, pdo in found):
             return  # a PDO brings it
         variables = self._cell.definition.variables
         names = names_and_more([variables[variable].name for variable, _, _ in found])

@@ -1,4 +1,4 @@
-"""Rules GW830 to GW841: objects of CANopen devices, their data sheets and PDOs."""
+"""Rules GW830 to GW841, GW848 and GW849: objects of CANopen devices, their data sheets and PDOs."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from gatewayd.links.devices.canopen.expand import (
     object_of,
     sheet_file,
 )
+from gatewayd.links.devices.canopen.managed_bus import bus_of
 from gatewayd.links.devices.canopen.plan import TYPES, WORDS
 from gatewayd.links.devices.expand import all_families, devices_of, family_of
 from gatewayd.links.devices.places import ExpandedPlace
@@ -211,6 +212,51 @@ def key_of_other_family(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
                 yield rule.at(place.at(key), message, hint=f"remove `{key}`")
 
 
+@cell_rule("GW848")
+def device_key_without_effect(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """A key of a CANopen device that nothing in the file lets act."""
+    for device, layout in _layouts(cell):
+        spec, bus = device.spec, bus_of(cell.document, device.spec)
+        written = any(pdo.written for pdo in (*layout.pdos, *layout.too_long, *layout.without_cob_id))
+        idle = (
+            (
+                "keep",
+                spec.heartbeat is None,
+                "without a heartbeat nobody knows whether the device is in operation",
+            ),
+            (
+                "manager",
+                not bus.heartbeat,
+                "the gateway has no heartbeat on the bus without `manager_heartbeat`",
+            ),
+            ("manager_heartbeat", bus.node is None, "a heartbeat needs the node-ID of its sender, `manager`"),
+            ("transmission", not written, "the gateway lays out no PDO of it (`pdo: N`)"),
+            ("event", not written, "the gateway lays out no PDO of it (`pdo: N`)"),
+        )
+        for key, has_none, reason in idle:
+            if has_none and key in spec.model_fields_set and getattr(spec, key) not in (None, False):
+                message = f"`{key}` of `{device.name}` has no effect: {reason}"
+                yield rule.at(device.key_at(key), message, hint=f"remove `{key}`, or add what it needs")
+
+
+@cell_rule("GW849", Severity.WARNING)
+def sync_without_sender(rule: Rule, cell: ExpandedCell) -> Iterator[Diagnostic]:
+    """A PDO that waits for a SYNC which nobody is said to send."""
+    for device, layout in _layouts(cell):
+        waiting = [
+            pdo
+            for pdo in layout.pdos
+            if pdo.transmission is not None and pdo.transmission <= _LAST_SYNCHRONOUS
+        ]
+        if waiting and not bus_of(cell.document, device.spec).sync.producer:
+            message = f"{waiting[0].label} of `{device.name}` goes with SYNC, and the gateway sends none"
+            hint = "add `sync: 10ms` to the devices of the bus, unless somebody else there sends it"
+            key = "transmission" if "transmission" in device.spec.model_fields_set else "canopen"
+            yield rule.at(device.at(key), message, hint=hint)
+
+
+_LAST_SYNCHRONOUS = 240
+"""Transmission types up to it are synchronous."""
 _SHARED = frozenset({"type", "scale", "offset"})
 """Keys of a place that mean the same in all families."""
 

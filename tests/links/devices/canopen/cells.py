@@ -29,7 +29,7 @@ cell: press
 robot: {{host: 127.0.0.1}}
 modbus: {{listen: '127.0.0.1:1502', allow: 127.0.0.1}}
 devices:
-  encoder: {{canopen: {channel}, interface: virtual, node: 5, eds: {sheet}, heartbeat: 900ms, poll: 20ms,
+  encoder: {{canopen: {channel}, interface: virtual, node: 5, eds: {sheet}, heartbeat: {heartbeat}, poll: 20ms,
     watchdog: none{more}}}
 writers:
   encoder: {{device: encoder}}
@@ -45,14 +45,14 @@ VARIABLES = """\
 VENDOR = 0x1F0
 
 
-def text(variables: str = VARIABLES, channel: str = "can1", more: str = "") -> str:
+def text(variables: str = VARIABLES, channel: str = "can1", more: str = "", heartbeat: str = "9s") -> str:
     """A mapping file."""
-    return HEAD.format(channel=channel, sheet=SHEET, more=more) + variables
+    return HEAD.format(channel=channel, sheet=SHEET, more=more, heartbeat=heartbeat) + variables
 
 
-def planned(variables: str = VARIABLES, channel: str = "can1", more: str = "") -> Plan:
+def planned(variables: str = VARIABLES, channel: str = "can1", more: str = "", heartbeat: str = "9s") -> Plan:
     """The plan of a mapping without errors."""
-    found = load(text(variables, channel, more).encode(), "press.yaml")
+    found = load(text(variables, channel, more, heartbeat).encode(), "press.yaml")
     assert [each.message for each in found.errors] == []
     assert found.plan is not None
     return found.plan

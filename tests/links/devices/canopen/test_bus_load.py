@@ -24,7 +24,7 @@ def test_pdos_heartbeat_and_repeated_reads() -> None:
     assert found == {
         "device encoder: TPDO 1": rate,
         "device encoder: RPDO 1": rate,
-        "device encoder: heartbeat": pytest.approx(10 / 3),
+        "device encoder: heartbeat": pytest.approx(1 / 3),
         "device encoder: reads of 2000h": pytest.approx(50.0),
     }
 

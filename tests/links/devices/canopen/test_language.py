@@ -22,7 +22,7 @@ def test_plan_has_all_that_the_daemon_needs() -> None:
     device = the_device(plan)
     assert device.bus == ManagerPlan("virtual", "can1", 500_000)
     assert device.node.expected == ExpectedIdentity(0x20196, 0x1F0, 0x401)
-    assert (device.node.heartbeat, device.node.producer, device.node.sdo_timeout) == (0.9, 300, 1.0)
+    assert (device.node.heartbeat, device.node.producer, device.node.sdo_timeout) == (9.0, 3000, 1.0)
     assert device.places == (
         ObjectPlace(0, 0x6004, 0, CanType.UNSIGNED32, (0.001, 0.0), 0, 0),
         ObjectPlace(1, 0x2000, 0, CanType.UNSIGNED16, poll=0.02),
@@ -85,7 +85,7 @@ def test_device_without_a_data_sheet() -> None:
 
 
 def test_time_that_pdos_are_good_for_is_at_least_that_of_the_heartbeat() -> None:
-    plan = load(text(more=", lost_after: 2s").replace("900ms", "6s").encode(), "press.yaml").plan
+    plan = load(text(more=", lost_after: 2s", heartbeat="6s").encode(), "press.yaml").plan
     assert plan is not None
     assert the_device(plan).lost_after == 6.0
 

@@ -48,7 +48,7 @@ async def test_values_go_both_ways(channel: str) -> None:
 
 
 async def test_value_that_does_not_change_stays_good_by_the_heartbeat(channel: str) -> None:
-    plan = planned(channel=channel, more=", lost_after: 900ms")
+    plan = planned(channel=channel, more=", lost_after: 900ms", heartbeat="900ms")
     robot = FakeRobot(plan)
     link = link_of(plan, robot.cell)
     async with an_encoder(channel), managed([link]):
@@ -60,7 +60,7 @@ async def test_value_that_does_not_change_stays_good_by_the_heartbeat(channel: s
 
 
 async def test_lost_device_is_a_lost_writer_and_comes_back(channel: str) -> None:
-    plan = planned(channel=channel)
+    plan = planned(channel=channel, heartbeat="900ms")
     robot = FakeRobot(plan)
     link = link_of(plan, robot.cell)
     async with an_encoder(channel) as encoder, managed([link]):
@@ -144,7 +144,7 @@ async def test_reload_goes_on_with_the_same_device(channel: str) -> None:
 
 
 def test_gap_of_our_own_makes_no_value_old() -> None:
-    plan = planned()
+    plan = planned(heartbeat="900ms")
     robot = FakeRobot(plan)
     link = link_of(plan, robot.cell)
     robot.fresh(100.0)
@@ -155,6 +155,23 @@ def test_gap_of_our_own_makes_no_value_old() -> None:
     link._tick(160.1)
     assert robot.owner("position") == "encoder"
     link._tick(170.0)
+    assert robot.owner("position") == ""
+
+
+def test_value_that_comes_with_sync_is_good_only_while_it_comes() -> None:
+    plan = planned(
+        VARIABLES.replace("0x6004,", "0x6004, pdo: 1,"),
+        more=", transmission: sync, sync: 10ms",
+        heartbeat="900ms",
+    )
+    robot = FakeRobot(plan)
+    link = link_of(plan, robot.cell)
+    robot.fresh(100.0)
+    link.node_started(100.0)
+    link.pdo_received(0, [1500], 100.0)
+    for second in range(1, 4):
+        link.node_seen(100.0 + second)
+        link._tick(100.0 + second)
     assert robot.owner("position") == ""
 
 
