@@ -39,3 +39,15 @@ COMPANIONS: Mapping[str, Companions] = MappingProxyType(
     }
 )
 """Value field -> what it acts through. Every other input acts by itself, as registers and the masks themselves do."""
+
+
+def _select_values() -> dict[str, int]:
+    bits: dict[str, int] = {}
+    for needs in COMPANIONS.values():
+        if needs.bit is not None:
+            bits[needs.mask] = bits.get(needs.mask, 0) | 1 << needs.bit
+    return bits
+
+
+MASK_BITS: Mapping[str, int] = MappingProxyType(_select_values())
+"""Mask whose bits select whole values -> all of them; every other bit means nothing."""

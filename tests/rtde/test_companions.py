@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from gatewayd.rtde.claims import recipe_key
-from gatewayd.rtde.companions import COMPANIONS
+from gatewayd.rtde.companions import COMPANIONS, MASK_BITS
 from gatewayd.rtde.fields import INPUTS
 
 
@@ -39,3 +39,7 @@ def test_the_bit_of_the_mask(field: str, mask_bit: int | None) -> None:
 def test_the_analog_outputs_share_a_mask() -> None:
     masked = [field for field, needs in COMPANIONS.items() if needs.mask == "standard_analog_output_mask"]
     assert masked == ["standard_analog_output_0", "standard_analog_output_1"]
+
+
+def test_the_bits_that_select_whole_values() -> None:
+    assert dict(MASK_BITS) == {"speed_slider_mask": 0b1, "standard_analog_output_mask": 0b11}

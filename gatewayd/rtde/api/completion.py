@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from gatewayd.rtde.api.errors import WriteRefusedError, wrong_count
 from gatewayd.rtde.api.sample import Value
-from gatewayd.rtde.companions import COMPANIONS
+from gatewayd.rtde.companions import COMPANIONS, MASK_BITS
 from gatewayd.rtde.recipe import Recipe, Scalar
 from gatewayd.rtde.types import INTEGER_RANGES, DataType
 
@@ -61,6 +61,11 @@ def _check(name: str, value: object, kind: DataType) -> None:
         raise ValueError(message)
     if name in _FINITE and not -math.inf < value < math.inf:
         message = f"{name} takes finite numbers, not {value!r}"
+        raise ValueError(message)
+    if name in MASK_BITS and int(value) & ~MASK_BITS[name]:
+        message = (
+            f"{name} has no bits but {MASK_BITS[name]:#b}, and {value!r} sets others, which select nothing"
+        )
         raise ValueError(message)
     if name in _RATIOS and not 0 <= value <= 1:
         message = f"{name} is a share from 0 to 1, not {value!r}"

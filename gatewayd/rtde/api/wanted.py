@@ -67,8 +67,8 @@ class Wanted:
 def wanted(outputs: Fields, inputs: Mapping[str, Fields] | None, frequency: float) -> Wanted:
     """Read the arguments of a program. TypeError or ValueError says what is wrong with them.
 
-    Names that are in no guide are let through: the controller decides. An empty or repeated name, and an input recipe
-    without a field, are refused.
+    Names that are in no guide are let through: the controller decides. An empty or repeated name, an input recipe
+    without a field, and an input in two recipes, where the controller would answer IN_USE, are refused.
     """
     if not 0 <= frequency < math.inf:
         message = (
@@ -82,14 +82,16 @@ def wanted(outputs: Fields, inputs: Mapping[str, Fields] | None, frequency: floa
     names, declared = _read("outputs", outputs)
     recipes: dict[str, tuple[str, ...]] = {}
     types: dict[str, DataType] = {}
+    holders: dict[str, str] = {}
     for key, fields in (inputs or {}).items():
         recipes[key], more = _read(f"input recipe {key!r}", fields)
         if not recipes[key]:
             message = f"input recipe {key!r} has no field"
             raise ValueError(message)
-        if any(types.get(name, kind) is not kind for name, kind in more.items()):
-            message = f"input recipe {key!r} declares another type for a field than an earlier one"
-            raise ValueError(message)
+        for name in recipes[key]:
+            if (other := holders.setdefault(name, key)) != key:
+                message = f"{name} is in the input recipes {other!r} and {key!r}: leave it in one of them"
+                raise ValueError(message)
         types |= more
     return Wanted(names, recipes, declared, types, frequency)
 

@@ -17,6 +17,7 @@ from gatewayd.rtde.types import DataType
 _ELEMENTS = {kind.word for kind in DataType if not kind.is_vector}
 _DELIMITER = re.compile(r'[^\w"]', re.ASCII)
 _BOM = "\ufeff"
+_BOMS_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 class RecordingReader(Protocol):
@@ -73,6 +74,8 @@ def _opened(file: BinaryIO, path: str, delimiter: str | None) -> RecordingReader
     if start.startswith(MAGIC):
         file.close()
         return ParquetReader(path)
+    if b"\0" in start or start.startswith(_BOMS_UTF_16):
+        raise RecordingError(f"{path}:1: no recording: it is UTF-16, or no text at all; save it as UTF-8")
     first = _text(start)
     if not first.endswith("\n"):
         raise RecordingError(f"{path}:1: no recording: it has no line with the names of its columns")

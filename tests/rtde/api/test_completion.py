@@ -129,6 +129,14 @@ def test_a_value_that_its_type_does_not_have_is_refused(name: str, value: Any) -
         elements(name, value, INPUTS[name].type)
 
 
+@pytest.mark.parametrize("mask, most", [("speed_slider_mask", 1), ("standard_analog_output_mask", 3)])
+def test_a_mask_has_no_bits_that_select_nothing(mask: str, most: int) -> None:
+    kind = INPUTS[mask].type
+    assert elements(mask, most, kind) == (most,)
+    with pytest.raises(ValueError, match=f"{mask} has no bits but {most:#b}, and 7 sets others"):
+        elements(mask, 7, kind)
+
+
 def test_doubles_take_integers_and_what_is_no_number() -> None:
     assert elements("input_double_register_0", 1, DataType.DOUBLE) == (1.0,)
     assert math.isnan(elements("input_double_register_0", math.nan, DataType.DOUBLE)[0])

@@ -45,9 +45,9 @@ def test_a_name_that_no_field_can_have_is_refused(name: str) -> None:
         wanted([name], None, 0)
 
 
-def test_one_field_has_one_type() -> None:
-    with pytest.raises(ValueError, match="another type"):
-        wanted([], {"a": {"x": "BOOL"}, "b": {"x": "INT32"}}, 0)
+def test_a_field_is_in_one_input_recipe_only() -> None:
+    with pytest.raises(ValueError, match="x is in the input recipes 'a' and 'c': leave it in one of them"):
+        wanted([], {"a": ["w", "x"], "b": ["y"], "c": {"x": "INT32"}}, 0)
 
 
 def test_a_misspelt_input_gets_a_suggestion() -> None:

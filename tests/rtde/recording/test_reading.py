@@ -65,6 +65,14 @@ def test_a_last_package_that_is_cut_off_is_left_out_and_reported(tmp_path: Path,
             assert found.torn.endswith("left out")
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+def test_text_of_two_bytes_a_character_is_no_recording(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text("\n".join((HEADER, *LINES)), encoding=encoding)
+    with pytest.raises(RecordingError, match=r"x\.csv:1: no recording: it is UTF-16, .*; save it as UTF-8"):
+        open_recording(path)
+
+
 def test_a_recording_of_one_column_is_of_text_whatever_its_first_cell(tmp_path: Path) -> None:
     path = tmp_path / "x"
     path.write_text("timestamp\n0.5\n")
