@@ -38,9 +38,10 @@ LINK = {
 LAYERS: dict[str, set[str]] = {
     "gatewayd": set(),
     "loop": {"loop"},
+    "whole_file": set(),
     "machine": {"loop.resolve", "machine"},
     "core": {"core"},
-    "rtde": {"loop", "report.format", "rtde"},
+    "rtde": {"loop", "report.format", "rtde", "whole_file"},
     "rtde.testing": {"simulator"},
     "encoding": {"core.definition", "encoding"},
     "modbus": {"core.definition", "encoding", "modbus"},
@@ -234,6 +235,7 @@ LAYERS: dict[str, set[str]] = {
         "service",
         "simulator",
         "web.settings",
+        "whole_file",
     },
     "__main__": {
         "cli",

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from gatewayd.whole_file import whole_file
+
 if TYPE_CHECKING:
     from gatewayd.links.exports import ExportedFile
 
@@ -61,10 +63,5 @@ def write(files: Sequence[Planned]) -> None:
     for file in files:
         if file.is_written:
             file.path.parent.mkdir(parents=True, exist_ok=True)
-            beside = file.path.with_name(f".{file.path.name}.new")
-            try:
-                beside.write_bytes(file.content)
-                beside.replace(file.path)
-            except BaseException:
-                beside.unlink(missing_ok=True)
-                raise
+            with whole_file(file.path, overwrite=True) as unfinished:
+                unfinished.write_bytes(file.content)

@@ -1,4 +1,4 @@
-"""Files that commands write: none is overwritten unasked, and what goes wrong is one line."""
+"""Files that commands write: none is overwritten unasked, each is whole, and what goes wrong is one line."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import click
 
 from gatewayd.cli.files import reason_of
 from gatewayd.report.printable import printable
+from gatewayd.whole_file import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,7 +40,8 @@ def write_bytes(context: click.Context, path: str | Path, content: bytes) -> Non
 
 def _written(context: click.Context, path: str | Path, write: Callable[[Path], object]) -> None:
     try:
-        write(Path(path))
+        with whole_file(path, overwrite=True) as unfinished:
+            write(unfinished)
     except (OSError, ValueError) as error:
         message = f"{click.format_filename(path)}: cannot be written: {reason_of(error)}"
         click.echo(printable(message), err=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 from collections.abc import Callable, Iterator
 from enum import Enum
@@ -15,11 +14,10 @@ from gatewayd.rtde.recording.gaps import SUFFIX, GapWriter, read_gaps
 from gatewayd.rtde.recording.parquet import write_parquet
 from gatewayd.rtde.recording.reading import RecordingReader, open_recording
 from gatewayd.rtde.recording.writing import check_delimiter, create_recording
+from gatewayd.whole_file import whole_file
 
 _TOGETHER = 256
 """Packages that are written together."""
-_NO_LINKS = {errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK}
-"""What file systems without links answer."""
 
 
 class Converted(NamedTuple):
@@ -71,15 +69,16 @@ def convert(
     if Path(target).exists() and Path(target).samefile(source):
         raise RecordingError(f"{target}: is the recording itself; choose another name")
     gaps = read_gaps(source)
-    unfinished = Path(f"{target}.{os.getpid()}.part")
     with open_recording(source, delimiter=delimiters[0]) as recording:
         try:
-            count = _write(recording, unfinished, form, delimiters[1], progress)
-            _finish(unfinished, Path(target), overwrite=overwrite)
+            with whole_file(target, overwrite=overwrite) as unfinished:
+                count = _write(recording, unfinished, form, delimiters[1], progress)
+        except FileExistsError:
+            raise RecordingExistsError(str(target)) from None
         except RecordingWriteError as error:
             raise RecordingError(f"{target}: cannot be written: {error.reason}") from error
-        finally:
-            unfinished.unlink(missing_ok=True)
+        except OSError as error:
+            raise RecordingError(f"{target}: cannot be written: {error.strerror or error}") from error
         torn = recording.torn
     with GapWriter(target, overwrite=overwrite) as writer:
         for gap in gaps:
@@ -120,18 +119,3 @@ def _write(
         for values, time in rows():
             writer.write(values, time or 0.0)
     return count
-
-
-def _finish(unfinished: Path, target: Path, *, overwrite: bool) -> None:
-    """Give the file its name; by a link, because a file of that name may have come in the meantime."""
-    try:
-        if overwrite:
-            unfinished.replace(target)
-        else:
-            target.hardlink_to(unfinished)
-    except FileExistsError:
-        raise RecordingExistsError(str(target)) from None
-    except OSError as error:
-        if error.errno not in _NO_LINKS:
-            raise RecordingError(f"{target}: cannot be written: {error.strerror}") from error
-        unfinished.rename(target)
