@@ -52,6 +52,7 @@ class LineRunner(ABC):
         self._report = report
         self._reported = ""
         self._channel: Channel | None = None
+        self._ended_early = ""
         self._changed = asyncio.Event()
         self._timer: asyncio.TimerHandle | None = None
         self._timer_at = NEVER
@@ -119,6 +120,9 @@ class LineRunner(ABC):
 
     def ended(self, reason: str) -> None:
         """The connection was closed by the other side, or broke."""
+        if self._channel is None:
+            # A device whose places are all taken closes a connection before `open` has returned it.
+            self._ended_early = reason
         self._close(reason)
 
     def _connect_at(self, backoff: Backoff) -> float:
@@ -132,8 +136,12 @@ class LineRunner(ABC):
     async def _connect(self, backoff: Backoff) -> None:
         """Open the connection and stay until it is closed."""
         limit = self.line.settings.connect_timeout
+        self._ended_early = ""
         try:
-            self._channel = await wait_with_progress(self._open_in_time(limit), self._count_progress, limit)
+            channel = await wait_with_progress(self._open_in_time(limit), self._count_progress, limit)
+            if self._ended_early:
+                channel.close()
+                raise LineError(self._ended_early)
         except (LineError, TimeoutError) as error:
             reason = str(error) or f"no connection within {limit:g} s"
             backoff.failed(clock.now())
@@ -141,6 +149,7 @@ class LineRunner(ABC):
             self.line.disconnected(reason, clock.now())
             self._turn(clock.now())
             return
+        self._channel = channel
         now = clock.now()
         self.line.connected(self.make_conversation(), now)
         self._turn(now)

@@ -21,8 +21,11 @@ class Pipe:
     def __init__(self, runner: LineRunner, unit: Unit) -> None:
         self._runner, self._unit = runner, unit
         self.is_open = True
+        self.is_broken = False
 
     def send(self, data: bytes) -> None:
+        if self.is_broken:
+            return
         request = split(bytearray(data), 0, len(data))
         assert request is not None
         answer = self._unit.answer(request.pdu)
@@ -46,11 +49,17 @@ class Runner(LineRunner):
         super().__init__(Line(LineSettings(max_backoff=0.02), [self.station]), self.reports.append)
         self.pipes: list[Pipe] = []
         self.failures: list[str] = []
+        self.stillborn = 0
+        """How many connections end before `open` has returned them."""
 
     async def open(self) -> Pipe:
         if self.failures:
             raise LineError(self.failures.pop(0))
         self.pipes.append(Pipe(self, self.unit))
+        if self.stillborn:
+            self.stillborn -= 1
+            self.pipes[-1].is_broken = True
+            self.ended("closed")
         return self.pipes[-1]
 
     def make_conversation(self) -> TcpConversation:
@@ -117,3 +126,13 @@ async def test_broadcast_goes_out_at_once() -> None:
         await until(lambda: runner.station.state is UnitState.ONLINE, "the unit")
         assert runner.broadcast(write_register(9, b"\0\1"))
         await until(lambda: runner.unit.registers == {9: 1}, "the broadcast")
+
+
+async def test_connection_that_ends_before_it_is_known_is_opened_again() -> None:
+    """A device whose places are all taken accepts and closes at once: nobody hears of that end a second time."""
+    runner = Runner(StationSettings(1, polls(0.01)))
+    runner.stillborn = 3
+    async with running(runner):
+        await until(lambda: runner.heard.values, "values")
+    assert len(runner.pipes) == 4
+    assert runner.reports == ["closed", ""]
