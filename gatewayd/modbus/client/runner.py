@@ -139,15 +139,12 @@ class LineRunner(ABC):
         self._ended_early = ""
         try:
             channel = await wait_with_progress(self._open_in_time(limit), self._count_progress, limit)
-            if self._ended_early:
-                channel.close()
-                raise LineError(self._ended_early)
         except (LineError, TimeoutError) as error:
-            reason = str(error) or f"no connection within {limit:g} s"
-            backoff.failed(clock.now())
-            self._say(reason)
-            self.line.disconnected(reason, clock.now())
-            self._turn(clock.now())
+            self._say_unconnected(backoff, str(error) or f"no connection within {limit:g} s")
+            return
+        if self._ended_early:
+            channel.close()
+            self._say_unconnected(backoff, self._ended_early)
             return
         self._channel = channel
         now = clock.now()
@@ -159,6 +156,12 @@ class LineRunner(ABC):
             backoff.worked()
         else:
             backoff.failed(clock.now())
+
+    def _say_unconnected(self, backoff: Backoff, reason: str) -> None:
+        backoff.failed(clock.now())
+        self._say(reason)
+        self.line.disconnected(reason, clock.now())
+        self._turn(clock.now())
 
     async def _open_in_time(self, limit: float) -> Channel:
         async with asyncio.timeout(limit):
