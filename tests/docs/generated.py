@@ -33,6 +33,7 @@ from gatewayd.core.status_layout import BASE, TABLES
 from gatewayd.links.modbus_server.functions import EXCEPTION_OF
 from gatewayd.links.registry import kinds, status_fields
 from gatewayd.links.registry import status_tables as link_tables
+from gatewayd.links.robot.dashboard.results import WORDS
 from gatewayd.logs.events import LEVELS
 from gatewayd.logs.records import LEVELS as LEVEL_NAMES
 from gatewayd.mapping.schema import mapping_schema
@@ -505,7 +506,13 @@ def simulator_control() -> str:
     return "```text\n" + "\n".join(lines) + "\n```"
 
 
+def dashboard_results() -> str:
+    """What the state `result` of the dashboard server means."""
+    return table(("number", "meaning"), [(str(int(result)), words) for result, words in WORDS.items()])
+
+
 PARTS: dict[str, Callable[[], str]] = {
+    "dashboard-results": dashboard_results,
     "objections": objections,
     "mapping-keys": mapping_keys,
     "command-line": command_line,
