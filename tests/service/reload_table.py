@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 REMOVED = object()
@@ -65,6 +66,95 @@ GUARDING_LINE = {
     "canopen.heartbeat": "none",
     "writers.line": {"canopen": "rpdo", "guarding": "20s"},
 }
+NOBODY_ANSWERS = "127.0.0.9:1502"
+ISLAND = {
+    "devices": {"island": {"modbus": NOBODY_ANSWERS}},
+    "writers.island": {"device": "island"},
+    "variables.present": {
+        "robot": "input_bit_register_9",
+        "device": {"at": "island", "discrete": 3},
+        "owner": "island",
+    },
+    "variables.force": {
+        "robot": "output_int_register_9",
+        "device": {"at": "island", "holding": 9, "type": "uint16"},
+    },
+}
+OTHER_ISLAND = {
+    "modbus": "127.0.0.9:1503",
+    "framing": "rtu",
+    "unit": 2,
+    "poll": "20ms",
+    "timeout": "100ms",
+    "lost_after": "2s",
+    "watchdog": "3s",
+    "failures": 2,
+    "gap": 8,
+    "single": True,
+    "connect": "per_request",
+    "write": "multiple",
+    "mask_write": False,
+    "identify": True,
+    "serial_number": "100..101",
+    "order": "CDAB",
+}
+OTHER_LINE = {"serial": "/dev/no-such-port", "baudrate": 19200, "parity": "even", "stop_bits": 1}
+OTHER_PLACE = {
+    "variables.present.device": {"coil": 4, "poll": "1s"},
+    "variables.force.device": {
+        "holding": 9,
+        "bits": "0..7",
+        "rest": 0,
+        "on_connect": "write",
+        "every": "1s",
+    },
+    "variables.more": {
+        "robot": "input_double_register_9",
+        "device": {"input": 4, "type": "float32", "order": "CDAB", "scale": 2, "offset": 1},
+        "owner": "island",
+    },
+}
+ENCODER = {
+    "devices": {"encoder": {"canopen": "cell", "interface": "virtual", "node": 9, "heartbeat": "1s"}},
+    "writers.encoder": {"device": "encoder"},
+    "variables.position": {
+        "robot": "input_int_register_9",
+        "device": {"object": "0x6004", "type": "uint32", "pdo": 1},
+        "owner": "encoder",
+    },
+}
+OTHER_ENCODER = {
+    "canopen": "line",
+    "interface": "virtual",
+    "bitrate": 250000,
+    "node": 10,
+    "eds": str(Path(__file__).parents[2] / "mappings/encoder.eds"),
+    "heartbeat": "2s",
+    "mandatory": True,
+    "keep": True,
+    "store": True,
+    "revision": 1,
+    "expected_serial": 7,
+    "software": "1.0",
+    "transmission": "sync",
+    "inhibit": "10ms",
+    "event": "1s",
+    "sync": "100ms",
+    "manager": 3,
+    "manager_heartbeat": "200ms",
+}
+OTHER_OBJECT = {"object": "0x6030", "sub": 1, "type": "int16", "pdo": "none", "poll": "1s"}
+DASHBOARD = {
+    "robot.series": "e",
+    "robot.dashboard": {"port": 1504, "programs": {1: "pick.urp"}, "poll": "1s"},
+    "variables.play": {"dashboard": "play", "modbus": {"coil": 40}, "owner": "hmi"},
+}
+
+
+def keys_of(name: str, table: Mapping[str, Any]) -> str:
+    return " ".join(f"{name}.{key}" for key in table)
+
+
 BOTH, PLC, LINE, NOBODY = "plc line", "plc", "line", ""
 
 
@@ -73,6 +163,7 @@ class Row:
     """A change of one key, and what comes of it."""
 
     key: str
+    """One, or several with blanks between them that are changed together."""
     changes: Changes
     kinds: str = ""
     """Of its objections, in their order."""
@@ -234,6 +325,43 @@ ROWS: dict[str, list[Row]] = {
         ),
         row("writers.plc.grace", "500ms"),
         row("writers.plc.grace", "2s", "weakening"),
+    ],
+    # A device goes on by itself: whatever changes of it ends only what it was given itself.
+    "devices": [
+        Row("devices writers.*.device variables.*.device", ISLAND),
+        Row(keys_of("devices.*", OTHER_ISLAND), {"devices.island": OTHER_ISLAND}, given=ISLAND),
+        Row("devices.*.in_flight", {"devices.island.in_flight": 4}, given=ISLAND),
+        Row(keys_of("devices.*", OTHER_LINE), {"devices.island": OTHER_LINE}, given=ISLAND),
+        Row(
+            "variables.*.device.coil variables.*.device.poll variables.*.device.bits variables.*.device.rest "
+            "variables.*.device.on_connect variables.*.device.every variables.*.device.input "
+            "variables.*.device.type variables.*.device.order variables.*.device.scale "
+            "variables.*.device.offset",
+            OTHER_PLACE,
+            given=ISLAND,
+        ),
+        Row(
+            "variables.*.device.at variables.*.device.discrete variables.*.device.holding",
+            {
+                "devices.more": {"modbus": NOBODY_ANSWERS, "unit": 2},
+                "writers.island": {"device": "more"},
+                "variables.present.device": {"at": "more", "discrete": 8},
+                "variables.force.device": {"at": "more", "holding": 3, "type": "uint16"},
+            },
+            given=ISLAND,
+        ),
+        Row(keys_of("devices.*", OTHER_ENCODER), {"devices.encoder": OTHER_ENCODER}, given=ENCODER),
+        Row(
+            keys_of("variables.*.device", OTHER_OBJECT),
+            {"variables.position.device": OTHER_OBJECT},
+            given=ENCODER,
+        ),
+    ],
+    "dashboard": [
+        Row("robot.dashboard variables.*.dashboard", DASHBOARD),
+        row("robot.dashboard.port", 1505, given=DASHBOARD),
+        row("robot.dashboard.programs", {1: "place.urp"}, given=DASHBOARD),
+        row("robot.dashboard.poll", "2s", given=DASHBOARD),
     ],
     "groups": [
         Row(
