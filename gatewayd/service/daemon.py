@@ -103,11 +103,14 @@ class Daemon:
         log.info("stopped")
 
     def _after_gap(self, gap: clock.Gap) -> None:
-        """The process stood still; nothing that waited meanwhile has been served yet."""
-        for runtime in self.runtimes:
-            runtime.gap(gap.since, gap.until)
+        """The process stood still; nothing that waited meanwhile has been served yet.
+
+        Shared parts first: what a cell sends because of the gap has a part look at its time-outs.
+        """
         for part in self.shared:
             part.gap(gap.since, gap.until)
+        for runtime in self.runtimes:
+            runtime.gap(gap.since, gap.until)
 
     # -- another mapping ---------------------------------------------------------------------------------------------
 

@@ -169,6 +169,9 @@ def test_a_gateway_that_stood_still_does_not_take_its_devices_for_lost(cell: Cel
     wait_for(
         lambda: cell.simulator.integer("input_int_register_1") == 1234, "the island's value in the robot"
     )
+    # What the robot's silence brings the island is written in the middle of it all.
+    assert cell.plc.write(60, [1]) == 0
+    wait_for(lambda: cell.island.do("get coil 0") == 1, "the robot's bit in the island")
     cell.daemon.signal(signal.SIGSTOP)
     stopped = time.monotonic()
     wait_for(lambda: time.monotonic() - stopped > 1.0, "a time longer than `lost_after`")

@@ -154,6 +154,14 @@ class Line:
             self._finish(Finished(job, ConnectionLost(reason)), now)
         self.check(now)
 
+    def gap(self, length: float) -> None:
+        """The process stood still for so many seconds, in which no answer could be heard: they are no silence."""
+        self._unanswered_since += length
+        for job in self._conversation.jobs if self._conversation is not None else ():
+            job.sent_at += length
+        for station in self.stations:
+            station.gap(length)
+
     def stop(self, reason: str, now: float) -> None:
         """Nobody runs it any more: all units are lost."""
         self.disconnected(reason, now)

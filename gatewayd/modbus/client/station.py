@@ -170,7 +170,7 @@ class Station:
             self._lose(trouble, now)
 
     def gap(self, length: float) -> None:
-        """The process stood still for so many seconds, in which no answer could be heard: they are no silence."""
+        """See `Line.gap`."""
         self.deadline += length
 
     def close(self, reason: str, now: float) -> None:

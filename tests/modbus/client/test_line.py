@@ -306,3 +306,18 @@ def test_lost_reads_are_reported_and_tried_again() -> None:
     world.run(0.2)
     assert heard[1].failures == [ConnectionLost("broken")]
     assert heard[1].order[-1] == "values"
+
+
+def test_time_in_which_the_process_stood_still_is_no_silence() -> None:
+    """Neither of a unit that was asked last nor of the connection: the answers are there, and not read yet."""
+    world, stations, heard, units = make_world(units_of(2))
+    world.run(1.0)
+    for unit in units.values():
+        unit.delay = 0.2
+    world.run(0.1)
+    assert world.line._conversation.jobs  # type: ignore[union-attr]
+    world.line.gap(10.0)
+    assert world.line.check(world.now + 10.0) == ""
+    assert [own.counters.time_outs for own in stations.values()] == [0, 0]
+    assert [own.state for own in stations.values()] == [UnitState.ONLINE, UnitState.ONLINE]
+    assert heard[1].failures == []

@@ -88,8 +88,7 @@ class ModbusLines(SharedPart):
     def gap(self, since: float, now: float) -> None:
         """The process stood still: that is no silence of any device."""
         for line in self.lines.values():
-            for station in line.stations:
-                station.gap(now - since)
+            line.runner.line.gap(now - since)
 
     def trace(self, tap: Tap | None) -> None:
         """All frames of all lines."""
