@@ -44,6 +44,7 @@ NEVER_ONE = {
     "links.devices.canopen.link: self.plan.name": "not a number",
     "links.devices.rules.objects: bits": "more than 64",
     "canopen.manager.pdo_content: shift": "more than 64",
+    "cli.rtde.recorder: wanted": "more than can be kept",
     "control.names: len(text)": "longer than any pattern may be",
     "links.canopen_node.rules.bus: len(bus)": "where there are several cells",
     "links.canopen_node.rules.node: names": "not a number, and writes is a verb",

@@ -53,7 +53,7 @@ async def test_a_virtual_bus_and_who_is_on_it(vcan: str) -> None:
     assert await look(vcan) == {
         "interface": f"ok: {vcan} is there",
         "bus state": f"ok: {vcan} is up",
-        "bit rate": f"note: {vcan} has none (a virtual bus)",
+        "bit rate": f"note: {vcan} reports none: a virtual bus, or an adapter at a serial line, where slcand sets it",
         "traffic": "note: nothing in 1.5 s: no other node sends, or none is on",
     }
     async with another_node(vcan, 0x705):
