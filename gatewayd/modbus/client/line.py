@@ -1,7 +1,6 @@
-"""Units that share a connection, and whose turn it is. Pure; seconds of any one clock.
+"""One connection and the units that share it: what is sent next, and to whom an answer goes. Pure.
 
-Each turn goes to the station with something due that has waited longest for one, so that a unit with much to say takes
-no more turns than one with little. Writes go before reads, but not more than MAX_WRITES_IN_ROW while a read waits.
+Seconds of any one clock. `turns` decides who is next.
 """
 
 from __future__ import annotations
@@ -11,10 +10,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
 
-from gatewayd.modbus.client.breaker import BreakerState
 from gatewayd.modbus.client.conversation import Broken, Conversation, Finished
-from gatewayd.modbus.client.polling import AT_ONCE, NEVER
-from gatewayd.modbus.client.probes import DEFAULT_SHARE, ProbeBudget
+from gatewayd.modbus.client.polling import NEVER
+from gatewayd.modbus.client.probes import DEFAULT_SHARE
 from gatewayd.modbus.client.requests import (
     ConnectionLost,
     ExceptionAnswer,
@@ -22,8 +20,8 @@ from gatewayd.modbus.client.requests import (
     ModbusRequest,
 )
 from gatewayd.modbus.client.station import Job, Station
+from gatewayd.modbus.client.turns import Turns
 
-MAX_WRITES_IN_ROW = 2
 MAX_BROADCASTS = 16
 
 
@@ -57,7 +55,7 @@ class Line:
 
     def __init__(self, settings: LineSettings, stations: Iterable[Station] = ()) -> None:
         self.settings = settings
-        self.stations: list[Station] = []
+        self._turns = Turns(settings.probe_share)
         self.trouble = ""
         """Why there is no connection, in words; empty while there is one."""
         self.connections = 0
@@ -68,13 +66,7 @@ class Line:
         """Seconds after which a connection is given up on which nobody at all answers."""
         self._conversation: Conversation | None = None
         self._unanswered_since = NEVER
-        self._budget = ProbeBudget(settings.probe_share)
-        self._turns = 0
-        self._writes_in_row = 0
         self._paused_until = float("-inf")
-        self._may_be_back: set[Station] = set()
-        self._probe: Job | None = None
-        self._failed_probe_at = 0
         self._broadcasts: deque[ModbusRequest] = deque()
         self._has_finished = False
         self._culprit: Job | None = None
@@ -84,26 +76,27 @@ class Line:
             self.add(station)
 
     @property
+    def stations(self) -> list[Station]:
+        """The units."""
+        return self._turns.stations
+
+    @property
     def is_connected(self) -> bool:
         """Whether there is a connection."""
         return self._conversation is not None
 
     def add(self, station: Station) -> None:
         """Another unit, which may be added at any time."""
-        self.stations.append(station)
-        station.served = 0
-        self._may_be_back.add(station)
+        self._turns.add(station)
 
     def remove(self, station: Station, now: float) -> None:
         """The unit goes: it counts as lost, and what is underway for it is ignored."""
-        self.stations.remove(station)
-        self._may_be_back.discard(station)
+        self._turns.remove(station)
         if self._conversation is not None:
             for job in self._conversation.jobs:
                 if job.station is station:
                     job.done, job.station = _ignored, None
-                    if job is self._probe:
-                        self._probe = None
+                    self._turns.forget(job)
         station.close("it is not asked any more", now)
 
     def broadcast(self, request: ModbusRequest) -> bool:
@@ -134,7 +127,7 @@ class Line:
         for station in self.stations if is_new else ():
             station.connected(now, may_be_back=self._is_nobodys_fault)
             if self._is_nobodys_fault:
-                self._may_be_back.add(station)
+                self._turns.may_be_back(station)
 
     def disconnected(self, reason: str, now: float) -> None:
         """It has ended, or could not be opened: what was underway is lost.
@@ -183,7 +176,7 @@ class Line:
         for station in self.stations:
             if trouble or now >= station.deadline:
                 if now >= station.deadline:
-                    self._may_be_back.add(station)
+                    self._turns.may_be_back(station)
                 station.check(now, trouble)
         if not reason and self._is_silent(now):
             reason = f"nobody answers for {self.silence_limit:g} s"
@@ -213,19 +206,13 @@ class Line:
         """When somebody has something to send, connection or not."""
         if self._broadcasts:
             return float("-inf")
-        allowed = self._probes_allowed()
-        due = NEVER
-        for station in self.stations:
-            due = min(due, station.write_due)
-            if station.read_due < due:
-                due = min(due, self._read_due(station, allowed))
-        return due
+        return self._turns.due_at()
 
     def _is_silent(self, now: float) -> bool:
         return (
             self._conversation is not None
             and now - self._unanswered_since >= self.silence_limit
-            and not self._is_protected
+            and not self._turns.is_anybody_there
         )
 
     @property
@@ -233,70 +220,10 @@ class Line:
         """Whether a late answer could be taken for that of the unit's next request."""
         return self._conversation is not None and self._conversation.is_ambiguous
 
-    @property
-    def _is_protected(self) -> bool:
-        """Whether there is somebody whom probes would cost time."""
-        for station in self.stations:  # noqa: SIM110 - asked several times for each answer; `any` takes thrice as long
-            if station.breaker.state is BreakerState.CLOSED:
-                return True
-        return False
-
-    def _probes_allowed(self) -> tuple[float, float]:
-        """When the next probe may go out, one after the other: to a unit that stays away, to one that may be back."""
-        if not self._is_protected:
-            return AT_ONCE, AT_ONCE
-        return (self._budget.free_at, AT_ONCE) if self._probe is None else (NEVER, NEVER)
-
-    def _read_due(self, station: Station, allowed: tuple[float, float]) -> float:
-        if station.breaker.state is BreakerState.CLOSED:
-            return station.read_due
-        return max(station.read_due, allowed[station in self._may_be_back])
-
     def _next_job(self, now: float) -> Job | None:
         if self._broadcasts:
             return Job(0, self._broadcasts.popleft(), 0.0, now, _ignored)
-        writing, reading = self._waiting(now)
-        if writing is not None and (reading is None or self._writes_in_row < MAX_WRITES_IN_ROW):
-            self._writes_in_row += 1
-            self._serve(writing)
-            return writing.take_write(now)
-        if reading is None:
-            return None
-        self._writes_in_row = 0
-        self._serve(reading)
-        job = reading.take_read(now)
-        if job.is_probe:
-            self._probe = job
-            self._may_be_back.discard(reading)
-        return job
-
-    def _waiting(self, now: float) -> tuple[Station | None, Station | None]:
-        """Who is next to write, and who to be read or probed."""
-        writing = polled = probed = None
-        allowed = self._probes_allowed()
-        for station in self.stations:
-            if station.write_due <= now and (writing is None or station.served < writing.served):
-                writing = station
-            if station.read_due > now:
-                continue
-            if station.breaker.state is BreakerState.CLOSED:
-                if polled is None or station.served < polled.served:
-                    polled = station
-            elif (probed is None or station.served < probed.served) and self._read_due(
-                station, allowed
-            ) <= now:
-                probed = station
-        return writing, self._first(polled, probed)
-
-    def _first(self, polled: Station | None, probed: Station | None) -> Station | None:
-        """Who has waited longer; but between two probes in vain everybody who answers has a turn."""
-        if polled is None or probed is None:
-            return polled or probed
-        return polled if polled.served < max(probed.served, self._failed_probe_at) else probed
-
-    def _serve(self, station: Station) -> None:
-        self._turns += 1
-        station.served = self._turns
+        return self._turns.next(now)
 
     def _expired(self, now: float) -> list[Finished]:
         assert self._conversation is not None
@@ -314,8 +241,6 @@ class Line:
 
     def _finish(self, finished: Finished, now: float) -> None:
         job, outcome = finished
-        if job is self._probe:
-            self._probe = None
         if self.settings.pause:
             self._paused_until = now + self.settings.pause
         self._has_finished = True
@@ -326,20 +251,7 @@ class Line:
         station = job.station
         if not is_answered and station is not None and self._is_ambiguous:
             station.hold(now + job.timeout)
-        was_protected = self._is_protected
-        was_closed = station is not None and station.breaker.is_closed
-        job.done(job, outcome, now)
-        if station is not None and was_closed and not station.breaker.is_closed:
-            self._may_be_back.add(station)
-        if job.is_probe and station is not None and not station.breaker.is_closed:
-            cost = now - job.sent_at
-            if not is_answered:
-                cost = max(cost, job.timeout)  # bytes that are no answer may cost others theirs
-            self._budget.spend(cost, now)
-            self._failed_probe_at = self._turns + 1
-        if not was_protected and self._is_protected:
-            # What was off altogether comes back together: nobody waits for those that stay away.
-            self._may_be_back.update(self.stations)
+        self._turns.finish(job, outcome, now)
 
 
 def _ignored(job: Job, outcome: bytes | Failure, now: float) -> None:
