@@ -65,7 +65,7 @@ def _server() -> Iterator[int]:
     port = free_port()
     with tempfile.TemporaryDirectory() as folder:
         program = compile_libmodbus_server(Path(folder))
-        with running([program, "tcp", "127.0.0.1", str(port)], port):
+        with running([program, "tcp", "127.0.0.1", str(port), str(len(ALL))], port):
             yield port
 
 

@@ -1,5 +1,5 @@
-/* libmodbus as a server of other people's, with units 1 to 32 on TCP or one unit on a serial line.
- * Usage: libmodbus_server tcp ADDRESS PORT | libmodbus_server rtu DEVICE BAUDRATE UNIT
+/* libmodbus as a server of other people's, with units 1 to 3, or as many as wanted, on TCP or one unit on a serial line.
+ * Usage: libmodbus_server tcp ADDRESS PORT [UNITS] | libmodbus_server rtu DEVICE BAUDRATE UNIT
  * Prints "listening" once it serves. A holding register that was never written reads as its address.
  * Build: cc -O2 -o libmodbus_server libmodbus_server.c -I/usr/include/modbus -lmodbus */
 #include <errno.h>
@@ -10,7 +10,7 @@
 #include <sys/select.h>
 #include <unistd.h>
 
-#define UNITS 32
+#define MAX_UNITS 64
 #define REGISTERS 2000
 
 static modbus_mapping_t *new_unit(void)
@@ -51,17 +51,19 @@ static int serve_line(const char *device, int baudrate, int number)
     }
 }
 
-static int serve_tcp(const char *address, int port)
+static int serve_tcp(const char *address, int port, int count)
 {
     modbus_t *context = modbus_new_tcp(address, port);
-    modbus_mapping_t *units[UNITS];
+    modbus_mapping_t *units[MAX_UNITS];
     uint8_t query[MODBUS_TCP_MAX_ADU_LENGTH];
     int listener = modbus_tcp_listen(context, 16), highest = listener;
     fd_set watched, ready;
 
     if (listener < 0)
         return fail("cannot listen");
-    for (int number = 0; number < UNITS; number++)
+    if (count > MAX_UNITS)
+        count = MAX_UNITS;
+    for (int number = 0; number < count; number++)
         units[number] = new_unit();
     FD_ZERO(&watched);
     FD_SET(listener, &watched);
@@ -86,7 +88,7 @@ static int serve_tcp(const char *address, int port)
             if (length < 0) {
                 close(fd);
                 FD_CLR(fd, &watched);
-            } else if (length > 0 && query[6] >= 1 && query[6] <= UNITS) {
+            } else if (length > 0 && query[6] >= 1 && query[6] <= count) {
                 modbus_reply(context, query, length, units[query[6] - 1]);
             }
         }
@@ -95,10 +97,10 @@ static int serve_tcp(const char *address, int port)
 
 int main(int argc, char **argv)
 {
-    if (argc == 4 && strcmp(argv[1], "tcp") == 0)
-        return serve_tcp(argv[2], atoi(argv[3]));
+    if ((argc == 4 || argc == 5) && strcmp(argv[1], "tcp") == 0)
+        return serve_tcp(argv[2], atoi(argv[3]), argc == 5 ? atoi(argv[4]) : 3);
     if (argc == 5 && strcmp(argv[1], "rtu") == 0)
         return serve_line(argv[2], atoi(argv[3]), atoi(argv[4]));
-    fprintf(stderr, "usage: libmodbus_server tcp ADDRESS PORT | rtu DEVICE BAUDRATE UNIT\n");
+    fprintf(stderr, "usage: libmodbus_server tcp ADDRESS PORT [UNITS] | rtu DEVICE BAUDRATE UNIT\n");
     return 2;
 }
