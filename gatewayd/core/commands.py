@@ -26,6 +26,9 @@ from gatewayd.core.definition import Value, Variable
 from gatewayd.core.ownership import LockTable
 from gatewayd.core.requester import Requester
 
+MAX_WAITED = 0.5
+"""Seconds for which a command may have waited while the gateway stood still; nobody expects it later."""
+
 
 class Obstacle(Enum):
     """Why a command that was written does not act, in words."""
@@ -120,8 +123,8 @@ class Commands:
     def _obstacle(self, requester: Requester, change: Change, *, cleared: bool) -> Obstacle | None:
         if change.implied:
             return Obstacle.IMPLIED
-        if requester.waited:
+        if requester.waited > MAX_WAITED:
             return Obstacle.WAITED
-        if requester.waited:
+        if requester.waited > MAX_WAITED:
             return Obstacle.WAITED
         return None if cleared else Obstacle.NOT_CLEARED

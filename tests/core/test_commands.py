@@ -69,7 +69,7 @@ def robot_up(cell: Cell, now: float = 0.0) -> None:
 @pytest.fixture
 def rig() -> Rig:
     """Everything there, nobody has written."""
-    cell = Cell(definition())
+    cell = Cell(definition(lease=5.0))
     cell.carried.begin(VIA, 0.0)
     robot_up(cell)
     return Rig(cell)
@@ -141,7 +141,7 @@ BETWEEN: dict[str, tuple[Callable[[Rig], None], Requester]] = {
     "another session": (_session, PLC),
     "another connection of the link": (_link, PLC),
     "the operator takes it": (_operator, PLC),
-    "the gateway stood still": (lambda _: None, replace(PLC, waited=0.01)),
+    "the gateway stood still": (lambda _: None, replace(PLC, waited=0.6)),
 }
 
 
@@ -172,7 +172,7 @@ def test_implied_bits_neither_act_nor_clear(rig: Rig) -> None:
 
 def test_a_reload_forgets_what_was_written(rig: Rig) -> None:
     rig.write(False)
-    later = Rig(succeed(rig.cell, definition(), 1.0).cell)
+    later = Rig(succeed(rig.cell, definition(lease=5.0), 1.0).cell)
     later.write(True)
     assert later.taken() == [Obstacle.NOT_CLEARED]
 

@@ -13,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, rule
 
 from gatewayd.core.admission import Change
 from gatewayd.core.cell import Cell
-from gatewayd.core.commands import Attempt
+from gatewayd.core.commands import MAX_WAITED, Attempt
 from gatewayd.core.definition import OPERATOR
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.ownership import Act
@@ -63,7 +63,7 @@ class AnyStory(RuleBasedStateMachine):
 
     def _expected(self, command: int, change: Change, requester: Requester) -> bool:
         """Looking back: is the newest word an explicit 0 by the same hand? An implied 0 leaves things as they are."""
-        if change.implied or not change.value or requester.waited:
+        if change.implied or not change.value or requester.waited > MAX_WAITED:
             return False
         told = [word for word in self.story[command] if word != ("implied", 0)]
         return told[-1:] == [(requester.writer, requester.connection, 0)]
@@ -72,7 +72,7 @@ class AnyStory(RuleBasedStateMachine):
         writer=writers,
         connection=connections,
         values=written,
-        waited=st.sampled_from([0.0, 0.0, 0.0, 0.01]),
+        waited=st.sampled_from([0.0, 0.0, 0.0, 0.6]),
     )
     def write(self, writer: int, connection: int, values: dict[int, tuple[int, bool]], waited: float) -> None:
         """A request with one or both commands, explicit or implied."""
@@ -119,7 +119,7 @@ class AnyStory(RuleBasedStateMachine):
             self.operator(command, holding=False)
         elif between != "nothing":
             getattr(self, between)()
-        self.write(*(other or hand), {command: (1, how == "implied")}, 0.01 if how == "late" else 0.0)
+        self.write(*(other or hand), {command: (1, how == "implied")}, 0.6 if how == "late" else 0.0)
 
     @rule(writer=writers, command=commands, act=st.sampled_from([Act.REQUEST, Act.RELEASE]))
     def lock(self, writer: int, command: int, act: Act) -> None:
