@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from statistics import median
 
+from tests.benchmarks import devices_path
 from tests.benchmarks.compiled import compiled, libmodbus_is_there
 from tests.benchmarks.processes import free_port, python, running
 from tests.benchmarks.report import Table, against, at_least, at_most
@@ -52,12 +53,12 @@ class Polled:
 
 
 def run(job: Job) -> list[Table]:
-    """Two tables: speed, silent units."""
+    """Three tables: speed, silent units, the way of a value to the robot and back."""
     if not libmodbus_is_there():
         return []
     seconds = job.seconds / ROUNDS
     with _server() as port, compiled("devices_client") as yardstick:
-        return [_speed(port, yardstick, seconds), _silence(port)]
+        return [_speed(port, yardstick, seconds), _silence(port), devices_path.table(port, job)]
 
 
 @contextmanager
