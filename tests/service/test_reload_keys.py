@@ -60,7 +60,7 @@ def put(mapping: dict[str, Any], changes: Changes) -> None:
         if value is REMOVED:
             del place[last]
         else:
-            place[last] = value
+            place[last] = deepcopy(value)
 
 
 class Rig:
@@ -80,7 +80,7 @@ class Rig:
     def write(self, *changes: Changes) -> None:
         mapping = deepcopy(BASE)
         for each in changes:
-            put(mapping, deepcopy(dict(each)))
+            put(mapping, each)
         text = re.sub(r'"(0x[0-9A-F.x]+)"', r"\1", json.dumps(mapping))  # COB-IDs are written so
         text = text.replace(f'"{ROBOT_PORT}"', str(self.robot.port))
         for name, port in self.ports.items():
