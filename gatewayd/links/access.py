@@ -139,6 +139,10 @@ class DeviceAccess:
     settings: Sequence[str] = ()
     """Those of `ScanOrder.settings` that its lines have."""
 
+    def takes(self, order: ScanOrder) -> bool:
+        """Whether the line, as it is written, is one of its own."""
+        return True
+
     def scan(self, order: ScanOrder) -> Scan:
         """How the line is scanned. Raises AccessError where it is none."""
         raise NotImplementedError

@@ -61,6 +61,12 @@ Exit codes:
 @click.option(
     "--framing", type=click.Choice(["tcp", "rtu"]), help="By TCP: frames of Modbus TCP, or of a serial line."
 )
+@click.option("--interface", metavar="NAME", help="Of python-can, for a CAN bus. Default: socketcan.")
+@click.option(
+    "--bitrate",
+    type=click.IntRange(10_000, 1_000_000),
+    help="Of a CAN bus by --interface; the kernel's are set up already. Default: 500000.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print who was found as JSON, at the end.")
 @click.pass_context
 def command(
@@ -73,6 +79,8 @@ def command(
     parity: str | None,
     stop_bits: int | None,
     framing: str | None,
+    interface: str | None,
+    bitrate: int | None,
     as_json: bool,
 ) -> None:
     """Ask on LINE who is there, one number after the other. It only reads, and needs no gateway.
@@ -86,7 +94,13 @@ def command(
     from gatewayd.links.access import ScanOrder
 
     first, last = _range(numbers)
-    settings = {"baudrate": baudrate, "parity": parity, "stop_bits": stop_bits, "framing": framing}
+    settings: dict[str, object] = {
+        "baudrate": baudrate,
+        "parity": parity,
+        "stop_bits": stop_bits,
+        "framing": framing,
+    }
+    settings |= {"interface": interface, "bitrate": bitrate}
     order = ScanOrder(line, first, last, timeout, settings)
     found = _scanned(order, context.parent.params.get("socket") if context.parent else None, quiet=as_json)
     if as_json:

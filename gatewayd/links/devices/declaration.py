@@ -25,6 +25,7 @@ class DeviceKind(LinkKind):
         "unit": "unit id of a Modbus device, node-ID of a CANopen device, or null",
         "state": "`starting`, `good`, `partial` (some values are lost), `lost`",
         "reason": "why it is not good, or empty",
+        "since": "seconds for which it is in this state",
         "round_trip": "seconds from request to answer, of the last one, or null",
         "answers": "requests that were answered, exceptions as well",
         "timeouts": "requests that were not answered in time",

@@ -59,6 +59,7 @@ def health_of(link: ManagedDevice, now: float) -> LinkHealth:
         "family": plan.family,
         "address": f"{plan.bus.interface}:{plan.bus.channel}",
         "unit": plan.node.node,
+        "since": round(max(0.0, now - link.state_since[1]), 3),
         "letter": letter.value if letter is not None else "",
         "nmt_state": node.nmt.name.lower().replace("_", "-")
         if node is not None and node.nmt is not None

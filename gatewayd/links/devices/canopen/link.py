@@ -9,22 +9,28 @@ from typing import Final
 
 from gatewayd.canopen.datatypes import Value as Raw
 from gatewayd.canopen.describe import object_text
+from gatewayd.canopen.dictionary import AbortCode
+from gatewayd.canopen.manager.channel import SdoJob
 from gatewayd.canopen.manager.emergency_text import EmergencyMessage
 from gatewayd.canopen.manager.letters import BootError
 from gatewayd.canopen.manager.node import NodeCondition
+from gatewayd.canopen.sdo.client import SdoResult
 from gatewayd.core.cell import Cell
 from gatewayd.core.definition import CellDefinition, Direction, Value, Variable
 from gatewayd.core.requester import Requester
+from gatewayd.links.access import AccessError, AccessProblem, PlaceAnswer, PlaceRequest
 from gatewayd.links.canopen_values import fit, limits_of, meaning
 from gatewayd.links.contract import Context, LinkHealth
+from gatewayd.links.devices.canopen.asking import ask_object
 from gatewayd.links.devices.canopen.buses import CanopenBuses
-from gatewayd.links.devices.canopen.figures import figures_of, health_of
+from gatewayd.links.devices.canopen.figures import figures_of, health_of, state_of
 from gatewayd.links.devices.canopen.managed import ManagedDevice
 from gatewayd.links.devices.canopen.plan import CanopenDevicePlan, ObjectPlace
 from gatewayd.links.devices.family import FamilyRuntime
 from gatewayd.links.devices.inflow import Inflow
 from gatewayd.links.devices.outflow import Outflow
 from gatewayd.links.devices.plan import DevicePlan
+from gatewayd.links.devices.status_words import DeviceState
 from gatewayd.logs.records import fields
 from gatewayd.loop import clock
 from gatewayd.mapping.plan import LinkPlan
@@ -34,6 +40,8 @@ PERIOD = 0.05
 """Seconds between two looks at what only time brings."""
 LAST_SYNCHRONOUS = 240
 """Transmission types up to it are synchronous."""
+_ASKED_LIMIT: Final = 10.0
+"""Seconds for a transfer by hand, with its time in the queue of the device."""
 CORE_TIME = 0.5
 """Seconds without a count of the core's heartbeat after which the core counts as stuck."""
 
@@ -51,6 +59,7 @@ class CanopenDeviceLink(ManagedDevice):
     def __init__(self, plan: CanopenDevicePlan, cell: Cell) -> None:
         self.node, self.manager, self.clash = None, None, ""
         self.heard, self.emergency, self.losses = None, None, 0
+        self.state_since = (DeviceState.STARTING, clock.now())
         self._progress = 0
         self._beat = (-1, 0.0)
         self._latest: dict[int, Value | None] = {}
@@ -135,6 +144,35 @@ class CanopenDeviceLink(ManagedDevice):
         """Have what changed last sent."""
         self._outflow.update(now)
         self._hand_over(now)
+
+    async def ask(self, request: PlaceRequest) -> PlaceAnswer:
+        """Read or write an object by hand, in the turn of the device's SDO channel."""
+        return await ask_object(self.plan, self._cell.definition, request, self._transfer)
+
+    async def _transfer(self, index: int, subindex: int, data: bytes | None) -> SdoResult:
+        node, manager = self.node, self.manager
+        if node is None or manager is None or not manager.bus.carries:
+            raise AccessError(
+                AccessProblem.NO_ANSWER, f"device {self.plan.name} is not asked: {state_of(self)[1]}"
+            )
+        ended: asyncio.Future[SdoResult] = asyncio.get_running_loop().create_future()
+
+        def done(result: SdoResult, _now: float) -> None:
+            if not ended.done():
+                ended.set_result(result)
+
+        now = clock.now()
+        if not node.channel.put(SdoJob(index, subindex, data, done), now):
+            raise AccessError(
+                AccessProblem.NO_ANSWER,
+                f"device {self.plan.name} is not asked: too much waits for it already",
+            )
+        manager.schedule(now)
+        try:
+            async with asyncio.timeout(_ASKED_LIMIT):
+                return await ended
+        except TimeoutError:  # a boot has dropped what waited
+            return SdoResult(index, subindex, code=AbortCode.TIMED_OUT, silent=True)
 
     def health(self) -> LinkHealth:
         """Whether it is in operation, and gives and takes everything."""
@@ -260,6 +298,9 @@ class CanopenDeviceLink(ManagedDevice):
         return "" if self.node is None or self.node.boot.letter is None else self.node.boot.letter.words
 
     def _tick(self, now: float) -> None:
+        state = state_of(self)[0]
+        if state is not self.state_since[0]:
+            self.state_since = (state, now)
         late = self._inflow.expire(now)
         if late and self.node is not None and self.node.condition is NodeCondition.OPERATIONAL:
             variables = self._cell.definition.variables

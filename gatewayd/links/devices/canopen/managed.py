@@ -7,6 +7,7 @@ from gatewayd.canopen.manager.node import ManagedNode, NodeObserver
 from gatewayd.canopen.manager.runtime import Manager
 from gatewayd.links.contract import Link
 from gatewayd.links.devices.canopen.plan import CanopenDevicePlan
+from gatewayd.links.devices.status_words import DeviceState
 
 
 class ManagedDevice(Link, NodeObserver):
@@ -20,6 +21,8 @@ class ManagedDevice(Link, NodeObserver):
     """Why no manager can have it; empty: one can."""
     heard: float | None
     """When it was heard last, in operation."""
+    state_since: tuple[DeviceState, float]
+    """Its state (`figures.state_of`) as of the last look, and since when."""
     emergency: EmergencyMessage | None
     """The error that it reports; None where it reports none."""
 

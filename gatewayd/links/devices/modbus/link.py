@@ -51,6 +51,7 @@ class ModbusDeviceLink(Link):
     def __init__(self, plan: ModbusDevicePlan, cell: Cell) -> None:
         self._progress = self._answers = 0
         self._heard: float | None = None
+        self._state_since = (DeviceState.STARTING, clock.now())
         self._bind(plan, cell)
         inputs = [placed.variable for placed in plan.inputs(cell.definition)]
         peer = f"{plan.name} ({plan.line.text} unit {plan.unit})"
@@ -132,8 +133,14 @@ class ModbusDeviceLink(Link):
 
     def health(self) -> LinkHealth:
         """Whether it answers, and to everything."""
-        figures = {"family": self.plan.family, "address": self.plan.line.text, "unit": self.plan.unit}
-        return self._figures(clock.now()).health(self.plan.name, figures)
+        now = clock.now()
+        figures = {
+            "family": self.plan.family,
+            "address": self.plan.line.text,
+            "unit": self.plan.unit,
+            "since": round(max(0.0, now - self._state_since[1]), 3),
+        }
+        return self._figures(now).health(self.plan.name, figures)
 
     async def ask(self, request: PlaceRequest) -> PlaceAnswer:
         """Read or write a place by hand, between the polls."""
@@ -231,6 +238,9 @@ class ModbusDeviceLink(Link):
     # -- inside --------------------------------------------------------------------------------------------------
 
     def _tick(self, now: float) -> None:
+        state = self._state()[0]
+        if state is not self._state_since[0]:
+            self._state_since = (state, now)
         # Timers come after sockets: whatever waited there has been read by now.
         self._inflow.caught_up()
         late = self._inflow.expire(now)

@@ -7,6 +7,7 @@ from uuid import uuid4
 import pytest
 
 from gatewayd.core.cell import Cell
+from gatewayd.links.access import AccessError, PlaceRequest
 from gatewayd.links.contract import Level
 from gatewayd.links.devices.canopen.link import FAMILY, CanopenDeviceLink
 from gatewayd.links.devices.declaration import KIND
@@ -201,3 +202,18 @@ def test_made_by_its_family() -> None:
     made = FAMILY.make(the_device(plan), Cell(plan.cell), None)  # type: ignore[arg-type]
     assert isinstance(made, CanopenDeviceLink)
     assert made.health().figures["state"] == "starting"
+
+
+async def test_object_is_asked_by_hand_beside_the_manager(channel: str) -> None:
+    plan = planned(channel=channel)
+    link = link_of(plan, FakeRobot(plan).cell)
+    with pytest.raises(AccessError, match="device encoder is not asked"):
+        await link.ask(PlaceRequest("0x6004"))
+    async with an_encoder(channel) as encoder, managed([link]):
+        await until(lambda: link.health().figures["state"] == "good")
+        assert (await link.ask(PlaceRequest("0x6004"))).values[0].value == 1500
+        answer = await link.ask(PlaceRequest("0x1014", value="0x85"))
+        assert (answer.values[0].value, encoder.get(0x1014)) == (0x85, 0x85)
+        with pytest.raises(AccessError, match="gatewayd force clamp VALUE"):
+            await link.ask(PlaceRequest("0x6200:1", value="1"))
+        assert link.health().figures["state"] == "good"

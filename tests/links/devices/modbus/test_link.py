@@ -7,11 +7,14 @@ from typing import Any
 
 import pytest
 
+from gatewayd.links.access import AccessError, PlaceRequest
 from gatewayd.links.contract import Level
 from gatewayd.links.devices.modbus.link import ModbusDeviceLink
+from gatewayd.links.devices.status_words import DeviceState
 from gatewayd.loop import clock
 from gatewayd.modbus.areas import Area
-from gatewayd.modbus.client.requests import ExceptionAnswer
+from gatewayd.modbus.client.requests import ExceptionAnswer, ModbusRequest
+from gatewayd.modbus.client.station import Answered
 from gatewayd.modbus.client.unit import UnitState
 from tests.links.devices.cells import HEAD, VARIABLES, FakeRobot, device, planned
 
@@ -154,3 +157,29 @@ def test_answers_that_waited_while_the_process_stood_still_are_no_news(bench: Be
     bench.link._tick(bench.now)
     bench.say(Area.INPUT, b"\x00\x7d")
     assert bench.robot.value("level") == 12.5
+
+
+async def test_place_is_asked_by_hand(bench: Bench) -> None:
+    with pytest.raises(AccessError, match="device island is not asked: it has not answered yet"):
+        await bench.link.ask(PlaceRequest("100"))
+    bench.there()
+    asked: list[bytes] = []
+
+    def ask(request: ModbusRequest, answered: Answered) -> bool:
+        asked.append(request.pdu)
+        answered(b"\x00\x07", bench.now)
+        return True
+
+    bench.link.station.ask = ask  # type: ignore[method-assign]
+    assert (await bench.link.ask(PlaceRequest("100"))).values[0].value == 7
+    assert [pdu.hex() for pdu in asked] == ["0300640001"]
+
+
+def test_state_lasts_since_it_was_seen_first(bench: Bench) -> None:
+    bench.there()
+    bench.link._tick(bench.now)
+    bench.link._tick(bench.now + 5.0)
+    assert bench.link._state_since == (DeviceState.GOOD, bench.now)
+    bench.lost()
+    bench.link._tick(bench.now + 9.0)
+    assert bench.link._state_since == (DeviceState.LOST, bench.now + 9.0)
