@@ -125,6 +125,4 @@ class Commands:
             return Obstacle.IMPLIED
         if requester.waited > MAX_WAITED:
             return Obstacle.WAITED
-        if requester.waited > MAX_WAITED:
-            return Obstacle.WAITED
         return None if cleared else Obstacle.NOT_CLEARED

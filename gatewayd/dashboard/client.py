@@ -141,6 +141,8 @@ class DashboardClient:
                 await self._obey(line)
                 answer = await self._exchange(line, question.value, TOLD_WITHIN)
                 words[question] = asked.answered(question, answer)
+            # A controller that knows none of the questions is commanded all the same.
+            await self._obey(line)
             state = asked.state(words)
             self._handler.told(state)
             if was_local and state.remote:

@@ -158,6 +158,20 @@ async def test_a_command_that_would_come_late_is_not_sent(monkeypatch: pytest.Mo
         assert "stop" not in server.heard
 
 
+async def test_a_server_that_knows_no_question_is_commanded_at_once() -> None:
+    def say(line: str) -> bytes:
+        return b"Starting program\n" if line == "play" else f"could not understand: '{line}'\n".encode()
+
+    async with scripted(say) as port, running(port) as (client, notes):
+        await notes.until(lambda: len(notes.states) > 2)  # the third round has no question left
+        assert client.give(PLAY)
+        await notes.until(lambda: bool(notes.replies))
+        assert notes.replies[0][1].outcome is CommandOutcome.DONE
+        rounds = len(notes.states)
+        await notes.until(lambda: len(notes.states) > rounds)
+        assert not client.is_busy
+
+
 async def test_silence_ends_the_connection(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "TOLD_WITHIN", 0.05)
     async with scripted(lambda _: b"") as port, running(port) as (client, notes):
