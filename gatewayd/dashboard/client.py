@@ -75,6 +75,7 @@ class DashboardClient:
         self._next: DashboardRequest | None = None
         self._next_at = 0.0
         self._is_sent = False
+        self._expiry: asyncio.TimerHandle | None = None
         self._given = asyncio.Event()
         self._again = False
         self._tap: StreamTap | None = None
@@ -95,6 +96,7 @@ class DashboardClient:
             return False
         self._next, self._next_at, self._is_sent = request, clock.now(), False
         self._given.set()
+        self._expiry = asyncio.get_running_loop().call_later(SENT_WITHIN, self._expire)
         return True
 
     def trace(self, tap: StreamTap | None) -> None:
@@ -118,6 +120,7 @@ class DashboardClient:
                 self._end(str(reason), was_connected=was_connected)
             finally:
                 self._line = None
+                self._no_expiry()
                 line.abort()
             if not self._again:
                 await self._wait(asyncio.sleep(delay), delay)
@@ -172,15 +175,26 @@ class DashboardClient:
             return
         self._given.clear()
         if clock.now() - self._next_at > SENT_WITHIN:
-            self._answered(request, DashboardReply(CommandOutcome.NOT_SENT, ""))
+            self._expire()
             return
         line.check()
         self._is_sent = True
         answer = await self._exchange(line, request.line, request.patience)
         self._answered(request, reply_to(request.command, answer))
 
+    def _expire(self) -> None:
+        """The answer to a question has kept a command waiting for too long: whoever gave it need not wait for both."""
+        if self._next is not None and not self._is_sent:
+            self._given.clear()
+            self._answered(self._next, DashboardReply(CommandOutcome.NOT_SENT, ""))
+
+    def _no_expiry(self) -> None:
+        if self._expiry is not None:
+            self._expiry.cancel()
+
     def _answered(self, request: DashboardRequest, reply: DashboardReply) -> None:
         self._next = None
+        self._no_expiry()
         self._handler.answered(request, reply)
 
     async def _exchange(self, line: _Line, text: str, limit: float) -> str:

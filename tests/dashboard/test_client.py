@@ -158,6 +158,25 @@ async def test_a_command_that_would_come_late_is_not_sent(monkeypatch: pytest.Mo
         assert "stop" not in server.heard
 
 
+async def test_a_command_that_a_slow_answer_keeps_waiting_is_refused_before_the_answer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "SENT_WITHIN", 0.02)
+    async with simulated() as server, running(server.port) as (client, notes):
+        await notes.until(lambda: bool(notes.states))
+        server.silent = True
+        asked = len(server.heard)
+        async with asyncio.timeout(5):
+            while len(server.heard) == asked:  # noqa: ASYNC110 - the server tells nobody
+                await asyncio.sleep(0.005)
+        assert client.give(STOP)
+        await notes.until(lambda: bool(notes.replies))
+        assert notes.replies[0][1].outcome is CommandOutcome.NOT_SENT
+        assert client.is_connected, "the question is still open"
+        assert not client.is_busy
+        assert "stop" not in server.heard
+
+
 async def test_a_server_that_knows_no_question_is_commanded_at_once() -> None:
     def say(line: str) -> bytes:
         return b"Starting program\n" if line == "play" else f"could not understand: '{line}'\n".encode()

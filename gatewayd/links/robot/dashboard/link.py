@@ -18,7 +18,7 @@ from gatewayd.core.definition import Value
 from gatewayd.core.events import Event, EventKind
 from gatewayd.core.freshness import Source
 from gatewayd.dashboard.client import DashboardClient
-from gatewayd.dashboard.replies import DashboardReply
+from gatewayd.dashboard.replies import CommandOutcome, DashboardReply
 from gatewayd.dashboard.requests import DashboardRequest, Verb
 from gatewayd.dashboard.state import RobotState
 from gatewayd.links.contract import Level, Link, LinkHealth, Passage, Tap
@@ -148,7 +148,6 @@ class DashboardLink(Link):
             is_up = self.client.is_connected
             self._refuse(attempt, CommandResult.BUSY if is_up else CommandResult.NOT_CONNECTED)
             return
-        self._sent += 1
         self._under_way = attempt
         self._record(EventKind.COMMANDED, attempt, request.line)
         self._conclude(CommandResult.UNDER_WAY, None, attempt.time)
@@ -198,6 +197,8 @@ class DashboardLink(Link):
         attempt, self._under_way = self._under_way, None
         result = BY_OUTCOME[reply.outcome]
         answer = printable(reply.text) or None
+        if reply.outcome is not CommandOutcome.NOT_SENT:
+            self._sent += 1
         if attempt is None:
             # It was given by the former mapping: the result is that of the robot all the same.
             self._conclude(result, answer, now)
