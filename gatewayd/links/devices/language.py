@@ -138,10 +138,16 @@ def _compile(cell: ExpandedCell, number: int, device: Part[DeviceSpec]) -> Devic
 
 
 def lost_after(device: DeviceSpec, places: Iterable[ExpandedPlace]) -> float:
-    """Seconds without an answer after which it counts as lost: as written, or three polls and a time-out."""
+    """Seconds without an answer after which it counts as lost: as written, or three polls and a time-out.
+
+    Three time-outs where frames are those of a serial line: after each the device is left alone for a while, and one
+    answer that is lost must not be a device that is lost.
+    """
     if device.lost_after is not None:
         return device.lost_after
-    return max(MIN_LOST_AFTER, 3 * slowest_poll(device, places) + device.timeout)
+    is_rtu = device.serial is not None or device.framing == "rtu"
+    time_outs = 3 if is_rtu else 1
+    return max(MIN_LOST_AFTER, 3 * slowest_poll(device, places) + time_outs * device.timeout)
 
 
 def slowest_poll(device: DeviceSpec, places: Iterable[ExpandedPlace]) -> float:

@@ -28,7 +28,7 @@ class DeviceKeys(Section):
     lost_after: Duration | None = Field(
         default=None,
         description="time without an answer after which the device, or a value of it, counts as lost; "
-        "default: three polls and a timeout, at least 1s",
+        "default: three polls and a timeout (three with frames of a serial line), at least 1s",
     )
     watchdog: OptionalDuration = Field(
         default=None,

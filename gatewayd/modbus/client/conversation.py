@@ -1,8 +1,8 @@
 """The requests that are underway on one connection. Pure; seconds of any one clock.
 
 On TCP the transaction id says which request an answer belongs to: one that comes after its time-out is dropped and
-counted. On a serial line only the unit says so, and the length: a unit that was given up is not asked again before its
-late answer has had as much time again (`Line`), and what comes meanwhile is thrown away.
+counted. On a serial line only unit, function and length say so: what was not answered is asked again before anything
+else, and once it is answered there is silence, in which late answers may come and are thrown away (`Station`).
 """
 
 from __future__ import annotations

@@ -250,7 +250,7 @@ class Line:
             self._unanswered_since = min(self._unanswered_since, job.sent_at)
         station = job.station
         if not is_answered and station is not None and self._is_ambiguous:
-            station.hold(now + job.timeout)
+            station.unanswered(job, now)
         self._turns.finish(job, outcome, now)
 
 

@@ -57,6 +57,11 @@ class PollCycle:
         self._position += 1
         return group, part, group.requests[part]
 
+    def repeat(self, group: ReadGroup, part: int) -> ModbusRequest:
+        """A request that has failed is sent once more, whatever the period; its answer counts as any."""
+        self._underway += 1
+        return group.requests[part]
+
     def answered(self, group: ReadGroup, part: int, data: bytes) -> bytes | None:
         """One of its requests has brought `data`; the data of the whole group, once they are there."""
         self._underway -= 1

@@ -42,6 +42,14 @@ _KEEPALIVE = ReadGroup(Area.HOLDING, 0, 1, (GroupMember(0, 0, 1),), (read(Area.H
 Answered = Callable[["bytes | Failure", float], None]
 """Hears what became of a request, and when."""
 
+_PATIENCE = 1.25
+"""How much longer than the one before a late answer may take."""
+_DOUBTFUL = 5
+"""Time-outs after which an answer is not expected any more, but not before _MIN_DOUBTFUL."""
+_MIN_DOUBTFUL = 2.0
+"""Seconds."""
+_MAX_UNANSWERED = 16
+
 
 @dataclass(eq=False, slots=True)
 class Job:
@@ -95,6 +103,10 @@ class Station:
         self._is_identifying = False
         self._asked: deque[tuple[ModbusRequest, Answered]] = deque()
         self._hold_until = AT_ONCE
+        self._repeat: tuple[PollCycle, ReadGroup, int] | None = None
+        """What is read next, because an answer to it may still come that nothing tells from another's."""
+        self._unanswered: deque[float] = deque(maxlen=_MAX_UNANSWERED)
+        """When the requests were sent whose answers may still come."""
 
     def write(self, key: Hashable, order: WriteOrder, now: float, *, repeat: float | None = None) -> bool:
         """Write as soon as the line is free; the newest wins for each key (`writes`).
@@ -137,14 +149,18 @@ class Station:
         is_probe = not self.breaker.is_closed
         if is_probe:
             self.breaker.probe()
-        elif (request := self._reader.request) is not None:
+        elif self._repeat is None and (request := self._reader.request) is not None:
             self._is_identifying = True
             return self._job(request, self._identity_done, now)
-        elif self._asked:
+        elif self._repeat is None and self._asked:
             asked, answered = self._asked.popleft()
             return self._job(asked, partial(self._ask_done, answered), now)
-        cycle = min(self._cycles, key=_due) if len(self._cycles) > 1 else self._cycles[0]
-        group, part, request = cycle.take(now)
+        if self._repeat is not None:
+            cycle, group, part = self._repeat
+            request = cycle.repeat(group, part)
+        else:
+            cycle = min(self._cycles, key=_due) if len(self._cycles) > 1 else self._cycles[0]
+            group, part, request = cycle.take(now)
         job = self._job(request, self._read_done, now)
         job.read, job.is_probe = (cycle, group, part), is_probe
         return job
@@ -152,14 +168,39 @@ class Station:
     def connected(self, now: float, *, may_be_back: bool) -> None:
         """The line's connection is there (again): what is behind it may be another device, or one that was away."""
         self._reader.begin()
+        self._repeat = None
         if may_be_back and self.breaker.state is BreakerState.OPEN:
             self.breaker.probe_at = min(self.breaker.probe_at, now)
         self._refresh()
 
-    def hold(self, until: float) -> None:
-        """Do not ask it before: a late answer could be taken for another's."""
-        self._hold_until = until
+    def unanswered(self, job: Job, now: float) -> None:
+        """Its request was not answered on a line where only unit, function and length say what an answer is to.
+
+        An answer that comes later must not be taken for that of another place in the unit: the same place is read
+        again, whose answer it may be (`_settle`). After a write or a single request it is left alone for a while.
+        """
+        if job.read is None:
+            self._hold_until = now + job.timeout
+        else:
+            self._repeat = job.read
+            self._unanswered.append(job.sent_at)
         self._refresh()
+
+    def _in_doubt_since(self, now: float) -> float:
+        """When the request was sent that an answer may be to which comes now; NEVER: to the last one."""
+        earliest = now - max(_DOUBTFUL * self.settings.timeout, _MIN_DOUBTFUL)
+        return next((sent_at for sent_at in self._unanswered if sent_at >= earliest), NEVER)
+
+    def _settle(self, job: Job, now: float) -> None:
+        """A place is answered that was read more than once. If the first time was meant, the rest comes as late.
+
+        A unit that was lost is probed once more then, before anything that it says counts.
+        """
+        since = self._in_doubt_since(now)
+        if since < NEVER:
+            self._hold_until = job.sent_at + _PATIENCE * (now - since)
+        self._repeat = None
+        self._unanswered.clear()
 
     def check(self, now: float, trouble: str) -> None:
         """Count it as lost if its deadline has passed, or if it was not there yet and the line has `trouble`."""
@@ -172,6 +213,7 @@ class Station:
     def gap(self, length: float) -> None:
         """See `Line.gap`."""
         self.deadline += length
+        self._unanswered = deque((sent_at + length for sent_at in self._unanswered), _MAX_UNANSWERED)
 
     def close(self, reason: str, now: float) -> None:
         """It leaves the line."""
@@ -189,9 +231,9 @@ class Station:
         self.write_due = max(self._writer.due, hold)
         if self.in_flight >= self.settings.in_flight:
             self.read_due = NEVER
-        elif self._reader.request is not None:
+        elif self._reader.request is not None and self._repeat is None:
             self.read_due = NEVER if self._is_identifying else hold
-        elif self._asked:
+        elif self._asked or self._repeat is not None:
             self.read_due = hold
         elif len(self._cycles) == 1:
             self.read_due = max(self._cycles[0].due, hold)
@@ -209,6 +251,10 @@ class Station:
     def _read_done(self, job: Job, outcome: bytes | Failure, now: float) -> None:
         assert job.read is not None
         cycle, group, part = job.read
+        if self._repeat is not None and isinstance(outcome, (bytes, ExceptionAnswer)):
+            if job.is_probe and self._in_doubt_since(now) < NEVER:
+                outcome = BadAnswer("an answer that may be to an earlier request")
+            self._settle(job, now)
         if not isinstance(outcome, bytes):
             is_first = cycle.failed(group)
             self._judge(job, outcome, now)
@@ -275,7 +321,7 @@ class Station:
     def _answered(self, now: float) -> None:
         self.breaker.answered()
         wanted = min([cycle.next_due for cycle in self._cycles])
-        self.deadline = max(now, wanted) + self.settings.breaker.lost_after
+        self.deadline = max(now, wanted, self._hold_until) + self.settings.breaker.lost_after
         if self.state is not UnitState.ONLINE:
             self._reader.begin()
             for cycle in self._cycles:

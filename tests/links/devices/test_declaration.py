@@ -26,7 +26,7 @@ def test_words() -> None:
     plan = planned()
     found = KIND.describe(device(plan, "gripper"), plan.cell)
     assert found.address == "/dev/ttyUSB0 115200 8N1 unit 9"
-    assert (found.settings["watchdog"], found.settings["lost_after"]) == ("1 s", "1 s")
+    assert (found.settings["watchdog"], found.settings["lost_after"]) == ("1 s", "1.8 s")
     ((place,),) = found.places.values()
     assert place.text == (
         "holding 1002.0..7 (401003.0..7) uint16, rest kept, written on connect, again every 1 s"

@@ -44,7 +44,13 @@ def test_a_place_in_nothing_is_kept_for_the_rules() -> None:
 
 @pytest.mark.parametrize(
     "polls, lost_after",
-    [("poll: 20ms", 1.0), ("poll: 1s", 3.5), ("poll: 1s, timeout: 200ms", 3.2), ("lost_after: 400ms", 0.4)],
+    [
+        ("poll: 20ms", 1.0),
+        ("poll: 20ms, framing: rtu", 1.56),
+        ("poll: 1s", 3.5),
+        ("poll: 1s, timeout: 200ms", 3.2),
+        ("lost_after: 400ms", 0.4),
+    ],
 )
 def test_a_device_is_lost_after_three_polls(polls: str, lost_after: float) -> None:
     plan = planned(head=HEAD.replace("poll: 20ms", polls))

@@ -255,17 +255,38 @@ def serial_world(count: int = 1) -> tuple[World, dict[int, Station], dict[int, U
     return world, stations, units
 
 
-def test_late_answer_on_a_serial_line_is_not_taken_for_the_next() -> None:
-    world, stations, units = serial_world(2)
+@pytest.mark.parametrize("delay", [number / 20 for number in range(1, 40)])
+def test_late_answer_on_a_serial_line_is_not_taken_for_that_of_another_place(delay: float) -> None:
+    """Two places that differ by nothing but their address, in a unit that is slow from one moment to the next."""
+    places = WantedItem(Area.HOLDING, 10, 1), WantedItem(Area.HOLDING, 20, 1)
+    world, stations, heard, units = make_world(
+        {1: StationSettings(1, polls(0.05, *places), TIMEOUT), 2: StationSettings(2, polls(0.05), TIMEOUT)}
+    )
+    world.use(lambda: RtuConversation(RtuTiming.of(115_200)))
+    units[1].registers = {10: 10, 20: 20}
     world.run(1.0)
-    units[1].delay = TIMEOUT + 0.2
-    world.run(3.0)
-    assert stations[1].counters.answers < 30
-    assert stations[1].counters.time_outs + stations[1].counters.bad_answers >= 3
-    assert stations[1].state is UnitState.LOST
+    units[1].delay = delay
+    world.run(10.0)
     assert stations[2].state is UnitState.ONLINE
-    times = [at for at, unit, _ in world.sent if unit == 1 and at > 1.0]
-    assert min(later - earlier for earlier, later in itertools.pairwise(times)) >= 2 * TIMEOUT
+    units[1].delay = 0.002
+    world.run(5.0)
+    assert stations[1].state is UnitState.ONLINE
+    assert {(group.address, data) for group, data in heard[1].values} == {(10, b"\0\x0a"), (20, b"\0\x14")}
+
+
+def test_answer_that_is_missing_on_a_serial_line_costs_its_unit_no_more_than_some_time_outs() -> None:
+    places = WantedItem(Area.HOLDING, 10, 1), WantedItem(Area.HOLDING, 20, 1)
+    world, stations, heard, units = make_world({1: StationSettings(1, polls(0.05, *places), TIMEOUT)})
+    world.use(lambda: RtuConversation(RtuTiming.of(115_200)))
+    world.run(1.0)
+    silence(units[1])
+    world.run(0.1)
+    heal(units[1])
+    for one in heard.values():
+        one.values.clear()
+    world.run(3 * TIMEOUT)
+    assert {group.address for group, _ in heard[1].values} == {10, 20}
+    assert stations[1].counters.losses == 0
 
 
 def test_broadcast_goes_to_all_and_is_bounded() -> None:
