@@ -32,11 +32,11 @@ ELSEWHERE = {
     r"gatewayd rtde (record|watch|get|set|message|fields|info|convert|plot) .*": "tests/cli/rtde",
     r"gatewayd import rtde .*": "tests/cli/importing",
     r"pip install 'gatewayd\[\w+\]'": "the extras of pyproject.toml, locked in requirements-dev.lock",
-    r"\.venv/bin/python docs/examples/.*": "tests/docs/test_examples.py",
+    r"\.venv/bin/python docs/examples/.*": "tests/docs/test_examples.py, test_device_tutorials.py",
     r"gatewayd reload|systemctl reload .*": "tests/e2e/test_reload.py",
     r"gatewayd simulate\b.*": "test_simulator_takes_the_options_of_the_guides below, tests/cli/test_simulate.py",
     r"mbpoll -0 -p 1502 -t 4:int -B -r 101 -c 2 127\.0\.0\.1": "tests/demo/test_view.py: the demonstration's own",
-    r"mbpoll -0 .*": "tests/docs/test_tutorial.py, with another Modbus client",
+    r"mbpoll -0 .*": "tests/docs/test_tutorial.py, test_device_tutorials.py, with another Modbus client",
     r"make (bench|demo)\b.*": "the Makefile; tests/test_docs.py knows its targets",
     r"make soak\b.*": "tests/soak/test_soak.py; tests/test_docs.py knows the target",
     r"\(umask 077; head -c 24 /dev/urandom \| base64 > token\)": "tests/web/test_launch.py reads such files",
@@ -113,7 +113,8 @@ def test_every_command_takes_its_arguments() -> None:
 
 @pytest.fixture
 def files(tmp_path: Path) -> Path:
-    """A directory with every file that the pages show."""
+    """A directory with every file that the pages show, and the data sheet that one has the reader copy."""
+    (tmp_path / "encoder.eds").write_bytes((DOCS.parent / "mappings" / "encoder.eds").read_bytes())
     for page in PAGES:
         for name, text in FILE.findall(page.read_text()):
             (tmp_path / name).write_text(text)

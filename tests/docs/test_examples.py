@@ -126,4 +126,9 @@ def test_without_arguments_an_example_says_which_it_takes(path: Path) -> None:
 
 def test_no_example_is_left_out() -> None:
     tested = {name.removeprefix("test_") for name in globals() if name.startswith("test_")}
+    tested |= {
+        "can_encoder",
+        "gripper",
+        "io_island",
+    }  # devices: tests/docs/test_device_tutorials.py plays with them
     assert {path.stem for path in EXAMPLES.glob("*.py")} <= tested
