@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from gatewayd.cli.importing.register_list.columns import DETAIL, MEANINGS, column_of
 from gatewayd.cli.importing.register_list.findings import ListFindings
+from gatewayd.cli.importing.register_list.numbers import NotReadable, area, limits
 
 MAX_BYTES: Final = 1024 * 1024
 MAX_ROWS: Final = 5000
@@ -173,8 +174,8 @@ def _table(
     head: Sequence[ListCell], records: Sequence[Sequence[ListCell]], delimiter: str, findings: ListFindings
 ) -> ListTable:
     columns: list[str] = []
-    for cell in head:
-        column = column_of(cell.text)
+    for index, cell in enumerate(head):
+        column = _column(cell, [record[index].text for record in records if index < len(record)], delimiter)
         if column and column != DETAIL and column in columns:
             findings.error(cell.place, f"two columns for the {MEANINGS[column]}", "delete one, or rename it")
         elif not column and cell.text:
@@ -187,6 +188,24 @@ def _table(
         findings.error((rows[MAX_ROWS].line, 1), f"more than {MAX_ROWS} rows", "split the list into several")
         rows = []
     return ListTable(frozenset(filter(None, columns)), tuple(rows), delimiter)
+
+
+def _column(head: ListCell, texts: Iterable[str], delimiter: str) -> str:
+    """The meaning of a column by its name; one called `Bereich` has areas, or limits if its cells look like these."""
+    column = column_of(head.text)
+    if column != "area":
+        return column
+    filled = [text for text in texts if text]
+    has_limits = any(_is_readable(text, lambda cell: limits(cell, comma=delimiter != ",")) for text in filled)
+    return "limits" if has_limits and not any(_is_readable(text, area) for text in filled) else column
+
+
+def _is_readable(text: str, read: Callable[[str], object]) -> bool:
+    try:
+        read(text)
+    except NotReadable:
+        return False
+    return True
 
 
 def _row(columns: Sequence[str], record: Sequence[ListCell], findings: ListFindings) -> ListRow:

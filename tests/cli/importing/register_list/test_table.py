@@ -55,3 +55,18 @@ def test_what_is_not_utf8_is_said() -> None:
     findings = ListFindings()
     assert decoded("Größe".encode("cp1252"), findings) == "Größe"
     assert [finding.text for finding in findings.all()] == ["the file is not UTF-8; read as Windows-1252"]
+
+
+def test_a_column_called_bereich_has_what_its_cells_look_like() -> None:
+    """German lists have areas or limits there."""
+    assert read("Name;Adresse;Bereich\na;1;Halteregister\nb;2;\n")[0][0]["area"][0] == "Halteregister"
+    rows, findings = read("Name;Adresse;Registerart;Bereich\na;1;holding;\nb;2;coil;0..1\n")
+    assert [row.get("limits", ("", 0, 0))[0] for row in rows] == ["", "0..1"]
+    assert [row["area"][0] for row in rows] == ["holding", "coil"]
+    assert findings == []
+
+
+def test_a_column_with_areas_and_limits_is_one_of_areas() -> None:
+    """What cannot be read there is found when the rows are read."""
+    rows, _ = read("Name;Adresse;Bereich\na;1;holding\nb;2;0..100\n")
+    assert [row["area"][0] for row in rows] == ["holding", "0..100"]
