@@ -36,9 +36,14 @@ def plan_from(path: Path) -> Plan:
     return loaded.plan
 
 
-def golden_model() -> PlcModel:
-    """The cell of the golden files, for its PLC on Modbus."""
-    return model_of(plan_from(MAPPING), PlcWishes(writer="plc"))
+def golden_model(handshake: str | None = None) -> PlcModel:
+    """The cell of the golden files, for its PLC on Modbus; with a self test where there is a handshake."""
+    return model_of(plan_from(MAPPING), PlcWishes(writer="plc", handshake=handshake))
+
+
+def model_for(target: str) -> PlcModel:
+    """The same, with a self test where the target has one."""
+    return golden_model(None if target in ("c", "studio5000") else "toggle:ack")
 
 
 def canopen_model() -> PdoModel:
@@ -48,7 +53,7 @@ def canopen_model() -> PdoModel:
 
 def made() -> Mapping[Path, bytes]:
     """Where each golden file for a PLC on Modbus lies, and what it has to be."""
-    return dict(_made(golden_model()))
+    return dict(_made())
 
 
 def made_for_canopen() -> Mapping[Path, bytes]:
@@ -61,9 +66,9 @@ def made_for_canopen() -> Mapping[Path, bytes]:
     }
 
 
-def _made(model: PlcModel) -> Iterator[tuple[Path, bytes]]:
+def _made() -> Iterator[tuple[Path, bytes]]:
     for target in TARGETS:
-        for file in files_for(target, model):
+        for file in files_for(target, model_for(target)):
             yield GOLDEN / target / file.name, file.content()
 
 

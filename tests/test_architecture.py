@@ -65,6 +65,7 @@ LAYERS: dict[str, set[str]] = {
     "links.examination": {"core.definition", "mapping.plan"},
     "links.language": {"core.definition", "links.can_buses", "links.contract", "mapping"},
     "links.exports": set(),
+    "links.robot_program": {"core.definition"},
     "links.route": {"links.examination", "machine"},
     "links.tables": {"mapping.expanded", "mapping.plan", "report.layout"},
     "links.registry": {
@@ -76,7 +77,7 @@ LAYERS: dict[str, set[str]] = {
         "links.language",
         "links.tables",
     },
-    "links.robot": {*LINK, "dashboard", "links.robot", "rtde"},
+    "links.robot": {*LINK, "dashboard", "links.robot", "links.robot_program", "rtde"},
     "links.modbus_places": {
         "core.definition",
         "links.modbus_places",
@@ -85,7 +86,14 @@ LAYERS: dict[str, set[str]] = {
         "report.format",
         "report.wording",
     },
-    "links.modbus_server": {*LINK, "links.modbus_places", "links.modbus_server", "modbus", "plc"},
+    "links.modbus_server": {
+        *LINK,
+        "links.modbus_places",
+        "links.modbus_server",
+        "links.robot_program",
+        "modbus",
+        "plc",
+    },
     "links.can_buses": {"canopen.load", "mapping.diagnostics"},
     "links.can_frames": {"canopen.frame"},
     "links.canopen_values": {"canopen", "core.definition", "encoding", "mapping.reach"},

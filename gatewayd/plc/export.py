@@ -38,6 +38,7 @@ def plc_export(
             prefix=cast("str", options["prefix"]),
             names=dict(map(_pair, cast("Sequence[str]", options["name"]))),
             host=cast("str | None", options["host"]),
+            handshake=cast("str | None", options["handshake"]),
         )
         return tuple(files(plan, wishes, cast("str", options["for"]), bool(options["small"])))
 
@@ -70,6 +71,7 @@ _EXAMPLES: Final = (
     "gatewayd export plc my-cell.yaml --for iec-st -o plc/",
     "gatewayd export plc my-cell.yaml --for iec-st --writer hmi --prefix HMI -o hmi/",
     "gatewayd export plc my-cell.yaml --for iec-st --name start=start_cycle -o plc/",
+    "gatewayd export plc my-cell.yaml --for iec-st --handshake start:busy -o plc/",
     "gatewayd export plc line.yaml --for c --link canopen -o master/",
 )
 _OPTIONS: Final = (
@@ -88,6 +90,11 @@ _OPTIONS: Final = (
     ),
     ExportOption(
         "--host", "How the PLC reaches the gateway by Modbus, if not where the mapping listens.", "ADDRESS"
+    ),
+    ExportOption(
+        "--handshake",
+        "Adds a self test, led by these two bits as that of `gatewayd export urscript`; structured text on Modbus.",
+        "TOGGLE:ACKNOWLEDGE",
     ),
     ExportOption("--small", "For a controller without 64-bit numbers: refuse what needs them."),
 )

@@ -27,6 +27,8 @@ class PlcWishes:
     """Variable or family of the mapping -> what it is called in the PLC."""
     host: str | None = None
     """How the PLC reaches the gateway; None: at the address where it listens, if it is one."""
+    handshake: str | None = None
+    """`TOGGLE:ACKNOWLEDGE`, by which a self test is led; None: without self test."""
 
 
 def owners(variable: Variable, cell: CellDefinition) -> tuple[int, ...]:

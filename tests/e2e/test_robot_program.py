@@ -13,15 +13,27 @@ import struct
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Thread
+from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
+from gatewayd.core.definition import Direction
+from gatewayd.links.modbus_server.plc.build import model_of
+from gatewayd.links.modbus_server.plc.model import PlcModel
+from gatewayd.links.modbus_server.plc.st.main import blocks
+from gatewayd.links.modbus_server.plc.targets.iec_st import DIALECT
+from gatewayd.plc.tags import PlcWishes
 from tests.e2e.plant import Plant
 from tests.e2e.plc import PLC, Plc
 from tests.e2e.processes import Simulator, wait_for
+from tests.links.modbus_server.plc import test_running as compiled
+from tests.links.modbus_server.plc.simulation import assign, instance, structure, value_in
 from tests.links.robot.urscript.language import load
+from tests.plc_golden import plan_from
 
 VARIABLES = f"""\
 writers: {{plc: {{modbus: {PLC}}}}}
@@ -197,3 +209,71 @@ def test_program_and_plc_name_what_is_exchanged(plant: Plant) -> None:
         f"gw self test, wrong: recipe[{index}]" for index in range(2)
     }
     assert "made" in counterpart.wrong
+
+
+class GeneratedPlc:
+    """The lines of `iec-st`: the block stepped through, with conversions compiled from the same lines, over Modbus."""
+
+    def __init__(self, plc: Plc, model: PlcModel, folder: Path) -> None:
+        self.plc, self.model = plc, model
+        self.binary = compiled.program(folder, replace(model, self_test=None), "iec-st")
+        self.inputs, self.outputs = structure(model.inputs), structure(model.outputs)
+        self.status = SimpleNamespace(trusted=True, values_fresh=True, robot_writable=True, refusals=0)
+        (unit,) = (unit for unit in blocks(model, DIALECT) if unit.name == "GW_SelfTest")
+        data = {"status": self.status, "inputs": self.inputs, "outputs": self.outputs}
+        self.block, self._call = instance(unit, **data, time_out=10_000, settle=50)
+
+    def run(self) -> None:
+        self.block.run = True
+        wait_for(self._is_done, "the end of the self test")
+
+    def _is_done(self) -> bool:
+        """One round of requests, and the block."""
+        words = [word for poll in self.model.reads for word in self.plc.read(poll.address, poll.count)]
+        shown = compiled.run(self.binary, "read", text=" ".join(f"{word:x}" for word in words))
+        for tag, text in zip(compiled.tags_of(self.model, Direction.OUTPUT), shown, strict=True):
+            assign(self.outputs, tag, compiled.number_of(text, tag))
+        self._call()
+        texts = (
+            compiled.text_of(value_in(self.inputs, tag), tag)
+            for tag in compiled.tags_of(self.model, Direction.INPUT)
+        )
+        packed = compiled.run(self.binary, text=" ".join(texts))
+        words = [int(word, 16) for word in packed]
+        for poll in self.model.writes:
+            mine, words = words[: poll.count], words[poll.count :]
+            assert not self.plc.write(poll.address, mine)
+        self.block.written += 1
+        return bool(self.block.done)
+
+
+def both(plant: Plant, folder: Path, variables_of_plc: str) -> tuple[int, Any]:
+    """Both generated halves, the PLC's from a mapping that may differ; what the program returned, and the block."""
+    simulator = plant.simulator("--control", "stdin")
+    mapping = plant.mapping(VARIABLES, simulator.port)
+    script = command("export", "urscript", mapping, "--handshake", "order:order_seen")
+    plant.daemon(mapping)
+    other = folder / "plc.yaml"
+    other.write_text(mapping.read_text().replace(VARIABLES, variables_of_plc))
+    model = model_of(plan_from(other), PlcWishes(handshake="order:order_seen"))
+    plc = GeneratedPlc(plant.ready_plc(), model, folder)
+    returned: list[int] = []
+    program = load(script, **Controller(simulator).functions())
+    robot = Thread(target=lambda: returned.append(program.call("gw_self_test")), daemon=True)
+    robot.start()
+    plc.run()
+    robot.join(30)
+    assert returned, "the program did not end"
+    return returned[0], plc.block
+
+
+@pytest.mark.skipif(compiled.COMPILER is None, reason="no C compiler")
+def test_the_generated_plc_and_the_generated_program_agree(plant: Plant, tmp_path: Path) -> None:
+    wrong, block = both(plant, tmp_path, VARIABLES)
+    assert (wrong, block.passed, block.error, block.first_name) == (0, True, False, "")
+
+
+@pytest.mark.skipif(compiled.COMPILER is None, reason="no C compiler")
+def test_a_wrong_word_order_in_the_generated_plc_is_named(plant: Plant, tmp_path: Path) -> None:
+    wrong, block = both(plant, tmp_path, VARIABLES.replace(", order: CDAB", ""))
+    assert (wrong, block.passed, block.error, block.reason, block.first_name) == (0, False, True, 4, "made")

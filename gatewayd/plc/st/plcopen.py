@@ -117,7 +117,7 @@ def _type(parent: Element, name: TypeName) -> None:
     if name.is_own or name.name in _BLOCKS:
         SubElement(parent, "derived", {"name": name.name})
     else:
-        SubElement(parent, name.name)
+        SubElement(parent, "string" if name.name == "STRING" else name.name)
 
 
 def _documentation(parent: Element, text: str) -> None:

@@ -49,6 +49,10 @@ def model_of(plan: Plan, wishes: PlcWishes) -> PdoModel:
         raise ExportError(
             "--host is for Modbus: on CANopen the node-ID of the mapping says where the node is"
         )
+    if wishes.handshake is not None:
+        raise ExportError(
+            "--handshake is for Modbus: nothing confirms that a PDO has arrived, so no self test can be led by it"
+        )
     cell = plan.cell
     by_rpdo = {pdo: _writer(pdo, node) for pdo in node.pdos if pdo.direction is Direction.INPUT}
     writers = {writer for writer in by_rpdo.values() if writer is not None}

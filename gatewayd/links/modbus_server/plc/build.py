@@ -13,6 +13,7 @@ from gatewayd.links.exports import ExportError
 from gatewayd.links.modbus_server.plan import ModbusPlan
 from gatewayd.links.modbus_server.plc.model import PlcModel, RegisterTag
 from gatewayd.links.modbus_server.plc.polling import numbered, read_polls, status_polls, write_polls
+from gatewayd.links.modbus_server.plc.self_test import self_test_plan
 from gatewayd.links.modbus_server.plc.tags import places, tag_of
 from gatewayd.mapping.plan import Plan
 from gatewayd.modbus.areas import Area
@@ -61,6 +62,9 @@ def model_of(plan: Plan, wishes: PlcWishes) -> PlcModel:
         polls=numbered(polls),
         left_out=tuple(_left_out(cell, chosen, inputs)),
         period=_PERIOD,
+        self_test=None
+        if wishes.handshake is None
+        else self_test_plan(wishes.handshake, inputs, outputs, cell),
     )
 
 

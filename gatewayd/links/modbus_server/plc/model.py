@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gatewayd.core.status_layout import BASE
+from gatewayd.links.robot_program import SelfTestValues
 from gatewayd.modbus.areas import Area
 from gatewayd.plc.model import CellModel, Tag
 
@@ -65,6 +66,27 @@ WRITES: Mapping[Area, int] = {Area.COIL: 15, Area.HOLDING: 16}
 
 
 @dataclass(frozen=True, slots=True)
+class TestedTag:
+    """One variable of the self test, as the PLC sees it."""
+
+    tag: RegisterTag
+    values: SelfTestValues
+
+
+@dataclass(frozen=True, slots=True)
+class SelfTestPlan:
+    """The PLC's half; the robot's half is made by `gatewayd export urscript` with the same handshake."""
+
+    toggle: RegisterTag
+    acknowledge: RegisterTag
+    rounds: int
+    inputs: tuple[TestedTag, ...]
+    """What the PLC writes."""
+    outputs: tuple[TestedTag, ...]
+    """What it compares."""
+
+
+@dataclass(frozen=True, slots=True)
 class PlcModel(CellModel):
     """A cell for one PLC that reaches it by Modbus."""
 
@@ -76,6 +98,8 @@ class PlcModel(CellModel):
     polls: tuple[Poll, ...]
     period: float
     """Seconds from one round of requests to the next."""
+    self_test: SelfTestPlan | None = None
+    """None: nobody asked for one."""
 
     @property
     def reads(self) -> tuple[Poll, ...]:

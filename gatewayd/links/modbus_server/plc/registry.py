@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import cast
+from typing import Final, cast
 
-from gatewayd.links.exports import ExportedFile
+from gatewayd.links.exports import ExportedFile, ExportError
 from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.plc.names import Holds, refuse_unfit
+
+_WITHOUT_SELF_TEST: Final = frozenset({"c", "studio5000"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,5 +31,10 @@ def target_named(name: str) -> PlcTool:
 def files_for(name: str, model: PlcModel, *, small: bool = False) -> tuple[ExportedFile, ...]:
     """All files of a target. Raises ExportError for what it cannot hold."""
     target = target_named(name)
+    if model.self_test is not None and name in _WITHOUT_SELF_TEST:
+        raise ExportError(
+            f"--handshake: the self test is there as structured text only, and `{name}` has none: "
+            "leave --handshake out, and program its steps by the comment in the robot program"
+        )
     refuse_unfit(model, target.holds, small=small)
     return tuple(target.files(model))

@@ -15,6 +15,7 @@ from gatewayd.links.robot.urscript import selftest
 from gatewayd.links.robot.urscript.accessors import accessors, index_check, wrapped
 from gatewayd.links.robot.urscript.handshake import Handshake
 from gatewayd.links.robot.urscript.registers import ScriptRegister, others, registers
+from gatewayd.links.robot_program import self_test_rounds
 from gatewayd.mapping.plan import Plan
 from gatewayd.report.wording import alternatives, did_you_mean
 
@@ -116,7 +117,8 @@ def _self_test(
     chosen = [
         member for member in members if not member.register.is_input or member.variable.number in inputs
     ]
-    yield from selftest.functions(chosen, leading, prefix, () if writer is None else (writer,))
+    count = self_test_rounds(plan.cell)
+    yield from selftest.functions(chosen, count, leading, prefix, () if writer is None else (writer,))
 
 
 def _of_writer(cell: CellDefinition, writer: str | None) -> frozenset[int]:

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from gatewayd.core.definition import CellDefinition, Direction, ValueKind, Variable
+from gatewayd.links.robot_program import register_number
 
-_WORD = re.compile(r"(?:input|output)_bit_registers(0|32)_to_(?:31|63)")
-_REGISTER = re.compile(r"(?:input|output)_(?:bit|int|double)_register_(\d+)")
 _ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 _SCRIPT_TYPES: Final = {ValueKind.BOOL: "boolean", ValueKind.INT: "integer", ValueKind.FLOAT: "float"}
 
@@ -64,15 +63,6 @@ def registers(cell: CellDefinition) -> tuple[ScriptRegister, ...]:
 def others(cell: CellDefinition) -> tuple[str, ...]:
     """Names of the variables that no robot program has as registers, families once."""
     return _once(_base(variable.name) for variable in cell.variables if register_number(variable) is None)
-
-
-def register_number(variable: Variable) -> int | None:
-    """The number of the register that a script's functions take; None for what is no single register."""
-    word = _WORD.fullmatch(variable.field)
-    if word is not None:
-        return None if variable.bit is None else int(word[1]) + variable.bit
-    register = _REGISTER.fullmatch(variable.field)
-    return int(register[1]) if register is not None and variable.bit is None else None
 
 
 def _base(name: str) -> str:

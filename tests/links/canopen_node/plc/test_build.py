@@ -62,6 +62,7 @@ def test_a_scaled_number_is_a_real() -> None:
             "`hmi` is no writer on CANopen, by RPDO: --writer is one of `plc` or `none`",
         ),
         (PlcWishes(host="192.0.2.1"), "--host is for Modbus"),
+        (PlcWishes(handshake="start:seen"), "--handshake is for Modbus"),
         (PlcWishes(names={"stop": "halt"}), "--name stop=halt: there is no `stop`"),
     ],
 )

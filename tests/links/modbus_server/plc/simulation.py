@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
+from gatewayd.plc.model import Tag, TagFamily
 from gatewayd.plc.st.program import ProgramUnit
 
 CYCLE = 10
@@ -15,7 +16,7 @@ WORDS = (
     (r" / ", " // "),
     (r"\bMOD\b", "%"),
     (r"\b(?:WORD|DWORD)#16#([0-9A-F]+)", r"0x\1"),
-    (r"\bUDINT#", ""),
+    (r"\b(?:UDINT|L?REAL)#", ""),
     (r"\bAND (?=0x)", "& "),
     ("<>", "!="),
     (r"(?<![<>!:=])=(?!=)", "=="),
@@ -25,6 +26,14 @@ WORDS = (
     (r"\bTRUE\b", "True"),
     (r"\bFALSE\b", "False"),
 )
+
+
+FUNCTIONS: Mapping[str, object] = {
+    "ABS": abs,
+    "SHL": lambda word, by: word << by & 0xFFFF,
+    "UINT_TO_INT": int,
+}
+"""Of the standard, as the blocks use them."""
 
 
 class Timer:
@@ -43,16 +52,37 @@ def instance(
 ) -> tuple[Any, Callable[[], None]]:
     """The variables of a block, and its call; `known`: names that it uses, and what they are."""
     fields = [field for section in unit.sections for field in section.fields]
-    starts = {"TON": Timer, "BOOL": bool}
+    starts = {"TON": Timer, "BOOL": bool, "STRING": str}
     present = SimpleNamespace(**{field.name: starts.get(field.type.name, int)() for field in fields})
     vars(present).update(values)
-    names = re.compile(rf"\b({'|'.join(field.name for field in fields)})\b")
+    names = re.compile(rf"(?<![\w.])({'|'.join(field.name for field in fields)})\b")
     code = compile("\n".join(_lines(unit, names)), unit.name, "exec")
 
     def call() -> None:
-        exec(code, {**(known or {}), "own": present})  # noqa: S102 - generated here
+        exec(code, {**FUNCTIONS, **(known or {}), "own": present})  # noqa: S102 - generated here
 
     return present, call
+
+
+def structure(families: Iterable[TagFamily]) -> SimpleNamespace:
+    """A variable of the data type with these members, all 0."""
+    return SimpleNamespace(
+        **{family.name: [0] * len(family.tags) if family.is_array else 0 for family in families}
+    )
+
+
+def assign(values: SimpleNamespace, tag: Tag, value: object) -> None:
+    """`values.tag := value`."""
+    if tag.element is None:
+        setattr(values, tag.member, value)
+    else:
+        getattr(values, tag.member)[tag.element] = value
+
+
+def value_in(values: SimpleNamespace, tag: Tag) -> Any:
+    """`values.tag`."""
+    member = getattr(values, tag.member)
+    return member if tag.element is None else member[tag.element]
 
 
 def _lines(unit: ProgramUnit, names: re.Pattern[str]) -> list[str]:
@@ -100,7 +130,8 @@ def _simple(statement: str, names: re.Pattern[str]) -> str:
 def _statements(lines: Iterable[str]) -> list[str]:
     """Without their ends; one that goes on in the next line is one."""
     found: list[str] = []
-    for line in (line.strip().rstrip(";") for line in lines):
+    split = (re.sub(r"( THEN|;) (?=\S)", r"\1\n", line.strip()) for line in lines)
+    for line in (line.rstrip(";") for text in split for line in text.split("\n")):
         if line.startswith("AND "):
             found[-1] += f" {line}"
         else:
@@ -109,7 +140,9 @@ def _statements(lines: Iterable[str]) -> list[str]:
 
 
 def _expression(text: str, names: re.Pattern[str]) -> str:
+    """What stands in quotes stays as it is."""
+    code, quote, rest = text.partition("'")
     for pattern, replacement in WORDS:
-        text = re.sub(pattern, replacement, text)
+        code = re.sub(pattern, replacement, code)
     # Operands by name, and assignments.
-    return names.sub(r"own.\1", text).replace(" := ", "=")
+    return names.sub(r"own.\1", code).replace(" := ", "=") + quote + rest

@@ -22,7 +22,7 @@ from tests.links.modbus_server.plc.cells import complete_plan, greatest_plan
 from tests.plc_golden import golden_model
 
 EVERY_CELL = pytest.mark.parametrize(
-    "model", [golden_model(), model_of(complete_plan(), PlcWishes())], ids=["golden", "complete"]
+    "model", [golden_model("toggle:ack"), model_of(complete_plan(), PlcWishes())], ids=["golden", "complete"]
 )
 GREATEST = model_of(greatest_plan(), PlcWishes(writer="none"))
 """1,024 variables, and a program that only reads."""
@@ -89,9 +89,9 @@ KEYWORDS = ("FUNCTION", "FUNCTION_BLOCK", "PROGRAM")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(set(texts("twincat", golden_model())) - SAME_TEXT))
+@pytest.mark.parametrize("name", sorted(set(texts("twincat", golden_model("toggle:ack"))) - SAME_TEXT))
 def test_twincat_objects_are_read(name: str) -> None:
-    result = blark.parse.parse_source_code(source(texts("twincat", golden_model())[name]))
+    result = blark.parse.parse_source_code(source(texts("twincat", golden_model("toggle:ack"))[name]))
     assert result.exception is None
 
 

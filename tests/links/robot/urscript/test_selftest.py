@@ -1,4 +1,4 @@
-"""The self test: its values, and the whole of it against a PLC that does its part, and one that does not."""
+"""The self test: the whole of it against a PLC that does its part, and one that does not."""
 
 from __future__ import annotations
 
@@ -6,53 +6,16 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from gatewayd.core.definition import Direction, Limits, ValueKind, Variable
 from gatewayd.links.exports import ExportError
 from gatewayd.links.robot.urscript.handshake import handshake
 from gatewayd.links.robot.urscript.registers import registers
-from gatewayd.links.robot.urscript.selftest import RegisterUnderTest, in_test, rounds, values_of
+from gatewayd.links.robot.urscript.selftest import RegisterUnderTest, in_test
+from gatewayd.links.robot_program import self_test_rounds
 from tests.links.robot.urscript.language import load
 from tests.links.robot.urscript.scripts import Registers, plan_of, script, shipped
 
 SMALL = "small-cell.yaml"
-
-
-def variable(kind: ValueKind, **settings: Any) -> Variable:
-    return Variable(1, "v", Direction.INPUT, kind, "input_int_register_0", **settings)
-
-
-NUMBERS = st.floats(-1e12, 1e12)
-RANGES = st.tuples(NUMBERS, NUMBERS).map(sorted)
-
-
-@given(limits=RANGES)
-def test_values_of_reals_are_within_limits_and_differ(limits: list[float]) -> None:
-    found = values_of(variable(ValueKind.FLOAT, limits=Limits(limits[0], limits[1])))
-    assert limits[0] <= found.low <= limits[1]
-    assert limits[0] <= found.high <= limits[1]
-    assert found.low != found.high or limits[0] == limits[1] or limits[1] - limits[0] < 1
-
-
-@given(limits=st.tuples(st.integers(-(2**31), 2**31 - 1), st.integers(-(2**31), 2**31 - 1)).map(sorted))
-def test_values_of_integers_are_within_limits_and_differ(limits: list[int]) -> None:
-    found = values_of(
-        variable(ValueKind.INT, low=-(2**31), high=2**31 - 1, limits=Limits(limits[0], limits[1]))
-    )
-    assert isinstance(found.low, int)
-    assert isinstance(found.high, int)
-    assert limits[0] <= found.low <= limits[1]
-    assert limits[0] <= found.high <= limits[1]
-    assert found.low != found.high or limits[0] == limits[1]
-
-
-def test_a_wide_value_shows_a_wrong_word_or_byte_order() -> None:
-    wide = values_of(variable(ValueKind.INT, low=-(2**31), high=2**31 - 1))
-    assert int(wide.high).to_bytes(4) == bytes([1, 2, 3, 4])
-    narrow = values_of(variable(ValueKind.INT, low=-(2**31), high=2**31 - 1, shown=(0, 65535)))
-    assert int(narrow.high).to_bytes(2) == bytes([1, 2])
 
 
 def members() -> tuple[RegisterUnderTest, ...]:
@@ -63,7 +26,8 @@ def members() -> tuple[RegisterUnderTest, ...]:
 
 def test_no_two_variables_are_alike_in_all_rounds() -> None:
     found = members()
-    codes = {tuple(member.variable.number >> step & 1 for step in range(rounds(found))) for member in found}
+    count = self_test_rounds(shipped(SMALL).cell)
+    codes = {tuple(member.variable.number >> step & 1 for step in range(count)) for member in found}
     assert len(codes) == len(found)
     assert all(code[-1] == 0 for code in codes), "in the last round all have their low value"
 
@@ -122,7 +86,7 @@ def test_all_is_well_where_both_do_their_part() -> None:
     peer = Peer()
     assert run(peer) == 0
     assert peer.wrong == []
-    assert peer.step == rounds(peer.members)
+    assert peer.step == self_test_rounds(shipped(SMALL).cell)
     assert peer.controller.said == ["gw self test, wrong values: 0"]
 
 

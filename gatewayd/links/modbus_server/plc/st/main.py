@@ -8,6 +8,7 @@ from gatewayd.links.modbus_server.plc.model import PlcModel
 from gatewayd.links.modbus_server.plc.st.decode import unpack
 from gatewayd.links.modbus_server.plc.st.encode import pack
 from gatewayd.links.modbus_server.plc.st.exchange import handshake
+from gatewayd.links.modbus_server.plc.st.self_test import self_test
 from gatewayd.links.modbus_server.plc.st.watch import watch
 from gatewayd.plc.st.dialect import Dialect, elementary, own
 from gatewayd.plc.st.program import PlcVariable, ProgramUnit, VariableSection
@@ -24,6 +25,8 @@ def blocks(model: PlcModel, dialect: Dialect) -> tuple[ProgramUnit, ...]:
         found.append(unpack(model, dialect))
     if model.inputs:
         found += [pack(model, dialect), handshake(model)]
+    if model.self_test is not None:
+        found.append(self_test(model, model.self_test, dialect))
     return tuple(found)
 
 
