@@ -22,6 +22,8 @@ class Reach:
     high: Fraction | None
     is_real: bool
     """Whether NaN and the infinities are shown as what they are."""
+    is_source: bool = False
+    """Whether the variable's values only come from here, and nobody reads there what it is."""
 
 
 def scaled(

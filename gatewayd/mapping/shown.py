@@ -28,7 +28,8 @@ def shown_of(cell: ExpandedCell) -> list[Shown]:
     reaches: list[list[Reach]] = [[] for _ in cell.variables]
     for language in languages():
         for index, reach in language.reaches(cell):
-            reaches[index].append(reach)
+            if not reach.is_source:
+                reaches[index].append(reach)
     return [
         _together(variable, places) if places else Shown()
         for variable, places in zip(cell.variables, reaches, strict=True)

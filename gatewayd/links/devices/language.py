@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar, Final
 
 from gatewayd.core.definition import Direction
@@ -89,15 +90,15 @@ class DevicesLanguage(LinkLanguage):
         return bool(line.spec.by(DevicePlaces).device)
 
     def reaches(self, cell: ExpandedCell) -> Iterable[tuple[int, Reach]]:
-        """What its registers and objects show."""
+        """What its registers and objects show of outputs, and which values of inputs come from them."""
         for placement in devices_of(cell).placements:
             if placement.codec is not None:
-                yield placement.variable.index, reach_of(placement.codec, placement.width)
+                yield _reached(placement.variable, reach_of(placement.codec, placement.width))
         for place in devices_of(cell).places:
             if place.device is not None and place.where is not None:
                 reach = family_of(place.device.spec).reach(place.where)
                 if reach is not None:
-                    yield place.variable.index, reach
+                    yield _reached(place.variable, reach)
 
     def bus_uses(self, cell: ExpandedCell) -> Iterable[BusUse]:
         """Its CANopen devices."""
@@ -116,6 +117,10 @@ class DevicesLanguage(LinkLanguage):
     @staticmethod
     def _of(variable: ExpandedVariable, cell: ExpandedCell) -> Iterable[ExpandedPlace]:
         return (place for place in devices_of(cell).places if place.variable.index == variable.index)
+
+
+def _reached(variable: ExpandedVariable, reach: Reach) -> tuple[int, Reach]:
+    return variable.index, replace(reach, is_source=variable.direction is Direction.INPUT)
 
 
 def _compile(cell: ExpandedCell, number: int, device: Part[DeviceSpec]) -> DevicePlan:

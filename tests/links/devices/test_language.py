@@ -35,6 +35,17 @@ def test_a_single_device_need_not_be_named(place: str) -> None:
     assert [(one.name, one.spec.selector, one.spec.address) for one in found] == [("island", "holding", 100)]
 
 
+def test_an_input_need_not_be_shown_where_it_comes_from() -> None:
+    written = """\
+  level: {robot: input_int_register_3, device: {at: island, input: 4, type: uint16}, owner: island, on_release: -1}
+  shared: {robot: input_int_register_4, device: {at: island, input: 5, type: uint16}, owner: island,
+    on_release: -1, modbus: {holding: 10, type: int16}}
+  back: {robot: output_int_register_5, device: {at: island, holding: 6, type: uint16}, limits: [0, 65535]}
+"""
+    shown = [variable.shown for variable in planned(written, ONE).cell.variables]
+    assert shown == [None, (-32768, 32767), (0, 65535)]
+
+
 def test_a_place_in_nothing_is_kept_for_the_rules() -> None:
     cell = loaded(FORCE % "{at: valve, holding: 100}").cell
     (place,) = devices_of(cell).places
