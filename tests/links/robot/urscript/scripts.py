@@ -30,7 +30,8 @@ def plan_of(variables: str, robot: str = "") -> Plan:
 
 
 def shipped(name: str) -> Plan:
-    found = load((MAPPINGS / name).read_bytes(), name).plan
+    path = MAPPINGS / name
+    found = load(path.read_bytes(), str(path)).plan
     assert found is not None
     return found
 
