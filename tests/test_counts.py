@@ -43,6 +43,7 @@ NEVER_ONE = {
     "canopen.manager.configuration: count": "more than the limit",
     "links.devices.canopen.link: self.plan.name": "not a number",
     "links.devices.rules.objects: bits": "more than 64",
+    "links.devices.canopen.proposal: bits": "more than 64",
     "canopen.manager.pdo_content: shift": "more than 64",
     "cli.rtde.recorder: wanted": "more than can be kept",
     "control.names: len(text)": "longer than any pattern may be",

@@ -28,7 +28,7 @@ COMMANDS = {
     "force": "Force a variable to a value, for commissioning.",
     "unforce": "End a force before its time.",
     "rtde": "Work with a robot's RTDE interface, without a mapping.",
-    "import": "Make a mapping file from a register list or an RTDE recipe.",
+    "import": "Make a mapping from a register list, data sheet or recipe.",
     "completion": "Print the completion script of a shell.",
 }
 """Name -> what the list of commands says. Module `gatewayd.cli.NAME` has the click command as `command`."""

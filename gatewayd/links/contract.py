@@ -125,6 +125,9 @@ class LinkKind:
     access: ClassVar[str] = ""
     """Module whose `ACCESS` talks to devices of its kind where no gateway does (`links.access`); empty: there are none.
     """
+    sheets: ClassVar[str] = ""
+    """Module whose `SHEETS` proposes a mapping from a data sheet of its devices (`links.proposals`); empty: none does.
+    """
     usual: ClassVar[bool] = False
     """Nearly every cell has one: its runtime is imported while the mapping files are read."""
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gatewayd.links.examination import Examination
     from gatewayd.links.exports import Export, ExportSet
     from gatewayd.links.language import DefiningLanguage, LinkLanguage
+    from gatewayd.links.proposals import SheetReader
     from gatewayd.links.tables import LinkTables
 
 LINK_KINDS = (
@@ -118,6 +119,11 @@ def access_of(key: str) -> DeviceAccess | None:
     module = kind_of(key).access
     found: DeviceAccess | None = import_module(module).ACCESS if module else None
     return found
+
+
+def sheet_readers() -> tuple[SheetReader, ...]:
+    """What proposes mappings from data sheets, of all kinds that do."""
+    return tuple(import_module(kind.sheets).SHEETS for kind in kinds() if kind.sheets)
 
 
 @cache

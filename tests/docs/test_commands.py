@@ -30,6 +30,7 @@ ELSEWHERE = {
     r"gatewayd doctor .*": "tests/cli/test_doctor.py",
     r"gatewayd import csv .*": "tests/cli/importing/test_csv.py, with the list of the guide",
     r"gatewayd rtde (record|watch|get|set|message|fields|info|convert|plot) .*": "tests/cli/rtde",
+    r"gatewayd import eds .*": "tests/cli/importing/test_eds.py",
     r"gatewayd import rtde .*": "tests/cli/importing",
     r"pip install 'gatewayd\[\w+\]'": "the extras of pyproject.toml, locked in requirements-dev.lock",
     r"\.venv/bin/python docs/examples/.*": "tests/docs/test_examples.py, test_device_tutorials.py",

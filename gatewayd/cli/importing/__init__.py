@@ -8,6 +8,7 @@ from gatewayd.cli.lazy import LazyGroup
 
 COMMANDS = {
     "csv": "Propose a mapping from a register list.",
+    "eds": "Propose a mapping from the data sheet of a CANopen device.",
     "rtde": "Make a mapping from a recipe of another RTDE client.",
 }
 """Name -> what the list of commands says. Module `gatewayd.cli.importing.NAME` has the click command as `command`."""

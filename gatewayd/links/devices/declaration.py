@@ -19,6 +19,7 @@ class DeviceKind(LinkKind):
     traffic = "gatewayd.links.devices.traffic"
     doctor = "gatewayd.links.devices.doctor"
     access = "gatewayd.links.devices.access"
+    sheets = "gatewayd.links.devices.canopen.proposal"
     fields = {  # noqa: RUF012 - never changed
         "family": "how it is spoken to: `modbus`, `canopen`",
         "address": "where it is reached: host:port, serial port with its settings, or CAN bus",
