@@ -1,4 +1,4 @@
-"""`gatewayd demo`: simulator, gateway, a small PLC program and a CANopen master in one terminal."""
+"""`gatewayd demo`: simulator, gateway, a small PLC program, an I/O island and a CANopen master in one terminal."""
 
 from __future__ import annotations
 
@@ -59,10 +59,11 @@ Exit codes:
     help="Modbus TCP port; 0 takes a free one. Default: 1502 if it is free, else a free one.",
 )
 def command(seconds: float | None, port: int | None) -> int:
-    """See it work: a simulated robot, the gateway, a small PLC program and a CANopen master; no robot is needed.
+    """See it work: a simulated robot, the gateway, a small PLC program, an I/O island and a CANopen master.
 
-    They talk to each other over real sockets and a CAN bus inside this process. The table shows what the gateway knows:
-    every variable with its registers, objects, value, quality, age and owner. From another terminal you can take part.
+    No robot is needed. They talk to each other over real sockets and a CAN bus inside this process. The table shows
+    what the gateway knows: every variable with its registers, objects, value, quality, age and owner. From another
+    terminal you can take part.
     """
     from rich.console import Console
 

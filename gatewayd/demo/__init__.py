@@ -1,1 +1,1 @@
-"""The demonstration: a simulated robot, the gateway and a small PLC program in one process, over real sockets."""
+"""The demonstration: a simulated robot, the gateway, a PLC program and an I/O island in one process, over sockets."""

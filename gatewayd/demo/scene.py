@@ -1,4 +1,4 @@
-"""Everything that `gatewayd demo` runs: a simulated controller, the gateway, a PLC on loopback and a CANopen master."""
+"""Everything that `gatewayd demo` runs: a simulated robot, the gateway, a PLC, an I/O island and a CANopen master."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from gatewayd.core.cell import Cell
+from gatewayd.demo.island import Island
 from gatewayd.demo.master import Master
 from gatewayd.demo.plc import FORCE_SHARE, Plc
 from gatewayd.loop import clock
@@ -28,6 +29,7 @@ HOST = "127.0.0.1"
 PORT = 1502
 """The gateway's port, if it is free."""
 ROBOT_PORT = 30004
+ISLAND_PORT = 1503
 PLC_ADDRESS = "127.0.0.2"
 """Where the PLC's connection comes from, so that the gateway can tell it from whatever else this machine starts."""
 MAPPING = "demo.yaml"
@@ -39,6 +41,7 @@ LINE = "line"
 ROBOT_PROGRAM = f"""\
 output_bit_register_0 = input_bit_register_0 for 400ms        # busy
 output_bit_register_1 = input_bit_register_0 after 400ms      # done
+output_bit_register_2 = input_bit_register_0 for 450ms        # the clamp
 output_int_register_0 = input_int_register_0 after 300ms      # the part made
 output_int_register_1 = count input_bit_register_0            # cycles
 output_double_register_0 = input_double_register_0 * {FORCE_SHARE} after 200ms
@@ -49,15 +52,16 @@ _FULL_SPEED = 100.0
 _PROBLEMS = 4
 
 
-def mapping(robot_port: int = ROBOT_PORT, port: int = PORT) -> Loaded:
-    """The mapping of the demonstration, with its robot and its Modbus server at these ports."""
+def mapping(robot_port: int = ROBOT_PORT, port: int = PORT, island_port: int = ISLAND_PORT) -> Loaded:
+    """The mapping of the demonstration, with its robot, its Modbus server and its island at these ports."""
     text = files(__package__).joinpath(MAPPING).read_text()
     text = text.replace(f"host: {HOST}\n", f"host: {HOST}\n  port: {robot_port}\n")
+    text = text.replace(f"modbus: '{HOST}:{ISLAND_PORT}'", f"modbus: '{HOST}:{island_port}'")
     return load(text.replace(f"listen: {HOST}:{PORT}", f"listen: {HOST}:{port}").encode(), MAPPING)
 
 
 class Scene:
-    """The four parties and what can be seen of them. `port` 0 takes a free one."""
+    """The five parties and what can be seen of them. `port` 0 takes a free one."""
 
     def __init__(self, port: int) -> None:
         loaded = mapping()
@@ -71,6 +75,8 @@ class Scene:
         self.robot.set("input_double_register_1", _FULL_SPEED)
         self.plc = Plc(HOST, self.port, PLC_ADDRESS)
         self.master = Master(CHANNEL)
+        self._island_port = free_port(HOST)
+        self.island = Island(HOST, self._island_port)
         self.can_writer = [writer.name for writer in loaded.plan.cell.writers].index(LINE)
         """Index of the writer that the master is."""
         self._daemon: Daemon | None = None
@@ -87,10 +93,10 @@ class Scene:
         """Everything runs inside the block. What follows it sees the parties as they ended."""
         stop = asyncio.Event()
         async with self.robot:
-            plan = mapping(self.robot.port, self.port).plan
+            plan = mapping(self.robot.port, self.port, self._island_port).plan
             assert plan is not None
             self._daemon = Daemon([plan], Path(self._state.name))
-            line = asyncio.create_task(self.master.run())
+            others = [asyncio.create_task(self.master.run()), asyncio.create_task(self.island.run())]
             gateway = asyncio.create_task(self._daemon.run(stop))
             plc = asyncio.create_task(self.plc.run())
             try:
@@ -102,9 +108,10 @@ class Scene:
                     await plc
                 stop.set()
                 await gateway
-                line.cancel()
-                with suppress(asyncio.CancelledError):
-                    await line
+                for other in others:
+                    other.cancel()
+                    with suppress(asyncio.CancelledError):
+                        await other
 
     def listen_to_logs(self) -> None:
         """Keep the log off the screen; errors go to `problems`."""

@@ -13,6 +13,7 @@ from gatewayd.core.freshness import Source
 from gatewayd.core.health import Health
 from gatewayd.core.image import Quality
 from gatewayd.core.refusal import Reason
+from gatewayd.demo.island import Terminals
 from gatewayd.demo.master import Master
 from gatewayd.demo.plc import Plc
 from gatewayd.demo.scene import Scene
@@ -105,6 +106,14 @@ class Snapshot:
     operational: bool
     pdo_rate: int
     """PDOs per second from the node."""
+    terminals: Terminals
+    """The island's."""
+    island_answers: bool
+    """Whether the gateway is connected to it."""
+    island_rate: int
+    """Requests per second."""
+    part_there: bool
+    """What its sensor sees."""
     lines: tuple[TableLine, ...]
     events: tuple[ShownEvent, ...]
     """The latest last."""
@@ -132,6 +141,10 @@ def snapshot(scene: Scene, now: float) -> Snapshot:
         node=_STATES.get(master.state, "unknown") if master.state is None or master.lives(now) else "lost",
         operational=master.operational(now),
         pdo_rate=master.rate(now),
+        terminals=scene.island.terminals,
+        island_answers=scene.island.connections > 0,
+        island_rate=scene.island.terminals.rate(now),
+        part_there=scene.island.terminals.part_there(now),
         lines=tuple(_line(cell, row, scene.can_writer, now) for row in scene.rows),
         events=tuple(events),
     )
@@ -169,7 +182,7 @@ def _line(cell: Cell, row: Row, can_writer: int | None, now: float) -> TableLine
             lease = f"{left:.1f} s" if left < math.inf else ""
     return TableLine(
         row=row,
-        address=f"{row['address']}" if row["bit"] is None else f"{row['address']}.{row['bit']}",
+        address=_address(row),
         value=value(cell.image.values[index], row.unit),
         quality=cell.image.quality[index],
         age=age(cell.image.age(index, now)),
@@ -177,6 +190,13 @@ def _line(cell: Cell, row: Row, can_writer: int | None, now: float) -> TableLine
         lease=lease,
         refused=_refused(cell, index, can_writer, now),
     )
+
+
+def _address(row: Row) -> str:
+    """Its register or bit in the gateway's own server, where it has one."""
+    if row["address"] is None:
+        return ""
+    return f"{row['address']}" if row["bit"] is None else f"{row['address']}.{row['bit']}"
 
 
 def _refused(cell: Cell, index: int, can_writer: int | None, now: float) -> str:

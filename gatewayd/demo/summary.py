@@ -8,7 +8,7 @@ from gatewayd.demo.scene import Scene
 from gatewayd.report.format import counted
 
 _LONG_ENOUGH = 3
-"""Handshakes within which the CANopen side must have come to work."""
+"""Handshakes within which the CANopen side and the island must have come to work."""
 
 
 def summary(scene: Scene, *, asked_for: bool) -> tuple[bool, str]:
@@ -18,17 +18,19 @@ def summary(scene: Scene, *, asked_for: bool) -> tuple[bool, str]:
     off need not.
     """
     program, health = scene.plc.program, scene.cell.health
-    master, feeder = scene.master, scene.master.feeder
+    master, feeder, terminals = scene.master, scene.master.feeder, scene.island.terminals
     counts = (
         f"{counted(health.packages, 'package')} from the robot ({health.skipped or 'none'} skipped), "
         f"{counted(program.handshakes, 'handshake')}, {counted(program.verified, 'value')} checked both ways, "
         f"{counted(health.writes_refused, 'write')} refused.\n"
         f"CANopen: {counted(master.heartbeats, 'heartbeat')}, {counted(master.received, 'PDO')} received, "
         f"{master.sent or 'none'} sent, {counted(feeder.verified, 'value')} checked, "
-        f"{counted(feeder.refusals, 'order')} overruled by the PLC."
+        f"{counted(feeder.refusals, 'order')} overruled by the PLC.\n"
+        f"Island: {counted(terminals.requests, 'request')}, clamp closed {counted(terminals.closed, 'time')}."
     )
     silent = ["the CANopen node fell silent"] if master.gone else []
-    wrong = [*program.wrong, *feeder.wrong, *silent, *scene.problems]
+    refused = ["the island refused requests"] if terminals.refused else []
+    wrong = [*program.wrong, *feeder.wrong, *silent, *refused, *scene.problems]
     if wrong:
         reasons = "; ".join(wrong)
         return False, f"{counts}\nSomething went wrong: {reasons}"
@@ -39,6 +41,9 @@ def summary(scene: Scene, *, asked_for: bool) -> tuple[bool, str]:
         what = "The CANopen master and the node never agreed" + (
             "." if asked_for else ": it was over too soon."
         )
+        return not (asked_for or program.handshakes >= _LONG_ENOUGH), f"{counts}\n{what}"
+    if terminals.closed == 0:
+        what = "The clamp never closed" + ("." if asked_for else ": it was over too soon.")
         return not (asked_for or program.handshakes >= _LONG_ENOUGH), f"{counts}\n{what}"
     parts = program.handshakes
     made = f"{counted(parts, 'part')} ordered, {counted(parts, 'part')} made"

@@ -26,7 +26,7 @@ _MIN_EVENTS, _MOST_EVENTS = 3, 8
 _FRAME_OF_TABLE = 5
 """Lines of the table that are no variables: title, rules and blank ones."""
 _EDGES = 2
-"""Blank ones above and below it, which a narrow window spares."""
+"""Blank ones above and below it, which a small window spares."""
 _FRAME_OF_POKES = 2
 _ABOVE = 4
 """Lines that are left to what was printed before."""
@@ -49,17 +49,18 @@ def commands(port: int, python: str) -> tuple[list[Poke], Poke]:
 def screen(shot: Snapshot, before: Snapshot | None, pokes: Sequence[Poke], width: int, height: int) -> Group:
     """One picture of at most `height` lines; values that differ from `before` are bright."""
     old = {line.row.number: line.value for line in before.lines} if before is not None else {}
-    table = _table(shot.lines, old, width)
     links = [line for text in _parties(shot, width) for line in wrapped(text, width)]
-    fixed = len(links) + _FRAME_OF_TABLE - (_EDGES if width < _NARROW else 0) + len(shot.lines)
-    tall = height >= fixed + _MIN_EVENTS + len(pokes) + _FRAME_OF_POKES
-    shown = list(pokes) if tall and width >= _width_of(pokes) else []
+    fixed, wanted = len(links) + _FRAME_OF_TABLE + len(shot.lines), _MIN_EVENTS + len(pokes) + _FRAME_OF_POKES
+    spares_edges = width < _NARROW or height < fixed + wanted
+    fixed -= _EDGES if spares_edges else 0
+    table = _table(shot.lines, old, width, has_edges=not spares_edges)
+    shown = list(pokes) if height >= fixed + wanted and width >= _width_of(pokes) else []
     room = height - fixed - (len(shown) + _FRAME_OF_POKES if shown else 0) - _ABOVE
     # A small window gives one event's line to the hint.
     events = min(max(room, _MIN_EVENTS) - (not shown), _MOST_EVENTS)
     left_out = ", ".join(name for name, needed in _NEEDED.items() if width < needed)
     hints = list(_hints(shown, left_out)) if shown else wrapped(_hint(pokes[1], left_out), width)
-    if width < _NARROW:
+    if spares_edges and not shown:
         # As many as fit below a table that is never cut; there may be none.
         events = max(0, min(height - fixed - len(hints) - 1, _MOST_EVENTS))
     return Group(*links, table, *_events(shot, events, width), *hints)
@@ -75,7 +76,8 @@ def plain(shot: Snapshot) -> str:
         f"writes {health.writes_accepted} accepted, {health.writes_refused} refused\n"
         f"          node {shot.node}, {counted(master.heartbeats, 'heartbeat')}, {shot.pdo_rate} PDOs/s | "
         f"line {counted(master.sent, 'RPDO')}, {counted(master.feeder.verified, 'value')} verified, "
-        f"{master.emergencies} EMCY"
+        f"{master.emergencies} EMCY\n"
+        f"          island {_island_words(shot)}"
     )
     lines = [
         f"  {'->' if line.row.direction == 'input' else '<-'} {line.row.name:<12} {line.row['robot']:<25} "
@@ -89,19 +91,24 @@ def plain(shot: Snapshot) -> str:
 
 def _parties(shot: Snapshot, width: int) -> list[Text]:
     """Who takes part, and how it goes: two to a line, or each on its own where there is no room for two."""
-    robot, plc = _links(shot, spacious=width >= _SPACIOUS)
+    robot, plc = _links(shot, width)
     node, line = _canopen(shot, spacious=width >= _SPACIOUS)
+    island = _party("island", _island_words(shot), good=shot.island_answers)
+    if width < _TINY:
+        # What it does stands in the table.
+        return [Text("  ").join((robot, _party("island", "", good=shot.island_answers))), plc, node, line]
     if width < _NARROW:
-        return [robot, plc, node, line]
-    return [Text("  ").join((left, right)) for left, right in ((robot, plc), (node, line))]
+        return [robot, plc, node, line, island]
+    return [*(Text("  ").join((left, right)) for left, right in ((robot, plc), (node, line))), island]
 
 
-def _links(shot: Snapshot, *, spacious: bool) -> tuple[Text, Text]:
-    health, program = shot.health, shot.plc.program
+def _links(shot: Snapshot, width: int) -> tuple[Text, Text]:
+    health, program, spacious = shot.health, shot.plc.program, width >= _SPACIOUS
     rate = f"{health.frequency:.1f} Hz" if shot.fresh and health.frequency else shot.robot
     packages = f", {counted(health.packages, 'package')}, {health.skipped} skipped" if spacious else ""
     robot = _party("robot", rate + packages, good=shot.fresh)
-    right = f"{counted(program.handshakes, 'handshake')}, {counted(program.verified, 'value')} right"
+    right = f", {counted(program.verified, 'value')} right" if width >= _TINY else ""
+    right = counted(program.handshakes, "handshake") + right
     text = _party("PLC", right, len(program.wrong), good=shot.plc.connected)
     text.append(f"   {counted(health.writes_accepted, 'write')}, " if spacious else "   ")
     return robot, text.append(f"{health.writes_refused} refused", "bold red" if health.writes_refused else "")
@@ -117,6 +124,12 @@ def _canopen(shot: Snapshot, *, spacious: bool) -> tuple[Text, Text]:
     return node, text.append("   ").append(
         f"{master.emergencies} EMCY", "bold red" if master.emergencies else ""
     )
+
+
+def _island_words(shot: Snapshot) -> str:
+    """`19 requests/s   part there, clamped`."""
+    part = "part there" if shot.part_there else "no part"
+    return f"{shot.island_rate} requests/s   {part}, {'clamped' if shot.terminals.clamp else 'not clamped'}"
 
 
 def _party(name: str, words: str, wrong: int = 0, *, good: bool) -> Text:
@@ -151,11 +164,9 @@ _NEEDED: Mapping[str, int] = {
 """Columns for which a terminal has to be so wide."""
 
 
-def _table(lines: Sequence[TableLine], old: dict[int, str], width: int) -> Table:
+def _table(lines: Sequence[TableLine], old: dict[int, str], width: int, *, has_edges: bool) -> Table:
     spacious = width >= _SPACIOUS
-    table = Table(
-        box=box.SIMPLE_HEAD, padding=(0, int(spacious), 0, 0), pad_edge=False, show_edge=width >= _NARROW
-    )
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, int(spacious), 0, 0), pad_edge=False, show_edge=has_edges)
     for name, justify, least in _COLUMNS:
         if width >= _NEEDED.get(name, 0):
             head = "quality" if name == "state" and spacious else name
@@ -164,7 +175,8 @@ def _table(lines: Sequence[TableLine], old: dict[int, str], width: int) -> Table
     previous = lines[0].row.direction if lines else ""
     for line in lines:
         if line.row.direction != previous:
-            table.add_section()
+            if has_edges or width >= _NARROW:
+                table.add_section()
             previous = line.row.direction
         changed = old.get(line.row.number, line.value) != line.value
         cells = _cells(line, changed=changed, width=width)

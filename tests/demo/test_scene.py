@@ -1,4 +1,4 @@
-"""The four parties together, over real sockets and a bus of this process."""
+"""The five parties together, over real sockets and a bus of this process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pymodbus.client import AsyncModbusTcpClient
 from gatewayd.demo.master import RETRY
 from gatewayd.demo.scene import HOST, Scene, free_port, mapping
 
-SPEED_NOW = 11
+SPEED_NOW = 12
 
 
 async def test_values_go_both_ways(scene: Scene, until) -> None:  # type: ignore[no-untyped-def]

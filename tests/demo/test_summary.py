@@ -12,6 +12,7 @@ def play(scene: Scene) -> None:
     """Everything has worked."""
     scene.plc.program.handshakes, scene.plc.program.verified = 8, 24
     scene.master.feeder.verified = 5
+    scene.island.terminals.closed = 8
 
 
 async def test_handshakes_pass(scene: Scene) -> None:
@@ -37,6 +38,24 @@ async def test_silent_node_fails_unless_it_was_broken_off(scene: Scene) -> None:
     assert not summary(scene, asked_for=False)[0], "eight handshakes are long enough"
     scene.plc.program.handshakes = 1
     assert summary(scene, asked_for=False)[0]
+
+
+async def test_clamp_that_never_closed_fails(scene: Scene) -> None:
+    play(scene)
+    scene.island.terminals.closed = 0
+    passed, text = summary(scene, asked_for=True)
+    assert not passed
+    assert "The clamp never closed." in text
+    scene.plc.program.handshakes = 1
+    assert summary(scene, asked_for=False)[0]
+
+
+async def test_refused_requests_of_the_island_fail(scene: Scene) -> None:
+    play(scene)
+    scene.island.terminals.refused = 1
+    passed, text = summary(scene, asked_for=False)
+    assert not passed
+    assert "the island refused requests" in text
 
 
 async def test_node_lost_at_the_end_fails(scene: Scene, until) -> None:  # type: ignore[no-untyped-def]

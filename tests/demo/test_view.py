@@ -37,6 +37,7 @@ async def test_picture_fits(shot: Snapshot, width: int, height: int) -> None:
     for line in shot.lines:
         assert line.row.name in text
     assert "operational" in text
+    assert "requests/s" in text
     assert ("2030h:01" in text and "0x210" in text) is (width >= 100)
     assert ("400001.0" in text) is (width >= 115)
     assert "mbpoll -0 -p 1502 -r 10 127.0.0.1 50" in text, "how to take part, in every window"
@@ -85,6 +86,7 @@ async def test_plain_lines_tell_the_same(shot: Snapshot) -> None:
         assert line.row["object"] in text
         assert line.row["cob_id"] in text
     assert "node operational" in text
+    assert "part there" in text or "no part" in text
 
 
 def test_commands_name_the_port() -> None:

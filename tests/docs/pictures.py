@@ -24,7 +24,7 @@ from gatewayd.loop import clock
 from tests.docs.generated import DOCS, ROOT
 
 PAGES = (ROOT / "README.md", DOCS / "tutorial/1-demo.md", DOCS / "tutorial/2-own-mapping.md")
-WIDTH, HEIGHT = 100, 28
+WIDTH, HEIGHT = 100, 31
 """A window that has room for the CANopen side."""
 _PART = re.compile(r"(<!-- recorded: ([\w-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 _PATIENCE = 60.0
