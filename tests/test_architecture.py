@@ -357,6 +357,7 @@ OTHER_CLOCK = {
     "cli.rtde.progress_lines": "paces lines of a terminal",
     "cli.watch": "paints a terminal; times of the gateway come as ages",
     "loop.clock": "is made of it",
+    "rtde.api.loop_thread": "has the clock of every plain loop",
     "service.compilation": "waits for a child, which is suspended as well",
     "service.watchdog": "the service manager compares it with its own CLOCK_MONOTONIC",
 }

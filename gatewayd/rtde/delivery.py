@@ -20,6 +20,8 @@ BEGINNING = struct.Struct(">I")
 class SteadyOutput:
     """How a read is told, without decoding it, that is one package of the working recipe and nothing else."""
 
+    __slots__ = ("beginning", "size", "taken")
+
     def __init__(self) -> None:
         self.size = 0
         """Its bytes; 0: whatever comes is to be decoded."""
@@ -41,6 +43,8 @@ class SteadyOutput:
 
 class OutputDelivery:
     """The packages of one working recipe. `every`: hand on all of them, however many came together."""
+
+    __slots__ = ("_clocked", "_every", "_handler", "_statistics", "outputs", "pace")
 
     def __init__(
         self, session: Session, handler: ClientHandler, statistics: Statistics, now: float, *, every: bool

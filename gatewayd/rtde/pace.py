@@ -45,6 +45,18 @@ class Statistics:
 class Pace:
     """The rhythm of one session. `statistics` is counted on."""
 
+    __slots__ = (
+        "_arrival",
+        "_excused_until",
+        "_pause",
+        "_period",
+        "_resumed",
+        "_statistics",
+        "_window_packages",
+        "_window_start",
+        "timestamp",
+    )
+
     def __init__(self, period: float, statistics: Statistics, now: float) -> None:
         self._period = period
         self._statistics = statistics

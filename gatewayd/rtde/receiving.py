@@ -26,6 +26,23 @@ class PackageReceiver:
     Everything but `wait` is to be called as the callbacks of the loop are: by one thread at a time.
     """
 
+    __slots__ = (
+        "_attention",
+        "_buffers",
+        "_fd",
+        "_interrupted",
+        "_loop",
+        "_poll",
+        "_take",
+        "_timer",
+        "_transport",
+        "_used",
+        "buffer",
+        "direct",
+        "readable",
+        "wait",
+    )
+
     def __init__(self, take: Callable[[int], None], interrupted: Callable[[], None]) -> None:
         self.buffer = memoryview(bytearray(_READ))
         """What was read last."""

@@ -11,6 +11,8 @@ _PERIODS_OF_PATIENCE = 5
 class Silence:
     """That of one connection. Times in seconds."""
 
+    __slots__ = ("_regular", "_timeout", "heard", "odd", "patience")
+
     def __init__(self, settings: ClientSettings) -> None:
         self.heard = 0.0
         """When a data package came last, or was due from."""

@@ -6,27 +6,27 @@ import asyncio
 
 
 class Waiters:
-    """Those that wait for the same; false while there are none."""
+    """Those that wait for the same."""
+
+    __slots__ = ("waiting",)
 
     def __init__(self) -> None:
-        self._futures: list[asyncio.Future[None]] = []
-
-    def __bool__(self) -> bool:
-        return bool(self._futures)
+        self.waiting: list[asyncio.Future[None]] = []
+        """One for each of them."""
 
     async def wait(self) -> None:
         """Wait for the next `wake`."""
         future = asyncio.get_running_loop().create_future()
-        self._futures.append(future)
+        self.waiting.append(future)
         try:
             await future
         finally:
-            if future in self._futures:
-                self._futures.remove(future)
+            if future in self.waiting:
+                self.waiting.remove(future)
 
     def wake(self) -> None:
         """Let all go on that wait now."""
-        futures, self._futures = self._futures, []
+        futures, self.waiting = self.waiting, []
         for future in futures:
             if not future.done():
                 future.set_result(None)

@@ -21,6 +21,8 @@ _Result = TypeVar("_Result")
 class DirectReader:
     """What the calls of a blocking robot do with the thread of its client's loop."""
 
+    __slots__ = ("_client", "_looked", "_receiver", "_thread", "_turn", "_waited")
+
     def __init__(self, thread: LoopThread, client: RtdeClient) -> None:
         self._thread = thread
         self._turn = thread.loop.turn
@@ -49,23 +51,22 @@ class DirectReader:
         TimeoutError after `timeout` seconds; what `otherwise` raises.
         """
         end = None if timeout is None else self._thread.loop.time() + timeout
-        if self._waited:
-            result, left = None, _PATIENCE
-            receiver, turn = self._receiver, self._turn
-            if receiver is None or not receiver.direct or found != self._looked:
-                result, receiver = self._begin(found)
-            while result is None and receiver is not None:
-                if end is not None:
-                    left = min(_PATIENCE, end - self._thread.loop.time())
-                if left < 0 or receiver.wait(1000 * left) != receiver.readable:
+        result, left = None, _PATIENCE
+        receiver, turn = self._receiver, self._turn
+        if receiver is None or not receiver.direct or found != self._looked:
+            result, receiver = self._begin(found)
+        while result is None and receiver is not None:
+            if end is not None:
+                left = min(_PATIENCE, end - self._thread.loop.time())
+            if left < 0 or receiver.wait(1000 * left) != receiver.readable:
+                break
+            with turn:
+                if not receiver.read():
                     break
-                with turn:
-                    if not receiver.read():
-                        break
-                    result = found()
-            if result is not None:
-                return result
+                result = found()
         self._waited = True
+        if result is not None:
+            return result
         self._leave()
         return self._thread.run(otherwise(None if end is None else end - self._thread.loop.time()))
 
@@ -79,11 +80,12 @@ class DirectReader:
             return look()
 
     def _begin(self, found: Callable[[], _Result | None]) -> tuple[_Result | None, PackageReceiver | None]:
-        """What is found without a further package; else have packages read here, if there is a session."""
+        """What is found without a further package; else have packages read here, if they were waited for before."""
+        self._thread.check()
         self._looked = found
         with self._turn:
             result = found()
-            if result is None and (self._receiver is None or not self._receiver.direct):
+            if result is None and self._waited and (self._receiver is None or not self._receiver.direct):
                 self._receiver = self._client.receiver
                 if self._receiver is not None:
                     self._receiver.detach()

@@ -183,7 +183,7 @@ class RobotFeed(ConnectionObserver):
         self.samples += 1
         for stream in self.streams:
             stream.put(sample)
-        if self._waiters:
+        if self._waiters.waiting:
             self._waiters.wake()
 
     def earlier(self, values: tuple[Scalar, ...], now: float) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import selectors
 import threading
+import time
 from collections.abc import Callable, Coroutine
 from contextvars import Context
 from typing import Any, TypeVar, TypeVarTuple, Unpack
@@ -43,6 +44,7 @@ class SharedLoop(asyncio.SelectorEventLoop):
         self._runner = 0
         super().__init__(_Selector(self.turn))
         self.set_debug(False)
+        self.__dict__["time"] = time.monotonic  # as asyncio has it, without a call around it
 
     def run_forever(self) -> None:
         """See asyncio."""

@@ -17,6 +17,19 @@ class BoundedStream(Generic[_Item]):
     and when reading goes on. Ends by StopAsyncIteration or, after what is left in it, by the error it was ended with.
     """
 
+    __slots__ = (
+        "_ended",
+        "_error",
+        "_items",
+        "_limit",
+        "_lost",
+        "_overflow",
+        "_read",
+        "_waiter",
+        "closing",
+        "overflowed",
+    )
+
     def __init__(self, limit: int, overflow: Callable[[int, int], None] = lambda _lost, _total: None) -> None:
         self.overflowed = 0
         """Items lost so far."""
@@ -56,17 +69,17 @@ class BoundedStream(Generic[_Item]):
 
     def take(self) -> list[_Item]:
         """All that is there, without waiting."""
-        return self.found() or []
-
-    def found(self) -> list[_Item] | None:
-        """All that is there, without waiting; None if nothing is."""
         if self._lost or not self._read:
             self._begin_reading()
-        if not self._items:
-            return None
         items = list(self._items)
         self._items.clear()
         return items
+
+    def first(self) -> _Item | None:
+        """The next item if it is there, without waiting; else None."""
+        if self._lost or not self._read:
+            self._begin_reading()
+        return self._items.popleft() if self._items else None
 
     def put(self, item: _Item) -> None:
         """Add an item, at the cost of the oldest if the buffer is full."""

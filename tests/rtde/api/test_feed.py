@@ -80,7 +80,7 @@ async def test_what_is_waited_for_is_asked_again_when_something_happens() -> Non
     idle = feed()
     with pytest.raises(TimeoutError):
         await idle.until(lambda: None, 0.001)
-    assert not idle._waiters
+    assert not idle._waiters.waiting
 
 
 async def test_another_type_than_declared_ends_the_client() -> None:

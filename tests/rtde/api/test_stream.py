@@ -23,8 +23,8 @@ async def test_items_come_in_their_order_and_waiting_ends_with_the_stream() -> N
     assert [item async for item in stream] == [4]
     stream.reopen()
     stream.put(5)
-    assert stream.found() == [5]
-    assert stream.found() is None
+    assert stream.first() == 5
+    assert stream.first() is None
     assert stream.take() == []
     stream.end(OSError("gone"))
     with pytest.raises(OSError, match="gone"):
