@@ -230,9 +230,10 @@ class ModbusDeviceLink(Link):
 
     def identified(self, identity: UnitIdentity, former: UnitIdentity | None, now: float) -> None:
         """It has said which device it is."""
-        if former is not None and former != identity:
+        changes = [] if former is None else identity.changes(former)
+        if changes:
             log.warning(
-                "another device has taken its place", extra=fields(**self._names(), now=str(identity))
+                "another device has taken its place", extra=fields(**self._names(), detail=", ".join(changes))
             )
 
     # -- inside --------------------------------------------------------------------------------------------------

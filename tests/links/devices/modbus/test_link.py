@@ -13,6 +13,7 @@ from gatewayd.links.devices.modbus.link import ModbusDeviceLink
 from gatewayd.links.devices.status_words import DeviceState
 from gatewayd.loop import clock
 from gatewayd.modbus.areas import Area
+from gatewayd.modbus.client.identity import UnitIdentity
 from gatewayd.modbus.client.requests import ExceptionAnswer, ModbusRequest
 from gatewayd.modbus.client.station import Answered
 from gatewayd.modbus.client.unit import UnitState
@@ -120,6 +121,17 @@ def test_parts_of_a_register_are_written_on_connect() -> None:
     bench.there()
     assert orders == [(1002, 0xFF, 7)]
     assert bench.link.reachable is None
+
+
+def test_another_device_is_reported_in_words(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
+    bench.there()
+    former = UnitIdentity(objects=((0, "WAGO"), (1, "750-352")))
+    bench.link.identified(former, None, bench.now)
+    bench.link.identified(former, former, bench.now)
+    assert "another device" not in caplog.text
+    bench.link.identified(UnitIdentity(objects=((0, "Beckhoff"), (1, "750-352"))), former, bench.now)
+    (record,) = [record for record in caplog.records if "another device" in record.message]
+    assert vars(record)["fields"]["detail"] == "vendor Beckhoff instead of WAGO"
 
 
 def test_another_link_takes_its_place(bench: Bench) -> None:
