@@ -6,6 +6,7 @@ import asyncio
 import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -124,8 +125,9 @@ async def test_the_frequency_is_what_came_of_it(connect: Connect, asked: float, 
     async with connect(outputs=["robot_mode"], frequency=asked) as robot:
         assert robot.frequency == pytest.approx(applied)
         assert robot.max_frequency == 500.0
-        one, other = await robot.samples.next(PATIENCE), await robot.samples.next(PATIENCE)
-        assert other.timestamp - one.timestamp == pytest.approx(1 / applied, abs=1e-6)
+        times = [(await robot.samples.next(PATIENCE)).timestamp for _ in range(10)]
+        steps = [after - before for before, after in pairwise(times)]
+        assert min(steps) == pytest.approx(1 / applied, abs=1e-6), "a busy machine may skip some"
 
 
 @pytest.mark.parametrize("series, most", [(Series.CB3, 125.0), (Series.E, 500.0), (Series.X, 500.0)])
