@@ -1,8 +1,8 @@
 """An encoder by CANopen (CiA 406) on your desk: python can_encoder.py CHANNEL EDS. A number and Enter sets its speed.
 
 The number is in steps per second; `q` ends it. CHANNEL is a CAN interface, for example vcan0; other interfaces of
-python-can than the kernel's: --interface. EDS is the data sheet that the mapping has too. What it shows as PDO 1 is what
-the manager on the bus has laid out there.
+python-can than the kernel's: --interface. EDS is the data sheet that the mapping has too. What it shows as PDO 1 is
+what the manager on the bus has laid out there.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """A gripper by Modbus RTU on your desk, with the registers of Robotiq's 2F and Hand-E grippers: python gripper.py PATH.
 
-PATH becomes the serial port that leads to it: a pseudo terminal, so the baud rate is whatever you like. Its fingers move
-when they are asked to, and stop at a part that they hold. Ctrl-C ends it.
+PATH becomes the serial port that leads to it: a pseudo terminal, so the baud rate is whatever you like. Its fingers
+move when they are asked to, and stop at a part that they hold. Ctrl-C ends it.
 """
 
 import argparse

@@ -36,7 +36,9 @@ async def main(host: str, port: int) -> None:
     await server.shutdown()
 
 
-async def written(function: int, _start: int, address: int, _count: int, _now: list[int], values: list | None) -> None:
+async def written(
+    function: int, _start: int, address: int, _count: int, _now: list[int], values: list | None
+) -> None:
     """Print what is written to coils."""
     if function in WRITES and values is not None:
         for number, is_on in enumerate(values, address):

@@ -7,9 +7,7 @@ from gatewayd.rtde import sync
 
 def main(host: str, port: int) -> None:
     inputs = {"in": ["input_int_register_24"]}
-    with sync.connect(
-        host, port=port, outputs=["actual_q", "target_speed_fraction"], inputs=inputs
-    ) as robot:
+    with sync.connect(host, port=port, outputs=["actual_q", "target_speed_fraction"], inputs=inputs) as robot:
         print("joint 1:", robot.newer(timeout=2).actual_q[0])
         robot.write("in", input_int_register_24=7, verify=True)
         print("the controller has taken 7")
